@@ -1,0 +1,37 @@
+"""Errors that say what, where, the number, its limit, and the remedy, in one or two lines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class CfddemError(Exception):
+    """Any failure that the user can do something about; never shown as a traceback by the command line."""
+
+    exit_code = 1
+
+
+class InputError(CfddemError, ValueError):
+    """A value that a run cannot start from."""
+
+    exit_code = 2
+
+    def __init__(self, field: str, value: Any, limit: str, remedy: str = "") -> None:
+        self.field, self.value, self.limit, self.remedy = field, value, limit, remedy
+        shown = f" = {value!r}" if value is not None else ""
+        super().__init__(f"{field}{shown}: must be {limit}" + (f"; {remedy}" if remedy else ""))
+
+
+class UnstableStep(CfddemError):
+    """A time step that the chosen physics cannot follow."""
+
+    exit_code = 2
+
+    def __init__(self, step: float, limit: float, clock: str, remedy: str) -> None:
+        super().__init__(f"time step {step:.3g} s is above the stability limit {limit:.3g} s of the {clock}; {remedy}")
+
+
+class RunFailed(CfddemError):
+    """A run that cannot go on: a number that is no number, a particle that is lost."""
+
+    exit_code = 3

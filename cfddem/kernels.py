@@ -1,0 +1,77 @@
+"""How a loop is compiled, cached and threaded.
+
+`@kernel` compiles a loop once and keeps the machine code between runs; `@threaded` does the same for a
+loop written with `prange`. Neither allows the compiler to reorder arithmetic: results are the same bits
+on any number of threads, and a NaN stays a NaN.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
+from numba import get_num_threads, njit, prange, set_num_threads
+from numba.core import event
+
+from cfddem.errors import InputError
+
+__all__ = ["CHUNKS", "announce_compilation", "inline", "kernel", "prange", "threaded", "use_threads"]
+
+CHUNKS = 64
+"""Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a serial loop; kept on disk."""
+    return njit(cache=True, error_model="numpy")(function)
+
+
+def threaded(function: Callable[..., Any]) -> Any:
+    """Compile a loop over `prange` that runs on all threads; kept on disk."""
+    return njit(cache=True, error_model="numpy", parallel=True)(function)
+
+
+def inline(function: Callable[..., Any]) -> Any:
+    """Compile a small helper into the loops that call it."""
+    return njit(error_model="numpy", inline="never")(function)
+
+
+def use_threads(count: int | None) -> int:
+    """Run threaded loops on `count` threads (None: leave as it is); returns the number in use."""
+    if count is not None:
+        try:
+            set_num_threads(count)
+        except ValueError as refusal:
+            raise InputError("threads", count, f"1 to {_most_threads()} on this machine") from refusal
+    return int(get_num_threads())
+
+
+def _most_threads() -> int:
+    from numba import config
+
+    return int(config.NUMBA_NUM_THREADS)
+
+
+class _Announcer(event.Listener):
+    """One line of progress while loops compile for the first time."""
+
+    def __init__(self) -> None:
+        self.compiled = 0
+
+    def on_start(self, seen: event.Event) -> None:
+        dispatcher = seen.data.get("dispatcher")
+        module = getattr(getattr(dispatcher, "py_func", None), "__module__", "")
+        if module.startswith(("cfddem", "scenarios")):
+            self.compiled += 1
+            print(f"\rcompiling loop {self.compiled} (kept for next time) ...", end="", file=sys.stderr)
+
+    def on_end(self, seen: event.Event) -> None:
+        print("\r" + " " * 60 + "\r", end="", file=sys.stderr)
+
+
+def announce_compilation() -> None:
+    """Tell the person at the terminal when loops are being compiled."""
+    if sys.stderr.isatty():
+        event.register("numba:compile", _Announcer())
