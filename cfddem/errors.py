@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Any
 
 
@@ -28,10 +30,23 @@ class UnstableStep(CfddemError):
     exit_code = 2
 
     def __init__(self, step: float, limit: float, clock: str, remedy: str) -> None:
-        super().__init__(f"time step {step:.3g} s is above the stability limit {limit:.3g} s of the {clock}; {remedy}")
+        super().__init__(
+            f"time step {step:.3g} s is above the stability limit {limit:.3g} s of the {clock}; {remedy}"
+        )
 
 
 class RunFailed(CfddemError):
     """A run that cannot go on: a number that is no number, a particle that is lost."""
 
     exit_code = 3
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The limit to state for an unknown word: the known ones, and the nearest first.
+
+    >>> nearest("restituton", ["friction", "restitution"])
+    "one of friction, restitution (did you mean 'restitution'?)"
+    """
+    words = list(known)
+    close = get_close_matches(word, words, n=1)
+    return f"one of {', '.join(words)}" + (f" (did you mean {close[0]!r}?)" if close else "")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
@@ -17,7 +18,16 @@ from numba.core import event
 
 from cfddem.errors import InputError
 
-__all__ = ["CHUNKS", "announce_compilation", "inline", "kernel", "prange", "threaded", "use_threads"]
+__all__ = [
+    "CHUNKS",
+    "announce_compilation",
+    "inline",
+    "kernel",
+    "prange",
+    "serial_and_threaded",
+    "threaded",
+    "use_threads",
+]
 
 CHUNKS = 64
 """Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
@@ -75,3 +85,14 @@ def announce_compilation() -> None:
     """Tell the person at the terminal when loops are being compiled."""
     if sys.stderr.isatty():
         event.register("numba:compile", _Announcer())
+
+
+def serial_and_threaded(function: Callable[..., Any]) -> tuple[Any, Any]:
+    """Compile one source twice: for one thread without overhead, and for all threads.
+
+    The second face carries its own name, because the compile cache tells functions apart by name.
+    """
+    twin = FunctionType(function.__code__, function.__globals__, function.__name__ + "_threaded")
+    twin.__qualname__ = function.__qualname__ + "_threaded"
+    twin.__module__ = function.__module__
+    return kernel(function), threaded(twin)

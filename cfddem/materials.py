@@ -1,0 +1,142 @@
+"""Solids and fluids, and what two solids do to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from cfddem.errors import InputError, nearest
+from closures import contact, minimum_gap
+
+
+class Checked(BaseModel):
+    """A frozen description whose values are checked when it is made; a refusal is one readable line."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as refusal:
+            raise _readable(refusal, type(self)) from None
+
+
+class Material(Checked):
+    """A solid.
+
+    The film always feels the real `youngs_modulus`. A smaller `contact_modulus` softens the contact alone,
+    so that larger time steps are stable.
+    """
+
+    density: float = Field(gt=0, description="rho_p [kg/m3]")
+    youngs_modulus: float = Field(gt=0, description="E, of the real solid [Pa]")
+    poisson: float = Field(gt=-1, le=0.5, description="nu [-]")
+    restitution: float = Field(1.0, gt=0, le=1, description="e, dry and normal [-]")
+    friction: float = Field(0.0, ge=0, description="mu, dry [-]")
+    friction_lubricated: float | None = Field(
+        None, ge=0, description="mu where a film keeps the solids apart; the dry one if not given [-]"
+    )
+    roughness: float = Field(0.0, ge=0, description="sigma, height of asperities [m]")
+    contact_modulus: float | None = Field(
+        None, gt=0, description="E of the contact; the real one if not given [Pa]"
+    )
+
+    @model_validator(mode="after")
+    def _softer_not_harder(self) -> Material:
+        if self.contact_modulus is not None and self.contact_modulus > self.youngs_modulus:
+            raise ValueError(
+                "contact_modulus: must be at most youngs_modulus; it is there to soften contacts"
+            )
+        return self
+
+
+class Fluid(Checked):
+    """A Newtonian fluid; viscosity 0 leaves the particles dry."""
+
+    density: float = Field(gt=0, description="rho_f [kg/m3]")
+    viscosity: float = Field(ge=0, description="eta, dynamic [Pa s]")
+
+
+PAIR = np.dtype(
+    [
+        ("film_modulus", "f8"),  # E* of the real solids [Pa]
+        ("contact_modulus", "f8"),  # E* of the contact, perhaps softened [Pa]
+        ("shear_modulus", "f8"),  # G* of the contact [Pa]
+        ("restitution", "f8"),  # e [-]
+        ("damping_ratio", "f8"),  # alpha of Tsuji's dashpot [-]
+        ("friction", "f8"),  # mu, dry [-]
+        ("friction_lubricated", "f8"),  # mu, where a film holds [-]
+        ("roughness_gap", "f8"),  # h_sigma [m]
+    ],
+    align=True,
+)
+"""One row of the table of material pairs."""
+
+_OVERRIDABLE = ("restitution", "friction", "friction_lubricated", "roughness_gap")
+
+
+def pair_table(
+    materials: Sequence[Material], overrides: Mapping[tuple[int, int], Mapping[str, float]] | None = None
+) -> np.ndarray:
+    """What each two materials do to each other.
+
+    Unless `overrides` says otherwise, unlike materials take the lower restitution and friction, the mean
+    roughness, and the reduced moduli.
+
+    materials  the solids of a run, walls among them
+    overrides  {(i, j): {"friction": 0.3, ...}} for indices into `materials`
+    returns    structured array (n, n) of dtype :data:`PAIR`, symmetric
+    """
+    table = np.zeros((len(materials), len(materials)), PAIR)
+    for i, first in enumerate(materials):
+        for j, second in enumerate(materials):
+            row = table[i, j]
+            real = (first.youngs_modulus, first.poisson, second.youngs_modulus, second.poisson)
+            soft = (_contact_modulus(first), first.poisson, _contact_modulus(second), second.poisson)
+            row["film_modulus"] = contact.reduced_modulus(*real)
+            row["contact_modulus"] = contact.reduced_modulus(*soft)
+            row["shear_modulus"] = contact.reduced_shear_modulus(*soft)
+            row["restitution"] = min(first.restitution, second.restitution)
+            row["friction"] = min(first.friction, second.friction)
+            row["friction_lubricated"] = min(_lubricated(first), _lubricated(second))
+            row["roughness_gap"] = minimum_gap.asperities(first.roughness, second.roughness)
+    for (i, j), values in (overrides or {}).items():
+        for name, value in values.items():
+            if name not in _OVERRIDABLE:
+                raise InputError(f"pair ({i}, {j}).{name}", value, nearest(name, _OVERRIDABLE))
+            table[i, j][name] = table[j, i][name] = value
+    for row in table.reshape(-1):
+        row["damping_ratio"] = contact.damping_ratio(float(row["restitution"]))
+    return table
+
+
+def _contact_modulus(material: Material) -> float:
+    return material.youngs_modulus if material.contact_modulus is None else material.contact_modulus
+
+
+def _lubricated(material: Material) -> float:
+    return material.friction if material.friction_lubricated is None else material.friction_lubricated
+
+
+def _readable(refusal: ValidationError, model: type[BaseModel]) -> InputError:
+    """The first complaint of the checker as field, value, limit."""
+    complaint = refusal.errors()[0]
+    field = ".".join(str(part) for part in complaint["loc"]) or model.__name__.lower()
+    kind, context = complaint["type"], complaint.get("ctx", {})
+    limits = {
+        "greater_than": f"above {context.get('gt')}",
+        "greater_than_equal": f"at least {context.get('ge')}",
+        "less_than_equal": f"at most {context.get('le')}",
+        "finite_number": "a finite number",
+        "missing": "given",
+        "extra_forbidden": nearest(field, model.model_fields),
+    }
+    limit = limits.get(kind, complaint["msg"])
+    if kind == "value_error":
+        field, _, limit = str(context["error"]).partition(": must be ")
+    value = None if kind in ("missing", "value_error") else complaint["input"]
+    described = model.model_fields[field].description if field in model.model_fields else ""
+    return InputError(field, value, limit, f"{field} is {described}" if described else "")

@@ -1,0 +1,45 @@
+"""How close two surfaces come before the solids take over from the film."""
+
+from __future__ import annotations
+
+from closures.law import law
+
+
+@law("minimum_gap", "Nijssen et al., Powder Technol. (2023), eq. (3), doi:10.1016/j.powtec.2022.118017")
+def asperities(roughness_i: float, roughness_j: float) -> float:
+    r"""Gap at which the tops of the asperities of two rigid surfaces meet.
+
+    .. math:: h_\sigma = (\sigma_i + \sigma_j)/2
+
+    roughness_i, roughness_j  sigma, height of the asperities of each body [m]
+    returns                   h_sigma [m]
+
+    >>> asperities(24e-9, 134e-9) * 1e9
+    79.0
+    """
+    return 0.5 * (roughness_i + roughness_j)
+
+
+@law(
+    "minimum_gap",
+    "Davis, Serayssol & Hinch, J. Fluid Mech. 163 (1986) 479; Nijssen et al. (2023), eq. (5) with the fifth root",
+)
+def elastohydrodynamic(
+    viscosity: float, approach_speed: float, reduced_modulus: float, reduced_radius: float
+) -> float:
+    r"""Gap at which the film's own pressure has flattened two smooth elastic spheres enough to turn them back.
+
+    .. math:: h_\varepsilon = 0.37\,(\eta v / E^*)^{2/5}\,R^{*\,3/5}
+
+    viscosity        eta, dynamic, of the film [Pa s]
+    approach_speed   v, largest normal approach speed of this encounter, >= 0 [m/s]
+    reduced_modulus  E*, of the real solids, never softened [Pa]
+    reduced_radius   R* [m]
+    returns          h_eps [m]; 0 at rest
+
+    Range: smooth spheres, h_eps << R*. The fifth root is the one that makes the printed equation a length.
+
+    >>> round(elastohydrodynamic(1e-3, 0.0253, 1.6e9, 3.175e-3) * 1e9)   # Delrin in water, St = 100
+    35
+    """
+    return float(0.37 * (viscosity * approach_speed / reduced_modulus) ** 0.4 * reduced_radius**0.6)
