@@ -30,9 +30,7 @@ class UnstableStep(CfddemError):
     exit_code = 2
 
     def __init__(self, step: float, limit: float, clock: str, remedy: str) -> None:
-        super().__init__(
-            f"time step {step:.3g} s is above the stability limit {limit:.3g} s of the {clock}; {remedy}"
-        )
+        super().__init__(f"time step {step:.3g} s is above the stability limit {limit:.3g} s of the {clock}; {remedy}")
 
 
 class RunFailed(CfddemError):

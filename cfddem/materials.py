@@ -40,16 +40,12 @@ class Material(Checked):
         None, ge=0, description="mu where a film keeps the solids apart; the dry one if not given [-]"
     )
     roughness: float = Field(0.0, ge=0, description="sigma, height of asperities [m]")
-    contact_modulus: float | None = Field(
-        None, gt=0, description="E of the contact; the real one if not given [Pa]"
-    )
+    contact_modulus: float | None = Field(None, gt=0, description="E of the contact; the real one if not given [Pa]")
 
     @model_validator(mode="after")
     def _softer_not_harder(self) -> Material:
         if self.contact_modulus is not None and self.contact_modulus > self.youngs_modulus:
-            raise ValueError(
-                "contact_modulus: must be at most youngs_modulus; it is there to soften contacts"
-            )
+            raise ValueError("contact_modulus: must be at most youngs_modulus; it is there to soften contacts")
         return self
 
 

@@ -7,12 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from cfddem.errors import RunFailed
+from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.forces import Laws
 from cfddem.particles.motion import march
 from cfddem.particles.neighbours import list_edges
-from cfddem.particles.pairs import gaps, remember
+from cfddem.particles.pairs import Edges, gaps, remember
 from cfddem.particles.state import Bodies
 from cfddem.particles.walls import Plane, walls
+from cfddem.record.collisions import CollisionRecord
+
+_NO_ROWS = np.zeros(0, ENCOUNTER)
 
 
 class Simulation:
@@ -25,6 +29,7 @@ class Simulation:
     gravity  [m/s2]
     free     1 along axes in which positions may change, 0 where they are held
     skin     allowance of the neighbour list; a quarter of the largest radius if not given [m]
+    record   keep a record of encounters, in `collisions`
     """
 
     def __init__(
@@ -37,6 +42,7 @@ class Simulation:
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         free: tuple[float, float, float] = (1.0, 1.0, 1.0),
         skin: float | None = None,
+        record: bool = False,
     ) -> None:
         self.bodies = bodies
         self.table = table
@@ -45,7 +51,8 @@ class Simulation:
         self.gravity, self.free = gravity, free
         self.skin = 0.25 * float(bodies.radius.max()) if skin is None else skin
         self.time, self.steps = 0.0, 0
-        self.edges = list_edges(self.bodies, self.walls, self._reach_ratio, self.skin)
+        self.collisions = CollisionRecord() if record else None
+        self.edges = self._listed()
         self._origin = bodies.position.copy()
         self.refresh()
 
@@ -69,8 +76,10 @@ class Simulation:
         steps  how many
         """
         while steps > 0:
-            done, farthest = self._march(step, steps)
+            done, farthest, noted = self._march(step, steps)
             steps -= done
+            if self.collisions is not None:
+                self.collisions.keep(noted)
             self.steps += done
             self.time += done * step
             if np.isnan(farthest):
@@ -78,7 +87,7 @@ class Simulation:
             if farthest >= (0.5 * self.skin) ** 2:
                 self._relist()
 
-    def _march(self, step: float, steps: int) -> tuple[int, float]:
+    def _march(self, step: float, steps: int) -> tuple[int, float, int]:
         return march(
             self.bodies,
             self.edges,
@@ -91,10 +100,15 @@ class Simulation:
             steps,
             self._origin,
             0.5 * self.skin,
+            self.time,
+            _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first)),
         )
 
+    def _listed(self) -> Edges:
+        return list_edges(self.bodies, self.walls, self._reach_ratio, self.skin, self.collisions is not None)
+
     def _relist(self) -> None:
-        fresh = list_edges(self.bodies, self.walls, self._reach_ratio, self.skin)
+        fresh = self._listed()
         remember(self.edges, fresh, self.bodies)
         self.edges = fresh
         self._origin = self.bodies.position.copy()

@@ -110,9 +110,7 @@ def hertz_largest_overlap(reduced_mass: float, stiffness: float, speed: float) -
     return float((1.25 * reduced_mass * speed**2 / stiffness) ** 0.4)
 
 
-@law(
-    "contact", "Tsuji, Tanaka & Ishida, Powder Technol. 71 (1992) 239; Antypov & Elliott, EPL 94 (2011) 50004"
-)
+@law("contact", "Tsuji, Tanaka & Ishida, Powder Technol. 71 (1992) 239; Antypov & Elliott, EPL 94 (2011) 50004")
 def damping_ratio(restitution: float) -> float:
     r"""Factor alpha of Tsuji's dashpot that makes a dry Hertz impact rebound with a wanted restitution.
 

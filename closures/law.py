@@ -64,6 +64,4 @@ def page(function: Callable[..., float]) -> Law:
         for card in laws.values():
             if card.function is function:
                 return card
-    raise KeyError(
-        f"{getattr(function, '__name__', function)!r} is no law; decorate it with @closures.law(...)"
-    )
+    raise KeyError(f"{getattr(function, '__name__', function)!r} is no law; decorate it with @closures.law(...)")

@@ -28,9 +28,7 @@ def film_strength(viscosity: float, reduced_radius: float) -> float:
     return 6.0 * math.pi * viscosity * reduced_radius**2
 
 
-@law(
-    "lubrication", "Nijssen et al., Powder Technol. (2023), eqs (8) and (9), doi:10.1016/j.powtec.2022.118017"
-)
+@law("lubrication", "Nijssen et al., Powder Technol. (2023), eqs (8) and (9), doi:10.1016/j.powtec.2022.118017")
 def film_resistance(strength: float, gap: float, minimum_gap: float, cutoff_gap: float) -> float:
     r"""Resistance of the film, the lever of the lubricated contact included.
 

@@ -24,9 +24,7 @@ def asperities(roughness_i: float, roughness_j: float) -> float:
     "minimum_gap",
     "Davis, Serayssol & Hinch, J. Fluid Mech. 163 (1986) 479; Nijssen et al. (2023), eq. (5) with the fifth root",
 )
-def elastohydrodynamic(
-    viscosity: float, approach_speed: float, reduced_modulus: float, reduced_radius: float
-) -> float:
+def elastohydrodynamic(viscosity: float, approach_speed: float, reduced_modulus: float, reduced_radius: float) -> float:
     r"""Gap at which the film's own pressure has flattened two smooth elastic spheres enough to turn them back.
 
     .. math:: h_\varepsilon = 0.37\,(\eta v / E^*)^{2/5}\,R^{*\,3/5}

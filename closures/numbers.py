@@ -50,9 +50,7 @@ def reynolds(density: float, speed: float, diameter: float, viscosity: float) ->
 
 
 @law("number", "Crowe et al., Multiphase Flows with Droplets and Particles (2011) ch. 4")
-def archimedes(
-    diameter: float, density: float, fluid_density: float, viscosity: float, gravity: float
-) -> float:
+def archimedes(diameter: float, density: float, fluid_density: float, viscosity: float, gravity: float) -> float:
     r"""Archimedes number: the weight of a submerged sphere against the viscosity that holds it back.
 
     .. math:: Ar = \frac{g\,\rho_f(\rho_p-\rho_f)d^3}{\eta^2}

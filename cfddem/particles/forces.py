@@ -185,9 +185,7 @@ def touch(k, bodies, edges, walls, row, laws, free, step, separation, distance, 
 
     if laws.friction_onset == FILM or gap < 0.0:
         swirling, stretch = swirl(k, bodies, edges, distance)
-        friction = dry_or_lubricated(
-            edges.minimum_gap[k], row.roughness_gap, row.friction, row.friction_lubricated
-        )
+        friction = dry_or_lubricated(edges.minimum_gap[k], row.roughness_gap, row.friction, row.friction_lubricated)
         moved = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
         halfway = minus(separation, times(0.5 * step, moved)) if k < edges.between_particles else separation
         halfway = times(1.0 / math.sqrt(dot(halfway, halfway)), halfway)

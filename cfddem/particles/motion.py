@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.kernels import CHUNKS, inline, prange, serial_and_threaded
+from cfddem.particles.encounters import observe
 from cfddem.particles.forces import VERLET, meet, squeeze
 from cfddem.particles.vectors import at, plus, put, times
 
@@ -66,19 +67,20 @@ def drift(i, bodies, free, step, origin):
     return moved
 
 
-def _march(bodies, edges, walls, table, laws, free, gravity, step, steps, origin, reach):
+def _march(bodies, edges, walls, table, laws, free, gravity, step, steps, origin, reach, time, rows):
     """Find the forces at the present places, then advance by up to `steps` steps.
 
     With `steps` = 0 nothing moves. With `steps` > 0 the forces at hand are taken as they are, and the march
-    stops early when a particle has moved by `reach` from `origin`. Returns the number of steps made and the
-    largest displacement squared; NaN if a position is no number.
+    stops early when a particle has moved by `reach` from `origin`, or when `rows`, the record of encounters
+    ended since `time`, could overflow. Returns the number of steps made, the largest displacement squared
+    (NaN if a position is no number) and the number of rows written.
     """
     farthest = np.zeros(CHUNKS)
     largest = 0.0
     count = len(bodies.radius)
     films = laws.film and laws.integrator != VERLET
     moving = steps > 0
-    done = 0
+    done, noted = 0, 0
     while True:
         if moving:
             for i in prange(count):
@@ -105,8 +107,11 @@ def _march(bodies, edges, walls, table, laws, free, gravity, step, steps, origin
         for chunk in range(CHUNKS):
             if not farthest[chunk] <= largest:
                 largest = farthest[chunk]
-        if done >= steps or not largest < reach * reach:
-            return done, largest
+        for k in range(len(edges.entry)):
+            noted = observe(k, bodies, edges, walls, table, laws, time + done * step, rows, noted)
+        full = len(rows) - noted < len(edges.entry)
+        if done >= steps or full or not largest < reach * reach:
+            return done, largest, noted
 
 
 march, march_threaded = serial_and_threaded(_march)

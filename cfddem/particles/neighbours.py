@@ -10,16 +10,17 @@ from cfddem.particles.state import Bodies
 from cfddem.particles.walls import Walls
 
 
-def list_edges(bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float) -> Edges:
+def list_edges(bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float, record: bool = False) -> Edges:
     """A fresh pair graph of all that is closer than the reach of the film plus a skin.
 
     cutoff_ratio  reach of a film over the reduced radius; 0 for dry contacts [-]
     skin          allowance for motion until the next list [m]
+    record        keep the begin of encounters, for a record of them
     """
     first, second = _pairs(bodies.position, bodies.radius, bodies.inverse_mass, cutoff_ratio, skin)
     particle, wall = _walls(bodies.position, bodies.radius, walls.point, walls.normal, cutoff_ratio, skin)
     return edges(
-        np.concatenate([first, particle]), np.concatenate([second, wall]), len(first), len(bodies.radius)
+        np.concatenate([first, particle]), np.concatenate([second, wall]), len(first), len(bodies.radius), record
     )
 
 

@@ -29,19 +29,21 @@ class Edges(NamedTuple):
     couple: np.ndarray  # (n, 3) torque per radius, the same on both bodies [N]
     resistance: np.ndarray  # (n,) of the film, without lever; 0 out of its reach [kg/s]
     impulse: np.ndarray  # (n, 3) of the film in this step, on the first body [N s]
+    entry: np.ndarray  # (n, 5) begin of the encounter, NaN outside one; (0, 5) where none are recorded
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
     incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
 
 
-MEMORY = ("spring", "approach_speed", "minimum_gap", "accounted_gap")
+MEMORY = ("spring", "approach_speed", "minimum_gap", "accounted_gap", "entry")
 """What a pair remembers from step to step."""
 
 
-def edges(first: np.ndarray, second: np.ndarray, between_particles: int, count: int) -> Edges:
+def edges(first: np.ndarray, second: np.ndarray, between_particles: int, count: int, record: bool = False) -> Edges:
     """A fresh graph over `count` particles; pairs that have never met.
 
     first, second      (n,) as in :class:`Edges`
     between_particles  number of edges that join two particles
+    record             keep the begin of encounters, for a record of them
     """
     number = len(first)
     first, second = np.ascontiguousarray(first, np.int32), np.ascontiguousarray(second, np.int32)
@@ -58,6 +60,7 @@ def edges(first: np.ndarray, second: np.ndarray, between_particles: int, count: 
         np.zeros((number, 3)),
         np.zeros(number),
         np.zeros((number, 3)),
+        np.full((number if record else 0, 5), np.nan),
         start,
         incident,
     )
@@ -96,7 +99,8 @@ def remember(old: Edges, new: Edges, bodies: Bodies) -> None:
     source = order[place]
     known = old_names[source] == new_names
     for field in MEMORY:
-        getattr(new, field)[known] = getattr(old, field)[source[known]]
+        if len(getattr(new, field)):
+            getattr(new, field)[known] = getattr(old, field)[source[known]]
     turned = known & (bodies.id[new.first] != bodies.id[old.first[source]])
     new.spring[turned] *= -1.0
 

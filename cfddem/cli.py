@@ -1,0 +1,135 @@
+"""The command line: the roof, and the one file of cfddem that reaches the scenarios."""
+
+from __future__ import annotations
+
+import json as _json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from cfddem import __version__
+from cfddem.errors import CfddemError, InputError, nearest
+
+app = App(
+    name="cfddem",
+    version=__version__,
+    help="Spheres in a fluid, with the thin film between them. All numbers are in SI units.",
+    help_flags=["--help", "-h"],
+)
+
+
+@app.command
+def collide(
+    *,
+    material: Annotated[str, Parameter(help="steel_smooth, steel_rough, glass or delrin")] = "delrin",
+    target: Annotated[str | None, Parameter(help="material of the target or wall; the same if not given")] = None,
+    diameter: Annotated[float, Parameter(help="of the striker [m]")] = 12.7e-3,
+    target_diameter: Annotated[float | None, Parameter(help="of the target; the same if not given [m]")] = None,
+    velocity: Annotated[float | None, Parameter(help="normal approach speed at h_co [m/s]")] = None,
+    viscosity: Annotated[float | None, Parameter(help="of the fluid; 0 for a dry collision [Pa s]")] = None,
+    stokes: Annotated[float | None, Parameter(help="of the normal approach; give two of the three")] = None,
+    angle: Annotated[float, Parameter(help="between velocity and line of centres [deg]")] = 0.0,
+    against: Annotated[str, Parameter(help="sphere or wall")] = "sphere",
+    trajectory: Annotated[str, Parameter(help="frozen or full")] = "frozen",
+    spin: Annotated[float, Parameter(help="of the striker before [rad/s]")] = 0.0,
+    integrator: Annotated[str, Parameter(help="drift or verlet")] = "drift",
+    friction_onset: Annotated[str, Parameter(help="film or overlap")] = "film",
+    step_fraction: Annotated[float | None, Parameter(help="time step over the Hertz time")] = None,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Let two spheres, or a sphere and a wall, collide in a fluid.
+
+    Example: cfddem collide --material delrin --stokes 30 --velocity 0.1
+    """
+    from scenarios.binary_collision import MATERIALS
+    from scenarios.binary_collision import collide as run
+
+    for name in (material, target):
+        if name is not None and name not in MATERIALS:
+            raise InputError("material", name, nearest(name, MATERIALS))
+    result = run(
+        (MATERIALS[material], MATERIALS[target or material]),
+        diameter=(diameter, diameter if target_diameter is None else target_diameter),
+        velocity=velocity,
+        viscosity=viscosity,
+        stokes=stokes,
+        angle=angle,
+        against=against,
+        trajectory=trajectory,
+        spin=(spin, 0.0),
+        integrator=integrator,
+        friction_onset=friction_onset,
+        step_fraction=step_fraction,
+    )
+    _show(result.summary(), _COLLISION_UNITS, json)
+
+
+_COLLISION_UNITS = {
+    "rebound_angle_striker": "deg",
+    "rebound_angle_relative": "deg",
+    "minimum_gap": "m",
+    "stop_gap": "m",
+    "spin": "rad/s",
+}
+
+
+@app.command
+def validate(
+    target: Annotated[str, Parameter(help="binary-collision, or all")] = "all",
+    *,
+    output: Annotated[Path, Parameter(help="folder for figures, tables and histories")] = Path("results/validation"),
+    json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
+) -> None:
+    """Redraw published results and compare; exits 1 if a limit does not hold.
+
+    Example: cfddem validate binary-collision
+    """
+    from scenarios.validation import TARGETS
+    from scenarios.validation import validate as run
+
+    if target != "all" and target not in TARGETS:
+        raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
+    names = list(TARGETS) if target == "all" else [target]
+    if not all([run(name, output, json) for name in names]):
+        sys.exit(1)
+
+
+def _show(values: dict[str, Any], units: dict[str, str], as_json: bool) -> None:
+    """Print a result as aligned lines or as JSON."""
+    if as_json:
+        print(_json.dumps(values))
+        return
+    width = max(len(name) for name in values)
+    for name, value in values.items():
+        print(f"{name:<{width}}  {_readable(value)} {units.get(name, '')}".rstrip())
+
+
+def _readable(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return ", ".join(_readable(each) for each in value) or "-"
+    return str(value)
+
+
+def main() -> None:
+    """Run a command; a user's mistake ends in one line and exit code 2, never in a traceback."""
+    try:
+        app(exit_on_error=False, print_error=False)
+    except CycloptsError as mistake:
+        print("cfddem: " + " ".join(str(mistake).split()), file=sys.stderr)
+        sys.exit(2)
+    except CfddemError as failure:
+        print(f"cfddem: {failure}", file=sys.stderr)
+        sys.exit(failure.exit_code)
+    except KeyboardInterrupt:
+        print("cfddem: stopped", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""Encounters: from the moment two bodies come within reach of each other until they leave it again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.kernels import inline
+from cfddem.particles.forces import geometry, pair_row, pair_viscosity, reduced_properties, relative_velocity
+from cfddem.particles.vectors import across, at, dot, times
+from closures.friction import dry_or_lubricated
+from closures.numbers import stokes
+
+ENCOUNTER = np.dtype(
+    [
+        ("first", "i8"),  # id of the first body
+        ("second", "i8"),  # id of the second body; -1 - w for wall w
+        ("begin", "f8"),  # time when the pair came within reach [s]
+        ("end", "f8"),  # time when it left again [s]
+        ("place", "f8", (3,)),  # where the first body was at the end [m]
+        ("stokes", "f8"),  # of the approach, normal; infinite without a film [-]
+        ("approach_speed", "f8"),  # normal speed at the begin [m/s]
+        ("minimum_gap", "f8"),  # h_min [m]
+        ("deformed", "?"),  # the film's pressure, not the asperities, set h_min
+        ("friction", "f8"),  # coefficient in force [-]
+        ("restitution", "f8"),  # normal speed out over in [-]
+        ("restitution_tangential", "f8"),  # tangential speed out over in; NaN for a head-on meeting [-]
+    ],
+    align=True,
+)
+
+ENTRY = 5
+"""What an edge keeps of the begin of its encounter: time, normal speed, tangential velocity."""
+
+
+@inline
+def observe(k, bodies, edges, walls, table, laws, time, rows, count):
+    """Note the begin of an encounter, or write a row at its end; returns the number of rows."""
+    separation, distance, gap = geometry(k, bodies, edges, walls)
+    reduced_radius, reduced_mass = reduced_properties(k, bodies, edges)
+    reach = laws.cutoff_ratio * reduced_radius if laws.film else 0.0
+    known = not np.isnan(edges.entry[k, 0])
+    if known == (gap <= reach):
+        return count
+    normal = times(1.0 / distance, separation)
+    velocity = relative_velocity(k, bodies, edges, walls)
+    normal_speed, tangential = dot(velocity, normal), across(velocity, normal)
+    if not known:
+        edges.entry[k, 0], edges.entry[k, 1] = time, normal_speed
+        edges.entry[k, 2], edges.entry[k, 3], edges.entry[k, 4] = tangential
+        return count
+
+    row, materials = rows[count], pair_row(k, bodies, edges, walls, table)
+    i, j = edges.first[k], edges.second[k]
+    row.first, row.second = bodies.id[i], bodies.id[j] if k < edges.between_particles else -1 - j
+    row.begin, row.end = edges.entry[k, 0], time
+    for axis in range(3):
+        row.place[axis] = bodies.position[i, axis]
+    speed, before = -edges.entry[k, 1], (edges.entry[k, 2], edges.entry[k, 3], edges.entry[k, 4])
+    row.approach_speed = speed
+    row.stokes = stokes(reduced_mass, speed, pair_viscosity(k, bodies, edges), reduced_radius) if laws.film else np.inf
+    row.minimum_gap = edges.minimum_gap[k]
+    row.deformed = edges.minimum_gap[k] > materials.roughness_gap
+    row.friction = dry_or_lubricated(
+        edges.minimum_gap[k], materials.roughness_gap, materials.friction, materials.friction_lubricated
+    )
+    row.restitution = normal_speed / speed
+    sideways = dot(before, before)
+    row.restitution_tangential = dot(tangential, before) / sideways if sideways > 0.0 else np.nan
+    edges.entry[k, 0] = np.nan
+    return count + 1

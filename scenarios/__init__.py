@@ -1,0 +1,1 @@
+"""Runnable cases: one page each, with its published comparison."""

@@ -1,0 +1,497 @@
+"""Two spheres, or a sphere and a wall, meet in a fluid.
+
+What you'll learn: how the film, the roughness and the elasticity of two bodies set their rebound.
+
+>>> from scenarios.binary_collision import MATERIALS, collide
+>>> result = collide(MATERIALS["delrin"], velocity=0.1, stokes=30)
+>>> result.outcome, round(float(result.restitution), 2)
+('rebound', 0.39)
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cfddem.errors import InputError, RunFailed, UnstableStep, nearest
+from cfddem.materials import Material, pair_table
+from cfddem.particles.forces import CONTACTS, DRIFT, FRICTION_ONSETS, INTEGRATORS, SPRINGS, VERLET, Laws
+from cfddem.particles.state import Bodies, bodies
+from cfddem.particles.walls import Plane
+from cfddem.simulation import Simulation
+from closures import contact, lubrication, timescales
+from closures.friction import dry_or_lubricated
+from closures.minimum_gap import elastohydrodynamic
+
+MATERIALS = {
+    "steel_smooth": Material(
+        density=7780, youngs_modulus=190e9, poisson=0.27, restitution=0.97,
+        friction=0.11, friction_lubricated=0.02, roughness=24e-9,
+    ),
+    "steel_rough": Material(
+        density=7780, youngs_modulus=190e9, poisson=0.27, restitution=0.97,
+        friction=0.11, friction_lubricated=0.02, roughness=272e-9,
+    ),
+    "glass": Material(
+        density=2540, youngs_modulus=60e9, poisson=0.23, restitution=0.97,
+        friction=0.40, friction_lubricated=0.10, roughness=134e-9,
+    ),
+    "delrin": Material(
+        density=1400, youngs_modulus=2.8e9, poisson=0.35, restitution=0.97,
+        friction=0.20, friction_lubricated=0.10, roughness=796e-9,
+    ),
+}  # fmt: skip
+"""The spheres of Yang & Hunt (2006), as listed in table 1 of Nijssen et al. (2023)."""
+
+COAST = 1e-5
+"""A pair has halted when what motion and spring energy it has left changes ln h by less than this."""
+
+MOST_STEPS = 2_000_000
+
+
+@dataclass(frozen=True)
+class Collision:
+    """What came of a collision. Speeds of rebound are taken where the pair leaves the film, at h = h_co."""
+
+    stokes: float  # of the normal approach at h_co [-]; infinite when dry
+    outcome: str  # "no_touch", "touch_no_rebound" or "rebound"
+    restitution: float  # normal speed out over in [-]
+    restitution_tangential: float  # tangential speed out over in [-]; NaN head-on
+    rebound_angle_striker: float  # of the striker's own velocity against the line of centres at contact [deg]
+    rebound_angle_relative: float  # of the relative velocity against the line of centres at contact [deg]
+    minimum_gap: float  # h_min [m]; 0 when dry
+    mechanism: str  # "roughness" or "elastohydrodynamic"; "dry" without a film
+    friction_used: float  # [-]
+    stop_gap: float | None  # where a pair that does not separate has come to rest [m]
+    spin: tuple[float, float]  # of striker and target about the plane's normal [rad/s]
+    time: np.ndarray  # [s]
+    gap: np.ndarray  # at these times [m]
+    history: dict[str, np.ndarray] = field(repr=False)  # more columns at these times
+    warnings: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """The result without its histories, ready for JSON."""
+        names = [name for name in self.__dataclass_fields__ if name not in ("time", "gap", "history")]
+        return {name: _plain(getattr(self, name)) for name in names}
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """The numbers of one pair before it moves."""
+
+    radius: tuple[float, float]  # of striker and target; infinite for a wall
+    reduced_radius: float
+    reduced_mass: float
+    speed: float
+    tangential_speed: float
+    viscosity: float
+    stiffness: float
+    impact_step: float
+    minimum_gap: float
+    film_speed: float  # B = A/m*
+
+    @property
+    def cutoff_gap(self) -> float:
+        return self.reduced_radius
+
+
+def collide(
+    material: Material | tuple[Material, Material],
+    *,
+    diameter: float | tuple[float, float] = 12.7e-3,
+    velocity: float | None = None,
+    viscosity: float | None = None,
+    stokes: float | None = None,
+    angle: float = 0.0,
+    against: str = "sphere",
+    trajectory: str = "frozen",
+    spin: tuple[float, float] = (0.0, 0.0),
+    integrator: str = "drift",
+    friction_onset: str = "film",
+    spring: str = "total",
+    step_fraction: float | None = None,
+) -> Collision:
+    r"""Let one body strike another that rests, in a fluid of the particle engine.
+
+    Two of velocity, viscosity and stokes are given: St = m* v / (6 pi eta R*^2).
+
+    material        of both bodies, or (striker, target); with a wall, (sphere, wall)
+    diameter        of both spheres, or (striker, target) [m]
+    velocity        normal approach speed at the cut-off gap h_co = R* [m/s]
+    viscosity       of the fluid; 0 for a dry collision [Pa s]
+    stokes          of the normal approach [-]
+    angle           between velocity and line of centres at contact, 0 <= angle < 90 [deg]
+    against         "sphere" or "wall"
+    trajectory      "frozen" holds the line of centres; "full" starts at a gap of 2 R* aimed at the contact point
+    spin            of striker and target before, about the plane's normal [rad/s]
+    integrator      "drift" (film as a potential difference) or "verlet" (film as a force)
+    friction_onset  "film": at h_min, weighed by the lever; "overlap": at h = 0, as in the published figures
+    spring          "total" tangential displacement, or "rescaled" while loading
+    step_fraction   of the Hertz time; 0.02, or 0.005 for an oblique impact with the sudden onset "overlap" [-]
+    returns         :class:`Collision`
+
+    >>> wall = collide(MATERIALS["glass"], against="wall", velocity=0.2, stokes=50)
+    >>> wall.mechanism, round(float(wall.restitution), 2)
+    ('roughness', 0.56)
+    """
+    materials, diameters = _both(material), _both(diameter)
+    velocity, viscosity = _speed_and_viscosity(materials, diameters, against, velocity, viscosity, stokes)
+    _check("angle", angle, 0.0 <= angle < 90.0, "at least 0 and below 90 degrees")
+    oblique = angle > 0.0 or any(spin)
+    if step_fraction is None:
+        step_fraction = 0.005 if oblique and friction_onset == "overlap" else 0.02
+    _check("step_fraction", step_fraction, 0.0 < step_fraction <= 0.2, "above 0 and at most 0.2")
+    for given in spin:
+        _check("spin", given, math.isfinite(given), "finite")
+    laws = Laws(
+        film=viscosity > 0.0,
+        integrator=_choice("integrator", integrator, INTEGRATORS),
+        friction_onset=_choice("friction_onset", friction_onset, FRICTION_ONSETS),
+        contact=CONTACTS["hertz"],
+        spring=_choice("spring", spring, SPRINGS),
+    )
+    full = _choice("trajectory", trajectory, {"frozen": False, "full": True})
+    table = pair_table(materials)
+    setting = _setting(table, materials, diameters, against, velocity, viscosity, angle, step_fraction)
+    caveats = _film_clock(setting, laws, step_fraction)
+    simulation = _stage(setting, table, materials, laws, full, spin)
+    history = _follow(simulation, setting, full)
+    return _result(simulation, setting, table, history, laws, full, caveats)
+
+
+def _both(value: Any) -> tuple[Any, Any]:
+    return value if isinstance(value, tuple) else (value, value)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return float(value) if isinstance(value, np.floating) else value
+
+
+Chosen = TypeVar("Chosen")
+
+
+def _choice(name: str, value: str, choices: dict[str, Chosen]) -> Chosen:
+    if value not in choices:
+        raise InputError(name, value, nearest(str(value), choices))
+    return choices[value]
+
+
+def _check(name: str, value: float, holds: bool, limit: str) -> None:
+    if not holds:
+        raise InputError(name, value, limit)
+
+
+def _masses(materials: tuple[Material, Material], diameters: tuple[float, float], against: str) -> tuple[float, float]:
+    """Reduced radius and reduced mass."""
+    for name, diameter in zip(("diameter", "diameter of the target"), diameters):
+        _check(name, diameter, math.isfinite(diameter) and diameter > 0.0, "above 0 and finite")
+    wall = _choice("against", against, {"sphere": False, "wall": True})
+    mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(materials, diameters)]
+    other = (math.inf, math.inf) if wall else (0.5 * diameters[1], mass[1])
+    return contact.reduced(0.5 * diameters[0], other[0]), contact.reduced(mass[0], other[1])
+
+
+def _speed_and_viscosity(
+    materials: tuple[Material, Material],
+    diameters: tuple[float, float],
+    against: str,
+    velocity: float | None,
+    viscosity: float | None,
+    stokes: float | None,
+) -> tuple[float, float]:
+    """The two that define the approach, from any two of three."""
+    given = {"velocity": velocity, "viscosity": viscosity, "stokes": stokes}
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) != 2:
+        raise InputError("velocity, viscosity, stokes", names, "two of the three", "the third follows from them")
+    for name in names:
+        value = given[name]
+        zero_allowed = name == "viscosity"
+        sound = math.isfinite(value) and (value >= 0.0 if zero_allowed else value > 0.0)  # type: ignore[arg-type, operator]
+        _check(name, value, sound, "finite and " + ("at least 0" if zero_allowed else "above 0"))  # type: ignore[arg-type]
+    radius, mass = _masses(materials, diameters, against)
+    film_speed_per_viscosity = lubrication.film_strength(1.0, radius) / mass
+    if velocity is None:
+        _check("viscosity", viscosity, viscosity > 0.0, "above 0 where stokes sets the velocity")  # type: ignore[arg-type, operator]
+        velocity = stokes * viscosity * film_speed_per_viscosity  # type: ignore[operator]
+    if viscosity is None:
+        viscosity = velocity / (stokes * film_speed_per_viscosity)  # type: ignore[operator]
+    return velocity, viscosity
+
+
+def _setting(
+    table: np.ndarray,
+    materials: tuple[Material, Material],
+    diameters: tuple[float, float],
+    against: str,
+    velocity: float,
+    viscosity: float,
+    angle: float,
+    step_fraction: float,
+) -> _Setting:
+    reduced_radius, reduced_mass = _masses(materials, diameters, against)
+    row = table[0, 1]
+    stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), reduced_radius)
+    deformed = elastohydrodynamic(viscosity, velocity, float(row["film_modulus"]), reduced_radius)
+    return _Setting(
+        radius=(0.5 * diameters[0], math.inf if against == "wall" else 0.5 * diameters[1]),
+        reduced_radius=reduced_radius,
+        reduced_mass=reduced_mass,
+        speed=velocity,
+        tangential_speed=velocity * math.tan(math.radians(angle)),
+        viscosity=viscosity,
+        stiffness=stiffness,
+        impact_step=step_fraction * timescales.hertz_time(reduced_mass, stiffness, velocity),
+        minimum_gap=max(float(row["roughness_gap"]), deformed) if viscosity > 0.0 else 0.0,
+        film_speed=lubrication.film_strength(viscosity, reduced_radius) / reduced_mass,
+    )
+
+
+def _film_clock(setting: _Setting, laws: Laws, step_fraction: float) -> tuple[str, ...]:
+    """Refuse or warn where the film as an explicit force cannot be followed by the step."""
+    if not laws.film or laws.integrator == DRIFT:
+        return ()
+    film_time = timescales.film_time(
+        setting.reduced_mass, setting.film_speed * setting.reduced_mass, setting.minimum_gap
+    )
+    step = setting.impact_step
+    if step >= 2.0 * film_time:
+        raise UnstableStep(
+            step,
+            2.0 * film_time,
+            "film",
+            f'use integrator="drift", or step_fraction below {2.0 * film_time / step * step_fraction:.2g}',
+        )
+    depth = contact.hertz_largest_overlap(setting.reduced_mass, setting.stiffness, setting.speed) / setting.minimum_gap
+    if step < film_time and depth < 15.0:
+        return ()
+    caveat = (
+        f"the film is poorly resolved: step/film time = {step / film_time:.2g} (should be below 1), "
+        f'largest overlap/minimum gap = {depth:.2g} (should be below 15); use integrator="drift"'
+    )
+    warnings.warn(caveat, stacklevel=3)
+    return (caveat,)
+
+
+def _stage(
+    setting: _Setting,
+    table: np.ndarray,
+    materials: tuple[Material, Material],
+    laws: Laws,
+    full: bool,
+    spin: tuple[float, float],
+) -> Simulation:
+    """Place striker and target; the line of centres at contact is the x axis, the plane of motion is x-y."""
+    velocity = np.array([setting.speed, setting.tangential_speed, 0.0])
+    wall = math.isinf(setting.radius[1])
+    start = 2.0 * setting.reduced_radius if full else setting.cutoff_gap if laws.film else 1e-3 * setting.reduced_radius
+    at_contact = np.array([-setting.radius[0] - (0.0 if wall else setting.radius[1]), 0.0, 0.0])
+    if full:
+        place = at_contact - velocity * _time_to_contact(at_contact, velocity, start, wall)
+    else:
+        place = at_contact - np.array([start, 0.0, 0.0])
+    spins = [[0.0, 0.0, spin[0]], [0.0, 0.0, spin[1]]]
+    number = 1 if wall else 2
+    pair = bodies(
+        np.array([place, np.zeros(3)])[:number],
+        np.array(setting.radius[:number]),
+        np.array([each.density for each in materials[:number]]),
+        velocity=np.array([velocity, np.zeros(3)])[:number],
+        spin=np.array(spins)[:number],
+        material=np.arange(number, dtype=np.int32),
+        viscosity=setting.viscosity,
+    )
+    return Simulation(
+        pair,
+        table,
+        planes=[Plane(normal=(-1.0, 0.0, 0.0), material=1)] if wall else [],
+        laws=laws,
+        free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
+        skin=8.0 * setting.reduced_radius,
+        record=True,
+    )
+
+
+def _time_to_contact(at_contact: np.ndarray, velocity: np.ndarray, start: float, wall: bool) -> float:
+    """How long before contact an undisturbed striker was at the gap where it starts."""
+    if wall:
+        return start / velocity[0]
+    target = float(np.linalg.norm(at_contact)) + start
+    along, square = float(at_contact @ velocity), float(velocity @ velocity)
+    return (along + math.sqrt(along**2 + square * (target**2 - float(at_contact @ at_contact)))) / square
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """Where a pair stands at one instant."""
+
+    gap: float
+    normal_speed: float
+    speed: float
+    rate: float = 0.0  # mean rate of the gap over the last step
+
+
+def _look(simulation: Simulation) -> _Moment:
+    """Gap and speeds of the pair, as plain numbers."""
+    position, velocity = simulation.bodies.position.tolist(), simulation.bodies.velocity.tolist()
+    if len(position) == 1:
+        (x, _, _), (u, v, w) = position[0], velocity[0]
+        return _Moment(-x - float(simulation.bodies.radius[0]), -u, math.hypot(u, v, w))
+    r = [b - a for a, b in zip(*position)]
+    u = [b - a for a, b in zip(*velocity)]
+    distance = math.hypot(*r)
+    approach = sum(a * b for a, b in zip(r, u)) / distance
+    return _Moment(distance - float(simulation.bodies.radius.sum()), approach, math.hypot(*u))
+
+
+def _follow(simulation: Simulation, setting: _Setting, full: bool) -> dict[str, np.ndarray]:
+    """March until the pair has left the film or halted; returns the history as columns.
+
+    Where only the film acts its impulse depends on the gap alone, so a step may take half of the gap; the
+    first step into the film is short, because a film is felt from the step after the one that enters it.
+    """
+    rows = [_row(simulation, _look(simulation))]
+    laws, cutoff = simulation.laws, setting.cutoff_gap if simulation.laws.film else 0.0
+    if not full:
+        simulation.advance(min(1e-6 * setting.cutoff_gap / setting.speed, setting.impact_step))
+    turn = 0.004 * setting.reduced_radius / math.hypot(setting.speed, setting.tangential_speed) if full else math.inf
+    touched = False
+    for moment, minimum_gap in _moments(simulation, rows):
+        touched = touched or moment.gap <= minimum_gap
+        if moment.gap > cutoff and moment.normal_speed > 0.0:
+            break
+        if laws.film and _halted(moment, minimum_gap, setting, full):
+            break
+        if laws.film and laws.integrator == VERLET:
+            near = moment.gap < 4.0 * minimum_gap + 2.0 * setting.speed * setting.impact_step
+            simulation.advance(setting.impact_step, 1 if near else 25)
+        else:
+            simulation.advance(_step(moment, minimum_gap, setting, cutoff, turn))
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return columns | {"touched": np.array(touched)}
+
+
+def _moments(simulation: Simulation, rows: list[dict[str, Any]]) -> Iterator[tuple[_Moment, float]]:
+    while simulation.steps < MOST_STEPS:
+        moment = _look(simulation)
+        last = rows[-1]
+        if simulation.time > last["time"]:
+            moment = replace(moment, rate=(moment.gap - last["gap"]) / (simulation.time - last["time"]))
+        rows.append(_row(simulation, moment))
+        yield moment, float(simulation.edges.minimum_gap[0])
+    raise RunFailed(
+        f"the pair neither separates nor halts within {MOST_STEPS} steps: gap {moment.gap:.3g} m, "
+        f"speed {moment.speed:.3g} m/s at t = {simulation.time:.3g} s; try a larger step_fraction"
+    )
+
+
+def _row(simulation: Simulation, moment: _Moment) -> dict[str, Any]:
+    return {
+        "time": simulation.time,
+        "gap": moment.gap,
+        "normal_speed": moment.normal_speed,
+        "position": simulation.bodies.position.copy(),
+        "velocity": simulation.bodies.velocity.copy(),
+        "spin": simulation.bodies.spin[:, 2].copy(),
+        "force": simulation.bodies.force[0].copy(),
+    }
+
+
+def _step(moment: _Moment, minimum_gap: float, setting: _Setting, cutoff: float, turn: float) -> float:
+    """Next step: a fraction of the Hertz time in contact, a fraction of the gap where only the film acts."""
+    if moment.gap <= minimum_gap:
+        return max(setting.impact_step, _creep_time(moment, minimum_gap, setting) if cutoff > 0.0 else 0.0)
+    room = moment.gap - minimum_gap if moment.normal_speed < 0.0 else moment.gap
+    if moment.gap > cutoff:
+        # the film begins with a full step inside it, which is kept short
+        room = min(room, moment.gap - cutoff + 1e-3 * setting.cutoff_gap) if cutoff > 0.0 else room
+        turn = max(turn, setting.impact_step)
+    stride = 0.5 if moment.gap <= cutoff else 1.0
+    return max(setting.impact_step, min(stride * room / max(abs(moment.normal_speed), 1e-300), turn))
+
+
+def _creep_time(moment: _Moment, minimum_gap: float, setting: _Setting) -> float:
+    """A tenth of the time in which a pair pressed below h_min relaxes, where the film overdamps it; else 0."""
+    overlap, mass = minimum_gap - moment.gap, setting.reduced_mass
+    if moment.gap <= 0.0 or overlap <= 0.0 or moment.rate <= 0.0:
+        return 0.0
+    stiffness = 2.5 * contact.hertz_force(setting.stiffness, overlap) / minimum_gap
+    rate = lubrication.film_resistance(setting.film_speed, moment.gap, minimum_gap, setting.cutoff_gap)
+    relaxation = rate * mass / stiffness
+    return 0.1 * min(relaxation, overlap / moment.rate) if rate * rate * mass > 16.0 * stiffness else 0.0
+
+
+def _halted(moment: _Moment, minimum_gap: float, setting: _Setting, full: bool) -> bool:
+    """Whether motion and spring together can no longer change ln h noticeably against the film."""
+    overlap = max(0.0, minimum_gap - moment.gap)
+    share = min(1.0, overlap / minimum_gap)
+    spring_energy = 0.4 * share * contact.hertz_force(setting.stiffness, overlap) * overlap
+    speed = moment.speed if full else abs(moment.normal_speed)
+    return speed + math.sqrt(2.0 * spring_energy / setting.reduced_mass) < COAST * setting.film_speed
+
+
+def _result(
+    simulation: Simulation,
+    setting: _Setting,
+    table: np.ndarray,
+    history: dict[str, np.ndarray],
+    laws: Laws,
+    full: bool,
+    caveats: tuple[str, ...],
+) -> Collision:
+    """Read the outcome off the end of the history."""
+    body: Bodies = simulation.bodies
+    target = body.velocity[1] if body.count == 2 else np.zeros(3)
+    parting = target - body.velocity[0]
+    cutoff = setting.cutoff_gap if laws.film else 0.0
+    separated = history["gap"][-1] > cutoff
+    touched = bool(history.pop("touched"))
+    outcome = "rebound" if separated and touched else "touch_no_rebound" if touched else "no_touch"
+    restitution = float(parting[0]) / setting.speed if separated or full else 0.0
+    sideways = -float(parting[1])
+    minimum_gap = _frozen_gap(simulation, setting)
+    row = table[0, 1]
+    friction = dry_or_lubricated(
+        minimum_gap, float(row["roughness_gap"]), float(row["friction"]), float(row["friction_lubricated"])
+    )
+    mechanism = "elastohydrodynamic" if minimum_gap > row["roughness_gap"] else "roughness"
+    return Collision(
+        stokes=setting.speed / setting.film_speed if laws.film else math.inf,
+        outcome=outcome,
+        restitution=restitution,
+        restitution_tangential=sideways / setting.tangential_speed if setting.tangential_speed > 0.0 else math.nan,
+        rebound_angle_striker=_degrees(float(body.velocity[0, 1]), float(body.velocity[0, 0])),
+        rebound_angle_relative=_degrees(sideways, restitution * setting.speed),
+        minimum_gap=minimum_gap,
+        mechanism=mechanism if laws.film else "dry",
+        friction_used=friction if laws.film else float(row["friction"]),
+        stop_gap=None if separated else float(history["gap"][-1]),
+        spin=(float(body.spin[0, 2]), float(body.spin[1, 2]) if body.count == 2 else 0.0),
+        time=history.pop("time"),
+        gap=history.pop("gap"),
+        history=history,
+        warnings=caveats,
+    )
+
+
+def _frozen_gap(simulation: Simulation, setting: _Setting) -> float:
+    """The minimum gap of the encounter, from its record or, where it has not ended, from the pair itself."""
+    if not simulation.laws.film:
+        return 0.0
+    assert simulation.collisions is not None
+    ended = simulation.collisions.table
+    return float(ended["minimum_gap"][-1] if len(ended) else simulation.edges.minimum_gap[0])
+
+
+def _degrees(sideways: float, along: float) -> float:
+    """Angle against the line of centres, 0 along it in either direction."""
+    return math.degrees(math.atan2(sideways, abs(along))) if sideways else 0.0
