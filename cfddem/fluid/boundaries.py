@@ -1,0 +1,372 @@
+"""What happens at the six sides of the box: walls, inlets, outlets, periodic partners.
+
+Each side, named `x_low` to `z_high`, has a condition or a list of them. The first of a list covers the whole
+side; each later one covers the region its `where` selects and wins there, so that a floor with jets reads
+
+    z_low=[NoSlip(), Inlet(2.0, where=discs([(0.05, 0.05)], diameter=0.01))]
+
+Inside the solver a condition is a fixed or free normal velocity on the boundary face and a rule for the ghost
+values beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cfddem.errors import InputError
+from cfddem.fluid.grid import HIGH, LOW, Array, Grid, Region
+
+SIDES = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """A condition on a side; `where(x, y, z)` selects its region, None is the whole side."""
+
+    where: Region | None = None
+
+
+@dataclass(frozen=True)
+class NoSlip(Condition):
+    """A wall the fluid sticks to. velocity: of the wall in its own plane (x, y, z) [m/s], e.g. a lid."""
+
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class FreeSlip(Condition):
+    """A frictionless wall, or a plane of symmetry."""
+
+
+@dataclass(frozen=True)
+class Inlet(Condition):
+    """Fluid enters at a given superficial velocity, volume per area and time [m/s].
+
+    velocity  inward speed, or a vector (x, y, z), or a function f(x, y, z, t) of points (n,) and time that
+              returns speeds (n,) or vectors (n, 3)
+    in_time   factor as a function of time, such as `ramp(0, 1)`; None is 1
+    """
+
+    velocity: float | Sequence[float] | Callable[[Array, Array, Array, float], Any] = 0.0
+    in_time: Callable[[float], float] | None = None
+
+
+@dataclass(frozen=True)
+class Outlet(Condition):
+    """Fluid leaves against a given pressure p' [Pa]; what flows back enters from rest."""
+
+    pressure: float = 0.0
+
+
+@dataclass(frozen=True)
+class Periodic(Condition):
+    """What leaves here enters at the opposite side. pressure_gradient: mean fall of pressure along the axis that
+    drives the flow [Pa/m], the same on both sides."""
+
+    pressure_gradient: float = 0.0
+
+
+def switch_on(at: float = 0.0) -> Callable[[float], float]:
+    """Time factor 0 before `at` [s], 1 from then on."""
+    return lambda t: 1.0 if t >= at else 0.0
+
+
+def ramp(begin: float, end: float) -> Callable[[float], float]:
+    """Time factor that rises linearly from 0 at `begin` to 1 at `end` [s]."""
+    return lambda t: min(max((t - begin) / (end - begin), 0.0), 1.0)
+
+
+def pulse(begin: float, end: float) -> Callable[[float], float]:
+    """Time factor 1 from `begin` up to `end` [s], 0 otherwise."""
+    return lambda t: 1.0 if begin <= t < end else 0.0
+
+
+def discs(centres: Sequence[Sequence[float]], diameter: float, axis: int = 2) -> Region:
+    """Round holes of a distributor normal to `axis`; centres: their two coordinates in the plane, in order [m]."""
+
+    def region(*coordinates: Array) -> Any:
+        first, second = (coordinates[d] for d in range(3) if d != axis)
+        return sum(((first - a) ** 2 + (second - b) ** 2 <= 0.25 * diameter**2) for a, b in centres) > 0
+
+    return region
+
+
+def rectangle(low: Sequence[float], high: Sequence[float]) -> Region:
+    """Points between two opposite corners (x, y, z) [m]; coordinates normal to the side are not looked at twice."""
+
+    def region(*coordinates: Array) -> Any:
+        return np.logical_and.reduce(
+            np.broadcast_arrays(*((a <= x) & (x <= b) for x, a, b in zip(coordinates, low, high)))
+        )
+
+    return region
+
+
+@dataclass
+class _Side:
+    """A side as arrays over its plane, ghost rows included, in the order of the two remaining array axes."""
+
+    name: str
+    axis: int
+    high: bool
+    conditions: list[Condition]
+    owner: np.ndarray = field(default_factory=lambda: np.zeros(0))  # index of the condition of each open cell
+
+    def __post_init__(self) -> None:
+        self.mirror = np.zeros(0)  # ghost = mirror * inside + 2 wall (for tangential components)
+        self.wall = np.zeros(0)  # (3, plane) velocity given on the face
+        self.outlet = np.zeros(0, dtype=bool)
+        self.pressure = np.zeros(0)
+        self.moving_inlets: list[int] = []
+
+    @property
+    def inward(self) -> float:
+        return -1.0 if self.high else 1.0
+
+    def layer(self, array: Array, index: int) -> Array:
+        """View of one layer of cells parallel to the side."""
+        place: list[Any] = [slice(None)] * 3
+        place[2 - self.axis] = index
+        return array[tuple(place)]
+
+
+class Boundaries:
+    """All six sides of a grid; fills ghost cells.
+
+    Sides not named are no-slip walls, or free-slip where the box is one cell thick.
+    """
+
+    def __init__(self, grid: Grid, conditions: Mapping[str, Condition | Sequence[Condition]] | None = None) -> None:
+        given = dict(conditions or {})
+        for name in given:
+            if name not in SIDES:
+                raise InputError(f"boundaries.{name}", None, "one of " + ", ".join(SIDES))
+        self.grid = grid
+        self.periodic, self.driving = np.zeros(3, dtype=bool), np.zeros(3)
+        self.sides: list[_Side] = []
+        for axis in range(3):
+            plain: Condition = FreeSlip() if grid.cells[axis] == 1 else NoSlip()
+            pair = []
+            for high in (False, True):
+                name = SIDES[2 * axis + high]
+                listed = given.get(name, plain)
+                pair.append(_Side(name, axis, high, [listed] if isinstance(listed, Condition) else list(listed)))
+            self._pair_up(axis, pair)
+        for side in self.sides:
+            self._lay_out(side)
+        self.has_outlet = any(bool(side.outlet.any()) for side in self.sides)
+
+    def _pair_up(self, axis: int, pair: list[_Side]) -> None:
+        """A periodic direction needs both its sides; others are kept as sides."""
+        wrapped = [any(isinstance(c, Periodic) for c in side.conditions) for side in pair]
+        if not any(wrapped):
+            self.sides += pair
+            return
+        fall = {c.pressure_gradient for side in pair for c in side.conditions if isinstance(c, Periodic)}
+        if not all(wrapped) or any(len(side.conditions) > 1 for side in pair) or len(fall) > 1:
+            raise InputError(
+                f"boundaries.{pair[wrapped.index(True)].name}",
+                None,
+                "periodic as a whole together with the opposite side, with one pressure gradient",
+            )
+        self.periodic[axis], self.driving[axis] = True, fall.pop()
+
+    def _lay_out(self, side: _Side) -> None:
+        grid, axis = self.grid, side.axis
+        plane = tuple(n for d, n in enumerate(grid.padded_shape) if d != 2 - axis)
+        points = self._points(side)
+        inner = points[0].shape
+        side.owner = np.zeros(inner, dtype=np.int64)
+        for number, condition in enumerate(side.conditions):
+            if not isinstance(condition, Condition):
+                raise InputError(f"boundaries.{side.name}", condition, "a condition such as NoSlip() or Inlet(0.1)")
+            if condition.where is not None:
+                side.owner[np.broadcast_to(condition.where(*points), inner)] = number
+            elif number > 0:
+                raise InputError(f"boundaries.{side.name}", None, "a list whose later conditions say `where` they hold")
+        solid = ~side.layer(grid.open, -1 if side.high else 0)
+        side.mirror, side.wall = np.zeros(plane), np.zeros((3, *plane))
+        mirror, wall = np.zeros(inner), np.zeros((3, *inner))
+        outlet, pressure = np.zeros(inner, dtype=bool), np.zeros(inner)
+        for number, condition in enumerate(side.conditions):
+            here = side.owner == number
+            mirror[here] = -1.0 if isinstance(condition, (NoSlip, Inlet)) else 1.0
+            if isinstance(condition, Inlet):
+                if (here & solid).any():
+                    raise InputError(
+                        f"boundaries.{side.name}", None, "an inlet whose cells are all open",
+                        f"{int((here & solid).sum())} of its {int(here.sum())} cells are solid; narrow it with `where`",
+                    )  # fmt: skip
+                if not here.any():
+                    raise InputError(f"boundaries.{side.name}", None, "an inlet that covers the centre of some cell")
+                side.moving_inlets.append(number)
+            elif isinstance(condition, NoSlip):
+                velocity = np.asarray(condition.velocity, dtype=float)
+                if velocity.shape != (3,) or not np.isfinite(velocity).all() or velocity[axis] != 0.0:
+                    raise InputError(
+                        f"boundaries.{side.name}.velocity", condition.velocity, "a vector in the plane of the wall"
+                    )
+                wall[:, here] = velocity[:, None]
+            elif isinstance(condition, Outlet):
+                if not np.isfinite(condition.pressure):
+                    raise InputError(f"boundaries.{side.name}.pressure", condition.pressure, "a number, in Pa")
+                outlet |= here & ~solid
+                pressure[here] = condition.pressure
+        side.mirror[:] = self._extend(mirror)
+        side.wall[:] = self._extend(wall)
+        side.outlet, side.pressure = self._extend(outlet), self._extend(pressure)
+
+    def _points(self, side: _Side) -> tuple[Array, Array, Array]:
+        """Centres of the boundary faces of a side, x, y, z as full arrays over its plane."""
+        coordinates = np.broadcast_arrays(*self.grid.faces(side.axis))
+        index = -1 if side.high else 0
+        x, y, z = (np.array(side.layer(c, index)) for c in coordinates)
+        return x, y, z
+
+    @staticmethod
+    def _extend(plane: Array) -> Array:
+        """A plane continued into the ghost rows around it."""
+        around = [(0, 0)] * (plane.ndim - 2) + [(LOW, HIGH)] * 2
+        return np.pad(plane, around, mode="edge")
+
+    # ------------------------------------------------------------ every step
+
+    def set_inlets(self, time: float, voidage: Array) -> None:
+        """Take the inlet velocities of this time; voidage is padded and holds its ghosts."""
+        for side in self.sides:
+            for number in side.moving_inlets:
+                here = side.owner == number
+                superficial = self.superficial(side, number, here, time)
+                inside = side.layer(self.grid.inner(voidage), -1 if side.high else 0)[here]
+                wall = side.wall[:, LOW:-HIGH, LOW:-HIGH].copy()
+                wall[:, here] = superficial.T / inside
+                side.wall = self._extend(wall)
+
+    def superficial(self, side: _Side, number: int, here: np.ndarray, time: float, steady: bool = False) -> Array:
+        inlet = side.conditions[number]
+        assert isinstance(inlet, Inlet)
+        x, y, z = (c[here] for c in self._points(side))
+        given = np.asarray(inlet.velocity(x, y, z, time) if callable(inlet.velocity) else inlet.velocity, dtype=float)
+        vector = np.zeros((x.size, 3))
+        if given.ndim == 0 or given.shape == (x.size,) and not (given.shape == (3,) and not callable(inlet.velocity)):
+            vector[:, side.axis] = side.inward * given
+        elif given.shape in ((3,), (x.size, 3)):
+            vector[:] = given
+        else:
+            raise InputError(
+                f"boundaries.{side.name}.velocity",
+                given.shape,
+                f"of shape ({x.size},) or ({x.size}, 3) for {x.size} faces",
+            )
+        factor = 1.0 if steady or inlet.in_time is None else float(inlet.in_time(time))
+        vector *= factor
+        bad = ~np.isfinite(vector).all(axis=1)
+        if bad.any():
+            n = int(np.argmax(bad))
+            raise InputError(
+                f"boundaries.{side.name}.velocity", None, "a number everywhere",
+                f"it is not at x, y, z = {x[n]:g}, {y[n]:g}, {z[n]:g} m, t = {time:g} s",
+            )  # fmt: skip
+        return vector
+
+    def mark_unknowns(self) -> tuple[Array, Array]:
+        """Which faces carry an unknown velocity, and which are buried in solid: two (3, ...) arrays of 0 and 1."""
+        grid = self.grid
+        fluid = np.zeros(grid.padded_shape)
+        grid.inner(fluid)[:] = grid.open
+        self.wrap(fluid)
+        solid = np.zeros(grid.padded_shape)
+        grid.inner(solid)[:] = ~grid.open
+        self.fill_cells(solid)
+        solved, buried = np.zeros((3, *grid.padded_shape)), np.zeros((3, *grid.padded_shape))
+        for d in range(3):
+            n = grid.cells[d]
+            both = fluid * np.roll(fluid, 1, axis=2 - d)
+            last = n + LOW if self.periodic[d] else n + LOW + 1
+            keep: list[Any] = [slice(LOW, m + LOW + 1) for m in grid.shape]
+            for e in range(3):
+                if e != d:
+                    keep[2 - e] = slice(LOW, grid.cells[e] + LOW)
+            keep[2 - d] = slice(LOW, last)
+            solved[d][tuple(keep)] = both[tuple(keep)]
+            buried[d] = solid * np.roll(solid, 1, axis=2 - d)
+        for side in self.sides:
+            face = LOW + self.grid.cells[side.axis] if side.high else LOW
+            inside = side.layer(fluid, face - 1 if side.high else face)
+            side.layer(solved[side.axis], face)[:] = side.outlet * inside
+        return solved, buried
+
+    # ------------------------------------------------------------ ghost cells
+
+    def wrap(self, array: Array) -> None:
+        """Copy periodic ghost layers of a padded field."""
+        for axis in range(3):
+            if self.periodic[axis]:
+                self._wrap_axis(array, axis)
+
+    def _wrap_axis(self, array: Array, axis: int) -> None:
+        n = self.grid.cells[axis]
+        view = np.moveaxis(array, array.ndim - 1 - axis, 0)
+        for ghost in (0, 1, n + LOW, n + LOW + 1, n + LOW + 2):
+            view[ghost] = view[LOW + (ghost - LOW) % n]
+
+    def fill_cells(self, array: Array) -> None:
+        """Ghosts of a cell field (..., nz, ny, nx): periodic, or the value of the nearest cell."""
+        for axis in range(3):
+            if self.periodic[axis]:
+                self._wrap_axis(array, axis)
+                continue
+            n = self.grid.cells[axis]
+            view = np.moveaxis(array, array.ndim - 1 - axis, 0)
+            view[:LOW] = view[LOW]
+            view[n + LOW :] = view[n + LOW - 1]
+
+    def fill_pressure(self, pressure: Array, correction: bool = False) -> None:
+        """First ghost layer of a pressure: given on outlets (zero for a correction), no gradient at walls."""
+        self.fill_cells(pressure)
+        for side in self.sides:
+            if side.outlet.any():
+                n = self.grid.cells[side.axis]
+                inside, ghost = (n + LOW - 1, n + LOW) if side.high else (LOW, LOW - 1)
+                held = 0.0 if correction else 2.0 * side.pressure
+                value = held - side.layer(pressure, inside)
+                side.layer(pressure, ghost)[side.outlet] = value[side.outlet]
+
+    def fill_velocity(self, velocity: Array) -> None:
+        """Boundary faces and ghosts of a velocity (3, ...)."""
+        for axis in range(3):
+            if self.periodic[axis]:
+                self._wrap_axis(velocity, axis)
+            else:
+                for side in self.sides:
+                    if side.axis == axis:
+                        self._fill_side(side, velocity)
+
+    def _fill_side(self, side: _Side, velocity: Array) -> None:
+        n, axis = self.grid.cells[side.axis], side.axis
+        face = n + LOW if side.high else LOW
+        inside = (n + LOW - 1, max(n + LOW - 2, LOW)) if side.high else (LOW, min(LOW + 1, n + LOW - 1))
+        beyond = (n + LOW, n + LOW + 1, n + LOW + 2) if side.high else (LOW - 1, LOW - 2)
+        normal = velocity[axis]
+        layer = side.layer
+        at_face = np.where(side.outlet, layer(normal, face), side.wall[axis])
+        layer(normal, face)[:] = at_face
+        # Fluid that flows back through an outlet comes from rest: it brings no momentum.
+        leaves = np.where(side.outlet, at_face * side.inward <= 0.0, True)
+        mirror = side.mirror * leaves
+        for component in range(3):
+            values = velocity[component]
+            if component == axis:
+                neighbour = layer(values, face - 1 if side.high else face + 1)
+                outside = np.where(side.outlet, at_face * leaves, 2.0 * at_face - neighbour)
+                for ghost in (face + 1, face + 2) if side.high else (face - 1, face - 2):
+                    if 0 <= ghost < values.shape[2 - axis]:
+                        layer(values, ghost)[:] = outside
+            else:
+                fixed = np.where(side.mirror < 0.0, 2.0 * side.wall[component], 0.0)
+                for ghost, source in zip(beyond, (*inside, inside[1])):
+                    layer(values, ghost)[:] = mirror * layer(values, source) + fixed

@@ -1,0 +1,219 @@
+"""The grid: a box of equal cells, velocities on their faces, everything else at their centres.
+
+Index order is `[k, j, i]` for `(z, y, x)` everywhere, x running fastest: a cell field has the shape
+`(nz, ny, nx)`, which is also the order of the output files. Users pass and receive cell fields as
+`(nz, ny, nx)` and vectors at cells as `(nz, ny, nx, 3)`; points are `(N, 3)` with columns x, y, z.
+
+Inside the solver fields carry ghost cells, `LOW` below and `HIGH` above in every direction, and vectors have
+their component first: `(3, nz + 5, ny + 5, nx + 5)`. Component d of a velocity at padded index p sits on the
+*low* d-face of cell p; the face on the high side of the box is therefore the low face of the first ghost cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cfddem.errors import InputError
+from cfddem.kernels import prange, threaded
+
+Array = NDArray[np.float64]
+Region = Callable[[Array, Array, Array], NDArray[np.bool_]]
+"""Answers, for coordinates x, y, z [m] that broadcast, which points belong to the region."""
+
+LOW, HIGH = 2, 3
+"""Ghost layers: a limited flux looks two faces upstream, on the high boundary face from one face further out."""
+
+UNIT = ((0, 0, 1), (0, 1, 0), (1, 0, 0))
+"""Index step (k, j, i) along x, y, z."""
+
+AT_FACES = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]])
+AT_CENTRES = np.full((1, 3), 0.5)
+"""Where in its cell a component is stored, in cell widths along x, y, z."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A box of nx x ny x nz equal cells, some of which may be solid.
+
+    cells    nx, ny, nz; 1 makes the problem two-dimensional
+    spacing  hx, hy, hz of a cell [m]; need not be equal
+    origin   corner of the box with the lowest x, y, z [m]
+    solid    (nz, ny, nx) true where a cell is filled with wall, or None
+    """
+
+    cells: tuple[int, int, int]
+    spacing: tuple[float, float, float]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    solid: NDArray[np.bool_] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if len(self.cells) != 3 or any(int(n) != n or n < 1 for n in self.cells):
+            raise InputError("grid.cells", self.cells, "three whole numbers of at least 1")
+        if len(self.spacing) != 3 or not all(np.isfinite(h) and h > 0 for h in self.spacing):
+            raise InputError("grid.spacing", self.spacing, "three positive lengths in m")
+        object.__setattr__(self, "cells", tuple(int(n) for n in self.cells))
+        object.__setattr__(self, "spacing", tuple(float(h) for h in self.spacing))
+        object.__setattr__(self, "origin", tuple(float(x) for x in self.origin))
+        if self.solid is not None:
+            solid = np.ascontiguousarray(self.solid, dtype=bool)
+            if solid.shape != self.shape:
+                raise InputError("grid.solid", solid.shape, f"an array of shape (nz, ny, nx) = {self.shape}")
+            if solid.all():
+                raise InputError("grid.solid", None, "open in at least one cell", "the mask fills the whole box")
+            object.__setattr__(self, "solid", solid if solid.any() else None)
+
+    @classmethod
+    def of_size(
+        cls,
+        size: Sequence[float],
+        cell: float | Sequence[float],
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        solid: Region | None = None,
+    ) -> Grid:
+        """The grid that fills a box with cells of a given size.
+
+        size     edge lengths of the box along x, y, z [m]
+        cell     edge of a cube, or three edges [m]; must divide the box to within 1e-6
+        origin   lowest corner [m]
+        solid    region that is wall; a cell is solid if its centre lies in it
+        returns  Grid
+        errors   InputError where the cells do not fit the box
+        """
+        lengths = np.asarray(size, dtype=float)
+        widths = np.broadcast_to(np.asarray(cell, dtype=float), (3,))
+        if lengths.shape != (3,) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
+            raise InputError("grid.size", tuple(lengths), "three positive lengths in m")
+        if not (np.isfinite(widths).all() and (widths > 0).all()):
+            raise InputError("grid.cell", tuple(widths), "positive, in m")
+        counts = np.maximum(np.rint(lengths / widths), 1.0)
+        for name, length, width, count in zip("xyz", lengths, widths, counts):
+            if abs(count * width - length) > 1e-6 * length:
+                raise InputError(
+                    "grid.cell",
+                    float(width),
+                    f"a whole fraction of the box, {length:g} m along {name}",
+                    f"{length / count:.6g} m fits {int(count)} times",
+                )
+        grid = cls(
+            tuple(int(n) for n in counts),  # type: ignore[arg-type]
+            tuple(float(length / n) for length, n in zip(lengths, counts)),  # type: ignore[arg-type]
+            tuple(float(x) for x in origin),  # type: ignore[arg-type]
+        )
+        return grid if solid is None else grid.with_solid(solid)
+
+    def with_solid(self, region: Region) -> Grid:
+        """The same grid with every cell solid whose centre lies in `region`."""
+        inside = np.broadcast_to(region(*self.centres()), self.shape)
+        return Grid(self.cells, self.spacing, self.origin, np.array(inside, dtype=bool))
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """(nz, ny, nx)."""
+        return self.cells[2], self.cells[1], self.cells[0]
+
+    @property
+    def padded_shape(self) -> tuple[int, int, int]:
+        """Shape of a cell field with its ghost cells."""
+        nz, ny, nx = self.shape
+        return nz + LOW + HIGH, ny + LOW + HIGH, nx + LOW + HIGH
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Edge lengths of the box [m]."""
+        return tuple(n * h for n, h in zip(self.cells, self.spacing))  # type: ignore[return-value]
+
+    @property
+    def cell_volume(self) -> float:
+        """Volume of a cell [m3]."""
+        return self.spacing[0] * self.spacing[1] * self.spacing[2]
+
+    @property
+    def open(self) -> NDArray[np.bool_]:
+        """(nz, ny, nx) true where a cell holds fluid."""
+        return np.ones(self.shape, dtype=bool) if self.solid is None else ~self.solid
+
+    def face_area(self, axis: int) -> float:
+        """Area of a face normal to axis 0, 1, 2 = x, y, z [m2]."""
+        return self.cell_volume / self.spacing[axis]
+
+    def centres(self) -> tuple[Array, Array, Array]:
+        """Coordinates of cell centres [m], three arrays that broadcast to (nz, ny, nx)."""
+        return self._coordinates((0.5, 0.5, 0.5), self.cells)
+
+    def faces(self, axis: int) -> tuple[Array, Array, Array]:
+        """Coordinates of the faces normal to `axis` [m], both boundary faces included, ready to broadcast."""
+        offset = [0.5, 0.5, 0.5]
+        offset[axis] = 0.0
+        counts = list(self.cells)
+        counts[axis] += 1
+        return self._coordinates(tuple(offset), tuple(counts))
+
+    def _coordinates(self, offset: Sequence[float], counts: Sequence[int]) -> tuple[Array, Array, Array]:
+        lines = [x0 + h * (np.arange(n) + o) for x0, h, n, o in zip(self.origin, self.spacing, counts, offset)]
+        return lines[0][None, None, :], lines[1][None, :, None], lines[2][:, None, None]
+
+    def inner(self, padded: Array) -> Array:
+        """View of a padded field (last three axes) without its ghost cells."""
+        nz, ny, nx = self.shape
+        return padded[..., LOW : LOW + nz, LOW : LOW + ny, LOW : LOW + nx]
+
+    def inner_faces(self, padded: Array, axis: int) -> Array:
+        """View of one padded velocity component on the faces of the box, both boundaries included."""
+        counts = list(self.shape)
+        counts[2 - axis] += 1
+        nz, ny, nx = counts
+        return padded[LOW : LOW + nz, LOW : LOW + ny, LOW : LOW + nx]
+
+
+def outside_cylinder(centre: Sequence[float], radius: float, axis: int = 2) -> Region:
+    """Region outside an endless cylinder along `axis` through the point `centre` [m]: the wall of a pipe."""
+    return outside_cone(centre, (0.0, 1.0), (radius, radius), axis)
+
+
+def outside_cone(
+    centre: Sequence[float], heights: tuple[float, float], radii: tuple[float, float], axis: int = 2
+) -> Region:
+    """Region outside a cone frustum, continued as cylinders below and above it.
+
+    centre   a point on the axis [m]
+    heights  coordinates along the axis where the cone begins and ends [m]
+    radii    its radius at these two places [m]
+    axis     0, 1, 2 for x, y, z
+    """
+
+    def region(*coordinates: Array) -> NDArray[np.bool_]:
+        across = [d for d in range(3) if d != axis]
+        distance = np.sqrt(sum((coordinates[d] - centre[d]) ** 2 for d in across))
+        return np.asarray(distance > np.interp(coordinates[axis], heights, radii))
+
+    return region
+
+
+@threaded
+def sample(fields, place, points, origin, inverse_spacing, values):
+    """Tri-linear values of padded fields at points.
+
+    fields  (m, nz+5, ny+5, nx+5), ghosts filled; place (m, 3) where in its cell each field sits;
+    points (N, 3) [m], taken at the edge of the ghosts where they lie outside; values (N, m) is written.
+    """
+    nz, ny, nx = fields.shape[1:]
+    for n in prange(points.shape[0]):
+        x = (points[n, 0] - origin[0]) * inverse_spacing[0] + LOW
+        y = (points[n, 1] - origin[1]) * inverse_spacing[1] + LOW
+        z = (points[n, 2] - origin[2]) * inverse_spacing[2] + LOW
+        for m in range(fields.shape[0]):
+            a = min(max(x - place[m, 0], 0.0), nx - 1.001)
+            b = min(max(y - place[m, 1], 0.0), ny - 1.001)
+            c = min(max(z - place[m, 2], 0.0), nz - 1.001)
+            i, j, k = int(a), int(b), int(c)
+            a, b, c = a - i, b - j, c - k
+            f = fields[m]
+            low = (1 - b) * ((1 - a) * f[k, j, i] + a * f[k, j, i + 1])
+            low += b * ((1 - a) * f[k, j + 1, i] + a * f[k, j + 1, i + 1])
+            high = (1 - b) * ((1 - a) * f[k + 1, j, i] + a * f[k + 1, j, i + 1])
+            high += b * ((1 - a) * f[k + 1, j + 1, i] + a * f[k + 1, j + 1, i + 1])
+            values[n, m] = (1 - c) * low + c * high

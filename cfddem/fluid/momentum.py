@@ -1,0 +1,323 @@
+r"""Momentum of the fluid, averaged over volumes that hold many particles; voidage eps, velocity u between them.
+
+Continuity, the same in both models, with the time derivative kept:
+
+.. math:: \partial_t\varepsilon + \nabla\cdot(\varepsilon u) = 0
+
+Gravity is taken into the pressure, :math:`p' = p - \rho\, g\cdot x`, so that a fluid at rest is at rest to the
+last bit. The viscous stress of both models is :math:`\tau = \mu(\nabla u + \nabla u^T - \tfrac23 \nabla\cdot u)`.
+
+**Model A**: pressure and gravity are shared between the phases by volume.
+
+.. math:: \partial_t(\rho\varepsilon u) + \nabla\cdot(\rho\varepsilon u u) = -\varepsilon\nabla p_A
+          + \varepsilon\rho g + \nabla\cdot(\varepsilon\tau) + \beta_A(v-u) + s
+          \quad\text{with}\quad -\varepsilon\nabla p_A + \varepsilon\rho g = -\varepsilon\nabla p_A'
+
+**Model B**: the whole pressure gradient stays with the fluid, particles feel the buoyancy of the displaced
+weight, :math:`-\rho V g`, whose reaction :math:`(1-\varepsilon)\rho g` the fluid gets, and a larger drag.
+
+.. math:: \partial_t(\rho\varepsilon u) + \nabla\cdot(\rho\varepsilon u u) = -\nabla p_B
+          + \varepsilon\rho g + (1-\varepsilon)\rho g + \nabla\cdot(\varepsilon\tau) + \beta_B(v-u) + s
+          \quad\text{with}\quad -\nabla p_B + \rho g = -\nabla p_B',\ \ \beta_B = \beta_A/\varepsilon
+
+Here v is the velocity of the particles, s a source per volume. The coefficient beta [kg/m3/s] handed to the
+solver is the one of the model chosen. With uniform eps and no drag both give the same velocities, and
+:math:`p_B' = \varepsilon p_A'`. Where eps varies, :math:`-\varepsilon\nabla p = -\nabla(\varepsilon p) + p\nabla\varepsilon`:
+the second part is what model A hands to the particles, and a ledger of the fluid must count it.
+
+In time (step h, from n to n+1) storage is centred, convection and viscous stress follow Heun's two stages,
+the pressure is the one that makes the new velocity satisfy continuity, and drag acts on
+:math:`u_\theta = \theta u^{n+1} + (1-\theta)u^n` with :math:`\theta = (1+z)/(2+z)`, :math:`z=\beta h/(\varepsilon\rho)`: second order for
+small z, fully implicit for large z; a velocity relaxes by 1/(1 + z + z^2/2), never past its target.
+"""
+
+from __future__ import annotations
+
+from cfddem.fluid.grid import LOW, UNIT
+from cfddem.kernels import inline, prange, threaded
+
+# ---------------------------------------------------------------- terms, one function each
+
+
+@inline
+def carried(flux, far_low, low, high, far_high, central):
+    """Volume flux times the value it carries through a face: central, or upwind with the MC limiter."""
+    upstream = low if flux > 0.0 else high
+    ahead = high - low if flux > 0.0 else low - high
+    behind = low - far_low if flux > 0.0 else high - far_high
+    mean = 0.5 * (ahead + behind)
+    steepest = min(0.5 * abs(mean), min(abs(ahead), abs(behind)))
+    limited = steepest if mean > 0.0 else -steepest
+    slope = 2.0 * limited if ahead * behind > 0.0 else 0.0
+    return flux * (upstream + 0.5 * (central * ahead + (1.0 - central) * slope))
+
+
+@inline
+def normal_stress(viscosity, low, high, inverse_spacing, dilatation):
+    """eps tau_nn at a cell centre; viscosity is eps mu."""
+    return viscosity * (2.0 * (high - low) * inverse_spacing - (2.0 / 3.0) * dilatation)
+
+
+@inline
+def shear_stress(viscosity, low, high, inverse_across, cross_low, cross_high, inverse_along):
+    """eps tau_nt at an edge: gradient of the velocity across the edge and of its partner along it."""
+    return viscosity * ((high - low) * inverse_across + (cross_high - cross_low) * inverse_along)
+
+
+@inline
+def implicitness(stiffness):
+    """theta of the drag; 1/2 for weak, 1 for stiff drag."""
+    return (1.0 + stiffness) / (2.0 + stiffness)
+
+
+@inline
+def slip_weight(face_voidage, cell_voidage, model_b):
+    r"""How strongly the drag of a cell acts on a face that it shares with a cell of other voidage.
+
+    The flux eps (u - v) is continuous through the face, so the slip inside the cell is that of the face times
+    w = eps_face/eps_cell. The pressure drop in that half of the momentum cell is drag/eps_cell (model A), acting
+    on eps_face of the face: together w^2; in model B the drop is the drag itself: w. For smooth voidage both
+    average to 1 to second order, and across a jump the pressure drop of a fixed bed is that of its two halves.
+    """
+    share = face_voidage / cell_voidage
+    return share * (share + model_b * (1.0 - share))
+
+
+# ---------------------------------------------------------------- loops
+
+
+@inline
+def _row(field, k, j, start, count):
+    return field[k, j, start : start + count]
+
+
+@threaded
+def transport(velocity, voidage, viscosity, buried, density, inverse, central, flux, dilatation, rate):
+    """rate = div(eps tau) - div(rho eps u u) on every face of the box; also writes flux = eps u and div u.
+
+    velocity, flux, rate (3, ...), voidage, viscosity (eps mu [Pa s]), dilatation padded cell fields;
+    buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half way;
+    inverse 1/spacing along x, y, z [1/m].
+    """
+    pz, py, px = voidage.shape
+    count = px - 1
+    for k in prange(1, pz):
+        for j in range(1, py):
+            for d in range(3):
+                dk, dj, di = UNIT[d]
+                here, before = _row(voidage, k, j, 1, count), _row(voidage, k - dk, j - dj, 1 - di, count)
+                out, u = _row(flux[d], k, j, 1, count), _row(velocity[d], k, j, 1, count)
+                for i in range(count):
+                    out[i] = 0.5 * (here[i] + before[i]) * u[i]
+            if k < pz - 1 and j < py - 1:
+                out = _row(dilatation, k, j, 1, count - 1)
+                u0, u1 = _row(velocity[0], k, j, 1, count - 1), _row(velocity[0], k, j, 2, count - 1)
+                v0, v1 = _row(velocity[1], k, j, 1, count - 1), _row(velocity[1], k, j + 1, 1, count - 1)
+                w0, w1 = _row(velocity[2], k, j, 1, count - 1), _row(velocity[2], k + 1, j, 1, count - 1)
+                for i in range(count - 1):
+                    out[i] = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
+    # The high boundary face of a direction is the low face of the first ghost cell: one more than cells.
+    n = px - 2 * LOW
+    for k in prange(LOW, pz - LOW):
+        for j in range(LOW, py - LOW):
+            for d in range(3):
+                out = _row(rate[d], k, j, LOW, n)
+                for i in range(n):
+                    out[i] = 0.0
+                for e in range(3):
+                    if e == d:
+                        _along(
+                            out, velocity[d], flux[d], viscosity, dilatation, k, j, n, d, density, inverse[d], central
+                        )
+                    else:
+                        _across(
+                            out, velocity[d], velocity[e], flux[e], viscosity, buried[d], k, j, n, d, e,
+                            density, inverse[e], inverse[d], central,
+                        )  # fmt: skip
+
+
+@inline
+def _along(out, u, flux, viscosity, dilatation, k, j, n, d, density, inverse, central):
+    """Add the balance over the two momentum faces normal to the component; they lie at cell centres."""
+    dk, dj, di = UNIT[d]
+    u0, u1 = _row(u, k - 2 * dk, j - 2 * dj, LOW - 2 * di, n), _row(u, k - dk, j - dj, LOW - di, n)
+    u2, u3 = _row(u, k, j, LOW, n), _row(u, k + dk, j + dj, LOW + di, n)
+    u4 = _row(u, k + 2 * dk, j + 2 * dj, LOW + 2 * di, n)
+    f1, f2 = _row(flux, k - dk, j - dj, LOW - di, n), _row(flux, k, j, LOW, n)
+    f3 = _row(flux, k + dk, j + dj, LOW + di, n)
+    m1, m2 = _row(viscosity, k - dk, j - dj, LOW - di, n), _row(viscosity, k, j, LOW, n)
+    t1, t2 = _row(dilatation, k - dk, j - dj, LOW - di, n), _row(dilatation, k, j, LOW, n)
+    for i in range(n):
+        inflow = carried(0.5 * (f1[i] + f2[i]), u0[i], u1[i], u2[i], u3[i], central)
+        outflow = carried(0.5 * (f2[i] + f3[i]), u1[i], u2[i], u3[i], u4[i], central)
+        pull_low = normal_stress(m1[i], u1[i], u2[i], inverse, t1[i])
+        pull_high = normal_stress(m2[i], u2[i], u3[i], inverse, t2[i])
+        out[i] += ((pull_high - pull_low) - density * (outflow - inflow)) * inverse
+
+
+@inline
+def _across(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_e, inverse_d, central):
+    """Add the balance over the two momentum faces tangential to the component u_d; v = u_e, edges along both."""
+    dk, dj, di = UNIT[d]
+    ek, ej, ei = UNIT[e]
+    u0, u1 = _row(u, k - 2 * ek, j - 2 * ej, LOW - 2 * ei, n), _row(u, k - ek, j - ej, LOW - ei, n)
+    u2, u3 = _row(u, k, j, LOW, n), _row(u, k + ek, j + ej, LOW + ei, n)
+    u4 = _row(u, k + 2 * ek, j + 2 * ej, LOW + 2 * ei, n)
+    wall_low, wall_high = _row(buried, k - ek, j - ej, LOW - ei, n), _row(buried, k + ek, j + ej, LOW + ei, n)
+    f_right, f_left = _row(flux, k, j, LOW, n), _row(flux, k - dk, j - dj, LOW - di, n)
+    f_right_up = _row(flux, k + ek, j + ej, LOW + ei, n)
+    f_left_up = _row(flux, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+    v_right, v_left = _row(v, k, j, LOW, n), _row(v, k - dk, j - dj, LOW - di, n)
+    v_right_up = _row(v, k + ek, j + ej, LOW + ei, n)
+    v_left_up = _row(v, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+    m_right, m_left = _row(viscosity, k, j, LOW, n), _row(viscosity, k - dk, j - dj, LOW - di, n)
+    m_right_up = _row(viscosity, k + ek, j + ej, LOW + ei, n)
+    m_left_up = _row(viscosity, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+    m_right_down = _row(viscosity, k - ek, j - ej, LOW - ei, n)
+    m_left_down = _row(viscosity, k - dk - ek, j - dj - ej, LOW - di - ei, n)
+    for i in range(n):
+        centre = u2[i]
+        inflow = carried(0.5 * (f_right[i] + f_left[i]), u0[i], u1[i], centre, u3[i], central)
+        outflow = carried(0.5 * (f_right_up[i] + f_left_up[i]), u1[i], centre, u3[i], u4[i], central)
+        # A face buried in solid holds zero; mirrored, it puts the no-slip wall half way.
+        low, high = u1[i] - wall_low[i] * centre, u3[i] - wall_high[i] * centre
+        edge = m_right[i] + m_left[i]
+        m_low, m_high = 0.25 * (edge + m_right_down[i] + m_left_down[i]), 0.25 * (edge + m_right_up[i] + m_left_up[i])
+        drag_low = shear_stress(m_low, low, centre, inverse_e, v_left[i], v_right[i], inverse_d)
+        drag_high = shear_stress(m_high, centre, high, inverse_e, v_left_up[i], v_right_up[i], inverse_d)
+        out[i] += ((drag_high - drag_low) - density * (outflow - inflow)) * inverse_e
+
+
+@threaded
+def predict(
+    old, rate_a, rate_b, weight_b, pressure, stored, voidage, drag, drag_momentum, source, driving, solved,
+    density, step, inverse, model_b, new, mobility,
+):  # fmt: skip
+    """Velocity after the step with the pressure as it is, and its mobility: velocity lost per pressure gradient.
+
+    old, new, mobility (3, ...) velocities [m/s] and [m2 s/kg]; rate_a, rate_b (3, ...) results of `transport`, the
+    second counting weight_b; pressure p' [Pa]; stored, voidage: voidage in storage at the old and the new velocity;
+    drag beta [kg/m3/s], drag_momentum beta v and source [N/m3], cell fields; driving mean pressure fall [Pa/m];
+    solved (3, ...) 1 where the velocity of a face is an unknown.
+    """
+    pz, py, px = voidage.shape
+    n = px - 2 * LOW
+    for k in prange(LOW, pz - LOW):
+        for j in range(LOW, py - LOW):
+            for d in range(3):
+                dk, dj, di = UNIT[d]
+                e_right, e_left = _row(voidage, k, j, LOW, n), _row(voidage, k - dk, j - dj, LOW - di, n)
+                s_right, s_left = _row(stored, k, j, LOW, n), _row(stored, k - dk, j - dj, LOW - di, n)
+                b_right, b_left = _row(drag, k, j, LOW, n), _row(drag, k - dk, j - dj, LOW - di, n)
+                v = drag_momentum[d]
+                v_right, v_left = _row(v, k, j, LOW, n), _row(v, k - dk, j - dj, LOW - di, n)
+                x = source[d]
+                x_right, x_left = _row(x, k, j, LOW, n), _row(x, k - dk, j - dj, LOW - di, n)
+                p_right, p_left = _row(pressure, k, j, LOW, n), _row(pressure, k - dk, j - dj, LOW - di, n)
+                first, second = _row(rate_a[d], k, j, LOW, n), _row(rate_b[d], k, j, LOW, n)
+                u, out, ease = _row(old[d], k, j, LOW, n), _row(new[d], k, j, LOW, n), _row(mobility[d], k, j, LOW, n)
+                free = _row(solved[d], k, j, LOW, n)
+                for i in range(n):
+                    face = 0.5 * (e_right[i] + e_left[i])
+                    right, left = slip_weight(face, e_right[i], model_b), slip_weight(face, e_left[i], model_b)
+                    beta = 0.5 * (right * b_right[i] + left * b_left[i])
+                    beta_v = 0.5 * (right * v_right[i] + left * v_left[i])
+                    inertia = density * face
+                    theta = implicitness(beta * step / inertia)
+                    gradient = (p_right[i] - p_left[i]) * inverse[d]
+                    share = face + model_b * (1.0 - face)
+                    momentum = (
+                        density * 0.5 * (s_right[i] + s_left[i]) * u[i]
+                        + step * ((1.0 - weight_b) * first[i] + weight_b * second[i])  # convection, viscous stress
+                        - step * share * gradient  # pressure, gravity within
+                        + step * share * driving[d]
+                        + step * 0.5 * (x_right[i] + x_left[i])
+                        + step * (beta_v - (1.0 - theta) * beta * u[i])  # drag, its explicit part
+                    )
+                    inertia += step * theta * beta  # drag, its implicit part
+                    out[i] = momentum / inertia if free[i] > 0.0 else u[i]
+                    ease[i] = free[i] * step * share / inertia
+
+
+@threaded
+def gather(velocity, mobility, voidage, rate, fresh, periodic, areas, inverse, ax, ay, az, anchor, b):
+    """Right-hand side of the pressure equation and, if fresh, its coefficients.
+
+    b = -(V d eps/dt + outflow of eps u) of every cell [m3/s]; rate is V d eps/dt of the open cells [m3/s].
+    """
+    nz, ny, nx = b.shape
+    for k in prange(nz):
+        for j in range(ny):
+            for i in range(nx):
+                outflow, held = rate[k, j, i], 0.0
+                kk, jj, ii = k + LOW, j + LOW, i + LOW
+                here = voidage[kk, jj, ii]
+                for d in range(3):
+                    dk, dj, di = UNIT[d]
+                    below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here)
+                    above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
+                    outflow += areas[d] * (
+                        above * velocity[d, kk + dk, jj + dj, ii + di] - below * velocity[d, kk, jj, ii]
+                    )
+                    if fresh:
+                        a_below = below * mobility[d, kk, jj, ii] * areas[d] * inverse[d]
+                        a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
+                        place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
+                        # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
+                        if not periodic[d] and place == 0:
+                            held += 2.0 * a_below
+                            a_below = 0.0
+                        if not periodic[d] and place == cells - 1:
+                            held += 2.0 * a_above
+                        if cells == 1:
+                            a_below = 0.0
+                        if d == 0:
+                            ax[k, j, i] = a_below
+                        elif d == 1:
+                            ay[k, j, i] = a_below
+                        else:
+                            az[k, j, i] = a_below
+                b[k, j, i] = -outflow
+                if fresh:
+                    anchor[k, j, i] = held
+
+
+@threaded
+def correct(new, mobility, correction, inverse):
+    """Take the gradient of the pressure correction from the velocity."""
+    pz, py, px = correction.shape
+    n = px - 2 * LOW
+    for k in prange(LOW, pz - LOW):
+        for j in range(LOW, py - LOW):
+            for d in range(3):
+                dk, dj, di = UNIT[d]
+                right, left = _row(correction, k, j, LOW, n), _row(correction, k - dk, j - dj, LOW - di, n)
+                out, ease = _row(new[d], k, j, LOW, n), _row(mobility[d], k, j, LOW, n)
+                for i in range(n):
+                    out[i] -= ease[i] * ((right[i] - left[i]) * inverse[d])
+
+
+@threaded
+def clocks(velocity, voidage, viscosity, open_cells, density, inverse, advection, diffusion, fastest):
+    """Plane by plane the largest |u|/h summed over directions [1/s], viscous rate [1/s] and eps |u| [m/s].
+
+    viscosity is eps mu; the viscous rate takes the thickest neighbour of the thinnest cell, 2 mu (sum 1/h^2)/rho eps.
+    """
+    nz, ny, nx = open_cells.shape
+    squares = 2.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
+    for k in prange(nz):
+        turnover, spreading, flux = 0.0, 0.0, 0.0
+        for j in range(ny):
+            for i in range(nx):
+                kk, jj, ii = k + LOW, j + LOW, i + LOW
+                crossing, thickest = 0.0, viscosity[kk, jj, ii]
+                for d in range(3):
+                    dk, dj, di = UNIT[d]
+                    speed = max(abs(velocity[d, kk, jj, ii]), abs(velocity[d, kk + dk, jj + dj, ii + di]))
+                    crossing += speed * inverse[d]
+                    flux = max(flux, speed * voidage[kk, jj, ii])
+                    around = max(viscosity[kk - dk, jj - dj, ii - di], viscosity[kk + dk, jj + dj, ii + di])
+                    thickest = max(thickest, around)
+                turnover = max(turnover, crossing)
+                spreading = max(spreading, open_cells[k, j, i] * thickest * squares / (density * voidage[kk, jj, ii]))
+        advection[k], diffusion[k], fastest[k] = turnover, spreading, flux

@@ -1,0 +1,328 @@
+"""The pressure equation: conjugate gradients, preconditioned by a small geometric multigrid.
+
+In every cell, with a face coefficient a >= 0 between neighbours and an anchor d >= 0 to a known pressure,
+
+    sum over faces  a_f (p - p_neighbour)  +  d p  =  b.
+
+A coefficient of zero is a wall; a cell without any coefficient is solid and keeps p = 0, so that masks cost
+nothing. Indices wrap around the box: the low face of the first cell is the periodic face, and its coefficient
+is zero where the box is not periodic. If no cell of a connected region is anchored its mean pressure is free;
+the mean of b is removed there and the pressure returned with mean zero.
+
+Multigrid: cells are agglomerated by two along the directions of strong coupling, transfer is piecewise
+constant, coarse coefficients are sums of the fine ones halved across the merged direction (which makes up for
+the piecewise constant transfer), and Gauss-Seidel sweeps by colours run forward before and backward after the
+coarse correction, so that the preconditioner is symmetric.
+
+Sums are taken plane by plane and then over the planes in order: the bits do not depend on the thread count.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cfddem.errors import RunFailed
+from cfddem.fluid.grid import Array, Grid
+from cfddem.kernels import inline, prange, threaded
+
+STRONG = 0.3
+"""Directions whose coupling exceeds this share of the strongest are coarsened together."""
+
+COARSEST = 32
+"""Cells below which the multigrid stops coarsening and sweeps until converged."""
+
+
+@inline
+def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
+    nz, ny, nx = x.shape
+    below, above = (k - 1) % nz, (k + 1) % nz
+    new = np.empty(nx)
+    # Of one colour only the first and the last row can be neighbours: backward takes the last one first.
+    shift = ny - 1 if backward else 0
+    for count in range(ny):
+        j = (count + shift) % ny
+        front, back = (j - 1) % ny, (j + 1) % ny
+        here, west, rhs, invert = x[k, j], ax[k, j], b[k, j], inverse[k, j]
+        south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
+        a_south, a_north, a_down, a_up = ay[k, j], ay[k, back], az[k, j], az[above, j]
+        for i in range(nx):
+            new[i] = (rhs[i] + a_south[i] * south[i] + a_north[i] * north[i]) + (a_down[i] * down[i] + a_up[i] * up[i])
+        for i in range(1, nx - 1):
+            new[i] = (new[i] + west[i] * here[i - 1] + west[i + 1] * here[i + 1]) * invert[i]
+        parity = (k + j + colour) & 1
+        # The ends of a row may see each other across a periodic boundary: one after the other.
+        for count_end in range(min(2, nx)):
+            i = nx - 1 if (count_end == 1) != backward else 0
+            if (i & 1) == parity:
+                sides = west[i] * here[(i - 1) % nx] + west[(i + 1) % nx] * here[(i + 1) % nx]
+                here[i] = (new[i] + sides) * invert[i]
+        for i in range(1, nx - 1):
+            here[i] = new[i] if (i & 1) == parity else here[i]
+
+
+@threaded
+def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
+    """Gauss-Seidel by colours in place; backward is the exact transpose of forward."""
+    nz = x.shape[0]
+    # With an odd number of planes the last and the first have the same colour and may be periodic neighbours.
+    together = nz - (nz & 1)
+    for half in range(2 * sweeps):
+        colour = (half + 1) & 1 if backward else half & 1
+        if backward and together < nz:
+            _relax_plane(nz - 1, colour, backward, x, b, ax, ay, az, inverse)
+        for k in prange(together):
+            _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse)
+        if not backward and together < nz:
+            _relax_plane(nz - 1, colour, backward, x, b, ax, ay, az, inverse)
+
+
+@inline
+def _apply_row(k, j, x, ax, ay, az, diagonal, out):
+    nz, ny, nx = x.shape
+    below, above, front, back = (k - 1) % nz, (k + 1) % nz, (j - 1) % ny, (j + 1) % ny
+    here, west, diag = x[k, j], ax[k, j], diagonal[k, j]
+    south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
+    a_south, a_north, a_down, a_up = ay[k, j], ay[k, back], az[k, j], az[above, j]
+    for i in range(nx):
+        out[i] = (diag[i] * here[i] - a_south[i] * south[i] - a_north[i] * north[i]) - (
+            a_down[i] * down[i] + a_up[i] * up[i]
+        )
+    for i in range(1, nx - 1):
+        out[i] -= west[i] * here[i - 1] + west[i + 1] * here[i + 1]
+    out[0] -= west[0] * here[nx - 1] + west[1 % nx] * here[1 % nx]
+    if nx > 1:
+        out[nx - 1] -= west[nx - 1] * here[nx - 2] + west[0] * here[0]
+
+
+@threaded
+def restrict_residual(x, b, ax, ay, az, diagonal, factors, coarse_b):
+    """Residual of a level, summed over the cells that make one coarse cell."""
+    nz, ny, nx = x.shape
+    fx, fy, fz = factors[0], factors[1], factors[2]
+    for kc in prange(coarse_b.shape[0]):
+        row = np.empty(nx)
+        for jc in range(coarse_b.shape[1]):
+            target = coarse_b[kc, jc]
+            target[:] = 0.0
+            for k in range(kc * fz, min(kc * fz + fz, nz)):
+                for j in range(jc * fy, min(jc * fy + fy, ny)):
+                    _apply_row(k, j, x, ax, ay, az, diagonal, row)
+                    for i in range(nx):
+                        row[i] = b[k, j, i] - row[i]
+                    if fx == 1:
+                        for i in range(nx):
+                            target[i] += row[i]
+                    else:
+                        for i in range(nx // 2):
+                            target[i] += row[2 * i] + row[2 * i + 1]
+                        if nx & 1:
+                            target[nx // 2] += row[nx - 1]
+
+
+@threaded
+def prolong(coarse_x, factors, x):
+    """Add the coarse correction to every cell below it."""
+    nz, ny, nx = x.shape
+    for k in prange(nz):
+        for j in range(ny):
+            source = coarse_x[k // factors[2], j // factors[1]]
+            for i in range(nx):
+                x[k, j, i] += source[i // factors[0]]
+
+
+@threaded
+def coarsen(ax, ay, az, anchor, factors, cx, cy, cz, coarse_anchor):
+    """Coefficients of a coarse level from those of the finer one."""
+    nz, ny, nx = ax.shape
+    fx, fy, fz = factors[0], factors[1], factors[2]
+    for kc in prange(cx.shape[0]):
+        for jc in range(cx.shape[1]):
+            for ic in range(cx.shape[2]):
+                sx = sy = sz = held = 0.0
+                for k in range(kc * fz, min(kc * fz + fz, nz)):
+                    for j in range(jc * fy, min(jc * fy + fy, ny)):
+                        sx += ax[k, j, ic * fx]
+                        for i in range(ic * fx, min(ic * fx + fx, nx)):
+                            held += anchor[k, j, i]
+                for j in range(jc * fy, min(jc * fy + fy, ny)):
+                    for i in range(ic * fx, min(ic * fx + fx, nx)):
+                        sz += az[kc * fz, j, i]
+                for k in range(kc * fz, min(kc * fz + fz, nz)):
+                    for i in range(ic * fx, min(ic * fx + fx, nx)):
+                        sy += ay[k, jc * fy, i]
+                # A single coarse cell is its own periodic neighbour: no coupling is left.
+                cx[kc, jc, ic] = sx / fx if cx.shape[2] > 1 else 0.0
+                cy[kc, jc, ic] = sy / fy if cx.shape[1] > 1 else 0.0
+                cz[kc, jc, ic] = sz / fz if cx.shape[0] > 1 else 0.0
+                coarse_anchor[kc, jc, ic] = 0.5 * held
+
+
+@threaded
+def invert_diagonal(ax, ay, az, anchor, diagonal, inverse):
+    """Diagonal of a level and its inverse, zero in solid cells."""
+    nz, ny, nx = ax.shape
+    for k in prange(nz):
+        for j in range(ny):
+            for i in range(nx):
+                sides = ax[k, j, i] + ax[k, j, (i + 1) % nx] + ay[k, j, i] + ay[k, (j + 1) % ny, i]
+                total = sides + az[k, j, i] + az[(k + 1) % nz, j, i] + anchor[k, j, i]
+                diagonal[k, j, i] = total
+                inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
+
+
+@threaded
+def apply(x, ax, ay, az, diagonal, out, sums):
+    """out = L x; sums[k] is the part of x.Lx in plane k."""
+    for k in prange(x.shape[0]):
+        total = 0.0
+        for j in range(x.shape[1]):
+            row = out[k, j]
+            _apply_row(k, j, x, ax, ay, az, diagonal, row)
+            for i in range(row.size):
+                total += x[k, j, i] * row[i]
+        sums[k] = total
+
+
+@threaded
+def descend(length, direction, image, x, residual, largest):
+    """x += length direction, residual -= length image; largest[k] is the largest residual in plane k."""
+    for k in prange(x.shape[0]):
+        most = 0.0
+        for j in range(x.shape[1]):
+            for i in range(x.shape[2]):
+                x[k, j, i] += length * direction[k, j, i]
+                left = residual[k, j, i] - length * image[k, j, i]
+                residual[k, j, i] = left
+                most = max(most, abs(left))
+        largest[k] = most
+
+
+@threaded
+def turn(z, residual, previous, direction, sums, ahead):
+    """Sums of z.residual by planes; with ahead, direction = z + (sum/previous) direction afterwards."""
+    nz, ny, nx = z.shape
+    for k in prange(nz):
+        total = 0.0
+        for j in range(ny):
+            for i in range(nx):
+                total += z[k, j, i] * residual[k, j, i]
+        sums[k] = total
+    product = 0.0
+    for k in range(nz):
+        product += sums[k]
+    share = product / previous if ahead else 0.0
+    for k in prange(nz):
+        for j in range(ny):
+            for i in range(nx):
+                direction[k, j, i] = z[k, j, i] + share * direction[k, j, i]
+
+
+@dataclass
+class Level:
+    """One grid of the hierarchy: coefficients, unknown and right-hand side, all (nz, ny, nx)."""
+
+    shape: tuple[int, int, int]
+    factors: NDArray[np.int64]  # cells merged along x, y, z to make the next coarser grid
+
+    def __post_init__(self) -> None:
+        self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
+        self.diagonal, self.inverse, self.x, self.b = (np.zeros(self.shape) for _ in range(4))
+
+
+class PressureEquation:
+    """The Poisson equation of one grid, its multigrid hierarchy and its conjugate gradients.
+
+    Fill `finest.ax`, `.ay`, `.az` (coefficient of the low face of each cell) and `.anchor`, call `prepare()`,
+    then `solve(b, limit)` as often as these coefficients hold.
+    """
+
+    def __init__(self, grid: Grid, closed_regions: NDArray[np.int64] | None, most_iterations: int = 200) -> None:
+        """grid; closed_regions (nz, ny, nx): 1, 2 ... in regions without anchor, 0 elsewhere, or None."""
+        self.levels = _hierarchy(grid)
+        self.finest = self.levels[0]
+        self.closed_regions = closed_regions
+        self.most_iterations = most_iterations
+        self.residual, self.direction, self.image = (np.zeros(grid.shape) for _ in range(3))
+        self._sums = np.zeros(grid.shape[0])
+
+    def prepare(self) -> None:
+        """Take over the coefficients of the finest grid into the whole hierarchy."""
+        for fine, coarse in zip(self.levels, self.levels[1:]):
+            coarsen(
+                fine.ax, fine.ay, fine.az, fine.anchor, fine.factors, coarse.ax, coarse.ay, coarse.az, coarse.anchor
+            )
+        for level in self.levels:
+            invert_diagonal(level.ax, level.ay, level.az, level.anchor, level.diagonal, level.inverse)
+
+    def solve(self, b: Array, limit: float) -> tuple[Array, int]:
+        """Solve L x = b until the largest residual of any cell is below `limit`.
+
+        b        (nz, ny, nx) right-hand side [m3/s]; zero in solid cells
+        limit    largest residual of any cell [m3/s]
+        returns  x (nz, ny, nx) [Pa] and the number of iterations
+        errors   RunFailed where the iteration does not get there
+        """
+        finest, x = self.finest, np.zeros_like(b)
+        np.copyto(self.residual, b)
+        self._remove_means(self.residual)
+        left = float(np.abs(self.residual).max())
+        product, iterations = 1.0, 0
+        while left > limit:
+            if iterations == self.most_iterations or not np.isfinite(left):
+                raise RunFailed(
+                    f"pressure: residual {left:.3g} m3/s after {iterations} iterations, must be below {limit:.3g}; "
+                    "a smaller step helps if a field has run away, a looser tolerance if it is at round-off"
+                )
+            np.copyto(finest.b, self.residual)
+            self._cycle(0)
+            before, ahead = product, iterations > 0
+            turn(finest.x, self.residual, before, self.direction, self._sums, ahead)
+            product = float(self._sums.sum())
+            apply(self.direction, finest.ax, finest.ay, finest.az, finest.diagonal, self.image, self._sums)
+            length = product / float(self._sums.sum())
+            descend(length, self.direction, self.image, x, self.residual, self._sums)
+            left = float(self._sums.max())
+            iterations += 1
+        self._remove_means(x)
+        return x, iterations
+
+    def _cycle(self, depth: int) -> None:
+        """One V-cycle: sweep forward, correct from the coarser grid, sweep backward."""
+        level = self.levels[depth]
+        system = (level.x, level.b, level.ax, level.ay, level.az)
+        level.x.fill(0.0)
+        if depth == len(self.levels) - 1:
+            smooth(*system, level.inverse, 15, False)
+            smooth(*system, level.inverse, 15, True)
+            return
+        coarse = self.levels[depth + 1]
+        smooth(*system, level.inverse, 2, False)
+        restrict_residual(*system, level.diagonal, level.factors, coarse.b)
+        self._cycle(depth + 1)
+        prolong(coarse.x, level.factors, level.x)
+        smooth(*system, level.inverse, 2, True)
+
+    def _remove_means(self, values: Array) -> None:
+        if self.closed_regions is None:
+            return
+        region = self.closed_regions.ravel()
+        share = np.bincount(region, values.ravel()) / np.maximum(np.bincount(region), 1)
+        share[0] = 0.0
+        values -= share[self.closed_regions]
+
+
+def _hierarchy(grid: Grid) -> list[Level]:
+    """Grids from fine to coarse; only directions of strong coupling are merged (semi-coarsening)."""
+    shape, width = np.array(grid.cells), np.array(grid.spacing)
+    levels = []
+    while True:
+        coupling = np.where(shape > 1, width**-2.0, 0.0)
+        merge = (coupling > STRONG * coupling.max()) & (shape > 1)
+        levels.append(Level((shape[2], shape[1], shape[0]), np.where(merge, 2, 1).astype(np.int64)))
+        if shape.prod() <= COARSEST or not merge.any():
+            return levels
+        shape = np.where(merge, -(-shape // 2), shape)
+        width = np.where(merge, 2 * width, width)
