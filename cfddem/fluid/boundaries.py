@@ -121,7 +121,7 @@ class _Side:
         self.wall = np.zeros(0)  # (3, plane) velocity given on the face
         self.outlet = np.zeros(0, dtype=bool)
         self.pressure = np.zeros(0)
-        self.moving_inlets: list[int] = []
+        self.inlets: list[int] = []
 
     @property
     def inward(self) -> float:
@@ -203,7 +203,7 @@ class Boundaries:
                     )  # fmt: skip
                 if not here.any():
                     raise InputError(f"boundaries.{side.name}", None, "an inlet that covers the centre of some cell")
-                side.moving_inlets.append(number)
+                side.inlets.append(number)
             elif isinstance(condition, NoSlip):
                 velocity = np.asarray(condition.velocity, dtype=float)
                 if velocity.shape != (3,) or not np.isfinite(velocity).all() or velocity[axis] != 0.0:
@@ -238,7 +238,7 @@ class Boundaries:
     def set_inlets(self, time: float, voidage: Array) -> None:
         """Take the inlet velocities of this time; voidage is padded and holds its ghosts."""
         for side in self.sides:
-            for number in side.moving_inlets:
+            for number in side.inlets:
                 here = side.owner == number
                 superficial = self.superficial(side, number, here, time)
                 inside = side.layer(self.grid.inner(voidage), -1 if side.high else 0)[here]
@@ -252,7 +252,7 @@ class Boundaries:
         x, y, z = (c[here] for c in self._points(side))
         given = np.asarray(inlet.velocity(x, y, z, time) if callable(inlet.velocity) else inlet.velocity, dtype=float)
         vector = np.zeros((x.size, 3))
-        if given.ndim == 0 or given.shape == (x.size,) and not (given.shape == (3,) and not callable(inlet.velocity)):
+        if given.ndim == 0 or (given.shape == (x.size,) and not (given.shape == (3,) and not callable(inlet.velocity))):
             vector[:, side.axis] = side.inward * given
         elif given.shape in ((3,), (x.size, 3)):
             vector[:] = given
@@ -286,12 +286,11 @@ class Boundaries:
         for d in range(3):
             n = grid.cells[d]
             both = fluid * np.roll(fluid, 1, axis=2 - d)
-            last = n + LOW if self.periodic[d] else n + LOW + 1
             keep: list[Any] = [slice(LOW, m + LOW + 1) for m in grid.shape]
             for e in range(3):
                 if e != d:
                     keep[2 - e] = slice(LOW, grid.cells[e] + LOW)
-            keep[2 - d] = slice(LOW, last)
+            keep[2 - d] = slice(LOW, n + LOW + 1)
             solved[d][tuple(keep)] = both[tuple(keep)]
             buried[d] = solid * np.roll(solid, 1, axis=2 - d)
         for side in self.sides:
@@ -299,6 +298,13 @@ class Boundaries:
             inside = side.layer(fluid, face - 1 if side.high else face)
             side.layer(solved[side.axis], face)[:] = side.outlet * inside
         return solved, buried
+
+    def blocked_faces(self) -> np.ndarray:
+        """(3, ...) true on faces of which a solid cell is one side."""
+        solid = np.zeros(self.grid.padded_shape, dtype=bool)
+        self.grid.inner(solid)[:] = ~self.grid.open
+        self.fill_cells(solid)
+        return np.stack([solid | np.roll(solid, 1, axis=2 - d) for d in range(3)])
 
     # ------------------------------------------------------------ ghost cells
 
@@ -335,6 +341,18 @@ class Boundaries:
                 held = 0.0 if correction else 2.0 * side.pressure
                 value = held - side.layer(pressure, inside)
                 side.layer(pressure, ghost)[side.outlet] = value[side.outlet]
+
+    def fill_faces(self, vector: Array) -> None:
+        """Ghosts of a face field (3, ...): periodic, or the value of the nearest face."""
+        for axis in range(3):
+            if self.periodic[axis]:
+                self._wrap_axis(vector, axis)
+                continue
+            n = self.grid.cells[axis]
+            for component in range(3):
+                view = np.moveaxis(vector[component], 2 - axis, 0)
+                last = n + LOW if component == axis else n + LOW - 1
+                view[:LOW], view[last + 1 :] = view[LOW], view[last]
 
     def fill_velocity(self, velocity: Array) -> None:
         """Boundary faces and ghosts of a velocity (3, ...)."""

@@ -22,19 +22,22 @@ weight, :math:`-\rho V g`, whose reaction :math:`(1-\varepsilon)\rho g` the flui
 
 Here v is the velocity of the particles, s a source per volume. The coefficient beta [kg/m3/s] handed to the
 solver is the one of the model chosen. With uniform eps and no drag both give the same velocities, and
-:math:`p_B' = \varepsilon p_A'`. Where eps varies, :math:`-\varepsilon\nabla p = -\nabla(\varepsilon p) + p\nabla\varepsilon`:
-the second part is what model A hands to the particles, and a ledger of the fluid must count it.
+:math:`p_B' = \varepsilon p_A'`. Where eps varies, :math:`-\varepsilon\nabla p = -\nabla(\varepsilon p) +
+p\nabla\varepsilon`: the second part is what model A hands to the particles, and a ledger of the fluid must count it.
 
 In time (step h, from n to n+1) storage is centred, convection and viscous stress follow Heun's two stages,
 the pressure is the one that makes the new velocity satisfy continuity, and drag acts on
-:math:`u_\theta = \theta u^{n+1} + (1-\theta)u^n` with :math:`\theta = (1+z)/(2+z)`, :math:`z=\beta h/(\varepsilon\rho)`: second order for
-small z, fully implicit for large z; a velocity relaxes by 1/(1 + z + z^2/2), never past its target.
+:math:`u_\theta = \theta u^{n+1} + (1-\theta)u^n` with :math:`\theta = (1+z)/(2+z)` and
+:math:`z=\beta h/(\varepsilon\rho)`: second order for small z, fully implicit for large z; a velocity relaxes by
+1/(1 + z + z^2/2), never past its target.
 """
 
 from __future__ import annotations
 
-from cfddem.fluid.grid import LOW, UNIT
-from cfddem.kernels import inline, prange, threaded
+import math
+
+from cfddem.fluid.grid import HIGH, LOW, UNIT
+from cfddem.kernels import inline, kernel, prange, threaded
 
 # ---------------------------------------------------------------- terms, one function each
 
@@ -86,7 +89,7 @@ def slip_weight(face_voidage, cell_voidage, model_b):
 # ---------------------------------------------------------------- loops
 
 
-@inline
+@kernel
 def _row(field, k, j, start, count):
     return field[k, j, start : start + count]
 
@@ -103,7 +106,7 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
     count = px - 1
     for k in prange(1, pz):
         for j in range(1, py):
-            for d in range(3):
+            for d in range(velocity.shape[0]):
                 dk, dj, di = UNIT[d]
                 here, before = _row(voidage, k, j, 1, count), _row(voidage, k - dk, j - dj, 1 - di, count)
                 out, u = _row(flux[d], k, j, 1, count), _row(velocity[d], k, j, 1, count)
@@ -120,11 +123,11 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
     n = px - 2 * LOW
     for k in prange(LOW, pz - LOW):
         for j in range(LOW, py - LOW):
-            for d in range(3):
+            for d in range(velocity.shape[0]):
                 out = _row(rate[d], k, j, LOW, n)
                 for i in range(n):
                     out[i] = 0.0
-                for e in range(3):
+                for e in range(velocity.shape[0]):
                     if e == d:
                         _along(
                             out, velocity[d], flux[d], viscosity, dilatation, k, j, n, d, density, inverse[d], central
@@ -136,7 +139,7 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
                         )  # fmt: skip
 
 
-@inline
+@kernel
 def _along(out, u, flux, viscosity, dilatation, k, j, n, d, density, inverse, central):
     """Add the balance over the two momentum faces normal to the component; they lie at cell centres."""
     dk, dj, di = UNIT[d]
@@ -155,7 +158,7 @@ def _along(out, u, flux, viscosity, dilatation, k, j, n, d, density, inverse, ce
         out[i] += ((pull_high - pull_low) - density * (outflow - inflow)) * inverse
 
 
-@inline
+@kernel
 def _across(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_e, inverse_d, central):
     """Add the balance over the two momentum faces tangential to the component u_d; v = u_e, edges along both."""
     dk, dj, di = UNIT[d]
@@ -204,7 +207,7 @@ def predict(
     n = px - 2 * LOW
     for k in prange(LOW, pz - LOW):
         for j in range(LOW, py - LOW):
-            for d in range(3):
+            for d in range(old.shape[0]):
                 dk, dj, di = UNIT[d]
                 e_right, e_left = _row(voidage, k, j, LOW, n), _row(voidage, k - dk, j - dj, LOW - di, n)
                 s_right, s_left = _row(stored, k, j, LOW, n), _row(stored, k - dk, j - dj, LOW - di, n)
@@ -240,19 +243,21 @@ def predict(
 
 
 @threaded
-def gather(velocity, mobility, voidage, rate, fresh, periodic, areas, inverse, ax, ay, az, anchor, b):
+def gather(
+    velocity, mobility, voidage, rate, open_cells, fresh, periodic, areas, inverse, ax, ay, az, anchor, b
+):  # fmt: skip
     """Right-hand side of the pressure equation and, if fresh, its coefficients.
 
-    b = -(V d eps/dt + outflow of eps u) of every cell [m3/s]; rate is V d eps/dt of the open cells [m3/s].
+    b = -(V d eps/dt + outflow of eps u) of every open cell [m3/s]; rate is d eps/dt [1/s].
     """
     nz, ny, nx = b.shape
     for k in prange(nz):
         for j in range(ny):
             for i in range(nx):
-                outflow, held = rate[k, j, i], 0.0
+                outflow, held = rate[k, j, i] * areas[0] / inverse[0], 0.0
                 kk, jj, ii = k + LOW, j + LOW, i + LOW
                 here = voidage[kk, jj, ii]
-                for d in range(3):
+                for d in range(velocity.shape[0]):
                     dk, dj, di = UNIT[d]
                     below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here)
                     above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
@@ -277,7 +282,7 @@ def gather(velocity, mobility, voidage, rate, fresh, periodic, areas, inverse, a
                             ay[k, j, i] = a_below
                         else:
                             az[k, j, i] = a_below
-                b[k, j, i] = -outflow
+                b[k, j, i] = -outflow * open_cells[k, j, i]
                 if fresh:
                     anchor[k, j, i] = held
 
@@ -289,7 +294,7 @@ def correct(new, mobility, correction, inverse):
     n = px - 2 * LOW
     for k in prange(LOW, pz - LOW):
         for j in range(LOW, py - LOW):
-            for d in range(3):
+            for d in range(new.shape[0]):
                 dk, dj, di = UNIT[d]
                 right, left = _row(correction, k, j, LOW, n), _row(correction, k - dk, j - dj, LOW - di, n)
                 out, ease = _row(new[d], k, j, LOW, n), _row(mobility[d], k, j, LOW, n)
@@ -311,7 +316,7 @@ def clocks(velocity, voidage, viscosity, open_cells, density, inverse, advection
             for i in range(nx):
                 kk, jj, ii = k + LOW, j + LOW, i + LOW
                 crossing, thickest = 0.0, viscosity[kk, jj, ii]
-                for d in range(3):
+                for d in range(velocity.shape[0]):
                     dk, dj, di = UNIT[d]
                     speed = max(abs(velocity[d, kk, jj, ii]), abs(velocity[d, kk + dk, jj + dj, ii + di]))
                     crossing += speed * inverse[d]
@@ -321,3 +326,62 @@ def clocks(velocity, voidage, viscosity, open_cells, density, inverse, advection
                 turnover = max(turnover, crossing)
                 spreading = max(spreading, open_cells[k, j, i] * thickest * squares / (density * voidage[kk, jj, ii]))
         advection[k], diffusion[k], fastest[k] = turnover, spreading, flux
+
+
+@threaded
+def eddy_viscosity(velocity, factor, inverse, viscosity):
+    r"""Sub-grid viscosity rho (C Delta)^2 sqrt(2 S:S) of every cell; factor is rho (C Delta)^2 [kg/m]."""
+    pz, py, px = viscosity.shape
+    for k in prange(LOW, pz - HIGH):
+        for j in range(LOW, py - HIGH):
+            for i in range(LOW, px - HIGH):
+                squares = 0.0
+                for d in range(velocity.shape[0]):
+                    dk, dj, di = UNIT[d]
+                    u = velocity[d]
+                    for e in range(velocity.shape[0]):
+                        ek, ej, ei = UNIT[e]
+                        if e == d:
+                            stretch = (u[k + dk, j + dj, i + di] - u[k, j, i]) * inverse[d]
+                            squares += 2.0 * stretch * stretch
+                        elif e > d:
+                            v = velocity[e]
+                            shear = 0.25 * inverse[e] * (
+                                u[k + ek, j + ej, i + ei] + u[k + ek + dk, j + ej + dj, i + ei + di]
+                                - u[k - ek, j - ej, i - ei] - u[k - ek + dk, j - ej + dj, i - ei + di]
+                            ) + 0.25 * inverse[d] * (
+                                v[k + dk, j + dj, i + di] + v[k + ek + dk, j + ej + dj, i + ei + di]
+                                - v[k - dk, j - dj, i - di] - v[k - dk + ek, j - dj + ej, i - di + ei]
+                            )  # fmt: skip
+                            squares += shear * shear
+                viscosity[k, j, i] = factor * math.sqrt(squares)
+
+
+@threaded
+def drag_seen(old, new, voidage, drag, solved, density, step, model_b, weight, seen):
+    """Weight W and velocity u_d with which the drag of every cell has acted over a step: half on each face."""
+    nz, ny, nx, dimensions = weight.shape
+    for k in prange(nz):
+        for j in range(ny):
+            for i in range(nx):
+                c, b, a = k + LOW, j + LOW, i + LOW
+                own_voidage, own_drag = voidage[c, b, a], drag[c, b, a]
+                for d in range(dimensions):
+                    dk, dj, di = UNIT[d]
+                    total, carried_velocity = 0.0, 0.0
+                    for side in range(2):
+                        # The face is the low face of cell f; the neighbour across it is n.
+                        fk, fj, fi = c + side * dk, b + side * dj, a + side * di
+                        nk, nj, ni = c + (2 * side - 1) * dk, b + (2 * side - 1) * dj, a + (2 * side - 1) * di
+                        other_voidage, other_drag = voidage[nk, nj, ni], drag[nk, nj, ni]
+                        if solved[d, fk, fj, fi] == 0.0:
+                            other_voidage, other_drag = own_voidage, own_drag
+                        face = 0.5 * (own_voidage + other_voidage)
+                        own = slip_weight(face, own_voidage, model_b)
+                        beta = 0.5 * (own * own_drag + slip_weight(face, other_voidage, model_b) * other_drag)
+                        theta = implicitness(beta * step / (density * face))
+                        u = theta * new[d, fk, fj, fi] + (1.0 - theta) * old[d, fk, fj, fi]
+                        total += 0.5 * own
+                        carried_velocity += 0.5 * own * u
+                    weight[k, j, i, d] = total
+                    seen[k, j, i, d] = carried_velocity / total

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from cfddem.errors import RunFailed
 from cfddem.fluid.grid import Array, Grid
-from cfddem.kernels import inline, prange, threaded
+from cfddem.kernels import kernel, prange, threaded
 
 STRONG = 0.3
 """Directions whose coupling exceeds this share of the strongest are coarsened together."""
@@ -35,7 +35,7 @@ COARSEST = 32
 """Cells below which the multigrid stops coarsening and sweeps until converged."""
 
 
-@inline
+@kernel
 def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
     nz, ny, nx = x.shape
     below, above = (k - 1) % nz, (k + 1) % nz
@@ -79,7 +79,7 @@ def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
             _relax_plane(nz - 1, colour, backward, x, b, ax, ay, az, inverse)
 
 
-@inline
+@kernel
 def _apply_row(k, j, x, ax, ay, az, diagonal, out):
     nz, ny, nx = x.shape
     below, above, front, back = (k - 1) % nz, (k + 1) % nz, (j - 1) % ny, (j + 1) % ny

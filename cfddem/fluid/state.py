@@ -1,0 +1,200 @@
+"""The fluid as it is: fields on the grid, and what they are at any point.
+
+`FluidState` holds the arrays of a solver with their ghost cells and answers questions about them; it does not
+advance them. Everything it returns is a plain array, in the index order of `cfddem.fluid.grid`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cfddem.errors import InputError
+from cfddem.fluid.boundaries import Boundaries
+from cfddem.fluid.grid import AT_CENTRES, AT_FACES, LOW, Array, Grid, sample
+from cfddem.fluid.momentum import drag_seen, eddy_viscosity, transport
+
+
+class FluidState:
+    """Fields of a fluid on a grid, and their values at points."""
+
+    def __init__(
+        self,
+        grid: Grid,
+        boundaries: Boundaries,
+        density: float,
+        viscosity: float,
+        gravity: Sequence[float],
+        smagorinsky: float,
+        model_b: float,
+    ) -> None:
+        self.grid, self.boundaries = grid, boundaries
+        self.density, self.viscosity, self.smagorinsky = float(density), float(viscosity), float(smagorinsky)
+        self.gravity = np.asarray(gravity, dtype=float)
+        self.time, self._last_step, self._model_b = 0.0, 0.0, model_b
+        self.voidage = np.ones(grid.shape)
+        self._inverse = 1.0 / np.array(grid.spacing)
+        self._areas = np.array([grid.face_area(d) for d in range(3)])
+        self._open = grid.open.astype(float)
+        self._solved, self._buried = boundaries.mark_unknowns()
+        self._blocked, self._rim = boundaries.blocked_faces(), _rim(grid, boundaries)
+
+        cells, vector = grid.padded_shape, (3, *grid.padded_shape)
+        self._voidage_rate = np.zeros(grid.shape)  # of the interval the velocity belongs to
+        self._mean_voidage, self._other_mean, self._stored = (np.ones(cells) for _ in range(3))
+        self._velocity, self._stage, self._other = (np.zeros(vector) for _ in range(3))
+        self._rate_a, self._rate_b, self._flux, self._mobility = (np.zeros(vector) for _ in range(4))
+        self._drag_momentum, self._source = np.zeros(vector), np.zeros(vector)
+        self._pressure, self._correction, self._dilatation = (np.zeros(cells) for _ in range(3))
+        self._drag, self._thickness = np.zeros(cells), np.zeros(cells)
+
+    # ------------------------------------------------------------ fields
+
+    @property
+    def pressure(self) -> Array:
+        """p' = p - rho g.x at cell centres (nz, ny, nx) [Pa], a view; zero in solid cells."""
+        return self.grid.inner(self._pressure)
+
+    @property
+    def static_pressure(self) -> Array:
+        """p = p' + rho g.x (nz, ny, nx) [Pa]."""
+        x, y, z = self.grid.centres()
+        return self.pressure + self.density * (self.gravity[0] * x + self.gravity[1] * y + self.gravity[2] * z)
+
+    @property
+    def velocity(self) -> Array:
+        """Velocity at cell centres (nz, ny, nx, 3) [m/s], mean of the two faces of each component."""
+        means = []
+        for d in range(3):
+            faces = np.moveaxis(self.face_velocity(d), 2 - d, 0)
+            means.append(np.moveaxis(0.5 * (faces[1:] + faces[:-1]), 0, 2 - d))
+        return np.stack(means, axis=-1)
+
+    def face_velocity(self, axis: int) -> Array:
+        """Component `axis` on its faces [m/s], both boundaries included, a view: (nz, ny, nx+1) for x."""
+        return self.grid.inner_faces(self._velocity[axis], axis)
+
+    def volume_flux(self, axis: int) -> Array:
+        """eps u through the faces normal to `axis`, per area [m/s]; shape as `face_velocity`."""
+        shifted = np.roll(self._mean_voidage, 1, axis=2 - axis)
+        return self.face_velocity(axis) * self.grid.inner_faces(0.5 * (self._mean_voidage + shifted), axis)
+
+    def continuity_residual(self) -> Array:
+        """V d(eps)/dt + outflow of every open cell (nz, ny, nx) [m3/s], summed face by face, not by the solver."""
+        total = self._voidage_rate * self.grid.cell_volume
+        for d in range(3):
+            total = total + np.diff(self.volume_flux(d), axis=2 - d) * self._areas[d]
+        return total * self._open
+
+    # ------------------------------------------------------------ at points
+
+    def velocity_at(self, points: Array) -> Array:
+        """Velocity at points (N, 3) [m], tri-linear between faces: (N, 3) [m/s]."""
+        return self._at(self._velocity, AT_FACES, points)
+
+    def pressure_gradient_at(self, points: Array) -> Array:
+        """grad p' at points (N, 3) [m]: (N, 3) [Pa/m]. Add rho g for the gradient of the static pressure."""
+        self.boundaries.fill_pressure(self._pressure)
+        gradient = np.empty_like(self._velocity)
+        for d in range(3):
+            gradient[d] = (self._pressure - np.roll(self._pressure, 1, axis=2 - d)) * self._inverse[d]
+            gradient[d] -= self.boundaries.driving[d]
+        return self._at(self._continued(gradient), AT_FACES, points)
+
+    def viscous_force_at(self, points: Array) -> Array:
+        """div tau, the stress of the fluid between the particles (not times eps), at points (N, 3): (N, 3) [N/m3]."""
+        self._thicken(self._velocity, np.ones_like(self._mean_voidage))
+        force = np.empty_like(self._velocity)
+        transport(
+            self._velocity, self._mean_voidage, self._thickness, self._buried, 0.0, self._inverse, 0.0,
+            self._flux, self._dilatation, force,
+        )  # fmt: skip
+        return self._at(self._continued(force), AT_FACES, points)
+
+    def cell_value_at(self, field: Array, points: Array) -> Array:
+        """A cell field (nz, ny, nx) at points (N, 3) [m], tri-linear between centres: (N,)."""
+        padded = np.zeros((1, *self.grid.padded_shape))
+        self.grid.inner(padded[0])[:] = field
+        self.boundaries.fill_cells(padded)
+        return self._at(padded, AT_CENTRES, points)[:, 0]
+
+    def _at(self, fields: Array, place: Array, points: Array) -> Array:
+        points = np.ascontiguousarray(points, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError("points", points.shape, "of shape (N, 3)")
+        values = np.empty((len(points), len(fields)))
+        sample(fields, place, points, np.array(self.grid.origin), self._inverse, values)
+        return values
+
+    def _continued(self, vector: Array) -> Array:
+        """Values on the faces of the momentum balance, carried on to faces without one (walls, inlets)."""
+        for d in range(3):
+            known, axis = self._solved[d] > 0.0, 2 - d
+            above, below = np.roll(known, -1, axis), np.roll(known, 1, axis)
+            nearest = np.where(above, np.roll(vector[d], -1, axis), np.where(below, np.roll(vector[d], 1, axis), 0.0))
+            vector[d] = np.where(known, vector[d], nearest)
+        self.boundaries.fill_faces(vector)
+        return vector
+
+    # ------------------------------------------------------------ drag that was exchanged
+
+    def drag_exchange(self) -> tuple[Array, Array, Array]:
+        r"""What drag did to the fluid over the last step, cell by cell.
+
+        .. math:: \Delta m = h V\, W\,(\beta v - \beta u_d)
+
+        returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
+                 the implicit drag has seen [m/s]; the momentum given to the fluid (nz, ny, nx, 3) [N s]
+
+        A particle with its own coefficient b [kg/s], of which beta V is the sum, received the impulse
+        h W b (u_d - v): summed over the particles of a cell this is the opposite of the third array to round-off.
+        h is the step just made, V the cell. Half the drag of a cell acts on each of its two faces; where a face is a
+        wall or an inlet that half is taken by what holds the face, and is counted here too.
+        """
+        weight, seen = np.empty((*self.grid.shape, 3)), np.empty((*self.grid.shape, 3))
+        drag_seen(
+            self._other, self._velocity, self._mean_voidage, self._drag, self._solved, self.density, self._last_step,
+            self._model_b, weight, seen,
+        )  # fmt: skip
+        inner = self.grid.inner
+        push = np.moveaxis(inner(self._drag_momentum), 0, -1) - inner(self._drag)[..., None] * seen
+        return weight, seen, self._last_step * self.grid.cell_volume * weight * push
+
+    # ------------------------------------------------------------ viscosity
+
+    def _thicken(self, velocity: Array, voidage: Array) -> None:
+        """eps mu of every cell and its ghosts, with the sub-grid viscosity; a solid cell takes that of its open
+        neighbours, so that the stress on a wall is that of the fluid before it."""
+        if self.smagorinsky > 0.0:
+            resolved = [h for h, n in zip(self.grid.spacing, self.grid.cells) if n > 1] or [0.0]
+            width = float(np.prod(resolved)) ** (1.0 / len(resolved))
+            eddy_viscosity(velocity, self.density * (self.smagorinsky * width) ** 2, self._inverse, self._thickness)
+            self._thickness += self.viscosity
+            self.boundaries.fill_cells(self._thickness)
+            self._thickness *= voidage
+        else:
+            np.multiply(voidage, self.viscosity, out=self._thickness)
+        if self._rim is not None:
+            cells, neighbours, shares = self._rim
+            flat = self._thickness.ravel()
+            flat[cells] = (flat[neighbours] * shares).sum(axis=1)
+            self.boundaries.fill_cells(self._thickness)
+
+
+def _rim(grid: Grid, boundaries: Boundaries) -> tuple[np.ndarray, np.ndarray, Array] | None:
+    """Solid cells that touch an open one: their places in a padded field, those of their 26 neighbours, shares."""
+    if grid.solid is None:
+        return None
+    is_open = np.zeros(grid.padded_shape)
+    grid.inner(is_open)[:] = grid.open
+    boundaries.wrap(is_open)
+    _, ny, nx = grid.padded_shape
+    steps = np.array([(c * ny + b) * nx + a for c in (-1, 0, 1) for b in (-1, 0, 1) for a in (-1, 0, 1) if a or b or c])
+    k, j, i = np.nonzero(grid.solid)
+    cells = ((k + LOW) * ny + j + LOW) * nx + i + LOW
+    neighbours = cells[:, None] + steps
+    shares = is_open.ravel()[neighbours]
+    total = shares.sum(axis=1)
+    touching = total > 0.0
+    return cells[touching], neighbours[touching], shares[touching] / total[touching, None]
