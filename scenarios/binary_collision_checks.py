@@ -1,0 +1,215 @@
+"""Binary collisions against exact and converged solutions, and against themselves at a finer step."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cfddem.errors import UnstableStep
+from cfddem.materials import Material, pair_table
+from closures.minimum_gap import elastohydrodynamic
+from scenarios.binary_collision import MATERIALS, collide
+from scenarios.validation import Columns, Row, numbers, worst
+
+Curves = dict[str, Columns]
+
+DRY = 0.97
+CUTOFF = 12.7e-3 / 4  # R* of two equal spheres and the reach of their film [m]
+WATER = 1.0e-3  # [Pa s]
+CONVERGED = 5e-4
+"""Step in Hertz times of a solution that a finer step does not change."""
+
+
+def film_gap(material: Material, speed: float, stokes: float, diameter: float = 12.7e-3) -> float:
+    """h_min of two equal spheres by its two laws [m]."""
+    row, radius = pair_table([material])[0, 0], diameter / 4.0
+    mass = material.density * math.pi / 12.0 * diameter**3
+    viscosity = speed * mass / (6.0 * math.pi * radius**2 * stokes)
+    return max(float(row["roughness_gap"]), elastohydrodynamic(viscosity, speed, float(row["film_modulus"]), radius))
+
+
+def walls(curves: Curves) -> list[Row]:
+    """Pair against wall on one curve of the binary Stokes number."""
+    stokes, rows = np.geomspace(25.0, 2000.0, 16), []
+    for name in ("steel_rough", "glass", "delrin"):
+        pair, wall = (
+            np.array([collide(MATERIALS[name], velocity=0.1, stokes=st, against=body).restitution for st in stokes])
+            for body in ("sphere", "wall")
+        )
+        curves[f"pair_and_wall/{name}"] = {"stokes": (stokes, "-"), "pair": (pair, "-"), "wall": (wall, "-")}
+        offset = [(st, a - b, (1.0 + DRY) * math.log(2.0) / st) for st, a, b in zip(stokes, pair, wall) if b > 0.0]
+        rows.append(worst(f"{name}: e of pair less e of wall, (1 + e_dry) ln 2/St", offset, 1e-3))
+    return rows
+
+
+def readings(curves: Curves) -> list[Row]:
+    """Two readings of restitution: where the pair leaves the film, and at the time 2 h0/v0."""
+    stokes = np.array([18, 19, 20, 22, 25, 28, 30, 35, 40, 50, 70, 100], float)
+    rows = []
+    for name in ("delrin", "glass"):
+        leaving, timed = [], []
+        for st in stokes:
+            run = collide(MATERIALS[name], viscosity=WATER, stokes=st, trajectory="full")
+            speed = run.history["normal_speed"] / -run.history["normal_speed"][0]
+            end = 4.0 * CUTOFF / -run.history["normal_speed"][0]
+            leaving.append(run.restitution)
+            timed.append(float(np.interp(end, run.time, speed)))
+        curves[f"readings/{name}"] = {
+            "stokes": (stokes, "-"),
+            "restitution_at_cutoff": (leaving, "-"),
+            "restitution_at_time": (timed, "-"),
+        }
+        rows += [
+            Row(f"{name}, St {st:.0f}: e read at t = 2 h0/v0; reference: at h_co", timed[k], leaving[k])
+            for k, st in enumerate(stokes)
+            if st in (20, 30)
+        ]
+    return rows
+
+
+def film_zone(curves: Curves) -> list[Row]:
+    """In the film zone the speed is linear in ln h."""
+    points = []
+    for name, material in MATERIALS.items():
+        for stokes in (5, 30, 100):
+            run = collide(material, velocity=0.1, stokes=stokes)
+            inbound = (np.arange(len(run.gap)) < np.argmin(run.gap)) & (run.gap > film_gap(material, 0.1, stokes))
+            speed = run.history["normal_speed"][inbound] / 0.1
+            line = -1.0 + np.log(CUTOFF / run.gap[inbound]) / stokes
+            most = int(np.abs(speed - line).argmax())
+            points.append((stokes, speed[most], line[most]))
+            curves[f"film_zone/{name}_stokes_{stokes}"] = {"gap": (run.gap[inbound], "m"), "speed": (speed, "-")}
+    return [worst("film zone: u/v0 is -1 + ln(h_co/h)/St", points, 1e-3)]
+
+
+def tables(curves: Curves) -> list[Row]:
+    """Converged solutions: head-on, oblique with a frozen line of centres, oblique on the full path."""
+    head_on, frozen, full = (
+        numbers(f"binary_collision_{name}") for name in ("head_on", "oblique_frozen", "oblique_full")
+    )
+    rows = []
+    for name in ("delrin", "glass"):
+        e = [collide(MATERIALS[name], velocity=0.1, stokes=st).restitution for st in head_on["St"]]
+        rows.append(worst(f"{name}, head-on: e at St 20 to 2000", zip(head_on["St"], e, head_on[f"e_{name}"]), 1e-3))
+    delrin = MATERIALS["delrin"]
+    runs = [collide(delrin, viscosity=WATER, stokes=100.0, angle=angle) for angle in frozen["angle"]]
+    along = [
+        collide(
+            delrin,
+            viscosity=WATER,
+            stokes=100.0 * math.cos(math.radians(angle)),
+            angle=angle,
+            trajectory="full",
+            friction_onset="overlap",
+        )
+        for angle in full["angle"]
+    ]
+    for title, results, reference, column, field, limit in (
+        ("frozen, 5 to 60 deg: e_t", runs, frozen, "e_t", "restitution_tangential", 5e-3),
+        ("frozen, 5 to 60 deg: striker's angle", runs, frozen, "angle_striker", "rebound_angle_striker", 0.3),
+        ("frozen, 5 to 60 deg: relative angle", runs, frozen, "angle_relative", "rebound_angle_relative", 0.3),
+        ("full path, 5 to 70 deg: e_n", along, full, "e_n", "restitution", 5e-3),
+        ("full path, 5 to 70 deg: e_t", along, full, "e_t", "restitution_tangential", 5e-3),
+        ("full path, 5 to 70 deg: striker's angle", along, full, "angle_striker", "rebound_angle_striker", 0.3),
+    ):
+        values = [getattr(result, field) for result in results]
+        unit = "deg" if limit == 0.3 else "-"
+        rows.append(worst(title, zip(reference["angle"], values, reference[column]), limit, unit=unit))
+    return rows
+
+
+@dataclass(frozen=True)
+class Impact:
+    """A head-on impact drawn at random."""
+
+    material: Material
+    diameter: float
+    speed: float
+    stokes: float
+
+    @property
+    def deformed(self) -> bool:
+        """Whether the film's pressure, not the asperities, sets the minimum gap."""
+        return film_gap(self.material, self.speed, self.stokes, self.diameter) > self.material.roughness
+
+    def restitution(self, **options: Any) -> float:
+        """Restitution where the pair leaves the film."""
+        return collide(
+            self.material, diameter=self.diameter, velocity=self.speed, stokes=self.stokes, **options
+        ).restitution
+
+
+def drawn(count: int, seed: int, restitution: tuple[float, float]) -> Iterator[Impact]:
+    """Impacts over 0.2 to 13 mm, 50 MPa to 190 GPa, either mechanism, and a range of dry restitution."""
+    random = np.random.default_rng(seed)
+
+    def between(low: float, high: float) -> float:
+        return math.exp(random.uniform(math.log(low), math.log(high)))
+
+    for _ in range(count):
+        diameter = between(0.2e-3, 13e-3)
+        material = Material(
+            density=between(1100.0, 8000.0),
+            youngs_modulus=between(50e6, 190e9),
+            poisson=0.3,
+            restitution=random.uniform(*restitution),
+            roughness=between(5e-9, 3e-6) * math.sqrt(diameter / 13e-3),
+        )
+        yield Impact(material, diameter, between(0.02, 1.0), between(15.0, 1000.0))
+
+
+def integrators(curves: Curves) -> list[Row]:
+    """Both integrators at 2 % of the Hertz time against a step forty times finer."""
+    rows = []
+    for title, count, span, limit in (
+        ("e_dry 0.9 to 0.98", 32, (0.9, 0.98), 1e-3),
+        ("e_dry 0.5 to 0.9", 12, (0.5, 0.9), 4e-3),
+    ):
+        found = Integrated()
+        for impact in drawn(count, seed=7, restitution=span):
+            found.add(impact)
+        group = f"integrators/{title.replace(' ', '_')}"
+        for name in ("drift", "verlet", "verlet_with_warning"):
+            curves[f"{group}/{name}"] = _columns(getattr(found, name))
+        mix = f"{found.deformed} of {count} elastohydrodynamic; plain Verlet refused {found.refused}"
+        rows += [worst(f"lubricated drift at 2 %, {title}: e converged", found.drift, limit, note=mix)]
+        if found.verlet:
+            rows += [worst(f"plain Verlet where it resolves the film, {title}", found.verlet, 0.012, note=mix)]
+        if found.verlet_with_warning:
+            rows += [worst(f"plain Verlet where it warns, {title}", found.verlet_with_warning, note=mix)]
+    return rows
+
+
+@dataclass
+class Integrated:
+    """What both integrators make of some impacts: (St, e, e converged) of each."""
+
+    drift: list[tuple[float, float, float]] = field(default_factory=list)
+    verlet: list[tuple[float, float, float]] = field(default_factory=list)
+    verlet_with_warning: list[tuple[float, float, float]] = field(default_factory=list)
+    deformed: int = 0
+    refused: int = 0
+
+    def add(self, impact: Impact) -> None:
+        """Run an impact converged, with the drift, and with plain Verlet unless that refuses."""
+        self.deformed += impact.deformed
+        exact = impact.restitution(step_fraction=CONVERGED)
+        self.drift.append((impact.stokes, impact.restitution(), exact))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                value = impact.restitution(integrator="verlet")
+            except UnstableStep:
+                self.refused += 1
+                return
+        (self.verlet_with_warning if caught else self.verlet).append((impact.stokes, value, exact))
+
+
+def _columns(points: list[tuple[float, float, float]]) -> Columns:
+    stokes, value, exact = np.array(points).reshape(-1, 3).T
+    return {"stokes": (stokes, "-"), "restitution": (value, "-"), "restitution_converged": (exact, "-")}

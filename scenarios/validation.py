@@ -1,0 +1,193 @@
+"""Validation: what the package gives, beside what has been published.
+
+A target is a module with a function `study(folder, tell)` that runs its cases, writes figures and histories
+into the folder, calls `tell` with what it is doing, and returns the rows of the table. A row with a limit
+decides; a row without one is reported only.
+"""
+
+from __future__ import annotations
+
+import csv
+import json as _json
+import os
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from importlib import import_module, resources
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from cfddem.errors import InputError
+
+TARGETS: dict[str, str] = {"binary-collision": "scenarios.binary_collision_validation"}
+"""Name of each target, and the module that holds its `study`."""
+
+WIDTH = 100
+"""Most columns that a printed table takes."""
+
+Tell = Callable[[str], None]
+Columns = Mapping[str, tuple[Any, str]]
+"""Arrays by name, each with its unit ("-" where it has none)."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One comparison: |value - reference| against a limit, or without a limit for the record."""
+
+    quantity: str
+    value: float
+    reference: float | None = None
+    limit: float | None = None
+    unit: str = "-"
+    note: str = ""
+    points: list[dict[str, float]] = field(default_factory=list)  # all comparisons of which this is the worst
+
+    @property
+    def difference(self) -> float | None:
+        """Value minus reference."""
+        return None if self.reference is None else self.value - self.reference
+
+    @property
+    def verdict(self) -> str:
+        """`holds`, `FAILS`, or `report` where there is no limit."""
+        if self.limit is None or self.difference is None:
+            return "report"
+        return "holds" if abs(self.difference) <= self.limit else "FAILS"
+
+    def card(self) -> dict[str, Any]:
+        """The row for JSON."""
+        return asdict(self) | {"difference": self.difference, "verdict": self.verdict}
+
+
+def worst(quantity: str, points: Iterable[tuple[float, float, float]], limit: float | None = None, **more: Any) -> Row:
+    """A row for many points (where, value, reference): it shows the largest difference and keeps them all."""
+    listed = [(float(at), float(value), float(reference)) for at, value, reference in points]
+    _, value, reference = max(listed, key=lambda point: _size(point[1] - point[2]))
+    kept = [{"at": at, "value": value, "reference": reference} for at, value, reference in listed]
+    return Row(f"{quantity} ({len(listed)})", value, reference, limit, points=kept, **more)
+
+
+def _size(difference: float) -> float:
+    """Magnitude; no number at all is the worst of all."""
+    return float("inf") if difference != difference else abs(difference)
+
+
+def validate(name: str, output: Path, json: bool = False) -> bool:
+    """Run a target, print its table and write its files into `output`/`name`.
+
+    name     one of TARGETS
+    output   folder for all targets
+    json     print the table as JSON
+    returns  whether every limit holds
+    """
+    folder = Path(output) / name
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as refusal:
+        raise InputError("output", str(output), "a folder that can be written", str(refusal)) from refusal
+    begin = perf_counter()
+    with _progress(name) as tell:
+        rows: Sequence[Row] = import_module(TARGETS[name]).study(folder, tell)
+    seconds = perf_counter() - begin
+    report = {
+        "target": name,
+        "holds": all(row.verdict != "FAILS" for row in rows),
+        "seconds": round(seconds, 1),
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in ("cfddem", "numpy", "numba")},
+        "rows": [row.card() for row in rows],
+    }
+    text = _json.dumps(_finite(report), indent=1)
+    with replacing(folder / "table.json") as path:
+        path.write_text(text + "\n")
+    if json:
+        print(text)
+    else:
+        _show(name, rows, folder, seconds)
+    return bool(report["holds"])
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for what is no finite number, which JSON cannot say."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Tell]:
+    """Say on a terminal what is being computed; say nothing when piped."""
+    from rich.console import Console
+
+    with Console(stderr=True).status(name) as status:
+        yield lambda doing: status.update(f"{name}: {doing}")
+
+
+def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
+    """Print the table, the verdict and where the files are."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    console = Console(highlight=False, width=min(WIDTH, console.width) if console.is_terminal else WIDTH)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("quantity (number of points: the worst is shown)", overflow="fold")
+    for heading in ("model", "reference", "difference", "limit"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    colour = {"holds": "green", "FAILS": "bold red", "report": "dim"}
+    for row in rows:
+        label = row.quantity if row.unit == "-" else f"{row.quantity} \\[{row.unit}]"
+        verdict = f"[{colour[row.verdict]}]{row.verdict}"
+        table.add_row(label, *map(_number, (row.value, row.reference, row.difference, row.limit)), verdict)
+    console.print(table)
+    failed = sum(row.verdict == "FAILS" for row in rows)
+    judged = sum(row.verdict != "report" for row in rows)
+    console.print(f"{name}: {judged - failed} of {judged} limits hold, {len(rows) - judged} rows reported only.")
+    print(f"{seconds:.0f} s; figures, histories and table in {folder}")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Write a file beside its place and move it there when it is whole."""
+    fresh = path.with_name(f".{os.getpid()}-{path.name}")
+    try:
+        yield fresh
+        os.replace(fresh, path)
+    finally:
+        fresh.unlink(missing_ok=True)
+
+
+def write_histories(path: Path, groups: Mapping[str, Columns]) -> None:
+    """Write arrays to HDF5; every dataset says its unit."""
+    import h5py
+
+    with replacing(path) as fresh, h5py.File(fresh, "w") as file:
+        for group, columns in groups.items():
+            for name, (values, unit) in columns.items():
+                file.create_dataset(f"{group}/{name}", data=np.asarray(values)).attrs["units"] = unit
+
+
+def reference(name: str) -> dict[str, list[str]]:
+    """Columns of a file in scenarios/data; its `#` lines say where the numbers are from."""
+    text = resources.files("scenarios").joinpath("data", f"{name}.csv").read_text()
+    heading, *lines = csv.reader(line for line in text.splitlines() if not line.startswith("#"))
+    return {title: [line[place] for line in lines] for place, title in enumerate(heading)}
+
+
+def numbers(name: str) -> dict[str, np.ndarray]:
+    """Columns of a file in scenarios/data, all numbers; units are left off the names."""
+    return {title.split(" [")[0]: np.array(column, float) for title, column in reference(name).items()}
