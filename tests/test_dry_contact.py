@@ -331,12 +331,22 @@ class Contacts:
         return most / brought - 1.0
 
 
+STORED_DASHPOT = "a sliding spring takes up the force of a strong dashpot and gives it back: up to 8 % in mid-contact"
+
+
 @pytest.mark.parametrize(
     ("spring", "restitution", "limit"),
-    [(TOTAL, 0.97, 1e-3), (TOTAL, 0.9, 1e-3), (RESCALED, 1.0, 1e-4), (RESCALED, 0.97, 1e-4), (RESCALED, 0.3, 1e-4)],
+    [
+        (TOTAL, 0.97, 1e-3),
+        (TOTAL, 0.9, 1e-3),
+        (RESCALED, 1.0, 1e-4),
+        (RESCALED, 0.97, 1e-4),
+        (RESCALED, 0.3, 1e-4),
+        pytest.param(TOTAL, 0.3, 1e-3, marks=pytest.mark.xfail(strict=True, reason=STORED_DASHPOT)),
+    ],
 )
 def test_no_energy_from_random_oblique_contacts(spring: int, restitution: float, limit: float) -> None:
-    """2000 random contacts of each kind, 10 000 in all, at 2 % of the Hertz time: none ever speeds up."""
+    """2000 random contacts of each kind, 12 000 in all, at 2 % of the Hertz time: none ever speeds up."""
     for seed in range(4):
         assert Contacts(500, restitution, seed).gain(spring).max() <= limit
 
