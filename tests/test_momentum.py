@@ -49,7 +49,7 @@ def largest_change(pair: Pair, laws: Laws, step: float, chunks: int, steps: int)
     met = turned = False
     for _ in range(chunks):
         run.advance(step, steps)
-        met |= bool((run.gap < run.edges.minimum_gap).any())
+        met |= bool((run.gap < (run.edges.minimum_gap if laws.film else 0.0)).any())
         turned |= not np.allclose(run.bodies.spin, pair.spin)
         moved = np.linalg.norm(momentum(run.bodies) - linear) / size.sum()
         swung = np.linalg.norm(angular_momentum(run.bodies) - angular) / (size @ run.bodies.radius)
