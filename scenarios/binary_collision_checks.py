@@ -35,7 +35,7 @@ def film_gap(material: Material, speed: float, stokes: float, diameter: float = 
 
 def walls(curves: Curves) -> list[Row]:
     """Pair against wall on one curve of the binary Stokes number."""
-    stokes, rows = np.geomspace(25.0, 2000.0, 16), []
+    stokes, rows = np.geomspace(25.0, 2000.0, 20), []
     for name in ("steel_rough", "glass", "delrin"):
         pair, wall = (
             np.array([collide(MATERIALS[name], velocity=0.1, stokes=st, against=body).restitution for st in stokes])
@@ -43,13 +43,13 @@ def walls(curves: Curves) -> list[Row]:
         )
         curves[f"pair_and_wall/{name}"] = {"stokes": (stokes, "-"), "pair": (pair, "-"), "wall": (wall, "-")}
         offset = [(st, a - b, (1.0 + DRY) * math.log(2.0) / st) for st, a, b in zip(stokes, pair, wall) if b > 0.0]
-        rows.append(worst(f"{name}: e of pair less e of wall, (1 + e_dry) ln 2/St", offset, 1e-3))
+        rows.append(worst(f"{name}: e pair - e wall, (1+e_dry) ln2/St", offset, 1e-3))
     return rows
 
 
 def readings(curves: Curves) -> list[Row]:
     """Two readings of restitution: where the pair leaves the film, and at the time 2 h0/v0."""
-    stokes = np.array([18, 19, 20, 22, 25, 28, 30, 35, 40, 50, 70, 100], float)
+    stokes = np.array([18, 18.5, 19, 20, 21, 21.5, 22, 23, 25, 27, 30, 33, 36, 40, 45, 50, 60], float)
     rows = []
     for name in ("delrin", "glass"):
         leaving, timed = [], []
@@ -65,7 +65,7 @@ def readings(curves: Curves) -> list[Row]:
             "restitution_at_time": (timed, "-"),
         }
         rows += [
-            Row(f"{name}, St {st:.0f}: e read at t = 2 h0/v0; reference: at h_co", timed[k], leaving[k])
+            Row(f"{name}, St {st:.0f}: e at 2 h0/v0; ref. at h_co", timed[k], leaving[k])
             for k, st in enumerate(stokes)
             if st in (20, 30)
         ]
@@ -84,7 +84,7 @@ def film_zone(curves: Curves) -> list[Row]:
             most = int(np.abs(speed - line).argmax())
             points.append((stokes, speed[most], line[most]))
             curves[f"film_zone/{name}_stokes_{stokes}"] = {"gap": (run.gap[inbound], "m"), "speed": (speed, "-")}
-    return [worst("film zone: u/v0 is -1 + ln(h_co/h)/St", points, 1e-3)]
+    return [worst("film zone: u/v0, -1 + ln(h_co/h)/St", points, 1e-3)]
 
 
 def tables(curves: Curves) -> list[Row]:
@@ -109,15 +109,15 @@ def tables(curves: Curves) -> list[Row]:
         )
         for angle in full["angle"]
     ]
-    for title, results, reference, column, field, limit in (
-        ("frozen, 5 to 60 deg: e_t", runs, frozen, "e_t", "restitution_tangential", 5e-3),
-        ("frozen, 5 to 60 deg: striker's angle", runs, frozen, "angle_striker", "rebound_angle_striker", 0.3),
-        ("frozen, 5 to 60 deg: relative angle", runs, frozen, "angle_relative", "rebound_angle_relative", 0.3),
-        ("full path, 5 to 70 deg: e_n", along, full, "e_n", "restitution", 5e-3),
-        ("full path, 5 to 70 deg: e_t", along, full, "e_t", "restitution_tangential", 5e-3),
-        ("full path, 5 to 70 deg: striker's angle", along, full, "angle_striker", "rebound_angle_striker", 0.3),
+    for title, results, reference, column, name, limit in (
+        ("oblique, frozen: e_t", runs, frozen, "e_t", "restitution_tangential", 5e-3),
+        ("oblique, frozen: striker's angle", runs, frozen, "angle_striker", "rebound_angle_striker", 0.3),
+        ("oblique, frozen: relative angle", runs, frozen, "angle_relative", "rebound_angle_relative", 0.3),
+        ("oblique, full path: e_n", along, full, "e_n", "restitution", 5e-3),
+        ("oblique, full path: e_t", along, full, "e_t", "restitution_tangential", 5e-3),
+        ("oblique, full path: striker's angle", along, full, "angle_striker", "rebound_angle_striker", 0.3),
     ):
-        values = [getattr(result, field) for result in results]
+        values = [getattr(result, name) for result in results]
         unit = "deg" if limit == 0.3 else "-"
         rows.append(worst(title, zip(reference["angle"], values, reference[column]), limit, unit=unit))
     return rows
@@ -177,11 +177,11 @@ def integrators(curves: Curves) -> list[Row]:
         for name in ("drift", "verlet", "verlet_with_warning"):
             curves[f"{group}/{name}"] = _columns(getattr(found, name))
         mix = f"{found.deformed} of {count} elastohydrodynamic; plain Verlet refused {found.refused}"
-        rows += [worst(f"lubricated drift at 2 %, {title}: e converged", found.drift, limit, note=mix)]
+        rows += [worst(f"drift at 2 %, {title}: e", found.drift, limit, note=mix)]
         if found.verlet:
-            rows += [worst(f"plain Verlet where it resolves the film, {title}", found.verlet, 0.012, note=mix)]
+            rows += [worst(f"Verlet, film resolved, {title}: e", found.verlet, 0.012, note=mix)]
         if found.verlet_with_warning:
-            rows += [worst(f"plain Verlet where it warns, {title}", found.verlet_with_warning, note=mix)]
+            rows += [worst(f"Verlet, it warns, {title}: e", found.verlet_with_warning, note=mix)]
     return rows
 
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.view.plots import BLUE, GREEN, GREY, ORANGE, RED, SKY, label, legend, panels, save, shades
+from cfddem.view.plots import BLUE, GREEN, GREY, ORANGE, RED, SKY, decades, label, legend, panels, save, shades
+from closures.restitution import legendre
 from scenarios.validation import Columns
 
 Curves = dict[str, Columns]
@@ -43,56 +44,67 @@ def _groups(curves: Curves, head: str) -> list[str]:
 
 def gap_histories(curves: Curves) -> Any:
     """Gap against time, linear and logarithmic."""
-    figure, (left, right) = panels(2, width=9.0, height=4.4)
+    figure, (left, right) = panels(2, width=9.6, height=4.4)
     groups = [group for group in _groups(curves, "figure_2") if not group.endswith("_17")]
     for group, colour in zip(groups, shades(len(groups), "plasma")):
         run = _of(curves, group)
-        time = run["time"] * run["approach_speed"] / run["cutoff_gap"]
         gap = run["gap"] / run["cutoff_gap"]
+        begin = np.interp(-1.0, -gap[: int(gap.argmin())], run["time"][: int(gap.argmin())])
+        time = (run["time"] - begin) * run["approach_speed"] / run["cutoff_gap"]
         if gap[-1] < 0.999:  # a pair at rest stays where it is
             time, gap = np.append(time, 8.0), np.append(gap, gap[-1])
-        name = group.rsplit("_", 1)[1]
         left.plot(time, gap, color=colour)
-        right.plot(time, np.maximum(gap, 1e-6), color=colour, label=name)
+        right.plot(time, np.maximum(gap, 1e-6), color=colour, label=group.rsplit("_", 1)[1])
     floor = float(run["minimum_gap"] / run["cutoff_gap"])
     right.axhline(floor, color=GREY, lw=1.0, ls="--")
-    right.text(7.9, 1.15 * floor, "$h_{min}$, asperities meet", color=GREY, ha="right", va="bottom", fontsize=9.5)
+    right.text(5.9, 1.12 * floor, "$h_{min}$: asperities meet", color=GREY, ha="right", va="bottom", fontsize=9.5)
     left.set(xlim=(0, 6), ylim=(0, 1.02))
-    right.set(xlim=(0, 8), ylim=(1.2e-4, 1.3), yscale="log")
+    right.set(xlim=(0, 6), ylim=(1.2e-4, 1.3), yscale="log")
     label(left, r"time  $t\,v_0/R^*$", "-", "gap  $h/R^*$", "-", "Delrin spheres meet in a liquid")
     label(right, r"time  $t\,v_0/R^*$", "-", "gap  $h/R^*$", "-", "the same, logarithmic")
-    legend(right, title="St", ncols=2, loc="center right", bbox_to_anchor=(1.0, 0.42))
+    legend(right, title="St", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
 def restitution(curves: Curves) -> Any:
     """Restitution against the Stokes number."""
     figure, axes = panels(height=5.0)
-    axes.axvspan(1.0, 10.0, color="#f3f3f3", lw=0)
-    axes.text(4.15, 0.03, "no rebound seen\n(Joseph et al. 2001)", color=GREY, fontsize=9, va="bottom")
-    fit = _of(curves, "figure_3/legendre_2006")
-    stokes, ratio = fit["stokes_with_added_mass"], fit["restitution_ratio"]
-    grid = np.geomspace(5, 3000, 200)
-    heavy, light = (0.97 * np.exp(-35.0 / (grid * (1.0 + 0.5 / density))) for density in (7.78, 1.40))
-    axes.fill_between(grid, heavy - 0.1, light + 0.1, color="#ececec", lw=0, label=r"$\pm$0.1, scatter of experiments")
-    axes.fill_between(grid, heavy, light, color="#cfcfcf", lw=0, label="fit of Legendre et al. (2006), steel to Delrin")
-    axes.plot(stokes, 0.97 * ratio, ".", color=GREY, ms=5, label="the fit without added mass")
+    axes.axvspan(1.0, 10.0, color="#f4f4f4", lw=0)
+    axes.text(4.15, 0.6, "no rebound\nwas seen here\n(Joseph et al.\n2001)", color=GREY, fontsize=9.5, va="bottom")
     for name, (title, colour) in MATERIAL_STYLES.items():
         run = _of(curves, f"figure_3/{name}")
-        axes.fill_between(
-            run["stokes"], run["restitution_lowest"], run["restitution_highest"], color=colour, alpha=0.18, lw=0
-        )
-        axes.plot(run["stokes"], run["closed_form"], color=colour, lw=1.0, ls=(0, (1, 1.5)))
+        low, high = run["restitution_lowest"], run["restitution_highest"]
+        axes.fill_between(run["stokes"], low, high, color=colour, alpha=0.2, lw=0)
         axes.plot(run["stokes"], run["restitution"], color=colour, label=title)
-    axes.errorbar(27, 0.46, yerr=0.03, color=RED, capsize=4, lw=2, label="from Gondret et al. (2002), steel on a wall")
+        axes.plot(run["stokes"], run["closed_form"], color="#222222", lw=1.0, ls=(0, (1, 2)))
+    axes.plot([], [], color="#222222", lw=1.0, ls=(0, (1, 2)), label="closed form with its + 1/2")
+    axes.errorbar(27, 0.46, yerr=0.03, color=RED, capsize=4, lw=2, ls="", label="Gondret et al. (2002), near the wall")
+    _legendre(axes, _of(curves, "figure_3/legendre_2006"))
     axes.axhline(0.97, color=GREY, lw=1.0, ls="--")
     axes.text(4.15, 0.975, "dry", color=GREY, fontsize=9.5, va="bottom")
-    axes.set(xscale="log", xlim=(4, 3000), ylim=(-0.01, 1.05))
-    axes.set_xticks([5, 10, 20, 50, 100, 200, 500, 1000, 2000], [5, 10, 20, 50, 100, 200, 500, 1000, 2000], minor=False)
-    axes.minorticks_off()
+    decades(axes, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
+    axes.set(xlim=(4, 3000), ylim=(-0.01, 1.05))
     label(axes, "Stokes number  St", "-", "restitution  $e$", "-", "Spheres of 12.7 mm collide head-on in a liquid")
     legend(axes, loc="lower right")
     return figure
+
+
+def _legendre(axes: Any, fit: dict[str, Any]) -> None:
+    """The fit for the densities of steel to Delrin in water, with the scatter of experiments."""
+    stokes = np.geomspace(5, 3000, 200)
+    heavy, light = (
+        np.array([legendre(each * (1.0 + 0.5 / density), 0.97) for each in stokes]) for density in (7.78, 1.40)
+    )
+    axes.fill_between(stokes, heavy, light, color="#c9c9c9", lw=0, zorder=0.6, label="fit of Legendre et al. (2006)")
+    axes.plot(
+        fit["stokes_with_added_mass"], 0.97 * fit["restitution_ratio"], ".", color=GREY, ms=5, zorder=0.7,
+        label="the same, no added mass",
+    )  # fmt: skip
+    some = (stokes > 20) & (stokes < 200)
+    axes.fill_between(
+        stokes[some], heavy[some] - 0.1, light[some] + 0.1, color="#ececec", lw=0, zorder=0.5,
+        label="scatter of experiments about it",
+    )  # fmt: skip
 
 
 def roughness(curves: Curves) -> Any:
@@ -105,15 +117,16 @@ def roughness(curves: Curves) -> Any:
         height = run["roughness"] * 1e9
         axes.plot(height, run["restitution"], color=colour)
         line.append((float(run["elastohydrodynamic_gap"]) * 1e9, float(run["restitution_there"])))
-        axes.text(1.08, run["restitution"][0] + 0.012, f"St {group.rsplit('_', 1)[1]}", color=colour, fontsize=9.5)
-    axes.plot(
-        *zip(*line), "o:", color=RED, ms=5, lw=1.4, label=r"$h_\sigma = h_\varepsilon$: pressure flattens the solids"
-    )
+        lift = -0.045 if group.endswith("_500") else 0.012
+        axes.text(1.08, run["restitution"][0] + lift, f"St {group.rsplit('_', 1)[1]}", color=colour, fontsize=9.5)
+    axes.plot(*zip(*line), "o:", color=RED, ms=5, lw=1.4, label=r"$h_\sigma = h_\varepsilon$")
     axes.axvline(796, color=GREY, lw=1.0, ls="--")
-    axes.text(850, 0.02, "Delrin of\nYang & Hunt", color=GREY, fontsize=9.5)
+    axes.text(870, 0.02, "spheres of\nYang & Hunt", color=GREY, fontsize=9.5)
     axes.set(xscale="log", xlim=(1, 3e4), ylim=(0, 1.0))
-    label(axes, r"roughness  $\sigma$", "nm", "restitution  $e$", "-", "Roughness of Delrin spheres, 0.1 m/s")
-    legend(axes, loc="lower right")
+    label(
+        axes, r"roughness  $\sigma$", "nm", "restitution  $e$", "-", "Delrin spheres of any roughness meet at 0.1 m/s"
+    )
+    legend(axes, loc="lower left", bbox_to_anchor=(0.0, 0.1))
     return figure
 
 
@@ -130,16 +143,28 @@ def oblique(curves: Curves) -> Any:
             axes.plot(angle, run[f"film_shown_{end}"], color=colour, label=title)
             axes.plot(angle, run[f"overlap_shown_{end}"], color=colour, ls="--", lw=1.4)
     right.plot([0, 70], [0, 70], color=GREY, lw=1.0, ls=":")
-    right.text(69, 62, "mirror", color=GREY, fontsize=9.5, ha="right", va="top")
+    right.text(33, 37, r"$\theta_1 = \theta_0$", color=GREY, fontsize=9.5, ha="right")
     left.plot([], [], color=GREY, label="friction from $h_{min}$ on (default)")
     left.plot([], [], color=GREY, ls="--", lw=1.4, label="friction at overlap (as published)")
     left.fill_between([], [], [], color=GREY, alpha=0.25, label="$St_n$ 10-25, 40-200, 500-2400")
     left.set(xlim=(0, 70), ylim=(0, 91), yticks=range(0, 91, 15))
     right.set(xlim=(0, 70))
     label(
-        left, r"impact angle  $\theta_0$", "deg", r"rebound angle  $\theta_1$", "deg", "of the striker's own velocity"
+        left,
+        r"impact angle  $\theta_0$",
+        "deg",
+        r"rebound angle  $\theta_1$",
+        "deg",
+        "Rebound of the striker's own velocity",
     )
-    label(right, r"impact angle  $\theta_0$", "deg", r"rebound angle  $\theta_1$", "deg", "of the relative velocity")
+    label(
+        right,
+        r"impact angle  $\theta_0$",
+        "deg",
+        r"rebound angle  $\theta_1$",
+        "deg",
+        "Rebound of the relative velocity",
+    )
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=9.5)
     return figure
 
@@ -156,9 +181,10 @@ def pair_and_wall(curves: Curves) -> Any:
     left.plot([], [], color=GREY, label="two spheres")
     left.plot([], [], "o", mfc="white", color=GREY, ms=5, label="sphere and wall")
     for axes in (left, right):
-        axes.set(xscale="log", xlim=(22, 2200), ylim=(0, 1.0))
-    label(left, "binary Stokes number  St", "-", "restitution  $e$", "-", "film reaches $h_{co} = R^*$")
-    label(right, "binary Stokes number  St", "-", "restitution  $e$", "-", r"wall raised by $(1+e_{dry})\,\ln 2/St$")
+        decades(axes, 25, 50, 100, 200, 500, 1000, 2000)
+        axes.set(xlim=(23, 2200), ylim=(0, 1.0))
+    label(left, "binary Stokes number  St", "-", "restitution  $e$", "-", "Film up to $h_{co} = R^*$ of each")
+    label(right, "binary Stokes number  St", "-", "restitution  $e$", "-", r"Wall raised by $(1+e_{dry})\,\ln 2/St$")
     legend(left, loc="lower right")
     return figure
 

@@ -140,7 +140,7 @@ def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
     console = Console(highlight=False)
     console = Console(highlight=False, width=min(WIDTH, console.width) if console.is_terminal else WIDTH)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("quantity (number of points: the worst is shown)", overflow="fold")
+    table.add_column("quantity (of how many the worst)", overflow="fold")
     for heading in ("model", "reference", "difference", "limit"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)

@@ -23,9 +23,6 @@ BLUE, SKY, ORANGE, GREEN, RED, GREY = "#0b4f8a", "#56a6d9", "#e07b00", "#1b8a5a"
 _STYLE = {
     "font.size": 11.0,
     "font.family": "sans-serif",
-    "axes.titlesize": 11.0,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": "#444444",
@@ -67,12 +64,19 @@ def label(axes: Axes, x: str, x_unit: str, y: str, y_unit: str, title: str = "")
     axes.set_xlabel(f"{x}  [{x_unit}]")
     axes.set_ylabel(f"{y}  [{y_unit}]")
     if title:
-        axes.set_title(title)
+        axes.set_title(title, loc="left", fontsize=11, fontweight="bold")
 
 
 def legend(axes: Axes, **options: Any) -> None:
     """A legend without a frame."""
     axes.legend(**{"frameon": False, "fontsize": 9.5} | options)
+
+
+def decades(axes: Axes, *marks: float) -> None:
+    """A logarithmic x axis with plain numbers at the given marks."""
+    axes.set_xscale("log")
+    axes.set_xticks(marks, [f"{mark:g}" for mark in marks])
+    axes.minorticks_off()
 
 
 def shades(count: int, name: str = "viridis") -> Sequence[Any]:
