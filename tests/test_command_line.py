@@ -115,7 +115,7 @@ def test_documented_examples_run(tmp_path: Path) -> None:
     for example in examples:
         done = cfddem(*shlex.split(example)[1:], folder=tmp_path)
         assert done.returncode == 0, f"{example}: {done.stderr}"
-        assert max(map(len, done.stdout.splitlines())) <= WIDTH
+        assert "--json" in example or max(map(len, done.stdout.splitlines())) <= WIDTH
 
 
 @pytest.mark.parametrize("words", ["--help", "collide --help", "validate --help", "--version"])
