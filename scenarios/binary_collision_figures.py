@@ -61,7 +61,7 @@ def gap_histories(curves: Curves) -> Any:
     left.set(xlim=(0, 6), ylim=(0, 1.02))
     right.set(xlim=(0, 6), ylim=(1.2e-4, 1.3), yscale="log")
     label(left, r"time  $t\,v_0/R^*$", "-", "gap  $h/R^*$", "-", "Delrin spheres meet in a liquid")
-    label(right, r"time  $t\,v_0/R^*$", "-", "gap  $h/R^*$", "-", "the same, logarithmic")
+    label(right, r"time  $t\,v_0/R^*$", "-", "gap  $h/R^*$", "-", "The same on a logarithmic scale")
     legend(right, title="St", loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 

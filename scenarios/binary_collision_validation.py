@@ -170,7 +170,18 @@ def oblique(curves: Curves) -> list[Row]:
         (span[1], collide(MATERIALS[material], viscosity=viscosity, stokes=span[1], angle=30.0).friction_used, friction)
         for (material, viscosity, span), friction in zip(CLASSES.values(), (0.02, 0.20, 0.11))
     ]
-    return [worst("friction, oblique, three classes", wanted, 0.0)]
+    onsets = {
+        onset: collide(MATERIALS["delrin"], viscosity=WATER, stokes=100.0, angle=10.0, friction_onset=onset)
+        for onset in ("film", "overlap")
+    }
+    return [
+        worst("friction, oblique, three classes", wanted, 0.0),
+        Row(
+            "Delrin, St_n 100, 10 deg: e_t, friction at overlap; ref. film",
+            onsets["overlap"].restitution_tangential,
+            onsets["film"].restitution_tangential,
+        ),
+    ]
 
 
 def gondret(curves: Curves) -> list[Row]:

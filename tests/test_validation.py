@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 
 from cfddem.errors import InputError
+from scenarios import binary_collision_checks as checks
+from scenarios import binary_collision_validation as study
 from scenarios import validation
 from scenarios.validation import Row, replacing, validate, worst, write_histories
 
@@ -87,6 +90,15 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
         raise RuntimeError
     assert place.read_text() == "old"
     assert list(tmp_path.iterdir()) == [place]
+
+
+@pytest.mark.parametrize(
+    "part",
+    [study.gap_histories, study.roughness, study.gondret, checks.walls, checks.film_zone, checks.tables],
+    ids=lambda part: part.__name__,
+)
+def test_quick_parts_of_the_binary_collisions_hold(part: Callable[[study.Curves], list[Row]]) -> None:
+    assert [row.card() for row in part({}) if row.verdict == "FAILS"] == []
 
 
 @pytest.mark.slow

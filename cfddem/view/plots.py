@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BLUE, SKY, ORANGE, GREEN, RED, GREY = "#0b4f8a", "#56a6d9", "#e07b00", "#1b8a5a", "#b8323c", "#7a7a7a"
 """Colours that stay apart in print and for the colour-blind."""
 
-_STYLE = {
+_STYLE: Any = {
     "font.size": 11.0,
     "font.family": "sans-serif",
     "axes.spines.top": False,
