@@ -193,13 +193,14 @@ def _across(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_
 
 @threaded
 def predict(
-    old, rate_a, rate_b, weight_b, pressure, stored, voidage, drag, drag_momentum, source, driving, solved,
+    old, rate_a, rate_b, weight_b, pressure, stored, centred, voidage, drag, drag_momentum, source, driving, solved,
     density, step, inverse, model_b, new, mobility,
 ):  # fmt: skip
     """Velocity after the step with the pressure as it is, and its mobility: velocity lost per pressure gradient.
 
     old, new, mobility (3, ...) velocities [m/s] and [m2 s/kg]; rate_a, rate_b (3, ...) results of `transport`, the
-    second counting weight_b; pressure p' [Pa]; stored, voidage: voidage in storage at the old and the new velocity;
+    second counting weight_b; pressure p' [Pa]; stored, centred, voidage: voidage stored with the old velocity, in the
+    middle of the step, stored with the new velocity;
     drag beta [kg/m3/s], drag_momentum beta v and source [N/m3], cell fields; driving mean pressure fall [Pa/m];
     solved (3, ...) 1 where the velocity of a face is an unknown.
     """
@@ -210,6 +211,7 @@ def predict(
             for d in range(old.shape[0]):
                 dk, dj, di = UNIT[d]
                 e_right, e_left = _row(voidage, k, j, LOW, n), _row(voidage, k - dk, j - dj, LOW - di, n)
+                c_right, c_left = _row(centred, k, j, LOW, n), _row(centred, k - dk, j - dj, LOW - di, n)
                 s_right, s_left = _row(stored, k, j, LOW, n), _row(stored, k - dk, j - dj, LOW - di, n)
                 b_right, b_left = _row(drag, k, j, LOW, n), _row(drag, k - dk, j - dj, LOW - di, n)
                 v = drag_momentum[d]
@@ -221,12 +223,11 @@ def predict(
                 u, out, ease = _row(old[d], k, j, LOW, n), _row(new[d], k, j, LOW, n), _row(mobility[d], k, j, LOW, n)
                 free = _row(solved[d], k, j, LOW, n)
                 for i in range(n):
-                    face = 0.5 * (e_right[i] + e_left[i])
-                    right, left = slip_weight(face, e_right[i], model_b), slip_weight(face, e_left[i], model_b)
+                    face = 0.5 * (c_right[i] + c_left[i])
+                    right, left = slip_weight(face, c_right[i], model_b), slip_weight(face, c_left[i], model_b)
                     beta = 0.5 * (right * b_right[i] + left * b_left[i])
                     beta_v = 0.5 * (right * v_right[i] + left * v_left[i])
-                    inertia = density * face
-                    theta = implicitness(beta * step / inertia)
+                    theta = implicitness(beta * step / (density * face))
                     gradient = (p_right[i] - p_left[i]) * inverse[d]
                     share = face + model_b * (1.0 - face)
                     momentum = (
@@ -237,7 +238,7 @@ def predict(
                         + step * 0.5 * (x_right[i] + x_left[i])
                         + step * (beta_v - (1.0 - theta) * beta * u[i])  # drag, its explicit part
                     )
-                    inertia += step * theta * beta  # drag, its implicit part
+                    inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
                     out[i] = momentum / inertia if free[i] > 0.0 else u[i]
                     ease[i] = free[i] * step * share / inertia
 

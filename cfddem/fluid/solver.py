@@ -142,6 +142,8 @@ class FluidSolver(FluidState):
         voidage_rate = (new_voidage - self.voidage) / step * self._open
         self._take(drag_coefficient, drag_momentum, source)
         self._pad(0.5 * (self.voidage + new_voidage), self._other_mean)
+        np.add(self._mean_voidage, self._other_mean, out=self._centred)
+        self._centred *= 0.5
         self.boundaries.set_inlets(self.time + step, self._other_mean)
 
         # Stage one: carried by the old flux, and stored with the voidage that agrees with that flux.
@@ -197,8 +199,8 @@ class FluidSolver(FluidState):
     def _predict(self, weight_b: float, step: float, new: Array) -> None:
         self.boundaries.fill_pressure(self._pressure)
         predict(
-            self._velocity, self._rate_a, self._rate_b, weight_b, self._pressure, self._stored, self._other_mean,
-            self._drag, self._drag_momentum, self._source, self.boundaries.driving, self._solved,
+            self._velocity, self._rate_a, self._rate_b, weight_b, self._pressure, self._stored, self._centred,
+            self._other_mean, self._drag, self._drag_momentum, self._source, self.boundaries.driving, self._solved,
             self.density, step, self._inverse, self._model_b, new, self._mobility,
         )  # fmt: skip
         self.boundaries.fill_velocity(new)
@@ -281,11 +283,21 @@ class FluidSolver(FluidState):
 
     # ------------------------------------------------------------ start
 
-    def set_voidage(self, voidage: Array | float, rate: Array | None = None) -> None:
-        """Voidage (nz, ny, nx) at the start, or a number, and d(eps)/dt [1/s] up to then; None is zero."""
+    def set_voidage(self, voidage: Array | float, before: Array | None = None, step: float | None = None) -> None:
+        """Voidage (nz, ny, nx) at the start, or a number; and where it moves, what it was a step [s] before.
+
+        The velocity set next belongs to the middle of that step.
+        """
         self.voidage[:] = checked_voidage(self.grid, voidage)
-        self._voidage_rate[:] = 0.0 if rate is None else rate * self._open
-        self._pad(self.voidage, self._mean_voidage)
+        self._voidage_rate.fill(0.0)
+        mean = self.voidage
+        if before is not None:
+            if step is None or not step > 0.0:
+                raise InputError("step", step, "the time between the two voidages, in s")
+            earlier = checked_voidage(self.grid, before)
+            mean = 0.5 * (self.voidage + earlier)
+            self._voidage_rate[:] = (self.voidage - earlier) / step * self._open
+        self._pad(mean, self._mean_voidage)
 
     def set_velocity(self, velocity: Sequence[Any]) -> None:
         """Start from a velocity, made to satisfy continuity by the smallest potential flow.

@@ -42,7 +42,7 @@ class FluidState:
 
         cells, vector = grid.padded_shape, (3, *grid.padded_shape)
         self._voidage_rate = np.zeros(grid.shape)  # of the interval the velocity belongs to
-        self._mean_voidage, self._other_mean, self._stored = (np.ones(cells) for _ in range(3))
+        self._mean_voidage, self._other_mean, self._centred, self._stored = (np.ones(cells) for _ in range(4))
         self._velocity, self._stage, self._other = (np.zeros(vector) for _ in range(3))
         self._rate_a, self._rate_b, self._flux, self._mobility = (np.zeros(vector) for _ in range(4))
         self._drag_momentum, self._source = np.zeros(vector), np.zeros(vector)
@@ -70,6 +70,11 @@ class FluidState:
             faces = np.moveaxis(self.face_velocity(d), 2 - d, 0)
             means.append(np.moveaxis(0.5 * (faces[1:] + faces[:-1]), 0, 2 - d))
         return np.stack(means, axis=-1)
+
+    @property
+    def mean_voidage(self) -> Array:
+        """Voidage in the middle of the last step of the voidage, the one stored with the velocity, a view."""
+        return self.grid.inner(self._mean_voidage)
 
     def face_velocity(self, axis: int) -> Array:
         """Component `axis` on its faces [m/s], both boundaries included, a view: (nz, ny, nx+1) for x."""
@@ -154,7 +159,7 @@ class FluidState:
         """
         weight, seen = np.empty((*self.grid.shape, 3)), np.empty((*self.grid.shape, 3))
         drag_seen(
-            self._other, self._velocity, self._mean_voidage, self._drag, self._solved, self.density, self._last_step,
+            self._other, self._velocity, self._centred, self._drag, self._solved, self.density, self._last_step,
             self._model_b, weight, seen,
         )  # fmt: skip
         inner = self.grid.inner
