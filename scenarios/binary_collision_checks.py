@@ -18,9 +18,10 @@ from scenarios.validation import Columns, Row, numbers, worst
 
 Curves = dict[str, Columns]
 
-DRY = 0.97
+DRY = 0.97  # e_dry of the four materials
 CUTOFF = 12.7e-3 / 4  # R* of two equal spheres and the reach of their film [m]
 WATER = 1.0e-3  # [Pa s]
+SPEED = 0.1  # of approach, where not said otherwise [m/s]
 CONVERGED = 5e-4
 """Step in Hertz times of a solution that a finer step does not change."""
 
@@ -38,7 +39,7 @@ def walls(curves: Curves) -> list[Row]:
     stokes, rows = np.geomspace(25.0, 2000.0, 20), []
     for name in ("steel_rough", "glass", "delrin"):
         pair, wall = (
-            np.array([collide(MATERIALS[name], velocity=0.1, stokes=st, against=body).restitution for st in stokes])
+            np.array([collide(MATERIALS[name], velocity=SPEED, stokes=st, against=body).restitution for st in stokes])
             for body in ("sphere", "wall")
         )
         curves[f"pair_and_wall/{name}"] = {"stokes": (stokes, "-"), "pair": (pair, "-"), "wall": (wall, "-")}
@@ -77,9 +78,9 @@ def film_zone(curves: Curves) -> list[Row]:
     points = []
     for name, material in MATERIALS.items():
         for stokes in (5, 30, 100):
-            run = collide(material, velocity=0.1, stokes=stokes)
-            inbound = (np.arange(len(run.gap)) < np.argmin(run.gap)) & (run.gap > film_gap(material, 0.1, stokes))
-            speed = run.history["normal_speed"][inbound] / 0.1
+            run = collide(material, velocity=SPEED, stokes=stokes)
+            inbound = (np.arange(len(run.gap)) < np.argmin(run.gap)) & (run.gap > film_gap(material, SPEED, stokes))
+            speed = run.history["normal_speed"][inbound] / SPEED
             line = -1.0 + np.log(CUTOFF / run.gap[inbound]) / stokes
             most = int(np.abs(speed - line).argmax())
             points.append((stokes, speed[most], line[most]))
@@ -94,7 +95,7 @@ def tables(curves: Curves) -> list[Row]:
     )
     rows = []
     for name in ("delrin", "glass"):
-        e = [collide(MATERIALS[name], velocity=0.1, stokes=st).restitution for st in head_on["St"]]
+        e = [collide(MATERIALS[name], velocity=SPEED, stokes=st).restitution for st in head_on["St"]]
         rows.append(worst(f"{name}, head-on: e at St 20 to 2000", zip(head_on["St"], e, head_on[f"e_{name}"]), 1e-3))
     delrin = MATERIALS["delrin"]
     runs = [collide(delrin, viscosity=WATER, stokes=100.0, angle=angle) for angle in frozen["angle"]]

@@ -19,16 +19,12 @@ from closures.restitution import critical_stokes, immersed, legendre, stop_gap
 from scenarios import binary_collision_checks as checks
 from scenarios import binary_collision_figures as figures
 from scenarios.binary_collision import MATERIALS, collide
+from scenarios.binary_collision_checks import CUTOFF, DRY, SPEED, WATER, Curves
 from scenarios.bouncing_sphere import SPEED as FALL_SPEED
 from scenarios.bouncing_sphere import bounce, speed_after_contact
-from scenarios.validation import Columns, Row, Tell, numbers, worst, write_histories
+from scenarios.validation import Row, Tell, numbers, worst, write_histories
 
-Curves = dict[str, Columns]
-
-DRY = 0.97
-CUTOFF = 12.7e-3 / 4  # R* of two equal spheres and the reach of their film [m]
-WATER, GLYCEROL_80 = 1.0e-3, 60.1e-3  # [Pa s]
-SPEED = 0.1  # [m/s]
+GLYCEROL_80 = 60.1e-3  # 80 % by weight at 20 C [Pa s]
 CLASSES: dict[str, tuple[str, float, tuple[float, float, float]]] = {
     "low": ("steel_smooth", GLYCEROL_80, (10.0, 20.0, 24.9)),
     "middle": ("delrin", WATER, (40.0, 100.0, 200.0)),
