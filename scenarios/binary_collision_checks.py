@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from cfddem.errors import UnstableStep
 from cfddem.materials import Material, pair_table
 from closures.minimum_gap import elastohydrodynamic
-from scenarios.binary_collision import MATERIALS, collide
+from scenarios.binary_collision import MATERIALS, Collision, collide
 from scenarios.validation import Columns, Row, numbers, worst
 
 Curves = dict[str, Columns]
@@ -138,11 +138,9 @@ class Impact:
         """Whether the film's pressure, not the asperities, sets the minimum gap."""
         return film_gap(self.material, self.speed, self.stokes, self.diameter) > self.material.roughness
 
-    def restitution(self, **options: Any) -> float:
-        """Restitution where the pair leaves the film."""
-        return collide(
-            self.material, diameter=self.diameter, velocity=self.speed, stokes=self.stokes, **options
-        ).restitution
+    def collide(self, **options: Any) -> Collision:
+        """Let it happen between two such spheres."""
+        return collide(self.material, diameter=self.diameter, velocity=self.speed, stokes=self.stokes, **options)
 
 
 def drawn(count: int, seed: int, restitution: tuple[float, float]) -> Iterator[Impact]:
@@ -186,6 +184,28 @@ def integrators(curves: Curves) -> list[Row]:
     return rows
 
 
+def oblique(curves: Curves) -> list[Row]:
+    """Oblique impacts drawn at random, at the default step and at 0.1 % of the Hertz time."""
+    random = np.random.default_rng(11)
+    rows = []
+    for onset in ("film", "overlap"):
+        pairs = []
+        for impact in drawn(12, seed=13, restitution=(0.9, 0.98)):
+            surface = {"friction": random.uniform(0.05, 0.5), "friction_lubricated": random.uniform(0.01, 0.1)}
+            rubbing = replace(impact, material=impact.material.model_copy(update=surface), stokes=impact.stokes + 10.0)
+            options: dict[str, Any] = {"angle": random.uniform(3.0, 70.0), "friction_onset": onset}
+            pairs.append((rubbing.collide(**options), rubbing.collide(**options, step_fraction=1e-3)))
+        for title, name, limit, unit in (
+            ("e_t", "restitution_tangential", 5e-3, "-"),
+            ("striker's angle", "rebound_angle_striker", 0.3, "deg"),
+            ("relative angle", "rebound_angle_relative", 0.3, "deg"),
+        ):
+            points = [(fine.stokes, getattr(run, name), getattr(fine, name)) for run, fine in pairs]
+            rows.append(worst(f"oblique, drawn, {onset}: {title}", points, limit, unit=unit))
+            curves[f"integrators/oblique_{onset}/{name}"] = _columns(points, unit)
+    return rows
+
+
 @dataclass
 class Integrated:
     """What both integrators make of some impacts: (St, e, e converged) of each."""
@@ -199,18 +219,18 @@ class Integrated:
     def add(self, impact: Impact) -> None:
         """Run an impact converged, with the drift, and with plain Verlet unless that refuses."""
         self.deformed += impact.deformed
-        exact = impact.restitution(step_fraction=CONVERGED)
-        self.drift.append((impact.stokes, impact.restitution(), exact))
+        exact = impact.collide(step_fraction=CONVERGED).restitution
+        self.drift.append((impact.stokes, impact.collide().restitution, exact))
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                value = impact.restitution(integrator="verlet")
+                value = impact.collide(integrator="verlet").restitution
             except UnstableStep:
                 self.refused += 1
                 return
         (self.verlet_with_warning if caught else self.verlet).append((impact.stokes, value, exact))
 
 
-def _columns(points: list[tuple[float, float, float]]) -> Columns:
+def _columns(points: list[tuple[float, float, float]], unit: str = "-") -> Columns:
     stokes, value, exact = np.array(points).reshape(-1, 3).T
-    return {"stokes": (stokes, "-"), "restitution": (value, "-"), "restitution_converged": (exact, "-")}
+    return {"stokes": (stokes, "-"), "value": (value, unit), "converged": (exact, unit)}

@@ -214,4 +214,5 @@ PARTS: tuple[Callable[[Curves], list[Row]], ...] = (
     checks.film_zone,
     checks.tables,
     checks.integrators,
+    checks.oblique,
 )
