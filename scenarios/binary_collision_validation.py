@@ -118,7 +118,7 @@ def _closed_form(material: Material, stokes: np.ndarray) -> tuple[np.ndarray, np
 
 def roughness(curves: Curves) -> list[Row]:
     """Figure 4: roughness of Delrin."""
-    delrin, sweep = MATERIALS["delrin"], np.geomspace(1e-9, 3e-5, 28)
+    delrin, sweep = MATERIALS["delrin"], np.geomspace(1e-9, 3e-5, 46)
     plateau = []
     for stokes in (20, 30, 50, 100, 200, 1000):
         limit = checks.film_gap(_rough(delrin, 0.0), SPEED, stokes)
