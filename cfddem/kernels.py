@@ -45,7 +45,9 @@ def threaded(function: Callable[..., Any]) -> Any:
 
 def inline(function: Callable[..., Any]) -> Any:
     """Compile a small helper into the loops that call it."""
-    return njit(error_model="numpy", inline="never")(function)
+    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True, _nrt=False)(
+        function
+    )
 
 
 def use_threads(count: int | None) -> int:
@@ -87,12 +89,15 @@ def announce_compilation() -> None:
         event.register("numba:compile", _Announcer())
 
 
-def serial_and_threaded(function: Callable[..., Any]) -> tuple[Any, Any]:
+def serial_and_threaded(function: Callable[..., Any], **swapped: Any) -> tuple[Any, Any]:
     """Compile one source twice: for one thread without overhead, and for all threads.
 
     The second face carries its own name, because the compile cache tells functions apart by name.
+
+    swapped  name=loop, what the threaded face calls instead of the loop of that name
     """
-    twin = FunctionType(function.__code__, function.__globals__, function.__name__ + "_threaded")
+    names = {**function.__globals__, **swapped}
+    twin = FunctionType(function.__code__, names, function.__name__ + "_threaded")
     twin.__qualname__ = function.__qualname__ + "_threaded"
     twin.__module__ = function.__module__
     return kernel(function), threaded(twin)

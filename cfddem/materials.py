@@ -63,6 +63,7 @@ PAIR = np.dtype(
         ("shear_modulus", "f8"),  # G* of the contact [Pa]
         ("restitution", "f8"),  # e [-]
         ("damping_ratio", "f8"),  # alpha of Tsuji's dashpot [-]
+        ("linear_damping_ratio", "f8"),  # zeta of the linear dashpot [-]
         ("friction", "f8"),  # mu, dry [-]
         ("friction_lubricated", "f8"),  # mu, where a film holds [-]
         ("roughness_gap", "f8"),  # h_sigma [m]
@@ -106,6 +107,7 @@ def pair_table(
             table[i, j][name] = table[j, i][name] = value
     for row in table.reshape(-1):
         row["damping_ratio"] = contact.damping_ratio(float(row["restitution"]))
+        row["linear_damping_ratio"] = contact.linear_damping_ratio(float(row["restitution"]))
     return table
 
 

@@ -9,12 +9,16 @@ import numpy as np
 from cfddem.errors import RunFailed
 from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.forces import Laws
-from cfddem.particles.motion import march
-from cfddem.particles.neighbours import list_edges
-from cfddem.particles.pairs import Edges, gaps, remember
+from cfddem.particles.motion import march, march_threaded
+from cfddem.particles.neighbours import list_edges, wrap
+from cfddem.particles.pairs import Edges, gaps, remember, shifts
 from cfddem.particles.state import Bodies
+from cfddem.particles.vectors import flat
 from cfddem.particles.walls import Plane, walls
 from cfddem.record.collisions import CollisionRecord
+
+THREADING_PAYS = 1000
+"""From this many particles on, loops run on all threads; on one they still work on several pairs at once."""
 
 _NO_ROWS = np.zeros(0, ENCOUNTER)
 
@@ -28,6 +32,7 @@ class Simulation:
     laws     which laws hold between two bodies
     gravity  [m/s2]
     free     1 along axes in which positions may change, 0 where they are held
+    box      length of the periodic box, which begins at 0; None along open axes [m]
     skin     allowance of the neighbour list; a quarter of the largest radius if not given [m]
     record   keep a record of encounters, in `collisions`
     """
@@ -41,6 +46,7 @@ class Simulation:
         laws: Laws | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         free: tuple[float, float, float] = (1.0, 1.0, 1.0),
+        box: tuple[float | None, float | None, float | None] = (None, None, None),
         skin: float | None = None,
         record: bool = False,
     ) -> None:
@@ -50,10 +56,10 @@ class Simulation:
         self.laws = laws or Laws()
         self.gravity, self.free = gravity, free
         self.skin = 0.25 * float(bodies.radius.max()) if skin is None else skin
+        self.box = np.array([np.inf if length is None else length for length in box])
         self.time, self.steps = 0.0, 0
         self.collisions = CollisionRecord() if record else None
-        self.edges = self._listed()
-        self._origin = bodies.position.copy()
+        self._take_list(self._listed())
         self.refresh()
 
     @property
@@ -63,7 +69,7 @@ class Simulation:
     @property
     def gap(self) -> np.ndarray:
         """Gap of every listed pair [m]."""
-        return gaps(self.edges, self.bodies, self.walls)
+        return gaps(self.edges, self.bodies, self.walls, self.box)
 
     def refresh(self) -> None:
         """Find the forces at the present places, as after a change of state from outside."""
@@ -88,31 +94,38 @@ class Simulation:
                 self._relist()
 
     def _march(self, step: float, steps: int) -> tuple[int, float, int]:
-        return march(
-            self.bodies,
-            self.edges,
-            self.walls,
+        record = self.collisions
+        large = self.bodies.count >= THREADING_PAYS
+        return (march_threaded if large else march)(  # type: ignore[no-any-return]
+            *self._views,
             self.table,
-            self.laws,
+            self.laws.without_the_absent() if large else self.laws,
             self.free,
             self.gravity,
             step,
             steps,
-            self._origin,
+            self._origin.reshape(-1),
             0.5 * self.skin,
             self.time,
-            _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first)),
+            _NO_ROWS if record is None else record.room(len(self.edges.first)),
         )
 
+    def _take_list(self, edges: Edges) -> None:
+        """Use a list from here on: the places it was made at, and the arrays as loops take them."""
+        self.edges = edges
+        self._origin = self.bodies.position.copy()
+        self._views = (flat(self.bodies), flat(edges), flat(self.walls), shifts(self.box).reshape(-1))
+
     def _listed(self) -> Edges:
-        return list_edges(self.bodies, self.walls, self._reach_ratio, self.skin, self.collisions is not None)
+        return list_edges(self.bodies, self.walls, self._reach_ratio, self.skin, self.box, self.collisions is not None)
 
     def _relist(self) -> None:
+        """Find the pairs anew; what they remember and the forces at hand are carried over."""
+        wrap(self.bodies.position, self.box)
+        order = np.arange(self.bodies.count, dtype=np.int32)
         fresh = self._listed()
-        remember(self.edges, fresh, self.bodies)
-        self.edges = fresh
-        self._origin = self.bodies.position.copy()
-        self.refresh()
+        remember(self.edges, fresh, order, order)
+        self._take_list(fresh)
 
     def _lost_number(self) -> str:
         row = int(np.argmax(np.isnan(self.bodies.position).any(axis=1)))

@@ -60,9 +60,18 @@ def _point_compiler_at(folder: Path) -> None:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
 
 
+_OPTIONS = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "forceinline": True,
+    "_nrt": False,
+}
+
+
 def expose(function: Callable[..., float]) -> None:
     """Let compiled loops call this plain function by its name."""
-    overload(function, strict=False, jit_options={"error_model": "numpy"})(lambda *_, **__: function)
+    overload(function, strict=False, jit_options=_OPTIONS)(lambda *_, **__: function)
 
 
 _point_compiler_at(cache_folder())

@@ -160,25 +160,37 @@ def mindlin_stiffness(reduced_shear_modulus: float, reduced_radius: float, overl
     >>> mindlin_stiffness(1e6, 1e-2, 1e-6)
     800.0
     """
-    return 8.0 * reduced_shear_modulus * math.sqrt(reduced_radius * overlap)
+    return 8.0 * reduced_shear_modulus * math.sqrt(reduced_radius) * math.sqrt(overlap)
 
 
-@law(
-    "contact",
-    "Cundall & Strack, Geotechnique 29 (1979) 47; Garg et al., Powder Technol. 220 (2012) 122, eq. (12)",
-)
-def linear_damping(restitution: float, reduced_mass: float, stiffness: float) -> float:
-    r"""Resistance of the dashpot beside a linear spring that gives a wanted restitution.
+@law("contact", "Schwager & Poeschel, Granul. Matter 9 (2007) 465; Garg et al., Powder Technol. 220 (2012) 122")
+def linear_damping_ratio(restitution: float) -> float:
+    r"""Damping ratio zeta of a linear spring and dashpot that rebound with a wanted restitution.
 
-    .. math:: \gamma = \frac{-2\ln e\,\sqrt{m^* k}}{\sqrt{\ln^2 e + \pi^2}}
+    .. math:: \zeta = \frac{-\ln e}{\sqrt{\ln^2 e + \pi^2}}
 
-    restitution   e, 0 < e <= 1 [-]
-    reduced_mass  m* [kg]
-    stiffness     k, linear [N/m]
-    returns       gamma [kg/s]
+    restitution  e, 0 < e <= 1 [-]
+    returns      zeta [-]
 
-    >>> round(linear_damping(0.9, 1.0, 1.0), 5)
-    0.06704
+    >>> round(linear_damping_ratio(0.9), 5)
+    0.03352
     """
     logarithm = math.log(restitution)
-    return -2.0 * logarithm * math.sqrt(reduced_mass * stiffness) / math.sqrt(logarithm**2 + math.pi**2)
+    return -logarithm / math.sqrt(logarithm**2 + math.pi**2)
+
+
+@law("contact", "Cundall & Strack, Geotechnique 29 (1979) 47; Garg et al., Powder Technol. 220 (2012) 122, eq. (12)")
+def linear_damping(damping_ratio: float, reduced_mass: float, stiffness: float) -> float:
+    r"""Resistance of the dashpot beside a linear spring.
+
+    .. math:: \gamma = 2\zeta\sqrt{m^* k}
+
+    damping_ratio  zeta, from :func:`linear_damping_ratio` [-]
+    reduced_mass   m* [kg]
+    stiffness      k, linear [N/m]
+    returns        gamma [kg/s]
+
+    >>> linear_damping(0.5, 4.0, 9.0)
+    6.0
+    """
+    return 2.0 * damping_ratio * math.sqrt(reduced_mass * stiffness)

@@ -105,7 +105,7 @@ def speed_after_film(
     high = total
     low = total - strength_per_mass * film_potential(cutoff_gap, minimum_gap, cutoff_gap)
     guess = min(max(speed, low), high)
-    tolerance = 1e-14 * (abs(speed) + strength_per_mass * 1e-3)
+    tolerance = 4e-16 * (abs(total) + high - low)
     for _ in range(100):
         end = gap + step * guess
         excess = guess + strength_per_mass * film_potential(end, minimum_gap, cutoff_gap) - total

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.kernels import inline
-from cfddem.particles.forces import geometry, pair_row, pair_viscosity, reduced_properties, relative_velocity
+from cfddem.particles.forces import pair_mass_and_radius, pair_row, pair_viscosity, relative_velocity
+from cfddem.particles.pairs import geometry
 from cfddem.particles.vectors import across, at, dot, times
 from closures.friction import dry_or_lubricated
 from closures.numbers import stokes
@@ -28,43 +29,47 @@ ENCOUNTER = np.dtype(
     align=True,
 )
 
-ENTRY = 5
-"""What an edge keeps of the begin of its encounter: time, normal speed, tangential velocity."""
-
 
 @inline
-def observe(k, bodies, edges, walls, table, laws, time, rows, count):
-    """Note the begin of an encounter, or write a row at its end; returns the number of rows."""
-    separation, distance, gap = geometry(k, bodies, edges, walls)
-    reduced_radius, reduced_mass = reduced_properties(k, bodies, edges)
+def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
+    """Note the begin of an encounter, or write a row at its end; returns the number of rows.
+
+    Of the begin an edge keeps five numbers: time, normal speed, tangential velocity.
+    """
+    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
+    reduced_radius, inverse_mass = pair_mass_and_radius(k, bodies, edges)
     reach = laws.cutoff_ratio * reduced_radius if laws.film else 0.0
-    known = not np.isnan(edges.entry[k, 0])
+    entry = 5 * k
+    known = not np.isnan(edges.entry[entry])
     if known == (gap <= reach):
         return count
     normal = times(1.0 / distance, separation)
     velocity = relative_velocity(k, bodies, edges, walls)
     normal_speed, tangential = dot(velocity, normal), across(velocity, normal)
     if not known:
-        edges.entry[k, 0], edges.entry[k, 1] = time, normal_speed
-        edges.entry[k, 2], edges.entry[k, 3], edges.entry[k, 4] = tangential
+        edges.entry[entry], edges.entry[entry + 1] = time, normal_speed
+        edges.entry[entry + 2], edges.entry[entry + 3], edges.entry[entry + 4] = tangential
         return count
 
     row, materials = rows[count], pair_row(k, bodies, edges, walls, table)
     i, j = edges.first[k], edges.second[k]
     row.first, row.second = bodies.id[i], bodies.id[j] if k < edges.between_particles else -1 - j
-    row.begin, row.end = edges.entry[k, 0], time
+    row.begin, row.end = edges.entry[entry], time
     for axis in range(3):
-        row.place[axis] = bodies.position[i, axis]
-    speed, before = -edges.entry[k, 1], (edges.entry[k, 2], edges.entry[k, 3], edges.entry[k, 4])
+        row.place[axis] = at(bodies.position, i)[axis]
+    speed = -edges.entry[entry + 1]
+    before = (edges.entry[entry + 2], edges.entry[entry + 3], edges.entry[entry + 4])
     row.approach_speed = speed
-    row.stokes = stokes(reduced_mass, speed, pair_viscosity(k, bodies, edges), reduced_radius) if laws.film else np.inf
+    row.stokes = (
+        stokes(1.0 / inverse_mass, speed, pair_viscosity(k, bodies, edges), reduced_radius) if laws.film else np.inf
+    )
     row.minimum_gap = edges.minimum_gap[k]
-    row.deformed = edges.minimum_gap[k] > materials.roughness_gap
+    row.deformed = row.minimum_gap > materials.roughness_gap
     row.friction = dry_or_lubricated(
-        edges.minimum_gap[k], materials.roughness_gap, materials.friction, materials.friction_lubricated
+        row.minimum_gap, materials.roughness_gap, materials.friction, materials.friction_lubricated
     )
     row.restitution = normal_speed / speed
     sideways = dot(before, before)
     row.restitution_tangential = dot(tangential, before) / sideways if sideways > 0.0 else np.nan
-    edges.entry[k, 0] = np.nan
+    edges.entry[entry] = np.nan
     return count + 1

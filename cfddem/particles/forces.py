@@ -1,7 +1,7 @@
-"""What two bodies do to each other: contact, friction and film, one edge at a time.
+"""What two bodies do to each other: contact and friction, and the film.
 
-Each function reads as the physics of one pair, from geometry to force. The loops over all edges stand in
-:mod:`cfddem.particles.motion`.
+The contact of a pair is a function of numbers alone, without arrays and without branches, so that the loop
+that calls it runs on several pairs at once. The film remembers its encounter and works on its edge.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.kernels import inline
-from cfddem.particles.vectors import across, at, cross, dot, minus, plus, put, times
+from cfddem.particles.pairs import geometry
+from cfddem.particles.vectors import across, at, cross, dot, either, minus, plus, put, times
 from closures.blend import contact_share
 from closures.contact import (
     hertz_damping,
@@ -20,7 +21,6 @@ from closures.contact import (
     hertz_stiffness,
     linear_damping,
     mindlin_stiffness,
-    reduced,
 )
 from closures.friction import coulomb_limit, dry_or_lubricated
 from closures.lubrication import film_resistance, film_strength, speed_after_film
@@ -38,6 +38,9 @@ FRICTION_ONSETS = {"film": FILM, "overlap": OVERLAP}
 CONTACTS = {"hertz": HERTZ, "linear": LINEAR}
 SPRINGS = {"total": TOTAL, "rescaled": RESCALED}
 
+NOTHING = (0.0, 0.0, 0.0)
+_LEAST = 1e-300  # keeps divisions of pairs that do not touch finite; their results are dropped
+
 
 class Laws(NamedTuple):
     """Which laws hold between two bodies."""
@@ -51,28 +54,106 @@ class Laws(NamedTuple):
     normal_stiffness: float = 0.0  # of the linear contact [N/m]
     tangential_stiffness: float = 0.0  # of the linear contact [N/m]
 
+    def without_the_absent(self) -> Laws:
+        """The same laws with each choice that is not made as None, which a loop compiled for it leaves out."""
+        choices = ("film", "integrator", "friction_onset", "contact", "spring")
+        return self._replace(**{name: None for name in choices if not getattr(self, name)})
+
+
+class Meeting(NamedTuple):
+    """Two bodies at one instant, seen from the first."""
+
+    separation: tuple[float, float, float]  # from the second body to the first [m]
+    distance: float  # of the centres, or from a wall [m]
+    gap: float  # [m]
+    velocity: tuple[float, float, float]  # of the first centre against the second [m/s]
+    surface_spin: tuple[float, float, float]  # sum of spin times radius [m/s]
+    reduced_radius: float  # R* [m]
+    inverse_sum: float  # 1 / (R_i + R_j); 1 / R_i at a wall [1/m]
+    inverse_mass: float  # 1 / m* [1/kg]
+    turning: float  # 1 where motion turns the normal, 0 at a flat wall
+
 
 @inline
-def geometry(k, bodies, edges, walls):
-    """Separation from the second body to the first, its length, and the gap."""
-    i, j = edges.first[k], edges.second[k]
-    if k < edges.between_particles:
-        separation = minus(at(bodies.position, i), at(bodies.position, j))
-        distance = math.sqrt(dot(separation, separation))
-        return separation, distance, distance - bodies.radius[i] - bodies.radius[j]
-    normal = at(walls.normal, j)
-    distance = dot(minus(at(bodies.position, i), at(walls.point, j)), normal)
-    return times(distance, normal), distance, distance - bodies.radius[i]
+def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
+    """Force on the first body, couple per radius on both, and the tangential spring afterwards.
+
+    Hertz and dashpot, Mindlin and Coulomb, times the share that the solids have in the load. The spring moves
+    with the half-step velocity in the tangent plane of half a step ago, and is then turned into the present
+    one, so that positions, velocities and history belong to the same instant.
+    """
+    row = rows[which]
+    touching = meeting.gap < minimum_gap
+    overlap = max(minimum_gap - meeting.gap, _LEAST)
+    share = contact_share(meeting.gap, minimum_gap) if laws.film else 1.0
+    inverse_distance = 1.0 / meeting.distance
+    normal = times(inverse_distance, meeting.separation)
+    normal_speed = dot(meeting.velocity, normal)
+
+    reduced_mass = 1.0 / meeting.inverse_mass
+    hertz = laws.contact != LINEAR
+    stiffness = hertz_stiffness(row.contact_modulus, meeting.reduced_radius)
+    elastic = hertz_force(stiffness, overlap) if hertz else laws.normal_stiffness * overlap
+    damping = (
+        hertz_damping(row.damping_ratio, reduced_mass, stiffness, overlap)
+        if hertz
+        else linear_damping(row.linear_damping_ratio, reduced_mass, laws.normal_stiffness)
+    )
+    tangential_stiffness = (
+        mindlin_stiffness(row.shear_modulus, meeting.reduced_radius, overlap) if hertz else laws.tangential_stiffness
+    )
+    # a dashpot acts on the speed at the middle of the kick, which it changes itself
+    kick = 0.5 * step * meeting.inverse_mass * share
+    mid_speed = (normal_speed + kick * elastic) / (1.0 + kick * damping)
+    normal_force = elastic - damping * mid_speed
+
+    # levers add up to the distance of the centres
+    stretch = meeting.distance * meeting.inverse_sum
+    moved = (free[0] * meeting.velocity[0], free[1] * meeting.velocity[1], free[2] * meeting.velocity[2])
+    halfway = minus(normal, times(0.5 * step * inverse_distance * meeting.turning, moved))
+    halfway = times(1.5 - 0.5 * dot(halfway, halfway), halfway)  # unit length, to second order of the turn
+    slip = minus(across(meeting.velocity, halfway), times(stretch, cross(meeting.surface_spin, halfway)))
+    before = max(overlap + step * normal_speed, 0.0)
+    loading = laws.spring == RESCALED and before < overlap
+    spring = times(math.sqrt(before / overlap) if loading else 1.0, spring)
+    # in its first step a contact slides only from where friction sets in
+    since = meeting.gap if laws.friction_onset == OVERLAP else -overlap
+    outward = step * normal_speed
+    portion = since / min(outward, -_LEAST) if outward < since else 1.0
+    spring = across(plus(spring, times(min(portion, 1.0) * step, slip)), normal)
+    slip = across(slip, normal)
+
+    mid_slip = minus(slip, times(ROLLING * kick * tangential_stiffness, spring))
+    mid_slip = times(1.0 / (1.0 + ROLLING * kick * damping), mid_slip)
+    pull = plus(times(tangential_stiffness, spring), times(damping, mid_slip))
+    friction = row.friction
+    if laws.film:
+        friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
+    limit = coulomb_limit(friction, normal_force)
+    size = math.sqrt(dot(pull, pull))
+    sliding = size > limit
+    pull = times(limit / max(size, _LEAST) if sliding else 1.0, pull)
+    slid = times(1.0 / max(tangential_stiffness, _LEAST), minus(pull, times(damping, slip)))
+    spring = either(sliding, slid, spring)
+
+    gripping = touching and (laws.friction_onset != OVERLAP or meeting.gap < 0.0)
+    pull = either(gripping, pull, NOTHING)
+    force = minus(times(normal_force, normal), pull)
+    return (
+        either(touching, times(share, force), NOTHING),
+        times(share * stretch, cross(normal, pull)),
+        either(gripping, spring, NOTHING),
+    )
 
 
 @inline
-def reduced_properties(k, bodies, edges):
-    """Reduced radius and mass of the pair; those of the particle itself against a wall."""
+def pair_mass_and_radius(k, bodies, edges):
+    """Reduced radius and inverse of the reduced mass; those of the particle itself against a wall."""
     i, j = edges.first[k], edges.second[k]
     if k < edges.between_particles:
-        mass = 1.0 / (bodies.inverse_mass[i] + bodies.inverse_mass[j])
-        return reduced(bodies.radius[i], bodies.radius[j]), mass
-    return bodies.radius[i], 1.0 / bodies.inverse_mass[i]
+        radius = bodies.radius[i] * bodies.radius[j] / (bodies.radius[i] + bodies.radius[j])
+        return radius, bodies.inverse_mass[i] + bodies.inverse_mass[j]
+    return bodies.radius[i], bodies.inverse_mass[i]
 
 
 @inline
@@ -81,17 +162,6 @@ def relative_velocity(k, bodies, edges, walls):
     i, j = edges.first[k], edges.second[k]
     other = at(bodies.velocity, j) if k < edges.between_particles else at(walls.velocity, j)
     return minus(at(bodies.velocity, i), other)
-
-
-@inline
-def swirl(k, bodies, edges, distance):
-    """Sum of spin times lever arm; the levers of both bodies add up to the distance of the centres."""
-    i, j = edges.first[k], edges.second[k]
-    if k < edges.between_particles:
-        stretch = distance / (bodies.radius[i] + bodies.radius[j])
-        own = times(stretch * bodies.radius[i], at(bodies.spin, i))
-        return plus(own, times(stretch * bodies.radius[j], at(bodies.spin, j))), stretch
-    return times(distance, at(bodies.spin, i)), distance / bodies.radius[i]
 
 
 @inline
@@ -121,115 +191,52 @@ def encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row):
 
 
 @inline
-def meet(k, bodies, edges, walls, table, laws, free, step):
-    """Force of edge k at the present positions: contact, friction, and the film if it acts as a force.
-
-    The tangential spring moves with the half-step velocity in the tangent plane of half a step ago, and is
-    then turned into the present one, so that positions, velocities and history belong to the same instant.
-    """
-    separation, distance, gap = geometry(k, bodies, edges, walls)
-    put(edges.force, k, (0.0, 0.0, 0.0))
-    put(edges.couple, k, (0.0, 0.0, 0.0))
+def wet(k, bodies, edges, walls, shift, table, laws):
+    """Find the resistance of the film of edge k; out of its reach the encounter is forgotten."""
+    _, _, gap = geometry(k, bodies, edges, walls, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
     row = pair_row(k, bodies, edges, walls, table)
-    if laws.film:
-        reduced_radius, _ = reduced_properties(k, bodies, edges)
-        cutoff_gap = laws.cutoff_ratio * reduced_radius
-        if gap > cutoff_gap:
-            edges.resistance[k] = 0.0
-            edges.approach_speed[k] = 0.0
-            edges.minimum_gap[k] = row.roughness_gap
-            edges.accounted_gap[k] = gap
-            return
-        viscosity = pair_viscosity(k, bodies, edges)
-        strength = film_strength(viscosity, reduced_radius)
-        if laws.integrator == VERLET:
-            normal = times(1.0 / distance, separation)
-            normal_speed = dot(relative_velocity(k, bodies, edges, walls), normal)
-            encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row)
-            resistance = film_resistance(strength, gap, edges.minimum_gap[k], cutoff_gap)
-            put(edges.force, k, times(-resistance * normal_speed, normal))
-        elif edges.accounted_gap[k] == np.inf:
-            edges.accounted_gap[k] = gap
-            edges.minimum_gap[k] = max(row.roughness_gap, edges.minimum_gap[k])
-        edges.resistance[k] = strength / max(gap, edges.minimum_gap[k])
-    if gap < edges.minimum_gap[k]:
-        touch(k, bodies, edges, walls, row, laws, free, step, separation, distance, gap)
-    else:
-        put(edges.spring, k, (0.0, 0.0, 0.0))
+    if gap > laws.cutoff_ratio * reduced_radius:
+        edges.resistance[k] = 0.0
+        edges.approach_speed[k] = 0.0
+        edges.minimum_gap[k] = row.roughness_gap
+        edges.accounted_gap[k] = gap
+        return
+    if edges.accounted_gap[k] == np.inf:
+        edges.accounted_gap[k] = gap
+        edges.minimum_gap[k] = row.roughness_gap
+    strength = film_strength(pair_viscosity(k, bodies, edges), reduced_radius)
+    edges.resistance[k] = strength / max(gap, edges.minimum_gap[k])
 
 
 @inline
-def touch(k, bodies, edges, walls, row, laws, free, step, separation, distance, gap):
-    """Add the solid contact of edge k to its force: Hertz and dashpot, Mindlin and Coulomb, times its lever."""
-    reduced_radius, reduced_mass = reduced_properties(k, bodies, edges)
-    overlap = edges.minimum_gap[k] - gap
-    share = contact_share(gap, edges.minimum_gap[k])
+def film_force(k, bodies, edges, walls, shift, table, laws):
+    """The film of edge k as an explicit force, for plain velocity Verlet."""
+    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
     normal = times(1.0 / distance, separation)
-    velocity = relative_velocity(k, bodies, edges, walls)
-    normal_speed = dot(velocity, normal)
-
-    if laws.contact == HERTZ:
-        stiffness = hertz_stiffness(row.contact_modulus, reduced_radius)
-        elastic = hertz_force(stiffness, overlap)
-        damping = hertz_damping(row.damping_ratio, reduced_mass, stiffness, overlap)
-        tangential_stiffness = mindlin_stiffness(row.shear_modulus, reduced_radius, overlap)
-    else:
-        elastic = laws.normal_stiffness * overlap
-        damping = linear_damping(row.restitution, reduced_mass, laws.normal_stiffness)
-        tangential_stiffness = laws.tangential_stiffness
-    # the dashpot acts on the speed at the middle of the kick, which it changes itself
-    kick = 0.5 * step / reduced_mass * share
-    mid_speed = (normal_speed + kick * elastic) / (1.0 + kick * damping)
-    normal_force = elastic - damping * mid_speed
-    force = times(share * normal_force, normal)
-
-    if laws.friction_onset == FILM or gap < 0.0:
-        swirling, stretch = swirl(k, bodies, edges, distance)
-        friction = dry_or_lubricated(edges.minimum_gap[k], row.roughness_gap, row.friction, row.friction_lubricated)
-        moved = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
-        halfway = minus(separation, times(0.5 * step, moved)) if k < edges.between_particles else separation
-        halfway = times(1.0 / math.sqrt(dot(halfway, halfway)), halfway)
-        slip = minus(across(velocity, halfway), cross(swirling, halfway))
-        spring = at(edges.spring, k)
-        before = overlap + step * normal_speed
-        if laws.spring == RESCALED and before < overlap:
-            spring = times(math.sqrt(max(before, 0.0) / overlap), spring)
-        # in its first step a contact slides only from where friction sets in
-        since = gap if laws.friction_onset == OVERLAP else -overlap
-        portion = min(1.0, since / (step * normal_speed)) if step * normal_speed < since else 1.0
-        spring = across(plus(spring, times(portion * step, slip)), normal)
-        slip = across(slip, normal)
-        mid_slip = minus(slip, times(ROLLING * kick * tangential_stiffness, spring))
-        mid_slip = times(1.0 / (1.0 + ROLLING * kick * damping), mid_slip)
-        pull = plus(times(tangential_stiffness, spring), times(damping, mid_slip))
-        size = math.sqrt(dot(pull, pull))
-        limit = coulomb_limit(friction, normal_force)
-        if size > limit:
-            pull = times(limit / size, pull)
-            spring = times(1.0 / tangential_stiffness, minus(pull, times(damping, slip)))
-        put(edges.spring, k, spring)
-        force = minus(force, times(share, pull))
-        put(edges.couple, k, times(share * stretch, cross(normal, pull)))
-    else:
-        put(edges.spring, k, (0.0, 0.0, 0.0))
-    put(edges.force, k, plus(at(edges.force, k), force))
+    normal_speed = dot(relative_velocity(k, bodies, edges, walls), normal)
+    viscosity = pair_viscosity(k, bodies, edges)
+    encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, pair_row(k, bodies, edges, walls, table))
+    strength = film_strength(viscosity, reduced_radius)
+    resistance = film_resistance(strength, gap, edges.minimum_gap[k], laws.cutoff_ratio * reduced_radius)
+    return times(-resistance * normal_speed, normal)
 
 
 @inline
-def squeeze(k, bodies, edges, walls, table, laws, step):
+def squeeze(k, bodies, edges, walls, shift, table, laws, step):
     """Impulse of the film of edge k over the coming step.
 
     Each body gives this film the part of its mass that the film has in the body's total resistance. The
     pair so made is solved exactly; the sum over all films conserves momentum and never raises energy.
     """
     if edges.resistance[k] == 0.0:
-        put(edges.impulse, k, (0.0, 0.0, 0.0))
         return
     i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, bodies, edges, walls)
+    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
     normal = times(1.0 / distance, separation)
     normal_speed = dot(relative_velocity(k, bodies, edges, walls), normal)
-    reduced_radius, _ = reduced_properties(k, bodies, edges)
+    reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
     viscosity = pair_viscosity(k, bodies, edges)
     row = pair_row(k, bodies, edges, walls, table)
     encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row)

@@ -1,58 +1,200 @@
-"""Who is near whom: the list of pairs that may interact before anything has moved half the skin."""
+"""Who is near whom: the list of pairs that may interact before anything has moved half the skin.
+
+Particles are binned by size class, each class in a grid of its own cells, so that a few large particles do
+not make the search among the small ones wide. Every particle looks once into the cells of each class and
+keeps the neighbours that come after it; lists come out sorted, the same for any number of threads.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from cfddem.kernels import kernel
-from cfddem.particles.pairs import Edges, edges
+from cfddem.errors import InputError
+from cfddem.kernels import inline, kernel, prange, threaded
+from cfddem.particles.pairs import HOME, Edges, edges
 from cfddem.particles.state import Bodies
-from cfddem.particles.walls import Walls
+from cfddem.particles.vectors import at, flat
+from cfddem.particles.walls import Walls, height
+
+CLASS_RATIO = 2.0
+"""Radii within this factor share a size class."""
 
 
-def list_edges(bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float, record: bool = False) -> Edges:
+class Cells(NamedTuple):
+    """Particles sorted into the cells of their size class."""
+
+    largest: np.ndarray  # (C,) largest radius of each class [m]
+    low: np.ndarray  # (3,) lower corner of all grids [m]
+    width: np.ndarray  # (C, 3) of a cell [m]
+    number: np.ndarray  # (C, 3) int64, cells along each axis
+    offset: np.ndarray  # (C,) int64, first cell of each class in `start`
+    start: np.ndarray  # (all cells + 1,) int64, where the particles of a cell begin in `member`
+    member: np.ndarray  # (N,) int32, rows
+
+
+def list_edges(
+    bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float, box: np.ndarray, record: bool = False
+) -> Edges:
     """A fresh pair graph of all that is closer than the reach of the film plus a skin.
 
     cutoff_ratio  reach of a film over the reduced radius; 0 for dry contacts [-]
     skin          allowance for motion until the next list [m]
+    box           (3,) length of the periodic box; infinite along axes that are open [m]
     record        keep the begin of encounters, for a record of them
     """
-    first, second = _pairs(bodies.position, bodies.radius, bodies.inverse_mass, cutoff_ratio, skin)
-    particle, wall = _walls(bodies.position, bodies.radius, walls.point, walls.normal, cutoff_ratio, skin)
+    largest = float(bodies.radius.max())
+    reach = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
+    for axis in range(3):
+        if box[axis] < 2.0 * reach:
+            raise InputError("box", float(box[axis]), f"at least {2.0 * reach:.3g} m, twice the reach of a pair")
+    cells = bin_particles(bodies.position, bodies.radius, cutoff_ratio, skin, box)
+    count = np.zeros(bodies.count, np.int64)
+    nothing = np.zeros(0, np.uint32)
+    images = np.zeros(0, np.uint8)
+    _search(flat(bodies), cells, cutoff_ratio, skin, box, count, nothing, nothing, images, False)
+    end = np.cumsum(count)
+    first = np.empty(end[-1], np.uint32)
+    second, image = np.empty_like(first), np.empty(end[-1], np.uint8)
+    _search(flat(bodies), cells, cutoff_ratio, skin, box, end, first, second, image, True)
+    particle, wall = _walls(flat(bodies), flat(walls), cutoff_ratio, skin)
     return edges(
-        np.concatenate([first, particle]), np.concatenate([second, wall]), len(first), len(bodies.radius), record
+        np.concatenate([first, particle]),
+        np.concatenate([second, wall]),
+        np.concatenate([image, np.full(len(wall), HOME, np.uint8)]),
+        len(first),
+        bodies.count,
+        film=cutoff_ratio > 0.0,
+        record=record,
     )
 
 
-@kernel
-def _pairs(position, radius, inverse_mass, cutoff_ratio, skin):
-    """All pairs i < j within reach."""
-    first, second = [], []
-    for i in range(len(radius)):
-        for j in range(i + 1, len(radius)):
-            if inverse_mass[i] + inverse_mass[j] == 0.0:
-                continue
-            touch = radius[i] + radius[j]
-            reach = touch + cutoff_ratio * radius[i] * radius[j] / touch + skin
-            apart = 0.0
-            for axis in range(3):
-                apart += (position[i, axis] - position[j, axis]) ** 2
-            if apart < reach * reach:
-                first.append(i)
-                second.append(j)
-    return np.array(first, dtype=np.int32), np.array(second, dtype=np.int32)
+def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float, skin: float, box: np.ndarray) -> Cells:
+    """Sort particles into the cells of their size class.
+
+    position  (N, 3), inside the box along periodic axes [m]
+    radius    (N,) [m]
+    """
+    smallest = float(radius.min())
+    size_class = np.floor(np.log(radius / smallest) / np.log(CLASS_RATIO) + 1e-9).astype(np.int64)
+    kinds, size_class = np.unique(size_class, return_inverse=True)
+    largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])
+    periodic = np.isfinite(box)
+    low = np.where(periodic, 0.0, position.min(axis=0))
+    span = np.where(periodic, box, np.maximum(position.max(axis=0) - low, smallest))
+    wanted = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
+    most = max(64.0, 4.0 * len(radius)) ** (1.0 / 3.0)
+    wanted = np.maximum(wanted, np.prod(span) ** (1.0 / 3.0) / most)
+    number = np.clip(np.floor(span / wanted[:, None]).astype(np.int64), 1, 1 << 20)
+    cells = np.prod(number, axis=1)
+    offset = np.concatenate([[0], np.cumsum(cells)])
+    cell = np.empty(len(radius), np.int64)
+    width = span / number
+    _place(position, size_class, low, width, number, offset, cell)
+    start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=offset[-1]))]).astype(np.int64)
+    return Cells(largest, low, width, number, offset[:-1], start, np.argsort(cell, kind="stable").astype(np.int32))
 
 
 @kernel
-def _walls(position, radius, point, normal, cutoff_ratio, skin):
+def _place(position, size_class, low, width, number, offset, cell):
+    """Cell of each particle."""
+    for i in range(len(cell)):
+        c = size_class[i]
+        where = 0
+        for axis in range(3):
+            step = int((position[i, axis] - low[axis]) / width[c, axis])
+            where = where * number[c, axis] + min(max(step, 0), number[c, axis] - 1)
+        cell[i] = offset[c] + where
+
+
+@threaded
+def _search(bodies, cells, cutoff_ratio, skin, box, end, first, second, image, fill):
+    """Count the later neighbours of each particle, or write them before `end` in ascending order."""
+    for i in prange(len(bodies.radius)):
+        radius, here = bodies.radius[i], at(bodies.position, i)
+        found = 0
+        base = end[i - 1] if fill and i > 0 else 0
+        for c in range(len(cells.largest)):
+            largest = cells.largest[c]
+            reach = radius + largest + cutoff_ratio * radius * largest / (radius + largest) + skin
+            x0, x1 = _range(here[0], reach, 0, c, cells, box)
+            y0, y1 = _range(here[1], reach, 1, c, cells, box)
+            z0, z1 = _range(here[2], reach, 2, c, cells, box)
+            for x in range(x0, x1 + 1):
+                ix, shift_x = _wrap(x, cells.number[c, 0])
+                for y in range(y0, y1 + 1):
+                    iy, shift_y = _wrap(y, cells.number[c, 1])
+                    for z in range(z0, z1 + 1):
+                        iz, shift_z = _wrap(z, cells.number[c, 2])
+                        cell = cells.offset[c] + (ix * cells.number[c, 1] + iy) * cells.number[c, 2] + iz
+                        for place in range(cells.start[cell], cells.start[cell + 1]):
+                            j = cells.member[place]
+                            if j <= i or bodies.inverse_mass[i] + bodies.inverse_mass[j] == 0.0:
+                                continue
+                            touch = radius + bodies.radius[j]
+                            near = touch + cutoff_ratio * radius * bodies.radius[j] / touch + skin
+                            there = at(bodies.position, j)
+                            dx = here[0] - there[0] - (shift_x * box[0] if shift_x != 0 else 0.0)
+                            dy = here[1] - there[1] - (shift_y * box[1] if shift_y != 0 else 0.0)
+                            dz = here[2] - there[2] - (shift_z * box[2] if shift_z != 0 else 0.0)
+                            if dx * dx + dy * dy + dz * dz < near * near:
+                                if fill:
+                                    code = HOME - 9 * shift_x - 3 * shift_y - shift_z
+                                    _insert(first, second, image, base, found, i, j, code)
+                                found += 1
+        if not fill:
+            end[i] = found
+
+
+@inline
+def _range(coordinate, reach, axis, c, cells, box):
+    """Cells within reach along one axis; they run past the ends of a periodic box and are wrapped there."""
+    low = int(np.floor((coordinate - reach - cells.low[axis]) / cells.width[c, axis]))
+    high = int(np.floor((coordinate + reach - cells.low[axis]) / cells.width[c, axis]))
+    number = cells.number[c, axis]
+    if np.isinf(box[axis]):
+        return min(max(low, 0), number - 1), min(max(high, 0), number - 1)
+    # a cell is looked into once for each image of the box it stands for
+    return max(low, -number), min(high, 2 * number - 1)
+
+
+@inline
+def _wrap(cell, number):
+    """Cell inside the box and the number of boxes it was shifted by."""
+    if cell < 0:
+        return cell + number, -1
+    if cell >= number:
+        return cell - number, 1
+    return cell, 0
+
+
+@inline
+def _insert(first, second, image, base, found, i, j, code):
+    """Keep the neighbours of i in ascending order."""
+    place = base + found
+    while place > base and second[place - 1] > j:
+        second[place], image[place] = second[place - 1], image[place - 1]
+        place -= 1
+    second[place], image[place] = j, code
+    first[base + found] = i
+
+
+@kernel
+def _walls(bodies, walls, cutoff_ratio, skin):
     """All particles within reach of a wall."""
     first, second = [], []
-    for i in range(len(radius)):
-        for w in range(len(point)):
-            distance = 0.0
-            for axis in range(3):
-                distance += (position[i, axis] - point[w, axis]) * normal[w, axis]
-            if distance < (1.0 + cutoff_ratio) * radius[i] + skin:
+    for i in range(len(bodies.radius)):
+        if bodies.inverse_mass[i] == 0.0:
+            continue
+        for w in range(len(walls.material)):
+            if height(walls, w, at(bodies.position, i)) < (1.0 + cutoff_ratio) * bodies.radius[i] + skin:
                 first.append(i)
                 second.append(w)
-    return np.array(first, dtype=np.int32), np.array(second, dtype=np.int32)
+    return np.array(first, dtype=np.uint32), np.array(second, dtype=np.uint32)
+
+
+def wrap(position: np.ndarray, box: np.ndarray) -> None:
+    """Bring positions back into a periodic box, in place."""
+    for axis in np.flatnonzero(np.isfinite(box)):
+        position[:, axis] -= box[axis] * np.floor(position[:, axis] / box[axis])

@@ -6,24 +6,27 @@ particle and then their second; edges of walls follow. Each neighbour is found o
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.kernels import kernel
+from cfddem.kernels import inline, kernel
 from cfddem.particles.state import Bodies
-from cfddem.particles.walls import Walls
+from cfddem.particles.vectors import at, dot, flat, minus, plus, times
+from cfddem.particles.walls import Walls, height
 
 
 class Edges(NamedTuple):
     """The arrays of n edges, as compiled loops take them."""
 
-    first: np.ndarray  # (n,) int32, particle
-    second: np.ndarray  # (n,) int32, particle; wall in the edges after `between_particles`
+    first: np.ndarray  # (n,) uint32, particle; unsigned, so that compiled loops need not look for negative rows
+    second: np.ndarray  # (n,) uint32, particle; wall in the edges after `between_particles`
+    image: np.ndarray  # (n,) uint8, across which borders of a periodic box the pair reaches
     between_particles: int
     spring: np.ndarray  # (n, 3) tangential displacement of the contact [m]
     approach_speed: np.ndarray  # (n,) largest approach speed of this encounter [m/s]
-    minimum_gap: np.ndarray  # (n,) h_min of this encounter [m]
+    minimum_gap: np.ndarray  # (n,) h_min of this encounter; 0 without a film [m]
     accounted_gap: np.ndarray  # (n,) gap up to which the film's impulse has been given [m]
     force: np.ndarray  # (n, 3) on the first body [N]
     couple: np.ndarray  # (n, 3) torque per radius, the same on both bodies [N]
@@ -34,32 +37,50 @@ class Edges(NamedTuple):
     incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
 
 
-MEMORY = ("spring", "approach_speed", "minimum_gap", "accounted_gap", "entry")
-"""What a pair remembers from step to step."""
+HOME = 13
+"""Image of a pair that does not reach across a periodic border: 9 (x + 1) + 3 (y + 1) + (z + 1), in boxes."""
 
 
-def edges(first: np.ndarray, second: np.ndarray, between_particles: int, count: int, record: bool = False) -> Edges:
+def shifts(box: np.ndarray) -> np.ndarray:
+    """What to add to the separation of a pair for each of its 27 images (27, 3) [m]."""
+    whole = np.where(np.isfinite(box), box, 0.0)
+    steps = np.arange(-1.0, 2.0)
+    return np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(27, 3) * whole
+
+
+def edges(
+    first: np.ndarray,
+    second: np.ndarray,
+    image: np.ndarray,
+    between_particles: int,
+    count: int,
+    *,
+    film: bool,
+    record: bool = False,
+) -> Edges:
     """A fresh graph over `count` particles; pairs that have never met.
 
-    first, second      (n,) as in :class:`Edges`
-    between_particles  number of edges that join two particles
-    record             keep the begin of encounters, for a record of them
+    first, second, image  (n,) as in :class:`Edges`
+    between_particles     number of edges that join two particles
+    film                  keep what films remember
+    record                keep the begin of encounters, for a record of them
     """
     number = len(first)
-    first, second = np.ascontiguousarray(first, np.int32), np.ascontiguousarray(second, np.int32)
+    films = number if film else 0
     start, incident = _incidence(first, second, between_particles, count)
     return Edges(
         first,
         second,
+        image,
         int(between_particles),
         np.zeros((number, 3)),
+        np.zeros(films),
         np.zeros(number),
-        np.zeros(number),
-        np.full(number, np.inf),
+        np.full(films, np.inf),
         np.zeros((number, 3)),
         np.zeros((number, 3)),
-        np.zeros(number),
-        np.zeros((number, 3)),
+        np.zeros(films),
+        np.empty((films, 3)),
         np.full((number if record else 0, 5), np.nan),
         start,
         incident,
@@ -89,37 +110,68 @@ def _incidence(first, second, between_particles, count):
     return start, incident
 
 
-def remember(old: Edges, new: Edges, bodies: Bodies) -> None:
-    """Carry the memory of each pair from an old list to a new one, by the ids of its bodies."""
-    if len(old.first) == 0 or len(new.first) == 0:
-        return
-    old_names, new_names = _names(old, bodies), _names(new, bodies)
-    order = np.argsort(old_names, kind="stable")
-    place = np.minimum(np.searchsorted(old_names, new_names, sorter=order), len(order) - 1)
-    source = order[place]
-    known = old_names[source] == new_names
-    for field in MEMORY:
-        if len(getattr(new, field)):
-            getattr(new, field)[known] = getattr(old, field)[source[known]]
-    turned = known & (bodies.id[new.first] != bodies.id[old.first[source]])
-    new.spring[turned] *= -1.0
+@kernel
+def remember(old, new, old_row, new_row):
+    """Carry the memory of each pair from an old list to a new one.
+
+    old_row  (N,) where the particle of each new row stood in the old list
+    new_row  (N,) the inverse
+    """
+    for k in range(len(new.first)):
+        i, j = new.first[k], new.second[k]
+        a = old_row[i]
+        for place in range(old.start[a], old.start[a + 1]):
+            edge = old.incident[place]
+            before = edge if edge >= 0 else -1 - edge
+            if k < new.between_particles:
+                other = old.second[before] if edge >= 0 else old.first[before]
+                same = before < old.between_particles and new_row[other] == j
+            else:
+                same = before >= old.between_particles and old.second[before] == j
+            if same:
+                sign = 1.0 if edge >= 0 else -1.0
+                for axis in range(3):
+                    new.spring[k, axis] = sign * old.spring[before, axis]
+                    new.force[k, axis] = sign * old.force[before, axis]
+                    new.couple[k, axis] = old.couple[before, axis]
+                if len(new.resistance) > 0:
+                    new.approach_speed[k] = old.approach_speed[before]
+                    new.minimum_gap[k] = old.minimum_gap[before]
+                    new.accounted_gap[k] = old.accounted_gap[before]
+                    new.resistance[k] = old.resistance[before]
+                if len(new.entry) > 0:
+                    for column in range(2):
+                        new.entry[k, column] = old.entry[before, column]
+                    for column in range(2, 5):
+                        new.entry[k, column] = sign * old.entry[before, column]
 
 
-def _names(edges: Edges, bodies: Bodies) -> np.ndarray:
-    """One integer that names a pair, whatever the order of its bodies and of the list."""
-    split = edges.between_particles
-    first = bodies.id[edges.first]
-    other = np.concatenate([bodies.id[edges.second[:split]], -1 - edges.second[split:].astype(np.int64)])
-    low, high = np.minimum(first, other), np.maximum(first, other)
-    return (high << 32) + low
-
-
-def gaps(edges: Edges, bodies: Bodies, walls: Walls) -> np.ndarray:
+def gaps(edges: Edges, bodies: Bodies, walls: Walls, box: np.ndarray) -> np.ndarray:
     """Gap of every edge (n,) [m]."""
-    split = edges.between_particles
-    i, j = edges.first[:split], edges.second[:split]
-    apart = np.linalg.norm(bodies.position[i] - bodies.position[j], axis=1)
-    between = apart - bodies.radius[i] - bodies.radius[j]
-    i, w = edges.first[split:], edges.second[split:]
-    height = np.einsum("ij,ij->i", bodies.position[i] - walls.point[w], walls.normal[w])
-    return np.concatenate([between, height - bodies.radius[i]])
+    result = np.empty(len(edges.first))
+    _gaps(flat(edges), flat(bodies), flat(walls), shifts(box).reshape(-1), result)
+    return result
+
+
+@kernel
+def _gaps(edges, bodies, walls, shift, result):
+    for k in range(len(result)):
+        result[k] = geometry(k, bodies, edges, walls, shift)[2]
+
+
+@inline
+def between(i, j, image, position, shift):
+    """Separation from particle j to particle i, across a periodic border where the image says so."""
+    return plus(minus(at(position, i), at(position, j)), at(shift, image))
+
+
+@inline
+def geometry(k, bodies, edges, walls, shift):
+    """Separation from the second body to the first, its length, and the gap."""
+    i, j = edges.first[k], edges.second[k]
+    if k < edges.between_particles:
+        separation = between(i, j, edges.image[k], bodies.position, shift)
+        distance = math.sqrt(dot(separation, separation))
+        return separation, distance, distance - bodies.radius[i] - bodies.radius[j]
+    distance = height(walls, j, at(bodies.position, i))
+    return times(distance, at(walls.normal, j)), distance, distance - bodies.radius[i]

@@ -1,24 +1,43 @@
-"""Three numbers as a vector, for compiled loops."""
+"""Three numbers as a vector, for compiled loops.
+
+Loops see the vectors of all rows as one flat array: x, y, z of row 0, then of row 1. Rows are unsigned, so
+that no row can be negative; both let the compiler work on several rows at once.
+"""
 
 from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
 
 from cfddem.kernels import inline
 
 Vector = tuple[float, float, float]
+Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
+
+_1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
+
+
+def flat(arrays: Arrays) -> Arrays:
+    """The same named arrays with every table of vectors as one flat array; nothing is copied."""
+    views = {name: value.reshape(-1) for name, value in arrays._asdict().items() if np.ndim(value) == 2}  # type: ignore[attr-defined]
+    return arrays._replace(**views)  # type: ignore[attr-defined, no-any-return]
 
 
 @inline
 def at(array, row):
-    """Row of an (N, 3) array."""
-    return (array[row, 0], array[row, 1], array[row, 2])
+    """Vector of a row of a flat array."""
+    x = _3 * np.uint64(row)
+    return (array[x], array[x + _1], array[x + _2])
 
 
 @inline
 def put(array, row, a):
-    """Write a vector into a row of an (N, 3) array."""
-    array[row, 0] = a[0]
-    array[row, 1] = a[1]
-    array[row, 2] = a[2]
+    """Write a vector into a row of a flat array."""
+    x = _3 * np.uint64(row)
+    array[x] = a[0]
+    array[x + _1] = a[1]
+    array[x + _2] = a[2]
 
 
 @inline
@@ -55,3 +74,9 @@ def cross(a, b):
 def across(a, normal):
     """The part of a that is perpendicular to a unit normal."""
     return minus(a, times(dot(a, normal), normal))
+
+
+@inline
+def either(condition, a, b):
+    """a where the condition holds, else b; without a branch."""
+    return (a[0] if condition else b[0], a[1] if condition else b[1], a[2] if condition else b[2])

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.errors import InputError
+from cfddem.kernels import inline
+from cfddem.particles.vectors import at, dot, minus
 
 
 @dataclass(frozen=True)
@@ -49,3 +51,9 @@ def walls(planes: Sequence[Plane] = ()) -> Walls:
         np.array([plane.velocity for plane in planes], float).reshape(-1, 3),
         np.array([plane.material for plane in planes], np.int32),
     )
+
+
+@inline
+def height(walls, w, place):
+    """Distance of a place from wall w, negative behind it."""
+    return dot(minus(place, at(walls.point, w)), at(walls.normal, w))
