@@ -61,6 +61,23 @@ def test_the_outcome_is_that_of_the_rows(
     assert [each.name for each in (tmp_path / "example").iterdir()] == ["table.json"]
 
 
+@pytest.mark.filterwarnings("ignore:Cyclopts application invoked")
+@pytest.mark.parametrize(("limit", "code"), [(0.2, 0), (0.05, 1)])
+def test_the_exit_code_says_whether_the_limits_hold(
+    limit: float, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from cfddem import cli
+
+    target(monkeypatch, Row("e", 0.5, 0.4, limit))
+    monkeypatch.setattr(sys, "argv", ["cfddem", "validate", "example", "--output", str(tmp_path)])
+    try:
+        cli.main()
+        left_with = 0
+    except SystemExit as leaving:
+        left_with = leaving.code
+    assert left_with == code
+
+
 def test_the_table_can_be_printed_as_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
