@@ -127,7 +127,7 @@ class _Side:
     def inward(self) -> float:
         return -1.0 if self.high else 1.0
 
-    def layer(self, array: Array, index: int) -> Array:
+    def layer(self, array: Any, index: int) -> Any:
         """View of one layer of cells parallel to the side."""
         place: list[Any] = [slice(None)] * 3
         place[2 - self.axis] = index

@@ -153,7 +153,9 @@ class Grid:
         return self._coordinates(tuple(offset), tuple(counts))
 
     def _coordinates(self, offset: Sequence[float], counts: Sequence[int]) -> tuple[Array, Array, Array]:
-        lines = [x0 + h * (np.arange(n) + o) for x0, h, n, o in zip(self.origin, self.spacing, counts, offset)]
+        lines: list[Array] = [
+            x0 + h * (np.arange(n, dtype=float) + o) for x0, h, n, o in zip(self.origin, self.spacing, counts, offset)
+        ]
         return lines[0][None, None, :], lines[1][None, :, None], lines[2][:, None, None]
 
     def inner(self, padded: Array) -> Array:

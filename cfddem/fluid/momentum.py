@@ -56,14 +56,8 @@ def carried(flux, far_low, low, high, far_high, central):
 
 
 @inline
-def normal_stress(viscosity, low, high, inverse_spacing, dilatation):
-    """eps tau_nn at a cell centre; viscosity is eps mu."""
-    return viscosity * (2.0 * (high - low) * inverse_spacing - (2.0 / 3.0) * dilatation)
-
-
-@inline
-def shear_stress(viscosity, low, high, inverse_across, cross_low, cross_high, inverse_along):
-    """eps tau_nt at an edge: gradient of the velocity across the edge and of its partner along it."""
+def stress(viscosity, low, high, inverse_across, cross_low, cross_high, inverse_along):
+    """eps tau_de without its dilatation: gradient of u_d along e and of u_e along d; viscosity is eps mu."""
     return viscosity * ((high - low) * inverse_across + (cross_high - cross_low) * inverse_along)
 
 
@@ -95,72 +89,57 @@ def _row(field, k, j, start, count):
 
 
 @threaded
-def transport(velocity, voidage, viscosity, buried, density, inverse, central, flux, dilatation, rate):
-    """rate = div(eps tau) - div(rho eps u u) on every face of the box; also writes flux = eps u and div u.
+def transport(velocity, voidage, viscosity, buried, density, inverse, central, flux, expansion, rate):
+    """rate = div(eps tau) - div(rho eps u u) on every face of the box; also writes flux and expansion.
 
-    velocity, flux, rate (3, ...), voidage, viscosity (eps mu [Pa s]), dilatation padded cell fields;
-    buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half way;
-    inverse 1/spacing along x, y, z [1/m].
+    velocity, flux (eps u), rate (3, ...); voidage, viscosity (eps mu [Pa s]), expansion (2/3 eps mu div u)
+    padded cell fields; buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half
+    way; inverse 1/spacing along x, y, z [1/m].
     """
     pz, py, px = voidage.shape
-    count = px - 1
     for k in prange(1, pz):
         for j in range(1, py):
+            n = px - 1
             for d in range(velocity.shape[0]):
                 dk, dj, di = UNIT[d]
-                here, before = _row(voidage, k, j, 1, count), _row(voidage, k - dk, j - dj, 1 - di, count)
-                out, u = _row(flux[d], k, j, 1, count), _row(velocity[d], k, j, 1, count)
-                for i in range(count):
+                here, before = _row(voidage, k, j, 1, n), _row(voidage, k - dk, j - dj, 1 - di, n)
+                out, u = _row(flux[d], k, j, 1, n), _row(velocity[d], k, j, 1, n)
+                for i in range(n):
                     out[i] = 0.5 * (here[i] + before[i]) * u[i]
             if k < pz - 1 and j < py - 1:
-                out = _row(dilatation, k, j, 1, count - 1)
-                u0, u1 = _row(velocity[0], k, j, 1, count - 1), _row(velocity[0], k, j, 2, count - 1)
-                v0, v1 = _row(velocity[1], k, j, 1, count - 1), _row(velocity[1], k, j + 1, 1, count - 1)
-                w0, w1 = _row(velocity[2], k, j, 1, count - 1), _row(velocity[2], k + 1, j, 1, count - 1)
-                for i in range(count - 1):
-                    out[i] = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
+                n = px - 2
+                out, thickness = _row(expansion, k, j, 1, n), _row(viscosity, k, j, 1, n)
+                u0, u1 = _row(velocity[0], k, j, 1, n), _row(velocity[0], k, j, 2, n)
+                v0, v1 = _row(velocity[1], k, j, 1, n), _row(velocity[1], k, j + 1, 1, n)
+                w0, w1 = _row(velocity[2], k, j, 1, n), _row(velocity[2], k + 1, j, 1, n)
+                for i in range(n):
+                    growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
+                    out[i] = (2.0 / 3.0) * thickness[i] * growth
     # The high boundary face of a direction is the low face of the first ghost cell: one more than cells.
-    n = px - 2 * LOW
     for k in prange(LOW, pz - LOW):
+        n = px - 2 * LOW
         for j in range(LOW, py - LOW):
             for d in range(velocity.shape[0]):
+                dk, dj, di = UNIT[d]
                 out = _row(rate[d], k, j, LOW, n)
+                right, left = _row(expansion, k, j, LOW, n), _row(expansion, k - dk, j - dj, LOW - di, n)
                 for i in range(n):
-                    out[i] = 0.0
+                    out[i] = (left[i] - right[i]) * inverse[d]
                 for e in range(velocity.shape[0]):
-                    if e == d:
-                        _along(
-                            out, velocity[d], flux[d], viscosity, dilatation, k, j, n, d, density, inverse[d], central
-                        )
-                    else:
-                        _across(
-                            out, velocity[d], velocity[e], flux[e], viscosity, buried[d], k, j, n, d, e,
-                            density, inverse[e], inverse[d], central,
-                        )  # fmt: skip
+                    _balance(
+                        out, velocity[d], velocity[e], flux[e], viscosity, buried[d], k, j, n, d, e,
+                        density, inverse[e], inverse[d], central,
+                    )  # fmt: skip
 
 
 @kernel
-def _along(out, u, flux, viscosity, dilatation, k, j, n, d, density, inverse, central):
-    """Add the balance over the two momentum faces normal to the component; they lie at cell centres."""
-    dk, dj, di = UNIT[d]
-    u0, u1 = _row(u, k - 2 * dk, j - 2 * dj, LOW - 2 * di, n), _row(u, k - dk, j - dj, LOW - di, n)
-    u2, u3 = _row(u, k, j, LOW, n), _row(u, k + dk, j + dj, LOW + di, n)
-    u4 = _row(u, k + 2 * dk, j + 2 * dj, LOW + 2 * di, n)
-    f1, f2 = _row(flux, k - dk, j - dj, LOW - di, n), _row(flux, k, j, LOW, n)
-    f3 = _row(flux, k + dk, j + dj, LOW + di, n)
-    m1, m2 = _row(viscosity, k - dk, j - dj, LOW - di, n), _row(viscosity, k, j, LOW, n)
-    t1, t2 = _row(dilatation, k - dk, j - dj, LOW - di, n), _row(dilatation, k, j, LOW, n)
-    for i in range(n):
-        inflow = carried(0.5 * (f1[i] + f2[i]), u0[i], u1[i], u2[i], u3[i], central)
-        outflow = carried(0.5 * (f2[i] + f3[i]), u1[i], u2[i], u3[i], u4[i], central)
-        pull_low = normal_stress(m1[i], u1[i], u2[i], inverse, t1[i])
-        pull_high = normal_stress(m2[i], u2[i], u3[i], inverse, t2[i])
-        out[i] += ((pull_high - pull_low) - density * (outflow - inflow)) * inverse
+def _balance(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_e, inverse_d, central):
+    """Add to a row of the component u_d the balance over its two momentum faces along e; v is u_e.
 
-
-@kernel
-def _across(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_e, inverse_d, central):
-    """Add the balance over the two momentum faces tangential to the component u_d; v = u_e, edges along both."""
+    Across the component (e != d) these faces lie around edges of the grid, between the cells right and left of the
+    face and those below or above them; along it (e == d) they are the centres of the two cells, where the same
+    differences of u = v give twice the stretching.
+    """
     dk, dj, di = UNIT[d]
     ek, ej, ei = UNIT[e]
     u0, u1 = _row(u, k - 2 * ek, j - 2 * ej, LOW - 2 * ei, n), _row(u, k - ek, j - ej, LOW - ei, n)
@@ -174,21 +153,27 @@ def _across(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_
     v_right_up = _row(v, k + ek, j + ej, LOW + ei, n)
     v_left_up = _row(v, k - dk + ek, j - dj + ej, LOW - di + ei, n)
     m_right, m_left = _row(viscosity, k, j, LOW, n), _row(viscosity, k - dk, j - dj, LOW - di, n)
-    m_right_up = _row(viscosity, k + ek, j + ej, LOW + ei, n)
-    m_left_up = _row(viscosity, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-    m_right_down = _row(viscosity, k - ek, j - ej, LOW - ei, n)
-    m_left_down = _row(viscosity, k - dk - ek, j - dj - ej, LOW - di - ei, n)
+    if e == d:
+        shared, mirror = 0.0, 0.0
+        m_right_down, m_left_down, m_right_up, m_left_up = m_left, m_left, m_right, m_right
+    else:
+        shared, mirror = 1.0, 1.0
+        m_right_up = _row(viscosity, k + ek, j + ej, LOW + ei, n)
+        m_left_up = _row(viscosity, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+        m_right_down = _row(viscosity, k - ek, j - ej, LOW - ei, n)
+        m_left_down = _row(viscosity, k - dk - ek, j - dj - ej, LOW - di - ei, n)
     for i in range(n):
         centre = u2[i]
         inflow = carried(0.5 * (f_right[i] + f_left[i]), u0[i], u1[i], centre, u3[i], central)
         outflow = carried(0.5 * (f_right_up[i] + f_left_up[i]), u1[i], centre, u3[i], u4[i], central)
         # A face buried in solid holds zero; mirrored, it puts the no-slip wall half way.
-        low, high = u1[i] - wall_low[i] * centre, u3[i] - wall_high[i] * centre
-        edge = m_right[i] + m_left[i]
-        m_low, m_high = 0.25 * (edge + m_right_down[i] + m_left_down[i]), 0.25 * (edge + m_right_up[i] + m_left_up[i])
-        drag_low = shear_stress(m_low, low, centre, inverse_e, v_left[i], v_right[i], inverse_d)
-        drag_high = shear_stress(m_high, centre, high, inverse_e, v_left_up[i], v_right_up[i], inverse_d)
-        out[i] += ((drag_high - drag_low) - density * (outflow - inflow)) * inverse_e
+        low, high = u1[i] - mirror * wall_low[i] * centre, u3[i] - mirror * wall_high[i] * centre
+        edge = shared * (m_right[i] + m_left[i])
+        m_low = 0.25 * (edge + (2.0 - shared) * (m_right_down[i] + m_left_down[i]))
+        m_high = 0.25 * (edge + (2.0 - shared) * (m_right_up[i] + m_left_up[i]))
+        pull_low = stress(m_low, low, centre, inverse_e, v_left[i], v_right[i], inverse_d)
+        pull_high = stress(m_high, centre, high, inverse_e, v_left_up[i], v_right_up[i], inverse_d)
+        out[i] += ((pull_high - pull_low) - density * (outflow - inflow)) * inverse_e
 
 
 @threaded

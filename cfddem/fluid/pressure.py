@@ -20,6 +20,7 @@ Sums are taken plane by plane and then over the planes in order: the bits do not
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,16 +68,15 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
 def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
     """Gauss-Seidel by colours in place; backward is the exact transpose of forward."""
     nz = x.shape[0]
-    # With an odd number of planes the last and the first have the same colour and may be periodic neighbours.
+    # Of an odd number of planes the last has the colour of the first, its neighbour if periodic: it goes alone.
     together = nz - (nz & 1)
     for half in range(2 * sweeps):
         colour = (half + 1) & 1 if backward else half & 1
-        if backward and together < nz:
-            _relax_plane(nz - 1, colour, backward, x, b, ax, ay, az, inverse)
-        for k in prange(together):
-            _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse)
-        if not backward and together < nz:
-            _relax_plane(nz - 1, colour, backward, x, b, ax, ay, az, inverse)
+        for part in range(2):
+            alone = (part == 0) == backward
+            begin, end = (together, nz) if alone else (0, together)
+            for k in prange(begin, end):
+                _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse)
 
 
 @kernel
@@ -98,28 +98,19 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
 
 
 @threaded
-def restrict_residual(x, b, ax, ay, az, diagonal, factors, coarse_b):
-    """Residual of a level, summed over the cells that make one coarse cell."""
-    nz, ny, nx = x.shape
+def restrict(b, image, factors, coarse_b):
+    """Residual b - image of a level, summed over the cells that make one coarse cell."""
+    nz, ny, nx = b.shape
     fx, fy, fz = factors[0], factors[1], factors[2]
     for kc in prange(coarse_b.shape[0]):
-        row = np.empty(nx)
         for jc in range(coarse_b.shape[1]):
-            target = coarse_b[kc, jc]
-            target[:] = 0.0
-            for k in range(kc * fz, min(kc * fz + fz, nz)):
-                for j in range(jc * fy, min(jc * fy + fy, ny)):
-                    _apply_row(k, j, x, ax, ay, az, diagonal, row)
-                    for i in range(nx):
-                        row[i] = b[k, j, i] - row[i]
-                    if fx == 1:
-                        for i in range(nx):
-                            target[i] += row[i]
-                    else:
-                        for i in range(nx // 2):
-                            target[i] += row[2 * i] + row[2 * i + 1]
-                        if nx & 1:
-                            target[nx // 2] += row[nx - 1]
+            for ic in range(coarse_b.shape[2]):
+                total = 0.0
+                for k in range(kc * fz, min(kc * fz + fz, nz)):
+                    for j in range(jc * fy, min(jc * fy + fy, ny)):
+                        for i in range(ic * fx, min(ic * fx + fx, nx)):
+                            total += b[k, j, i] - image[k, j, i]
+                coarse_b[kc, jc, ic] = total
 
 
 @threaded
@@ -131,46 +122,6 @@ def prolong(coarse_x, factors, x):
             source = coarse_x[k // factors[2], j // factors[1]]
             for i in range(nx):
                 x[k, j, i] += source[i // factors[0]]
-
-
-@threaded
-def coarsen(ax, ay, az, anchor, factors, cx, cy, cz, coarse_anchor):
-    """Coefficients of a coarse level from those of the finer one."""
-    nz, ny, nx = ax.shape
-    fx, fy, fz = factors[0], factors[1], factors[2]
-    for kc in prange(cx.shape[0]):
-        for jc in range(cx.shape[1]):
-            for ic in range(cx.shape[2]):
-                sx = sy = sz = held = 0.0
-                for k in range(kc * fz, min(kc * fz + fz, nz)):
-                    for j in range(jc * fy, min(jc * fy + fy, ny)):
-                        sx += ax[k, j, ic * fx]
-                        for i in range(ic * fx, min(ic * fx + fx, nx)):
-                            held += anchor[k, j, i]
-                for j in range(jc * fy, min(jc * fy + fy, ny)):
-                    for i in range(ic * fx, min(ic * fx + fx, nx)):
-                        sz += az[kc * fz, j, i]
-                for k in range(kc * fz, min(kc * fz + fz, nz)):
-                    for i in range(ic * fx, min(ic * fx + fx, nx)):
-                        sy += ay[k, jc * fy, i]
-                # A single coarse cell is its own periodic neighbour: no coupling is left.
-                cx[kc, jc, ic] = sx / fx if cx.shape[2] > 1 else 0.0
-                cy[kc, jc, ic] = sy / fy if cx.shape[1] > 1 else 0.0
-                cz[kc, jc, ic] = sz / fz if cx.shape[0] > 1 else 0.0
-                coarse_anchor[kc, jc, ic] = 0.5 * held
-
-
-@threaded
-def invert_diagonal(ax, ay, az, anchor, diagonal, inverse):
-    """Diagonal of a level and its inverse, zero in solid cells."""
-    nz, ny, nx = ax.shape
-    for k in prange(nz):
-        for j in range(ny):
-            for i in range(nx):
-                sides = ax[k, j, i] + ax[k, j, (i + 1) % nx] + ay[k, j, i] + ay[k, (j + 1) % ny, i]
-                total = sides + az[k, j, i] + az[(k + 1) % nz, j, i] + anchor[k, j, i]
-                diagonal[k, j, i] = total
-                inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
 
 
 @threaded
@@ -200,26 +151,6 @@ def descend(length, direction, image, x, residual, largest):
         largest[k] = most
 
 
-@threaded
-def turn(z, residual, previous, direction, sums, ahead):
-    """Sums of z.residual by planes; with ahead, direction = z + (sum/previous) direction afterwards."""
-    nz, ny, nx = z.shape
-    for k in prange(nz):
-        total = 0.0
-        for j in range(ny):
-            for i in range(nx):
-                total += z[k, j, i] * residual[k, j, i]
-        sums[k] = total
-    product = 0.0
-    for k in range(nz):
-        product += sums[k]
-    share = product / previous if ahead else 0.0
-    for k in prange(nz):
-        for j in range(ny):
-            for i in range(nx):
-                direction[k, j, i] = z[k, j, i] + share * direction[k, j, i]
-
-
 @dataclass
 class Level:
     """One grid of the hierarchy: coefficients, unknown and right-hand side, all (nz, ny, nx)."""
@@ -229,7 +160,44 @@ class Level:
 
     def __post_init__(self) -> None:
         self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
-        self.diagonal, self.inverse, self.x, self.b = (np.zeros(self.shape) for _ in range(4))
+        self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
+        self.sums = np.zeros(self.shape[0])
+
+    def coarsen_from(self, fine: Level) -> None:
+        """Coefficients from those of the finer grid."""
+        for d, (own, its) in enumerate(((self.ax, fine.ax), (self.ay, fine.ay), (self.az, fine.az))):
+            if self.shape[2 - d] == 1:
+                continue  # a single cell is its own periodic neighbour: no coupling is left
+            kept = its[tuple(slice(None, None, fine.factors[d] if axis == 2 - d else None) for axis in range(3))]
+            for e in range(3):
+                if e != d and fine.factors[e] == 2:
+                    kept = _pairs(kept, 2 - e)
+            np.multiply(kept, 1.0 / fine.factors[d], out=own)
+        held = fine.anchor
+        for d in range(3):
+            held = _pairs(held, 2 - d) if fine.factors[d] == 2 else held
+        np.multiply(held, 0.5, out=self.anchor)
+
+    def take_diagonal(self) -> None:
+        """Diagonal and its inverse, zero in solid cells."""
+        np.add(self.ax, self.ay, out=self.diagonal)
+        self.diagonal += self.az
+        self.diagonal += self.anchor
+        for axis, a in ((2, self.ax), (1, self.ay), (0, self.az)):
+            total, high = np.moveaxis(self.diagonal, axis, 0), np.moveaxis(a, axis, 0)
+            total[:-1] += high[1:]
+            total[-1] += high[0]
+        self.inverse.fill(0.0)
+        np.divide(1.0, self.diagonal, out=self.inverse, where=self.diagonal > 0.0)
+
+
+def _pairs(values: Array, axis: int) -> Array:
+    """Sums of neighbours two by two along an axis; an odd last one stands alone."""
+    moved = np.moveaxis(values, axis, 0)
+    total = moved[0::2].copy()
+    odd = moved[1::2]
+    total[: len(odd)] += odd
+    return np.moveaxis(total, 0, axis)
 
 
 class PressureEquation:
@@ -245,17 +213,14 @@ class PressureEquation:
         self.finest = self.levels[0]
         self.closed_regions = closed_regions
         self.most_iterations = most_iterations
-        self.residual, self.direction, self.image = (np.zeros(grid.shape) for _ in range(3))
-        self._sums = np.zeros(grid.shape[0])
+        self.residual, self.direction = np.zeros(grid.shape), np.zeros(grid.shape)
 
     def prepare(self) -> None:
         """Take over the coefficients of the finest grid into the whole hierarchy."""
-        for fine, coarse in zip(self.levels, self.levels[1:]):
-            coarsen(
-                fine.ax, fine.ay, fine.az, fine.anchor, fine.factors, coarse.ax, coarse.ay, coarse.az, coarse.anchor
-            )
+        for fine, coarse in pairwise(self.levels):
+            coarse.coarsen_from(fine)
         for level in self.levels:
-            invert_diagonal(level.ax, level.ay, level.az, level.anchor, level.diagonal, level.inverse)
+            level.take_diagonal()
 
     def solve(self, b: Array, limit: float) -> tuple[Array, int]:
         """Solve L x = b until the largest residual of any cell is below `limit`.
@@ -278,13 +243,14 @@ class PressureEquation:
                 )
             np.copyto(finest.b, self.residual)
             self._cycle(0)
-            before, ahead = product, iterations > 0
-            turn(finest.x, self.residual, before, self.direction, self._sums, ahead)
-            product = float(self._sums.sum())
-            apply(self.direction, finest.ax, finest.ay, finest.az, finest.diagonal, self.image, self._sums)
-            length = product / float(self._sums.sum())
-            descend(length, self.direction, self.image, x, self.residual, self._sums)
-            left = float(self._sums.max())
+            before, product = product, float(np.einsum("kji,kji->k", finest.x, self.residual).sum())
+            self.direction *= product / before if iterations else 0.0
+            self.direction += finest.x
+            operator = (finest.ax, finest.ay, finest.az, finest.diagonal)
+            apply(self.direction, *operator, finest.image, finest.sums)
+            length = product / float(finest.sums.sum())
+            descend(length, self.direction, finest.image, x, self.residual, finest.sums)
+            left = float(finest.sums.max())
             iterations += 1
         self._remove_means(x)
         return x, iterations
@@ -300,7 +266,8 @@ class PressureEquation:
             return
         coarse = self.levels[depth + 1]
         smooth(*system, level.inverse, 2, False)
-        restrict_residual(*system, level.diagonal, level.factors, coarse.b)
+        apply(level.x, level.ax, level.ay, level.az, level.diagonal, level.image, level.sums)
+        restrict(level.b, level.image, level.factors, coarse.b)
         self._cycle(depth + 1)
         prolong(coarse.x, level.factors, level.x)
         smooth(*system, level.inverse, 2, True)

@@ -193,7 +193,7 @@ class FluidSolver(FluidState):
         self._thicken(velocity, voidage)
         transport(
             velocity, voidage, self._thickness, self._buried, self.density, self._inverse, self._central,
-            self._flux, self._dilatation, rate,
+            self._flux, self._expansion, rate,
         )  # fmt: skip
 
     def _predict(self, weight_b: float, step: float, new: Array) -> None:

@@ -46,7 +46,7 @@ class FluidState:
         self._velocity, self._stage, self._other = (np.zeros(vector) for _ in range(3))
         self._rate_a, self._rate_b, self._flux, self._mobility = (np.zeros(vector) for _ in range(4))
         self._drag_momentum, self._source = np.zeros(vector), np.zeros(vector)
-        self._pressure, self._correction, self._dilatation = (np.zeros(cells) for _ in range(3))
+        self._pressure, self._correction, self._expansion = (np.zeros(cells) for _ in range(3))
         self._drag, self._thickness = np.zeros(cells), np.zeros(cells)
 
     # ------------------------------------------------------------ fields
@@ -113,7 +113,7 @@ class FluidState:
         force = np.empty_like(self._velocity)
         transport(
             self._velocity, self._mean_voidage, self._thickness, self._buried, 0.0, self._inverse, 0.0,
-            self._flux, self._dilatation, force,
+            self._flux, self._expansion, force,
         )  # fmt: skip
         return self._at(self._continued(force), AT_FACES, points)
 

@@ -1,0 +1,236 @@
+"""The pressure equation, the grid's interpolation, and bits that do not depend on threads."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
+
+from cfddem.fluid.boundaries import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.grid import Grid, outside_cone, outside_cylinder
+from cfddem.fluid.pressure import PressureEquation
+from cfddem.fluid.solver import FluidSolver
+
+
+def equation(cells, spacing=(1.0, 1.0, 1.0), periodic=(False, False, False), anchored=True, solid=False, seed=0):
+    """A pressure equation with random coefficients of contrast 30, its solid mask and its right-hand side."""
+    rng = np.random.default_rng(seed)
+    grid = Grid(cells, spacing)
+    if solid:
+        grid = grid.with_solid(outside_cylinder((cells[0] / 2, cells[1] / 2, 0), 0.45 * cells[0]))
+    system = PressureEquation(grid, None if anchored else grid.open.astype(np.int64))
+    finest = system.finest
+    for d, a in enumerate((finest.ax, finest.ay, finest.az)):
+        a[:] = rng.uniform(0.1, 3.0, grid.shape) * grid.face_area(d) / spacing[d]
+        first = [slice(None)] * 3
+        first[2 - d] = 0
+        if not periodic[d] or cells[d] == 1:
+            a[tuple(first)] = 0.0
+        a *= grid.open & np.roll(grid.open, 1, 2 - d)
+    if anchored:
+        finest.anchor[-1] = 2.0 * grid.open[-1] * grid.face_area(2) / spacing[2]
+    b = rng.standard_normal(grid.shape) * grid.open
+    if not anchored:
+        b -= grid.open * b.sum() / grid.open.sum()
+    system.prepare()
+    return grid, system, b
+
+
+def matrix(finest):
+    """The same equation as a sparse matrix, assembled from its definition."""
+    shape = finest.ax.shape
+    number = np.arange(np.prod(shape)).reshape(shape)
+    rows, columns, values = [number.ravel()], [number.ravel()], [finest.anchor.ravel()]
+    for d, a in enumerate((finest.ax, finest.ay, finest.az)):
+        other = np.roll(number, 1, 2 - d)
+        for first, second, sign in ((number, number, 1), (other, other, 1), (number, other, -1), (other, number, -1)):
+            rows.append(first.ravel())
+            columns.append(second.ravel())
+            values.append(sign * a.ravel())
+    return coo_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))).tocsr()
+
+
+CASES = {
+    "box": {"cells": (12, 8, 20)},
+    "odd box": {"cells": (13, 7, 21)},
+    "one cell thick": {"cells": (16, 1, 12)},
+    "flat cells": {"cells": (12, 12, 12), "spacing": (1.0, 1.0, 4.0)},
+    "cylinder": {"cells": (14, 14, 16), "solid": True},
+    "closed": {"cells": (12, 8, 20), "anchored": False},
+    "periodic": {"cells": (12, 8, 20), "anchored": False, "periodic": (True, True, True)},
+    "odd periodic": {"cells": (11, 9, 15), "anchored": False, "periodic": (True, True, True)},
+    "closed cylinder": {"cells": (14, 14, 16), "anchored": False, "solid": True, "periodic": (False, False, True)},
+}
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_the_pressure_equation_is_solved(case):
+    """Against a direct sparse solve of the same equation, in at most 16 iterations for 1e-10."""
+    grid, system, b = equation(**case)
+    x, iterations = system.solve(b, 1e-10 * np.abs(b).max())
+    full = matrix(system.finest)
+    assert np.abs(full @ x.ravel() - b.ravel()).max() < 2e-10 * np.abs(b).max()
+    assert iterations <= 16
+    open_cells = np.flatnonzero(grid.open.ravel())
+    if not case.get("anchored", True):
+        assert abs(x[grid.open].mean()) < 1e-12 * np.abs(x).max()
+        open_cells = open_cells[1:]  # one pressure given instead of the mean
+    direct = np.zeros(b.size)
+    direct[open_cells] = spsolve(full[open_cells][:, open_cells].tocsc(), b.ravel()[open_cells])
+    difference = (x.ravel() - direct)[grid.open.ravel()]
+    if not case.get("anchored", True):
+        difference -= difference.mean()
+    assert np.abs(difference).max() < 1e-7 * np.abs(x).max()
+    assert not x[~grid.open].any()
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_the_preconditioner_is_symmetric(case):
+    """a.M b = b.M a for random a, b: conjugate gradients may use it."""
+    grid, system, _ = equation(**case)
+    rng = np.random.default_rng(1)
+    a, b = (rng.standard_normal(grid.shape) * grid.open for _ in range(2))
+
+    def cycle(residual):
+        np.copyto(system.finest.b, residual)
+        system._cycle(0)
+        return system.finest.x.copy()
+
+    assert (a * cycle(b)).sum() == pytest.approx((b * cycle(a)).sum(), rel=1e-11)
+    assert (a * cycle(a)).sum() > 0.0
+
+
+def test_iterations_do_not_grow_with_the_grid():
+    """Multigrid: as many iterations on 64^3 as on 16^3, but for two."""
+    counts = []
+    for n in (16, 32, 64):
+        _, system, b = equation((n, n, n))
+        counts.append(system.solve(b, 1e-8 * np.abs(b).max())[1])
+    assert counts[2] <= counts[0] + 2
+
+
+def test_regions_cut_off_from_each_other_are_solved_each_for_itself():
+    """Two chambers without an outlet, one of them stirred: no flow through the wall, continuity in both."""
+    solid = np.zeros((8, 8, 9), dtype=bool)
+    solid[:, :, 4] = True
+    grid = Grid((9, 8, 8), (0.1,) * 3, solid=solid)
+    fluid = FluidSolver(grid, density=1.0, viscosity=0.1)
+    source = np.zeros((*grid.shape, 3))
+    source[2, :, :4, 1] = 1.0
+    for _ in range(5):
+        fluid.step(0.01, source=source)
+    assert np.abs(fluid.velocity[:, :, :4]).max() > 1e-4
+    assert np.abs(fluid.velocity[:, :, 5:]).max() == 0.0
+    assert np.abs(fluid.continuity_residual()).max() < 1e-8 * np.abs(fluid.velocity).max() * grid.face_area(0)
+
+
+RUN = """
+import numpy as np
+from cfddem.fluid.boundaries import Inlet, Outlet, Periodic
+from cfddem.fluid.grid import Grid
+from cfddem.fluid.solver import FluidSolver
+rng = np.random.default_rng(0)
+grid = Grid((15, 9, 33), (0.01, 0.01, 0.012))
+sides = {"z_low": Inlet(0.4), "z_high": Outlet(), "x_low": Periodic(), "x_high": Periodic()}
+fluid = FluidSolver(grid, sides, density=1.2, viscosity=1.8e-5, smagorinsky=0.1)
+voidage = rng.uniform(0.4, 0.9, grid.shape)
+fluid.set_voidage(voidage)
+for _ in range(4):
+    voidage = voidage + rng.uniform(-1e-3, 1e-3, grid.shape)
+    fluid.step(1e-3, voidage, rng.uniform(0, 500, grid.shape))
+points = rng.uniform(0, 0.1, (50, 3))
+print(np.abs(fluid.velocity).max(), hash(fluid.velocity.tobytes()), hash(fluid.pressure.tobytes()),
+      hash(fluid.drag_exchange()[2].tobytes()), hash(fluid.pressure_gradient_at(points).tobytes()),
+      hash(fluid.viscous_force_at(points).tobytes()))
+"""
+
+
+def test_bits_do_not_depend_on_the_number_of_threads():
+    """The same run on one, two and three threads gives the same arrays, bit by bit."""
+    outputs = {
+        subprocess.run(
+            [sys.executable, "-c", RUN],
+            env={**os.environ, "NUMBA_NUM_THREADS": str(threads), "PYTHONHASHSEED": "0"},
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for threads in (1, 2, 3)
+    }  # fmt: skip
+    assert len(outputs) == 1
+
+
+# ---------------------------------------------------------------- points
+
+
+def linear(a, b, c, d):
+    return lambda x, y, z: a + b * x + c * y + d * z
+
+
+def test_velocity_at_points_is_exact_for_linear_fields():
+    """Tri-linear between faces, up to the walls."""
+    grid = Grid((6, 5, 7), (0.1, 0.2, 0.15), origin=(-0.3, 0.2, 1.0))
+    fluid = FluidSolver(grid, dict.fromkeys(SIDES, Outlet()), density=1.0, viscosity=0.1)
+    parts = (linear(1, 2, 3, 4), linear(0, -1, 1, 2), linear(2, 1, 1, -3))
+    fluid.set_velocity(parts)
+    points = np.random.default_rng(0).uniform((-0.2, 0.4, 1.15), (0.2, 1.0, 1.9), (40, 3))
+    expected = np.stack([f(*points.T) for f in parts], axis=1)
+    assert fluid.velocity_at(points) == pytest.approx(expected, abs=1e-7)
+
+
+def test_pressure_gradient_and_viscous_force_at_points_of_plane_poiseuille_flow():
+    """The force on a parcel anywhere: mu u'' = dp/dx = -G, also in the cells beside the walls."""
+    fall, mu, n = 2.0, 0.5, 16
+    sides = {"x_low": Periodic(fall), "x_high": Periodic(fall)}
+    fluid = FluidSolver(Grid((4, 1, n), (1 / n,) * 3), sides, density=1.0, viscosity=mu, voidage=0.6)
+    fluid.run_until(4.0)
+    rng = np.random.default_rng(0)
+    points = rng.uniform(0, 1, (50, 3)) * np.array(fluid.grid.size)
+    assert fluid.pressure_gradient_at(points)[:, 0] == pytest.approx(-fall, rel=1e-9)
+    assert fluid.viscous_force_at(points)[:, 0] == pytest.approx(-fall, rel=1e-6)
+    assert np.abs(fluid.viscous_force_at(points)[:, 1:]).max() < 1e-6
+
+
+def test_pressure_gradient_at_points_beside_inlet_outlet_and_mask():
+    """Drag of a uniform bed in a masked cylinder: the gradient is that of the bed at every point of it."""
+    grid = Grid((10, 10, 12), (0.01,) * 3).with_solid(outside_cylinder((0.05, 0.05, 0), 0.045))
+    fluid = FluidSolver(
+        grid, {"z_low": [FreeSlip(), Inlet(0.3, where=lambda x, y, z: (x - 0.05) ** 2 + (y - 0.05) ** 2 < 0.045**2)],
+               "z_high": Outlet()}, density=1.0, viscosity=0.0, voidage=0.5,
+    )  # fmt: skip
+    beta = 1e4 * grid.open
+    for _ in range(5):
+        fluid.step(1.0, None, beta)
+    rng = np.random.default_rng(0)
+    points = rng.uniform((0.025, 0.025, 0.0), (0.075, 0.075, 0.12), (60, 3))
+    gradient = fluid.pressure_gradient_at(points)
+    assert gradient[:, 2] == pytest.approx(-1e4 * 0.6 / 0.5, rel=1e-5)
+    assert np.abs(gradient[:, :2]).max() < 1e-4 * 1.2e4
+
+
+def test_a_cell_field_at_points():
+    """Tri-linear between centres; the nearest cell beyond the last centre."""
+    grid = Grid((4, 3, 5), (0.1, 0.2, 0.1))
+    fluid = FluidSolver(grid, density=1.0, viscosity=0.1)
+    x, y, z = grid.centres()
+    field = 1 + x + 2 * y - z
+    assert fluid.cell_value_at(field, np.array([[0.2, 0.3, 0.25]]))[0] == pytest.approx(1 + 0.2 + 0.6 - 0.25)
+    assert fluid.cell_value_at(field, np.array([[0.0, 0.0, 0.0]]))[0] == pytest.approx(field[0, 0, 0])
+
+
+def test_a_cone_is_cut_from_the_box():
+    """Volume of a frustum of masked cells within 2 %, and a flow through it keeps its flux from bottom to top."""
+    grid = Grid.of_size((0.2, 0.2, 0.3), 0.01, solid=outside_cone((0.1, 0.1, 0), (0.05, 0.25), (0.03, 0.09)))
+    h = 0.2
+    frustum = np.pi * h / 3 * (0.03**2 + 0.03 * 0.09 + 0.09**2) + np.pi * 0.05 * (0.03**2 + 0.09**2)
+    assert grid.open.sum() * grid.cell_volume == pytest.approx(frustum, rel=0.02)
+    sides = {"z_low": [NoSlip(), Inlet(1.0, where=lambda x, y, z: (x - 0.1) ** 2 + (y - 0.1) ** 2 < 0.029**2)]}
+    fluid = FluidSolver(grid, {**sides, "z_high": Outlet()}, density=1.0, viscosity=1e-3)
+    for _ in range(3):
+        fluid.step(2e-3)
+    flux = fluid.volume_flux(2).sum(axis=(1, 2))
+    assert flux == pytest.approx(flux[0], rel=1e-6)
+    assert not fluid.velocity[grid.solid].any()
