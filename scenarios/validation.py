@@ -88,6 +88,8 @@ def validate(name: str, output: Path, json: bool = False) -> bool:
     folder = Path(output) / name
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        (folder / ".writable").touch()
+        (folder / ".writable").unlink()
     except OSError as refusal:
         raise InputError("output", str(output), "a folder that can be written", str(refusal)) from refusal
     begin = perf_counter()
@@ -135,6 +137,7 @@ def _progress(name: str) -> Iterator[Tell]:
 def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
     """Print the table, the verdict and where the files are."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     console = Console(highlight=False)
@@ -146,7 +149,7 @@ def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
     table.add_column("verdict", no_wrap=True)
     colour = {"holds": "green", "FAILS": "bold red", "report": "dim"}
     for row in rows:
-        label = row.quantity if row.unit == "-" else f"{row.quantity} \\[{row.unit}]"
+        label = escape(row.quantity if row.unit == "-" else f"{row.quantity} [{row.unit}]")
         verdict = f"[{colour[row.verdict]}]{row.verdict}"
         table.add_row(label, *map(_number, (row.value, row.reference, row.difference, row.limit)), verdict)
     console.print(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import json
 import math
 import sys
@@ -14,9 +15,10 @@ import numpy as np
 import pytest
 
 from cfddem.errors import InputError
+from cfddem.view import plots
+from scenarios import binary_collision, bouncing_sphere, validation
 from scenarios import binary_collision_checks as checks
 from scenarios import binary_collision_validation as study
-from scenarios import validation
 from scenarios.validation import Row, replacing, validate, worst, write_histories
 
 
@@ -54,6 +56,7 @@ def test_the_outcome_is_that_of_the_rows(
     printed = capsys.readouterr().out
     assert max(map(len, printed.splitlines()[:-1])) <= 100
     assert "\x1b" not in printed
+    assert "[m]" in printed
     report = json.loads((tmp_path / "example" / "table.json").read_text())
     assert report["holds"] is holds
     assert report["rows"][0]["difference"] == pytest.approx(0.1)
@@ -116,6 +119,11 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
 )
 def test_quick_parts_of_the_binary_collisions_hold(part: Callable[[study.Curves], list[Row]]) -> None:
     assert [row.card() for row in part({}) if row.verdict == "FAILS"] == []
+
+
+@pytest.mark.parametrize("module", [binary_collision, bouncing_sphere, plots], ids=lambda module: module.__name__)
+def test_examples_in_the_pages_of_modules_hold(module: ModuleType) -> None:
+    assert doctest.testmod(module).failed == 0
 
 
 @pytest.mark.slow
