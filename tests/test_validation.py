@@ -16,7 +16,7 @@ import pytest
 
 from cfddem.errors import InputError
 from cfddem.view import plots
-from scenarios import binary_collision, bouncing_sphere, validation
+from scenarios import bouncing_sphere, validation
 from scenarios import binary_collision_checks as checks
 from scenarios import binary_collision_validation as study
 from scenarios.validation import Row, replacing, validate, worst, write_histories
@@ -121,7 +121,7 @@ def test_quick_parts_of_the_binary_collisions_hold(part: Callable[[study.Curves]
     assert [row.card() for row in part({}) if row.verdict == "FAILS"] == []
 
 
-@pytest.mark.parametrize("module", [binary_collision, bouncing_sphere, plots], ids=lambda module: module.__name__)
+@pytest.mark.parametrize("module", [bouncing_sphere, plots], ids=lambda module: module.__name__)
 def test_examples_in_the_pages_of_modules_hold(module: ModuleType) -> None:
     assert doctest.testmod(module).failed == 0
 
