@@ -16,9 +16,9 @@ import pytest
 
 from cfddem.errors import InputError
 from cfddem.view import plots
-from scenarios import bouncing_sphere, validation
 from scenarios import binary_collision_checks as checks
 from scenarios import binary_collision_validation as study
+from scenarios import bouncing_sphere, validation
 from scenarios.validation import Row, replacing, validate, worst, write_histories
 
 
