@@ -102,6 +102,11 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
     tangential_stiffness = (
         mindlin_stiffness(row.shear_modulus, meeting.reduced_radius, overlap) if hertz else laws.tangential_stiffness
     )
+    # in the steps in which the surfaces meet and part, the dashpot lasts for a part of the step only; there
+    # Hertz' grows as the fourth root of the overlap, and its mean is 4/5 of its present value
+    stride = max(abs(step * normal_speed), _LEAST)
+    lasted = overlap / stride
+    damping *= 0.5 + (0.8 if hertz else 1.0) * lasted if lasted < 1.0 else 1.0
     # a dashpot acts on the speed at the middle of the kick, which it changes itself
     kick = 0.5 * step * meeting.inverse_mass * share
     mid_speed = (normal_speed + kick * elastic) / (1.0 + kick * damping)
@@ -117,10 +122,9 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
     loading = laws.spring == RESCALED and before < overlap
     spring = times(math.sqrt(before / overlap) if loading else 1.0, spring)
     # in its first step a contact slides only from where friction sets in
-    since = meeting.gap if laws.friction_onset == OVERLAP else -overlap
-    outward = step * normal_speed
-    portion = since / min(outward, -_LEAST) if outward < since else 1.0
-    spring = across(plus(spring, times(min(portion, 1.0) * step, slip)), normal)
+    gripped = -meeting.gap / stride if laws.friction_onset == OVERLAP else lasted
+    portion = min(max(gripped, 0.0), 1.0) if normal_speed < 0.0 else 1.0
+    spring = across(plus(spring, times(portion * step, slip)), normal)
     slip = across(slip, normal)
 
     mid_slip = minus(slip, times(ROLLING * kick * tangential_stiffness, spring))
@@ -133,8 +137,10 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
     size = math.sqrt(dot(pull, pull))
     sliding = size > limit
     pull = times(limit / max(size, _LEAST) if sliding else 1.0, pull)
-    slid = times(1.0 / max(tangential_stiffness, _LEAST), minus(pull, times(damping, slip)))
-    spring = either(sliding, slid, spring)
+    # a sliding spring carries what the dashpot leaves of Coulomb's limit, and never more than the limit
+    carried = minus(pull, times(damping, slip))
+    carried = either(dot(carried, carried) > limit * limit, pull, carried)
+    spring = either(sliding, times(1.0 / max(tangential_stiffness, _LEAST), carried), spring)
 
     gripping = touching and (laws.friction_onset != OVERLAP or meeting.gap < 0.0)
     pull = either(gripping, pull, NOTHING)
