@@ -27,10 +27,13 @@ from numpy.typing import NDArray
 
 from cfddem.errors import RunFailed
 from cfddem.fluid.grid import Array, Grid
-from cfddem.kernels import kernel, prange, threaded
+from cfddem.kernels import kernel, prange, threaded, use_threads
 
 STRONG = 0.3
 """Directions whose coupling exceeds this share of the strongest are coarsened together."""
+
+SMALL = 20_000
+"""Cells below which a level runs on one thread: waking the others takes longer than the work."""
 
 COARSEST = 32
 """Cells below which the multigrid stops coarsening and sweeps until converged."""
@@ -75,8 +78,9 @@ def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
         for part in range(2):
             alone = (part == 0) == backward
             begin, end = (together, nz) if alone else (0, together)
-            for k in prange(begin, end):
-                _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse)
+            if begin < end:
+                for k in prange(begin, end):
+                    _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse)
 
 
 @kernel
@@ -256,7 +260,17 @@ class PressureEquation:
         return x, iterations
 
     def _cycle(self, depth: int) -> None:
-        """One V-cycle: sweep forward, correct from the coarser grid, sweep backward."""
+        """One V-cycle, on one thread from the first small level down."""
+        threads = use_threads(None)
+        if threads > 1 and self.levels[depth].x.size < SMALL:
+            use_threads(1)
+            self._cycle_here(depth)
+            use_threads(threads)
+        else:
+            self._cycle_here(depth)
+
+    def _cycle_here(self, depth: int) -> None:
+        """Sweep forward, correct from the coarser grid, sweep backward."""
         level = self.levels[depth]
         system = (level.x, level.b, level.ax, level.ay, level.az)
         level.x.fill(0.0)
