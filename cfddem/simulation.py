@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cfddem.errors import RunFailed
+from cfddem.particles.clocks import Clocks, clocks
 from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.forces import Laws
+from cfddem.particles.guard import guard
 from cfddem.particles.motion import march, march_threaded
-from cfddem.particles.neighbours import list_edges, wrap
+from cfddem.particles.neighbours import list_edges, locality_order, wrap
 from cfddem.particles.pairs import Edges, gaps, remember, shifts
 from cfddem.particles.state import Bodies
 from cfddem.particles.vectors import flat
@@ -19,6 +20,9 @@ from cfddem.record.collisions import CollisionRecord
 
 THREADING_PAYS = 1000
 """From this many particles on, loops run on all threads; on one they still work on several pairs at once."""
+
+SHORT_LIST, LONG_LIST = 40, 200
+"""Steps that a neighbour list should last at least and at most."""
 
 _NO_ROWS = np.zeros(0, ENCOUNTER)
 
@@ -33,7 +37,9 @@ class Simulation:
     gravity  [m/s2]
     free     1 along axes in which positions may change, 0 where they are held
     box      length of the periodic box, which begins at 0; None along open axes [m]
-    skin     allowance of the neighbour list; a quarter of the largest radius if not given [m]
+    domain   corners of the room that no centre may leave; all of space if not given [m]
+    skin     allowance of the neighbour list; found and tuned in the run if not given [m]
+    sort_every  re-sort many particles by place at every so many lists
     record   keep a record of encounters, in `collisions`
     """
 
@@ -47,7 +53,9 @@ class Simulation:
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         free: tuple[float, float, float] = (1.0, 1.0, 1.0),
         box: tuple[float | None, float | None, float | None] = (None, None, None),
+        domain: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None,
         skin: float | None = None,
+        sort_every: int = 5,
         record: bool = False,
     ) -> None:
         self.bodies = bodies
@@ -55,10 +63,16 @@ class Simulation:
         self.walls = walls(planes)
         self.laws = laws or Laws()
         self.gravity, self.free = gravity, free
-        self.skin = 0.25 * float(bodies.radius.max()) if skin is None else skin
+        self._skin_is_given = skin is not None
+        self.skin = 0.1 * float(bodies.radius.mean()) if skin is None else skin
+        self.domain = None if domain is None else np.array(domain, float)
+        self.sort_every = sort_every
+        self._lists, self._listed_at = -1, 0
         self.box = np.array([np.inf if length is None else length for length in box])
         self.time, self.steps = 0.0, 0
         self.collisions = CollisionRecord() if record else None
+        wrap(self.bodies.position, self.box)
+        self._next_order()
         self._take_list(self._listed())
         self.refresh()
 
@@ -75,11 +89,20 @@ class Simulation:
         """Find the forces at the present places, as after a change of state from outside."""
         self._march(0.0, 0)
 
+    def clocks(self, reference_speed: float = 0.0) -> Clocks:
+        """Largest steps that the particles' physics allows now.
+
+        reference_speed  fastest approach to be expected [m/s]
+        """
+        return clocks(self.bodies, self.edges, self.gap, self.table, self.laws, reference_speed)
+
     def advance(self, step: float, steps: int = 1) -> None:
         """Move by a number of equal time steps.
 
         step   [s]
         steps  how many
+
+        Raises RunFailed, naming the particle, where one is no number any more, has left or was pressed through.
         """
         while steps > 0:
             done, farthest, noted = self._march(step, steps)
@@ -88,9 +111,10 @@ class Simulation:
                 self.collisions.keep(noted)
             self.steps += done
             self.time += done * step
-            if np.isnan(farthest):
-                raise RunFailed(self._lost_number())
-            if farthest >= (0.5 * self.skin) ** 2:
+            moved_far = not farthest < (0.5 * self.skin) ** 2
+            if moved_far or (steps == 0 and self.bodies.count >= THREADING_PAYS):
+                guard(self.bodies, self.edges, self.gap, self.domain, self.time, step)
+            if moved_far:
                 self._relist()
 
     def _march(self, step: float, steps: int) -> tuple[int, float, int]:
@@ -122,14 +146,30 @@ class Simulation:
     def _relist(self) -> None:
         """Find the pairs anew; what they remember and the forces at hand are carried over."""
         wrap(self.bodies.position, self.box)
-        order = np.arange(self.bodies.count, dtype=np.int32)
+        old, order = self.edges, self._next_order()
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        self._tune_skin()
         fresh = self._listed()
-        remember(self.edges, fresh, order, order)
+        remember(old, fresh, order, place)
         self._take_list(fresh)
 
-    def _lost_number(self) -> str:
-        row = int(np.argmax(np.isnan(self.bodies.position).any(axis=1)))
-        return (
-            f"particle {self.bodies.id[row]} has no position any more at t = {self.time:.6g} s; "
-            "the step is too large or a force is no number"
-        )
+    def _next_order(self) -> np.ndarray:
+        """Re-sort the particles now and then, so that near particles have near rows; returns the old rows."""
+        self._lists += 1
+        if self.bodies.count < THREADING_PAYS or self._lists % self.sort_every:
+            return np.arange(self.bodies.count, dtype=np.int32)
+        order = locality_order(self.bodies.position, 2.0 * float(self.bodies.radius.mean()))
+        self.bodies.reorder(order)
+        return order
+
+    def _tune_skin(self) -> None:
+        """Widen a skin that is used up too soon, narrow one that lists too many pairs for too long."""
+        age, self._listed_at = self.steps - self._listed_at, self.steps
+        if self._skin_is_given:
+            return
+        radius = float(self.bodies.radius.mean())
+        if age < SHORT_LIST:
+            self.skin = min(1.25 * self.skin, 0.6 * radius)
+        elif age > LONG_LIST:
+            self.skin = max(0.8 * self.skin, 0.04 * radius)

@@ -211,7 +211,7 @@ def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps,
     largest = 0.0
     count, pairs, number = len(bodies.radius), edges.between_particles, len(edges.first)
     kinds, rows = np.uint64(len(table)), table.reshape(-1)
-    films = True if laws.film else False
+    films = True if laws.film else False  # noqa: SIM210  a film that is None has no truth of type bool
     drifting = films and laws.integrator != VERLET
     moving = steps > 0
     half = step if moving else 0.0

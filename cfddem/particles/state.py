@@ -32,6 +32,11 @@ class Bodies(NamedTuple):
         """Number of particles."""
         return len(self.radius)
 
+    def reorder(self, order: np.ndarray) -> None:
+        """Put the particles into another order, in place; their ids go with them."""
+        for array in self:
+            array[:] = array[order]
+
     @property
     def mass(self) -> np.ndarray:
         """Mass of each particle (N,) [kg]."""
