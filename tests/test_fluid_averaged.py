@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cfddem.fluid.boundaries import SIDES, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 
@@ -162,6 +162,16 @@ def test_continuity_holds_in_every_cell():
         fluid.step(2e-3, voidage, np.full(grid.shape, 50.0))
         worst = max(worst, float(np.abs(fluid.continuity_residual()).max()))
     assert worst < 1e-8 * 0.4 * grid.face_area(2)
+
+
+def test_a_fluid_at_rest_is_displaced_by_moving_voidage_alone():
+    """No inlet, no drag: the flux that the change of voidage asks for appears in the first step, and only that."""
+    grid = Grid((16, 1, 1), (0.01,) * 3)
+    fluid = FluidSolver(grid, density=1000.0, viscosity=1e-3, voidage=moving_voidage(grid, 0.0))
+    step = 1e-3
+    fluid.step(step, moving_voidage(grid, step))
+    displaced = -np.cumsum(moving_voidage(grid, step) - moving_voidage(grid, 0.0), axis=2) * 0.01 / step
+    assert fluid.volume_flux(0)[:, :, 1:] == pytest.approx(displaced, abs=1e-8 * np.abs(displaced).max())
 
 
 def momentum(fluid):

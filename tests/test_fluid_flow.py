@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import scenarios
-from cfddem.fluid.boundaries import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic, ramp
+from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic, ramp
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
 
@@ -83,7 +83,7 @@ def test_poiseuille_flow_between_plates(voidage, model):
         fluid = FluidSolver(
             Grid((1, 1, n), (height / n,) * 3), sides, density=1.0, viscosity=mu, voidage=voidage, model=model
         )
-        fluid.run_until(5.0)
+        fluid.run_until(2.5)
         _, _, z = fluid.grid.faces(0)
         # In model B the driving gradient acts on the fluid alone.
         exact = fall / (2 * mu) * z * (height - z) / (voidage if model == "B" else 1.0)
@@ -108,7 +108,7 @@ def test_poiseuille_flow_in_a_square_duct():
         width, mu, fall = 1.0, 0.5, 2.0
         sides = {"x_low": Periodic(fall), "x_high": Periodic(fall)}
         fluid = FluidSolver(Grid((1, n, n), (width / n,) * 3), sides, density=1.0, viscosity=mu)
-        fluid.run_until(2.0)
+        fluid.run_until(1.2)
         _, y, z = fluid.grid.faces(0)
         exact = square_duct(y - 0.5, z - 0.5, 0.5, fall, mu)
         errors.append(rms(fluid.face_velocity(0)[:, :, :1] - exact) / exact.max())
@@ -125,7 +125,7 @@ def test_pipe_flow_in_a_masked_cylinder_converges():
         h = 2 * radius / n
         grid = Grid((n, n, 1), (h, h, h)).with_solid(outside_cylinder((radius, radius, 0.0), radius))
         fluid = FluidSolver(grid, {"z_low": Periodic(fall), "z_high": Periodic(fall)}, density=1.0, viscosity=mu)
-        fluid.run_until(1.5)
+        fluid.run_until(0.8)
         errors.append(abs(float(fluid.volume_flux(2)[0].sum()) * h * h / exact - 1))
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 0.05

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cfddem.errors import InputError, RunFailed
-from cfddem.fluid.boundaries import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, pulse, ramp, rectangle, switch_on
+from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, pulse, ramp, rectangle, switch_on
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
 
@@ -127,6 +127,14 @@ def test_jets_of_a_distributor_carry_the_flux_given():
     assert covered == 2
     assert fluid.volume_flux(2)[0].sum() == pytest.approx(covered * 2.0, rel=1e-12)
     assert fluid.volume_flux(2)[-1].sum() == pytest.approx(covered * 2.0, rel=1e-6)
+
+
+def test_an_inlet_alone_in_its_list_leaves_a_wall_around_it():
+    """`Inlet(..., where=...)` on a side: the rest of the side is a wall."""
+    fluid = started({"z_low": Inlet(2.0, where=rectangle((0, 0, -1), (0.02, 0.06, 1))), "z_high": Outlet()})
+    fluid.step(1e-4)
+    assert fluid.volume_flux(2)[0][:, :2] == pytest.approx(2.0)
+    assert not fluid.volume_flux(2)[0][:, 2:].any()
 
 
 def test_inlet_profile_as_a_vector_function():

@@ -11,7 +11,7 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from cfddem.fluid.boundaries import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid, outside_cone, outside_cylinder
 from cfddem.fluid.pressure import PressureEquation
 from cfddem.fluid.solver import FluidSolver
@@ -131,7 +131,7 @@ def test_regions_cut_off_from_each_other_are_solved_each_for_itself():
 
 RUN = """
 import numpy as np
-from cfddem.fluid.boundaries import Inlet, Outlet, Periodic
+from cfddem.fluid.conditions import Inlet, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 rng = np.random.default_rng(0)

@@ -1,127 +1,43 @@
-"""What happens at the six sides of the box: walls, inlets, outlets, periodic partners.
+"""The six sides of the box as the solver sees them: known faces, unknown faces, ghost values.
 
 Each side, named `x_low` to `z_high`, has a condition or a list of them. The first of a list covers the whole
-side; each later one covers the region its `where` selects and wins there, so that a floor with jets reads
+side (a wall, if it says `where` it holds); each later one covers the region its `where` selects and wins there, so
+that a floor with jets reads
 
     z_low=[NoSlip(), Inlet(2.0, where=discs([(0.05, 0.05)], diameter=0.01))]
 
-Inside the solver a condition is a fixed or free normal velocity on the boundary face and a rule for the ghost
-values beyond it.
+A condition becomes a fixed or free normal velocity on the boundary face and a rule for the ghosts beyond it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from cfddem.errors import InputError
-from cfddem.fluid.grid import HIGH, LOW, Array, Grid, Region
-
-SIDES = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Condition:
-    """A condition on a side; `where(x, y, z)` selects its region, None is the whole side."""
-
-    where: Region | None = None
-
-
-@dataclass(frozen=True)
-class NoSlip(Condition):
-    """A wall the fluid sticks to. velocity: of the wall in its own plane (x, y, z) [m/s], e.g. a lid."""
-
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class FreeSlip(Condition):
-    """A frictionless wall, or a plane of symmetry."""
-
-
-@dataclass(frozen=True)
-class Inlet(Condition):
-    """Fluid enters at a given superficial velocity, volume per area and time [m/s].
-
-    velocity  inward speed, or a vector (x, y, z), or a function f(x, y, z, t) of points (n,) and time that
-              returns speeds (n,) or vectors (n, 3)
-    in_time   factor as a function of time, such as `ramp(0, 1)`; None is 1
-    """
-
-    velocity: float | Sequence[float] | Callable[[Array, Array, Array, float], Any] = 0.0
-    in_time: Callable[[float], float] | None = None
-
-
-@dataclass(frozen=True)
-class Outlet(Condition):
-    """Fluid leaves against a given pressure p' [Pa]; what flows back enters from rest."""
-
-    pressure: float = 0.0
-
-
-@dataclass(frozen=True)
-class Periodic(Condition):
-    """What leaves here enters at the opposite side. pressure_gradient: mean fall of pressure along the axis that
-    drives the flow [Pa/m], the same on both sides."""
-
-    pressure_gradient: float = 0.0
-
-
-def switch_on(at: float = 0.0) -> Callable[[float], float]:
-    """Time factor 0 before `at` [s], 1 from then on."""
-    return lambda t: 1.0 if t >= at else 0.0
-
-
-def ramp(begin: float, end: float) -> Callable[[float], float]:
-    """Time factor that rises linearly from 0 at `begin` to 1 at `end` [s]."""
-    return lambda t: min(max((t - begin) / (end - begin), 0.0), 1.0)
-
-
-def pulse(begin: float, end: float) -> Callable[[float], float]:
-    """Time factor 1 from `begin` up to `end` [s], 0 otherwise."""
-    return lambda t: 1.0 if begin <= t < end else 0.0
-
-
-def discs(centres: Sequence[Sequence[float]], diameter: float, axis: int = 2) -> Region:
-    """Round holes of a distributor normal to `axis`; centres: their two coordinates in the plane, in order [m]."""
-
-    def region(*coordinates: Array) -> Any:
-        first, second = (coordinates[d] for d in range(3) if d != axis)
-        return sum(((first - a) ** 2 + (second - b) ** 2 <= 0.25 * diameter**2) for a, b in centres) > 0
-
-    return region
-
-
-def rectangle(low: Sequence[float], high: Sequence[float]) -> Region:
-    """Points between two opposite corners (x, y, z) [m]; coordinates normal to the side are not looked at twice."""
-
-    def region(*coordinates: Array) -> Any:
-        return np.logical_and.reduce(
-            np.broadcast_arrays(*((a <= x) & (x <= b) for x, a, b in zip(coordinates, low, high)))
-        )
-
-    return region
+from cfddem.fluid.conditions import SIDES, Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.grid import HIGH, LOW, Array, Grid
 
 
 @dataclass
-class _Side:
+class Side:
     """A side as arrays over its plane, ghost rows included, in the order of the two remaining array axes."""
 
     name: str
     axis: int
     high: bool
     conditions: list[Condition]
-    owner: np.ndarray = field(default_factory=lambda: np.zeros(0))  # index of the condition of each open cell
 
     def __post_init__(self) -> None:
-        self.mirror = np.zeros(0)  # ghost = mirror * inside + 2 wall (for tangential components)
-        self.wall = np.zeros(0)  # (3, plane) velocity given on the face
+        self.owner = np.zeros(0, dtype=np.int64)  # which condition holds, without ghost rows
+        self.mirror = np.zeros(0)  # of tangential velocities: ghost = mirror * inside + 2 wall where it sticks
+        self.wall = np.zeros(0)  # (3, plane) velocity given on the face [m/s]
         self.outlet = np.zeros(0, dtype=bool)
-        self.pressure = np.zeros(0)
-        self.inlets: list[int] = []
+        self.pressure = np.zeros(0)  # given on outlets [Pa]
+        self.inlets: list[int] = []  # which conditions are inlets
 
     @property
     def inward(self) -> float:
@@ -147,20 +63,23 @@ class Boundaries:
                 raise InputError(f"boundaries.{name}", None, "one of " + ", ".join(SIDES))
         self.grid = grid
         self.periodic, self.driving = np.zeros(3, dtype=bool), np.zeros(3)
-        self.sides: list[_Side] = []
+        self.sides: list[Side] = []
         for axis in range(3):
             plain: Condition = FreeSlip() if grid.cells[axis] == 1 else NoSlip()
             pair = []
             for high in (False, True):
                 name = SIDES[2 * axis + high]
                 listed = given.get(name, plain)
-                pair.append(_Side(name, axis, high, [listed] if isinstance(listed, Condition) else list(listed)))
+                several = [listed] if isinstance(listed, Condition) else list(listed)
+                if getattr(several[0], "where", None) is not None:
+                    several.insert(0, plain)
+                pair.append(Side(name, axis, high, several))
             self._pair_up(axis, pair)
         for side in self.sides:
             self._lay_out(side)
         self.has_outlet = any(bool(side.outlet.any()) for side in self.sides)
 
-    def _pair_up(self, axis: int, pair: list[_Side]) -> None:
+    def _pair_up(self, axis: int, pair: list[Side]) -> None:
         """A periodic direction needs both its sides; others are kept as sides."""
         wrapped = [any(isinstance(c, Periodic) for c in side.conditions) for side in pair]
         if not any(wrapped):
@@ -175,10 +94,8 @@ class Boundaries:
             )
         self.periodic[axis], self.driving[axis] = True, fall.pop()
 
-    def _lay_out(self, side: _Side) -> None:
-        grid, axis = self.grid, side.axis
-        plane = tuple(n for d, n in enumerate(grid.padded_shape) if d != 2 - axis)
-        points = self._points(side)
+    def _lay_out(self, side: Side) -> None:
+        grid, points = self.grid, self._points(side)
         inner = points[0].shape
         side.owner = np.zeros(inner, dtype=np.int64)
         for number, condition in enumerate(side.conditions):
@@ -189,24 +106,17 @@ class Boundaries:
             elif number > 0:
                 raise InputError(f"boundaries.{side.name}", None, "a list whose later conditions say `where` they hold")
         solid = ~side.layer(grid.open, -1 if side.high else 0)
-        side.mirror, side.wall = np.zeros(plane), np.zeros((3, *plane))
         mirror, wall = np.zeros(inner), np.zeros((3, *inner))
         outlet, pressure = np.zeros(inner, dtype=bool), np.zeros(inner)
         for number, condition in enumerate(side.conditions):
             here = side.owner == number
             mirror[here] = -1.0 if isinstance(condition, (NoSlip, Inlet)) else 1.0
             if isinstance(condition, Inlet):
-                if (here & solid).any():
-                    raise InputError(
-                        f"boundaries.{side.name}", None, "an inlet whose cells are all open",
-                        f"{int((here & solid).sum())} of its {int(here.sum())} cells are solid; narrow it with `where`",
-                    )  # fmt: skip
-                if not here.any():
-                    raise InputError(f"boundaries.{side.name}", None, "an inlet that covers the centre of some cell")
+                self._refuse_blocked(side, here, solid)
                 side.inlets.append(number)
             elif isinstance(condition, NoSlip):
                 velocity = np.asarray(condition.velocity, dtype=float)
-                if velocity.shape != (3,) or not np.isfinite(velocity).all() or velocity[axis] != 0.0:
+                if velocity.shape != (3,) or not np.isfinite(velocity).all() or velocity[side.axis] != 0.0:
                     raise InputError(
                         f"boundaries.{side.name}.velocity", condition.velocity, "a vector in the plane of the wall"
                     )
@@ -216,11 +126,22 @@ class Boundaries:
                     raise InputError(f"boundaries.{side.name}.pressure", condition.pressure, "a number, in Pa")
                 outlet |= here & ~solid
                 pressure[here] = condition.pressure
-        side.mirror[:] = self._extend(mirror)
-        side.wall[:] = self._extend(wall)
+        side.mirror, side.wall = self._extend(mirror), self._extend(wall)
         side.outlet, side.pressure = self._extend(outlet), self._extend(pressure)
 
-    def _points(self, side: _Side) -> tuple[Array, Array, Array]:
+    @staticmethod
+    def _refuse_blocked(side: Side, here: Any, solid: Any) -> None:
+        """An inlet needs open cells behind all its faces, and some face."""
+        if not here.any():
+            raise InputError(f"boundaries.{side.name}", None, "an inlet that covers the centre of some cell")
+        blocked = int((here & solid).sum())
+        if blocked:
+            raise InputError(
+                f"boundaries.{side.name}", None, "an inlet whose cells are all open",
+                f"{blocked} of its {int(here.sum())} cells are solid; narrow it with `where`",
+            )  # fmt: skip
+
+    def _points(self, side: Side) -> tuple[Array, Array, Array]:
         """Centres of the boundary faces of a side, x, y, z as full arrays over its plane."""
         coordinates = np.broadcast_arrays(*self.grid.faces(side.axis))
         index = -1 if side.high else 0
@@ -246,24 +167,25 @@ class Boundaries:
                 wall[:, here] = superficial.T / inside
                 side.wall = self._extend(wall)
 
-    def superficial(self, side: _Side, number: int, here: np.ndarray, time: float, steady: bool = False) -> Array:
+    def superficial(self, side: Side, number: int, here: np.ndarray, time: float, steady: bool = False) -> Array:
+        """Superficial velocity (n, 3) on the n faces of an inlet [m/s]; steady leaves its time factor out."""
         inlet = side.conditions[number]
         assert isinstance(inlet, Inlet)
         x, y, z = (c[here] for c in self._points(side))
+        by_function = callable(inlet.velocity)
         given = np.asarray(inlet.velocity(x, y, z, time) if callable(inlet.velocity) else inlet.velocity, dtype=float)
         vector = np.zeros((x.size, 3))
-        if given.ndim == 0 or (given.shape == (x.size,) and not (given.shape == (3,) and not callable(inlet.velocity))):
+        if given.ndim == 0 or (by_function and given.shape == (x.size,)):
             vector[:, side.axis] = side.inward * given
-        elif given.shape in ((3,), (x.size, 3)):
+        elif given.shape == (x.size, 3) or (not by_function and given.shape == (3,)):
             vector[:] = given
         else:
-            raise InputError(
-                f"boundaries.{side.name}.velocity",
-                given.shape,
-                f"of shape ({x.size},) or ({x.size}, 3) for {x.size} faces",
+            wanted = (
+                f"of shape ({x.size},) or ({x.size}, 3) for {x.size} faces" if by_function else "a speed or a vector"
             )
-        factor = 1.0 if steady or inlet.in_time is None else float(inlet.in_time(time))
-        vector *= factor
+            raise InputError(f"boundaries.{side.name}.velocity", given.shape, wanted)
+        if inlet.in_time is not None and not steady:
+            vector *= float(inlet.in_time(time))
         bad = ~np.isfinite(vector).all(axis=1)
         if bad.any():
             n = int(np.argmax(bad))
@@ -284,14 +206,8 @@ class Boundaries:
         self.fill_cells(solid)
         solved, buried = np.zeros((3, *grid.padded_shape)), np.zeros((3, *grid.padded_shape))
         for d in range(3):
-            n = grid.cells[d]
             both = fluid * np.roll(fluid, 1, axis=2 - d)
-            keep: list[Any] = [slice(LOW, m + LOW + 1) for m in grid.shape]
-            for e in range(3):
-                if e != d:
-                    keep[2 - e] = slice(LOW, grid.cells[e] + LOW)
-            keep[2 - d] = slice(LOW, n + LOW + 1)
-            solved[d][tuple(keep)] = both[tuple(keep)]
+            grid.inner_faces(solved[d], d)[:] = grid.inner_faces(both, d)
             buried[d] = solid * np.roll(solid, 1, axis=2 - d)
         for side in self.sides:
             face = LOW + self.grid.cells[side.axis] if side.high else LOW
@@ -364,7 +280,7 @@ class Boundaries:
                     if side.axis == axis:
                         self._fill_side(side, velocity)
 
-    def _fill_side(self, side: _Side, velocity: Array) -> None:
+    def _fill_side(self, side: Side, velocity: Array) -> None:
         n, axis = self.grid.cells[side.axis], side.axis
         face = n + LOW if side.high else LOW
         inside = (n + LOW - 1, max(n + LOW - 2, LOW)) if side.high else (LOW, min(LOW + 1, n + LOW - 1))

@@ -34,9 +34,7 @@ the pressure is the one that makes the new velocity satisfy continuity, and drag
 
 from __future__ import annotations
 
-import math
-
-from cfddem.fluid.grid import HIGH, LOW, UNIT
+from cfddem.fluid.grid import LOW, UNIT
 from cfddem.kernels import inline, kernel, prange, threaded
 
 # ---------------------------------------------------------------- terms, one function each
@@ -84,7 +82,7 @@ def slip_weight(face_voidage, cell_voidage, model_b):
 
 
 @kernel
-def _row(field, k, j, start, count):
+def row(field, k, j, start, count):
     return field[k, j, start : start + count]
 
 
@@ -102,16 +100,16 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
             n = px - 1
             for d in range(velocity.shape[0]):
                 dk, dj, di = UNIT[d]
-                here, before = _row(voidage, k, j, 1, n), _row(voidage, k - dk, j - dj, 1 - di, n)
-                out, u = _row(flux[d], k, j, 1, n), _row(velocity[d], k, j, 1, n)
+                here, before = row(voidage, k, j, 1, n), row(voidage, k - dk, j - dj, 1 - di, n)
+                out, u = row(flux[d], k, j, 1, n), row(velocity[d], k, j, 1, n)
                 for i in range(n):
                     out[i] = 0.5 * (here[i] + before[i]) * u[i]
             if k < pz - 1 and j < py - 1:
                 n = px - 2
-                out, thickness = _row(expansion, k, j, 1, n), _row(viscosity, k, j, 1, n)
-                u0, u1 = _row(velocity[0], k, j, 1, n), _row(velocity[0], k, j, 2, n)
-                v0, v1 = _row(velocity[1], k, j, 1, n), _row(velocity[1], k, j + 1, 1, n)
-                w0, w1 = _row(velocity[2], k, j, 1, n), _row(velocity[2], k + 1, j, 1, n)
+                out, thickness = row(expansion, k, j, 1, n), row(viscosity, k, j, 1, n)
+                u0, u1 = row(velocity[0], k, j, 1, n), row(velocity[0], k, j, 2, n)
+                v0, v1 = row(velocity[1], k, j, 1, n), row(velocity[1], k, j + 1, 1, n)
+                w0, w1 = row(velocity[2], k, j, 1, n), row(velocity[2], k + 1, j, 1, n)
                 for i in range(n):
                     growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
                     out[i] = (2.0 / 3.0) * thickness[i] * growth
@@ -121,8 +119,8 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
         for j in range(LOW, py - LOW):
             for d in range(velocity.shape[0]):
                 dk, dj, di = UNIT[d]
-                out = _row(rate[d], k, j, LOW, n)
-                right, left = _row(expansion, k, j, LOW, n), _row(expansion, k - dk, j - dj, LOW - di, n)
+                out = row(rate[d], k, j, LOW, n)
+                right, left = row(expansion, k, j, LOW, n), row(expansion, k - dk, j - dj, LOW - di, n)
                 for i in range(n):
                     out[i] = (left[i] - right[i]) * inverse[d]
                 for e in range(velocity.shape[0]):
@@ -142,26 +140,26 @@ def _balance(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse
     """
     dk, dj, di = UNIT[d]
     ek, ej, ei = UNIT[e]
-    u0, u1 = _row(u, k - 2 * ek, j - 2 * ej, LOW - 2 * ei, n), _row(u, k - ek, j - ej, LOW - ei, n)
-    u2, u3 = _row(u, k, j, LOW, n), _row(u, k + ek, j + ej, LOW + ei, n)
-    u4 = _row(u, k + 2 * ek, j + 2 * ej, LOW + 2 * ei, n)
-    wall_low, wall_high = _row(buried, k - ek, j - ej, LOW - ei, n), _row(buried, k + ek, j + ej, LOW + ei, n)
-    f_right, f_left = _row(flux, k, j, LOW, n), _row(flux, k - dk, j - dj, LOW - di, n)
-    f_right_up = _row(flux, k + ek, j + ej, LOW + ei, n)
-    f_left_up = _row(flux, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-    v_right, v_left = _row(v, k, j, LOW, n), _row(v, k - dk, j - dj, LOW - di, n)
-    v_right_up = _row(v, k + ek, j + ej, LOW + ei, n)
-    v_left_up = _row(v, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-    m_right, m_left = _row(viscosity, k, j, LOW, n), _row(viscosity, k - dk, j - dj, LOW - di, n)
+    u0, u1 = row(u, k - 2 * ek, j - 2 * ej, LOW - 2 * ei, n), row(u, k - ek, j - ej, LOW - ei, n)
+    u2, u3 = row(u, k, j, LOW, n), row(u, k + ek, j + ej, LOW + ei, n)
+    u4 = row(u, k + 2 * ek, j + 2 * ej, LOW + 2 * ei, n)
+    wall_low, wall_high = row(buried, k - ek, j - ej, LOW - ei, n), row(buried, k + ek, j + ej, LOW + ei, n)
+    f_right, f_left = row(flux, k, j, LOW, n), row(flux, k - dk, j - dj, LOW - di, n)
+    f_right_up = row(flux, k + ek, j + ej, LOW + ei, n)
+    f_left_up = row(flux, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+    v_right, v_left = row(v, k, j, LOW, n), row(v, k - dk, j - dj, LOW - di, n)
+    v_right_up = row(v, k + ek, j + ej, LOW + ei, n)
+    v_left_up = row(v, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+    m_right, m_left = row(viscosity, k, j, LOW, n), row(viscosity, k - dk, j - dj, LOW - di, n)
     if e == d:
         shared, mirror = 0.0, 0.0
         m_right_down, m_left_down, m_right_up, m_left_up = m_left, m_left, m_right, m_right
     else:
         shared, mirror = 1.0, 1.0
-        m_right_up = _row(viscosity, k + ek, j + ej, LOW + ei, n)
-        m_left_up = _row(viscosity, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-        m_right_down = _row(viscosity, k - ek, j - ej, LOW - ei, n)
-        m_left_down = _row(viscosity, k - dk - ek, j - dj - ej, LOW - di - ei, n)
+        m_right_up = row(viscosity, k + ek, j + ej, LOW + ei, n)
+        m_left_up = row(viscosity, k - dk + ek, j - dj + ej, LOW - di + ei, n)
+        m_right_down = row(viscosity, k - ek, j - ej, LOW - ei, n)
+        m_left_down = row(viscosity, k - dk - ek, j - dj - ej, LOW - di - ei, n)
     for i in range(n):
         centre = u2[i]
         inflow = carried(0.5 * (f_right[i] + f_left[i]), u0[i], u1[i], centre, u3[i], central)
@@ -195,18 +193,18 @@ def predict(
         for j in range(LOW, py - LOW):
             for d in range(old.shape[0]):
                 dk, dj, di = UNIT[d]
-                e_right, e_left = _row(voidage, k, j, LOW, n), _row(voidage, k - dk, j - dj, LOW - di, n)
-                c_right, c_left = _row(centred, k, j, LOW, n), _row(centred, k - dk, j - dj, LOW - di, n)
-                s_right, s_left = _row(stored, k, j, LOW, n), _row(stored, k - dk, j - dj, LOW - di, n)
-                b_right, b_left = _row(drag, k, j, LOW, n), _row(drag, k - dk, j - dj, LOW - di, n)
+                e_right, e_left = row(voidage, k, j, LOW, n), row(voidage, k - dk, j - dj, LOW - di, n)
+                c_right, c_left = row(centred, k, j, LOW, n), row(centred, k - dk, j - dj, LOW - di, n)
+                s_right, s_left = row(stored, k, j, LOW, n), row(stored, k - dk, j - dj, LOW - di, n)
+                b_right, b_left = row(drag, k, j, LOW, n), row(drag, k - dk, j - dj, LOW - di, n)
                 v = drag_momentum[d]
-                v_right, v_left = _row(v, k, j, LOW, n), _row(v, k - dk, j - dj, LOW - di, n)
+                v_right, v_left = row(v, k, j, LOW, n), row(v, k - dk, j - dj, LOW - di, n)
                 x = source[d]
-                x_right, x_left = _row(x, k, j, LOW, n), _row(x, k - dk, j - dj, LOW - di, n)
-                p_right, p_left = _row(pressure, k, j, LOW, n), _row(pressure, k - dk, j - dj, LOW - di, n)
-                first, second = _row(rate_a[d], k, j, LOW, n), _row(rate_b[d], k, j, LOW, n)
-                u, out, ease = _row(old[d], k, j, LOW, n), _row(new[d], k, j, LOW, n), _row(mobility[d], k, j, LOW, n)
-                free = _row(solved[d], k, j, LOW, n)
+                x_right, x_left = row(x, k, j, LOW, n), row(x, k - dk, j - dj, LOW - di, n)
+                p_right, p_left = row(pressure, k, j, LOW, n), row(pressure, k - dk, j - dj, LOW - di, n)
+                first, second = row(rate_a[d], k, j, LOW, n), row(rate_b[d], k, j, LOW, n)
+                u, out, ease = row(old[d], k, j, LOW, n), row(new[d], k, j, LOW, n), row(mobility[d], k, j, LOW, n)
+                free = row(solved[d], k, j, LOW, n)
                 for i in range(n):
                     face = 0.5 * (c_right[i] + c_left[i])
                     right, left = slip_weight(face, c_right[i], model_b), slip_weight(face, c_left[i], model_b)
@@ -226,121 +224,6 @@ def predict(
                     inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
                     out[i] = momentum / inertia if free[i] > 0.0 else u[i]
                     ease[i] = free[i] * step * share / inertia
-
-
-@threaded
-def gather(
-    velocity, mobility, voidage, rate, open_cells, fresh, periodic, areas, inverse, ax, ay, az, anchor, b
-):  # fmt: skip
-    """Right-hand side of the pressure equation and, if fresh, its coefficients.
-
-    b = -(V d eps/dt + outflow of eps u) of every open cell [m3/s]; rate is d eps/dt [1/s].
-    """
-    nz, ny, nx = b.shape
-    for k in prange(nz):
-        for j in range(ny):
-            for i in range(nx):
-                outflow, held = rate[k, j, i] * areas[0] / inverse[0], 0.0
-                kk, jj, ii = k + LOW, j + LOW, i + LOW
-                here = voidage[kk, jj, ii]
-                for d in range(velocity.shape[0]):
-                    dk, dj, di = UNIT[d]
-                    below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here)
-                    above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
-                    outflow += areas[d] * (
-                        above * velocity[d, kk + dk, jj + dj, ii + di] - below * velocity[d, kk, jj, ii]
-                    )
-                    if fresh:
-                        a_below = below * mobility[d, kk, jj, ii] * areas[d] * inverse[d]
-                        a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
-                        place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
-                        # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
-                        if not periodic[d] and place == 0:
-                            held += 2.0 * a_below
-                            a_below = 0.0
-                        if not periodic[d] and place == cells - 1:
-                            held += 2.0 * a_above
-                        if cells == 1:
-                            a_below = 0.0
-                        if d == 0:
-                            ax[k, j, i] = a_below
-                        elif d == 1:
-                            ay[k, j, i] = a_below
-                        else:
-                            az[k, j, i] = a_below
-                b[k, j, i] = -outflow * open_cells[k, j, i]
-                if fresh:
-                    anchor[k, j, i] = held
-
-
-@threaded
-def correct(new, mobility, correction, inverse):
-    """Take the gradient of the pressure correction from the velocity."""
-    pz, py, px = correction.shape
-    n = px - 2 * LOW
-    for k in prange(LOW, pz - LOW):
-        for j in range(LOW, py - LOW):
-            for d in range(new.shape[0]):
-                dk, dj, di = UNIT[d]
-                right, left = _row(correction, k, j, LOW, n), _row(correction, k - dk, j - dj, LOW - di, n)
-                out, ease = _row(new[d], k, j, LOW, n), _row(mobility[d], k, j, LOW, n)
-                for i in range(n):
-                    out[i] -= ease[i] * ((right[i] - left[i]) * inverse[d])
-
-
-@threaded
-def clocks(velocity, voidage, viscosity, open_cells, density, inverse, advection, diffusion, fastest):
-    """Plane by plane the largest |u|/h summed over directions [1/s], viscous rate [1/s] and eps |u| [m/s].
-
-    viscosity is eps mu; the viscous rate takes the thickest neighbour of the thinnest cell, 2 mu (sum 1/h^2)/rho eps.
-    """
-    nz, ny, nx = open_cells.shape
-    squares = 2.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
-    for k in prange(nz):
-        turnover, spreading, flux = 0.0, 0.0, 0.0
-        for j in range(ny):
-            for i in range(nx):
-                kk, jj, ii = k + LOW, j + LOW, i + LOW
-                crossing, thickest = 0.0, viscosity[kk, jj, ii]
-                for d in range(velocity.shape[0]):
-                    dk, dj, di = UNIT[d]
-                    speed = max(abs(velocity[d, kk, jj, ii]), abs(velocity[d, kk + dk, jj + dj, ii + di]))
-                    crossing += speed * inverse[d]
-                    flux = max(flux, speed * voidage[kk, jj, ii])
-                    around = max(viscosity[kk - dk, jj - dj, ii - di], viscosity[kk + dk, jj + dj, ii + di])
-                    thickest = max(thickest, around)
-                turnover = max(turnover, crossing)
-                spreading = max(spreading, open_cells[k, j, i] * thickest * squares / (density * voidage[kk, jj, ii]))
-        advection[k], diffusion[k], fastest[k] = turnover, spreading, flux
-
-
-@threaded
-def eddy_viscosity(velocity, factor, inverse, viscosity):
-    r"""Sub-grid viscosity rho (C Delta)^2 sqrt(2 S:S) of every cell; factor is rho (C Delta)^2 [kg/m]."""
-    pz, py, px = viscosity.shape
-    for k in prange(LOW, pz - HIGH):
-        for j in range(LOW, py - HIGH):
-            for i in range(LOW, px - HIGH):
-                squares = 0.0
-                for d in range(velocity.shape[0]):
-                    dk, dj, di = UNIT[d]
-                    u = velocity[d]
-                    for e in range(velocity.shape[0]):
-                        ek, ej, ei = UNIT[e]
-                        if e == d:
-                            stretch = (u[k + dk, j + dj, i + di] - u[k, j, i]) * inverse[d]
-                            squares += 2.0 * stretch * stretch
-                        elif e > d:
-                            v = velocity[e]
-                            shear = 0.25 * inverse[e] * (
-                                u[k + ek, j + ej, i + ei] + u[k + ek + dk, j + ej + dj, i + ei + di]
-                                - u[k - ek, j - ej, i - ei] - u[k - ek + dk, j - ej + dj, i - ei + di]
-                            ) + 0.25 * inverse[d] * (
-                                v[k + dk, j + dj, i + di] + v[k + ek + dk, j + ej + dj, i + ei + di]
-                                - v[k - dk, j - dj, i - di] - v[k - dk + ek, j - dj + ej, i - di + ei]
-                            )  # fmt: skip
-                            squares += shear * shear
-                viscosity[k, j, i] = factor * math.sqrt(squares)
 
 
 @threaded

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.errors import InputError
-from cfddem.fluid.boundaries import Boundaries, Condition
+from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import (
     checked_field,
     checked_voidage,
@@ -34,9 +34,12 @@ from cfddem.fluid.checks import (
     refuse_nonsense,
     refuse_trapped_inflow,
 )
+from cfddem.fluid.conditions import Condition
 from cfddem.fluid.grid import Array, Grid
-from cfddem.fluid.momentum import clocks, correct, gather, predict, transport
+from cfddem.fluid.momentum import predict, transport
 from cfddem.fluid.pressure import PressureEquation
+from cfddem.fluid.projection import correct, gather
+from cfddem.fluid.stability import StepLimit, clocks
 from cfddem.fluid.state import FluidState
 
 LOOSE = 1e-6
@@ -47,14 +50,6 @@ STIFF = 1.0
 
 SETTLED = 0.01
 """Change of the velocity between two passes, over the largest velocity, that ends the repetition."""
-
-
-@dataclass(frozen=True)
-class StepLimit:
-    """The largest stable step [s] and the clock that sets it: "Courant", "viscous" or "none"."""
-
-    step: float
-    clock: str
 
 
 @dataclass(frozen=True)
@@ -150,7 +145,7 @@ class FluidSolver(FluidState):
         self._pad(self.grid.inner(self._other_mean) - step * self._voidage_rate, self._stored)
         self._transport(self._velocity, self._mean_voidage, self._rate_a)
         self._predict(0.0, step, self._stage)
-        scale = self._flux_scale()
+        scale = self._flux_scale(voidage_rate)
         iterations = [self._project(self._stage, voidage_rate, scale, max(LOOSE, self.tolerance), fresh=True)]
 
         # Stage two: the average of start and end; again while drag is stiff and the end still moves.
@@ -205,10 +200,12 @@ class FluidSolver(FluidState):
         )  # fmt: skip
         self.boundaries.fill_velocity(new)
 
-    def _flux_scale(self) -> float:
-        """Largest volume flux through a face [m3/s]: of the old velocity, or a hundredth of the predicted one."""
+    def _flux_scale(self, voidage_rate: Array) -> float:
+        """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or
+        displaced by the change of voidage in a cell."""
         old, predicted = self._clocks(self._velocity, self._mean_voidage), self._clocks(self._stage, self._other_mean)
-        return float(self._areas.max()) * max(old[2], 0.01 * predicted[2])
+        displaced = self.grid.cell_volume * max(float(voidage_rate.max()), -float(voidage_rate.min()))
+        return max(float(self._areas.max()) * max(old[2], 0.01 * predicted[2]), displaced)
 
     def _project(self, velocity: Array, voidage_rate: Array, scale: float, tolerance: float, fresh: bool) -> int:
         """Find the pressure with which a velocity satisfies continuity; returns the iterations it took."""
@@ -314,6 +311,7 @@ class FluidSolver(FluidState):
         share = 1.0 if self.model == "B" else self._mean_voidage
         np.multiply(self._solved, share / self.density, out=self._mobility)
         kept = self.pressure.copy()
-        scale = float(self._areas.max()) * self._clocks(self._velocity, self._mean_voidage)[2]
+        np.copyto(self._stage, self._velocity)
+        scale = self._flux_scale(self._voidage_rate)
         self._project(self._velocity, self._voidage_rate, scale, self.tolerance, fresh=True)
         self.pressure[:] = kept

@@ -12,8 +12,9 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.grid import AT_CENTRES, AT_FACES, LOW, Array, Grid, sample
-from cfddem.fluid.momentum import drag_seen, eddy_viscosity, transport
+from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, sample
+from cfddem.fluid.momentum import drag_seen, transport
+from cfddem.fluid.viscosity import eddy_viscosity, rim
 
 
 class FluidState:
@@ -38,7 +39,7 @@ class FluidState:
         self._areas = np.array([grid.face_area(d) for d in range(3)])
         self._open = grid.open.astype(float)
         self._solved, self._buried = boundaries.mark_unknowns()
-        self._blocked, self._rim = boundaries.blocked_faces(), _rim(grid, boundaries)
+        self._blocked, self._rim = boundaries.blocked_faces(), rim(grid, boundaries)
 
         cells, vector = grid.padded_shape, (3, *grid.padded_shape)
         self._voidage_rate = np.zeros(grid.shape)  # of the interval the velocity belongs to
@@ -60,7 +61,8 @@ class FluidState:
     def static_pressure(self) -> Array:
         """p = p' + rho g.x (nz, ny, nx) [Pa]."""
         x, y, z = self.grid.centres()
-        return self.pressure + self.density * (self.gravity[0] * x + self.gravity[1] * y + self.gravity[2] * z)
+        head: Array = self.density * (self.gravity[0] * x + self.gravity[1] * y + self.gravity[2] * z)
+        return self.pressure + head
 
     @property
     def velocity(self) -> Array:
@@ -87,7 +89,7 @@ class FluidState:
 
     def continuity_residual(self) -> Array:
         """V d(eps)/dt + outflow of every open cell (nz, ny, nx) [m3/s], summed face by face, not by the solver."""
-        total = self._voidage_rate * self.grid.cell_volume
+        total: Array = self._voidage_rate * self.grid.cell_volume
         for d in range(3):
             total = total + np.diff(self.volume_flux(d), axis=2 - d) * self._areas[d]
         return total * self._open
@@ -185,21 +187,3 @@ class FluidState:
             flat = self._thickness.ravel()
             flat[cells] = (flat[neighbours] * shares).sum(axis=1)
             self.boundaries.fill_cells(self._thickness)
-
-
-def _rim(grid: Grid, boundaries: Boundaries) -> tuple[np.ndarray, np.ndarray, Array] | None:
-    """Solid cells that touch an open one: their places in a padded field, those of their 26 neighbours, shares."""
-    if grid.solid is None:
-        return None
-    is_open = np.zeros(grid.padded_shape)
-    grid.inner(is_open)[:] = grid.open
-    boundaries.wrap(is_open)
-    _, ny, nx = grid.padded_shape
-    steps = np.array([(c * ny + b) * nx + a for c in (-1, 0, 1) for b in (-1, 0, 1) for a in (-1, 0, 1) if a or b or c])
-    k, j, i = np.nonzero(grid.solid)
-    cells = ((k + LOW) * ny + j + LOW) * nx + i + LOW
-    neighbours = cells[:, None] + steps
-    shares = is_open.ravel()[neighbours]
-    total = shares.sum(axis=1)
-    touching = total > 0.0
-    return cells[touching], neighbours[touching], shares[touching] / total[touching, None]

@@ -21,7 +21,7 @@ import time
 
 import numpy as np
 
-from cfddem.fluid.boundaries import Inlet, Outlet
+from cfddem.fluid.conditions import Inlet, Outlet
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.kernels import use_threads
