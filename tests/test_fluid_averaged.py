@@ -225,6 +225,10 @@ def test_ledgers_of_volume_and_momentum_close_in_a_periodic_box(convection):
         remainder = momentum(fluid) - old_momentum - sum(parts)
         turnover = sum(np.abs(p) for p in parts) + np.abs(old_momentum) + np.abs(drag).sum()
         assert np.abs(remainder).max() < 1e-12 * turnover.max()
+        ledger = fluid.momentum_ledger()
+        assert np.abs(ledger["change"] - momentum(fluid) + old_momentum).max() < 1e-12 * turnover.max()
+        assert np.abs(ledger["particles"] - parts[2]).max() < 1e-12 * turnover.max()
+        assert np.abs(ledger["boundaries"]).max() < 1e-12 * turnover.max()
 
 
 def test_momentum_ledger_closes_in_a_closed_box():
@@ -285,29 +289,28 @@ def test_momentum_ledger_closes_in_a_closed_box():
     walls = 0.5 * wall_force(start) + 0.5 * wall_force(stage)
     assert np.abs(walls).min() > 1e-3 and np.abs(pressure).min() > 1e-3
     assert np.abs(gained - step * (walls + pressure + drag)).max() < 1e-12 * step * np.abs(walls).max()
+    held = fluid.momentum_ledger()["boundaries"] + fluid.momentum_ledger()["drag"]
+    assert np.abs(held - step * (walls + pressure + drag)).max() < 1e-12 * step * np.abs(walls).max()
 
 
 @pytest.mark.parametrize("convection", ["limited", "central"])
-def test_a_uniform_velocity_stays_uniform_while_the_voidage_moves_with_it(convection):
-    """Voidage carried at the speed of the fluid: nothing accelerates (storage and convection agree)."""
+def test_a_uniform_velocity_stays_uniform_in_a_moving_voidage(convection):
+    """Steep voidage sweeps past a uniform transverse velocity: storage and convection agree, nothing changes."""
     n, speed = 16, 0.8
-    grid = Grid((n, 1, 1), (1.0 / n, 1.0, 1.0))
+    grid = Grid((n, 1, n), (1.0 / n,) * 3)
     step = 1.0 / n / speed / 4
 
     def voidage(t):
-        x, _, _ = grid.centres()
-        return 0.7 + 0.2 * np.tanh(3 * np.sin(2 * np.pi * (x - speed * t))) + np.zeros(grid.shape)
+        x, _, z = grid.centres()
+        return 0.65 + 0.3 * np.tanh(3 * np.sin(2 * np.pi * (x - speed * t))) * np.cos(2 * np.pi * z)
 
-    # The flux that moves this voidage exactly is speed * eps only to second order; start from that flux.
     fluid = FluidSolver(grid, ALL_PERIODIC, density=1.0, viscosity=0.0, convection=convection)
     fluid.set_voidage(voidage(step / 2), voidage(-step / 2), step)
-    fluid.set_velocity((speed, 0.0, 0.0))
-    assert np.abs(fluid.face_velocity(0) - speed).max() < 0.06 * speed
-    start = momentum(fluid)[0]
+    fluid.set_velocity((speed, 0.5, 0.0))
     for k in range(1, 4 * n + 1):
         fluid.step(step, voidage((k + 0.5) * step))
-    assert np.abs(fluid.face_velocity(0) - speed).max() < 0.06 * speed
-    assert np.isfinite(start)
+    assert np.abs(fluid.face_velocity(0)).max() > 1.1 * speed  # the flow itself is not uniform
+    assert np.abs(fluid.face_velocity(1) - 0.5).max() < 1e-6
 
 
 @pytest.mark.parametrize("voidage", [0.3, 0.65])

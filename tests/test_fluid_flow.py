@@ -273,6 +273,15 @@ def test_the_binding_clock_is_named(speed, viscosity, clock):
     assert fluid.largest_step().clock == clock
 
 
+def test_a_run_counts_what_set_its_steps():
+    """At rest: viscous steps, a given largest step, and two equal last ones."""
+    fluid = FluidSolver(Grid((8, 8, 8), (0.1,) * 3), ALL_PERIODIC, density=1.0, viscosity=0.1)
+    viscous = fluid.largest_step().step
+    assert set(fluid.run_until(5.5 * viscous)) == {"viscous", "end"}
+    assert fluid.time == pytest.approx(5.5 * viscous)
+    assert fluid.run_until(10 * viscous, largest=0.5 * viscous)["given"] >= 7
+
+
 @pytest.mark.parametrize("courant", [0.5, 1.0])
 def test_the_named_step_is_stable(courant):
     """Random velocities, steps at the limit given: kinetic energy never grows."""

@@ -83,6 +83,7 @@ def slip_weight(face_voidage, cell_voidage, model_b):
 
 @kernel
 def row(field, k, j, start, count):
+    """Cells start ... start + count of a row: loops over rows indexed from zero are the ones that vectorise."""
     return field[k, j, start : start + count]
 
 
@@ -182,10 +183,9 @@ def predict(
     """Velocity after the step with the pressure as it is, and its mobility: velocity lost per pressure gradient.
 
     old, new, mobility (3, ...) velocities [m/s] and [m2 s/kg]; rate_a, rate_b (3, ...) results of `transport`, the
-    second counting weight_b; pressure p' [Pa]; stored, centred, voidage: voidage stored with the old velocity, in the
-    middle of the step, stored with the new velocity;
-    drag beta [kg/m3/s], drag_momentum beta v and source [N/m3], cell fields; driving mean pressure fall [Pa/m];
-    solved (3, ...) 1 where the velocity of a face is an unknown.
+    second counting weight_b; pressure p' [Pa]; stored, centred, voidage: that stored with the old velocity, that of
+    the middle of the step, that stored with the new velocity; drag beta [kg/m3/s], drag_momentum beta v and source
+    [N/m3], cell fields; driving mean pressure fall [Pa/m]; solved (3, ...) 1 where a face carries an unknown.
     """
     pz, py, px = voidage.shape
     n = px - 2 * LOW

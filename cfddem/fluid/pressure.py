@@ -237,6 +237,7 @@ class PressureEquation:
         finest, x = self.finest, np.zeros_like(b)
         np.copyto(self.residual, b)
         self._remove_means(self.residual)
+        self.direction.fill(0.0)
         left = float(np.abs(self.residual).max())
         product, iterations = 1.0, 0
         while left > limit:
@@ -248,7 +249,7 @@ class PressureEquation:
             np.copyto(finest.b, self.residual)
             self._cycle(0)
             before, product = product, float(np.einsum("kji,kji->k", finest.x, self.residual).sum())
-            self.direction *= product / before if iterations else 0.0
+            self.direction *= product / before
             self.direction += finest.x
             operator = (finest.ax, finest.ay, finest.az, finest.diagonal)
             apply(self.direction, *operator, finest.image, finest.sums)
@@ -264,8 +265,10 @@ class PressureEquation:
         threads = use_threads(None)
         if threads > 1 and self.levels[depth].x.size < SMALL:
             use_threads(1)
-            self._cycle_here(depth)
-            use_threads(threads)
+            try:
+                self._cycle_here(depth)
+            finally:
+                use_threads(threads)
         else:
             self._cycle_here(depth)
 

@@ -168,6 +168,49 @@ class FluidState:
         push = np.moveaxis(inner(self._drag_momentum), 0, -1) - inner(self._drag)[..., None] * seen
         return weight, seen, self._last_step * self.grid.cell_volume * weight * push
 
+    # ------------------------------------------------------------ ledger
+
+    def momentum(self) -> Array:
+        """Momentum of the fluid, sum of rho eps u V over all faces with an unknown velocity (3,) [N s]."""
+        return self._momentum(self._velocity, self._mean_voidage)
+
+    def momentum_ledger(self) -> dict[str, Array]:
+        r"""Where the momentum of the last step came from, each (3,) [N s].
+
+        change      of `momentum()`
+        drag        sum of `drag_exchange()`
+        particles   :math:`h \sum V p\,\nabla\varepsilon`, what model A takes from the fluid and gives to the particles
+        source      of the user
+        driving     of the mean pressure gradient of periodic sides
+        boundaries  the rest: pressure, stress and flow at walls, inlets and outlets; zero in a periodic box
+        """
+        h, volume, inner = self._last_step, self.grid.cell_volume, self.grid.inner
+        lines = {
+            "change": self.momentum() - self._momentum(self._other, self._other_mean),
+            "drag": self.drag_exchange()[2].sum(axis=(0, 1, 2)),
+            "particles": np.zeros(3),
+            "source": h * volume * inner(self._source).sum(axis=(1, 2, 3)),
+        }
+        share = self._open if self._model_b else self._open * inner(self._centred)
+        lines["driving"] = h * volume * float(share.sum()) * self.boundaries.driving
+        for d in range(3) if not self._model_b else ():
+            own, axis = self._centred, 2 - d
+            low = np.where(self._solved[d] > 0.0, 0.5 * (own + np.roll(own, 1, axis)), own)
+            high = np.where(np.roll(self._solved[d], -1, axis) > 0.0, 0.5 * (own + np.roll(own, -1, axis)), own)
+            lines["particles"][d] = h * self._areas[d] * float((self.pressure * inner(high - low)).sum())
+        lines["boundaries"] = lines["change"] - sum(lines[name] for name in lines if name != "change")
+        return lines
+
+    def _momentum(self, velocity: Array, voidage: Array) -> Array:
+        total = np.zeros(3)
+        for d in range(3):
+            stored = 0.5 * (voidage + np.roll(voidage, 1, 2 - d)) * velocity[d] * self._solved[d]
+            faces = self.grid.inner_faces(stored, d)
+            # The last face of a periodic direction is the first one again.
+            unique = np.moveaxis(faces, 2 - d, 0)[: self.grid.cells[d] if self.boundaries.periodic[d] else None]
+            total[d] = self.density * self.grid.cell_volume * float(unique.sum())
+        return total
+
     # ------------------------------------------------------------ viscosity
 
     def _thicken(self, velocity: Array, voidage: Array) -> None:
