@@ -48,10 +48,13 @@ def cache_folder() -> Path:
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     private = f"cfddem-{os.getuid() if hasattr(os, 'getuid') else os.getlogin()}"
     candidates = [Path(chosen)] if chosen else [Path(home) / "cfddem", Path(tempfile.gettempdir()) / private]
+    key = source_key()
     for folder in candidates:
+        if folder.name == key:
+            return folder  # a parent process has added the key already
         if _writable(folder):
-            return folder / source_key()
-    return Path(tempfile.mkdtemp(prefix="cfddem-")) / source_key()
+            return folder / key
+    return Path(tempfile.mkdtemp(prefix="cfddem-")) / key
 
 
 def _point_compiler_at(folder: Path) -> None:

@@ -175,7 +175,6 @@ def test_friction_is_lubricated_where_the_film_holds_the_solids_apart(
         assert result.rebound_angle_relative == pytest.approx(90.0)
 
 
-@pytest.mark.xfail(reason="the pair's minimum gap is reset where it leaves the film, before it is recorded")
 def test_a_rebound_keeps_the_film_that_turned_it_back() -> None:
     result = collide(STEEL, velocity=0.3, stokes=30.0)
     assert result.outcome == "rebound"

@@ -122,7 +122,6 @@ def test_compiled_code_is_kept_under_a_key_of_its_sources(copy: Path, tmp_path: 
     assert run_in(copy, CACHE, **kept) != before
 
 
-@pytest.mark.xfail(reason="the key of the sources is added once more in every child process")
 def test_a_child_process_finds_the_compiled_code_of_its_parent(tmp_path: Path) -> None:
     child = f"import subprocess, sys, closures.compiled; subprocess.run([sys.executable, '-c', {CACHE!r}])"
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
