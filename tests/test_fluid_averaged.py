@@ -306,10 +306,10 @@ def test_a_uniform_velocity_stays_uniform_in_a_moving_voidage(convection):
 
     fluid = FluidSolver(grid, ALL_PERIODIC, density=1.0, viscosity=0.0, convection=convection)
     fluid.set_voidage(voidage(step / 2), voidage(-step / 2), step)
-    fluid.set_velocity((speed, 0.5, 0.0))
+    fluid.set_velocity((0.0, 0.5, 0.0))
     for k in range(1, 4 * n + 1):
         fluid.step(step, voidage((k + 0.5) * step))
-    assert np.abs(fluid.face_velocity(0)).max() > 1.1 * speed  # the flow itself is not uniform
+    assert np.ptp(fluid.face_velocity(0)) > 0.1  # the flow that moves the voidage is not uniform
     assert np.abs(fluid.face_velocity(1) - 0.5).max() < 1e-6
 
 
@@ -354,7 +354,7 @@ def test_hydrostatic_rest_stays_at_rest_at_a_steep_voidage_jump(model):
     fluid.pressure[:] = 1000 * 9.81 * depth
     fluid.step(1e-3, None, beta)
     fluid.step(1e-3, None, beta)
-    assert np.abs(fluid.velocity).max() < 1e-8 * 9.81 * 1e-3
+    assert np.abs(fluid.velocity).max() < limit
 
 
 def ergun(voidage, superficial, viscosity, density, diameter):

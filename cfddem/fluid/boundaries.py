@@ -195,6 +195,11 @@ class Boundaries:
             )  # fmt: skip
         return vector
 
+    def varies_along(self, axis: int) -> bool:
+        """Whether the flow can vary along an axis: not if it is one cell thick between planes of symmetry."""
+        sides = [side for side in self.sides if side.axis == axis]
+        return self.grid.cells[axis] > 1 or any((side.mirror < 0.0).any() or side.outlet.any() for side in sides)
+
     def mark_unknowns(self) -> tuple[Array, Array]:
         """Which faces carry an unknown velocity, and which are buried in solid: two (3, ...) arrays of 0 and 1."""
         grid = self.grid

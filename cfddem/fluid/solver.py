@@ -108,6 +108,7 @@ class FluidSolver(FluidState):
         self._central = float(convection == "central")
         self._equation = PressureEquation(grid, closed_regions(grid, sides))
         self._wanted = np.zeros(grid.shape)
+        self._clock_inverse = self._inverse * [sides.varies_along(d) for d in range(3)]
         self._by_plane = np.zeros((3, grid.shape[0]))
         self.set_voidage(voidage)
         self.set_velocity((0.0, 0.0, 0.0))
@@ -241,7 +242,8 @@ class FluidSolver(FluidState):
 
         .. math:: h \le C / \sum_d |u_d|/h_d, \qquad h \le 0.8 / (2\nu \sum_d h_d^{-2})
 
-        courant  C; Heun's scheme with the limiter is bounded up to 1
+        courant  C; Heun's scheme with the limiter is bounded up to 1. A direction one cell thick without walls
+                 that stick does not count
         returns  StepLimit; infinite with the clock "none" where nothing moves and nothing is viscous
         """
         self._thicken(self._velocity, self._mean_voidage)
@@ -255,7 +257,7 @@ class FluidSolver(FluidState):
 
     def _clocks(self, velocity: Array, voidage: Array) -> tuple[float, float, float]:
         """Largest |u|/h [1/s], viscous rate [1/s] and eps |u| [m/s]."""
-        clocks(velocity, voidage, self._thickness, self._open, self.density, self._inverse, *self._by_plane)
+        clocks(velocity, voidage, self._thickness, self._open, self.density, self._clock_inverse, *self._by_plane)
         advection, diffusion, fastest = (float(most) for most in self._by_plane.max(axis=1))
         return advection, diffusion, fastest
 
