@@ -12,21 +12,20 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
-from cfddem.errors import InputError, RunFailed, UnstableStep, nearest
+from cfddem.errors import InputError, UnstableStep, nearest
 from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import CONTACTS, DRIFT, FRICTION_ONSETS, INTEGRATORS, SPRINGS, VERLET, Laws
-from cfddem.particles.state import Bodies, bodies
-from cfddem.particles.walls import Plane
+from cfddem.particles.forces import CONTACTS, DRIFT, FRICTION_ONSETS, INTEGRATORS, SPRINGS, Laws
+from cfddem.particles.state import Bodies
 from cfddem.simulation import Simulation
 from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
 from closures.minimum_gap import elastohydrodynamic
+from scenarios.pair_motion import Setting, follow, stage
 
 MATERIALS = {
     "steel_smooth": Material(
@@ -47,11 +46,6 @@ MATERIALS = {
     ),
 }  # fmt: skip
 """The spheres of Yang & Hunt (2006), as listed in table 1 of Nijssen et al. (2023)."""
-
-COAST = 1e-5
-"""A pair has halted when what motion and spring energy it has left changes ln h by less than this."""
-
-MOST_STEPS = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -78,26 +72,6 @@ class Collision:
         """The result without its histories, ready for JSON."""
         names = [name for name in self.__dataclass_fields__ if name not in ("time", "gap", "history")]
         return {name: _plain(getattr(self, name)) for name in names}
-
-
-@dataclass(frozen=True)
-class _Setting:
-    """The numbers of one pair before it moves."""
-
-    radius: tuple[float, float]  # of striker and target; infinite for a wall
-    reduced_radius: float
-    reduced_mass: float
-    speed: float
-    tangential_speed: float
-    viscosity: float
-    stiffness: float
-    impact_step: float
-    minimum_gap: float
-    film_speed: float  # B = A/m*
-
-    @property
-    def cutoff_gap(self) -> float:
-        return self.reduced_radius
 
 
 def collide(
@@ -159,8 +133,8 @@ def collide(
     table = pair_table(materials)
     setting = _setting(table, materials, diameters, against, velocity, viscosity, angle, step_fraction)
     caveats = _film_clock(setting, laws, step_fraction)
-    simulation = _stage(setting, table, materials, laws, full, spin)
-    history = _follow(simulation, setting, full)
+    simulation = stage(setting, table, materials, laws, full, spin)
+    history = follow(simulation, setting, full)
     return _result(simulation, setting, table, history, laws, full, caveats)
 
 
@@ -237,12 +211,12 @@ def _setting(
     viscosity: float,
     angle: float,
     step_fraction: float,
-) -> _Setting:
+) -> Setting:
     reduced_radius, reduced_mass = _masses(materials, diameters, against)
     row = table[0, 1]
     stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), reduced_radius)
     deformed = elastohydrodynamic(viscosity, velocity, float(row["film_modulus"]), reduced_radius)
-    return _Setting(
+    return Setting(
         radius=(0.5 * diameters[0], math.inf if against == "wall" else 0.5 * diameters[1]),
         reduced_radius=reduced_radius,
         reduced_mass=reduced_mass,
@@ -256,7 +230,7 @@ def _setting(
     )
 
 
-def _film_clock(setting: _Setting, laws: Laws, step_fraction: float) -> tuple[str, ...]:
+def _film_clock(setting: Setting, laws: Laws, step_fraction: float) -> tuple[str, ...]:
     """Refuse or warn where the film as an explicit force cannot be followed by the step."""
     if not laws.film or laws.integrator == DRIFT:
         return ()
@@ -282,166 +256,9 @@ def _film_clock(setting: _Setting, laws: Laws, step_fraction: float) -> tuple[st
     return (caveat,)
 
 
-def _stage(
-    setting: _Setting,
-    table: np.ndarray,
-    materials: tuple[Material, Material],
-    laws: Laws,
-    full: bool,
-    spin: tuple[float, float],
-) -> Simulation:
-    """Place striker and target; the line of centres at contact is the x axis, the plane of motion is x-y."""
-    velocity = np.array([setting.speed, setting.tangential_speed, 0.0])
-    wall = math.isinf(setting.radius[1])
-    start = 2.0 * setting.reduced_radius if full else setting.cutoff_gap if laws.film else 1e-3 * setting.reduced_radius
-    at_contact = np.array([-setting.radius[0] - (0.0 if wall else setting.radius[1]), 0.0, 0.0])
-    if full:
-        place = at_contact - velocity * _time_to_contact(at_contact, velocity, start, wall)
-    else:
-        place = at_contact - np.array([start, 0.0, 0.0])
-    spins = [[0.0, 0.0, spin[0]], [0.0, 0.0, spin[1]]]
-    number = 1 if wall else 2
-    pair = bodies(
-        np.array([place, np.zeros(3)])[:number],
-        np.array(setting.radius[:number]),
-        np.array([each.density for each in materials[:number]]),
-        velocity=np.array([velocity, np.zeros(3)])[:number],
-        spin=np.array(spins)[:number],
-        material=np.arange(number, dtype=np.int32),
-        viscosity=setting.viscosity,
-    )
-    return Simulation(
-        pair,
-        table,
-        walls=[Plane(normal=(-1.0, 0.0, 0.0), material=1)] if wall else [],
-        laws=laws,
-        free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
-        skin=8.0 * setting.reduced_radius,
-        record=True,
-    )
-
-
-def _time_to_contact(at_contact: np.ndarray, velocity: np.ndarray, start: float, wall: bool) -> float:
-    """How long before contact an undisturbed striker was at the gap where it starts."""
-    if wall:
-        return start / velocity[0]
-    target = float(np.linalg.norm(at_contact)) + start
-    along, square = float(at_contact @ velocity), float(velocity @ velocity)
-    return (along + math.sqrt(along**2 + square * (target**2 - float(at_contact @ at_contact)))) / square
-
-
-@dataclass(frozen=True)
-class _Moment:
-    """Where a pair stands at one instant."""
-
-    gap: float
-    normal_speed: float
-    speed: float
-    rate: float = 0.0  # mean rate of the gap over the last step
-
-
-def _look(simulation: Simulation) -> _Moment:
-    """Gap and speeds of the pair, as plain numbers."""
-    position, velocity = simulation.bodies.position.tolist(), simulation.bodies.velocity.tolist()
-    if len(position) == 1:
-        (x, _, _), (u, v, w) = position[0], velocity[0]
-        return _Moment(-x - float(simulation.bodies.radius[0]), -u, math.hypot(u, v, w))
-    r = [b - a for a, b in zip(*position)]
-    u = [b - a for a, b in zip(*velocity)]
-    distance = math.hypot(*r)
-    approach = sum(a * b for a, b in zip(r, u)) / distance
-    return _Moment(distance - float(simulation.bodies.radius.sum()), approach, math.hypot(*u))
-
-
-def _follow(simulation: Simulation, setting: _Setting, full: bool) -> dict[str, np.ndarray]:
-    """March until the pair has left the film or halted; returns the history as columns.
-
-    Where only the film acts its impulse depends on the gap alone, so a step may take up to half of the gap, less
-    where the film changes the speed so much that times would be coarse; the first step into the film is short, because a film is felt from the step after the one that enters it.
-    """
-    rows = [_row(simulation, _look(simulation))]
-    laws, cutoff = simulation.laws, setting.cutoff_gap if simulation.laws.film else 0.0
-    if not full:
-        simulation.advance(min(1e-6 * setting.cutoff_gap / setting.speed, setting.impact_step))
-    turn = 0.004 * setting.reduced_radius / math.hypot(setting.speed, setting.tangential_speed) if full else math.inf
-    touched = False
-    for moment, minimum_gap in _moments(simulation, rows):
-        touched = touched or moment.gap <= minimum_gap
-        if moment.gap > cutoff and moment.normal_speed > 0.0:
-            break
-        if laws.film and _halted(moment, minimum_gap, setting, full):
-            break
-        if laws.film and laws.integrator == VERLET:
-            near = moment.gap < 4.0 * minimum_gap + 2.0 * setting.speed * setting.impact_step
-            simulation.advance(setting.impact_step, 1 if near else 25)
-        else:
-            simulation.advance(_step(moment, minimum_gap, setting, cutoff, turn))
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    return columns | {"touched": np.array(touched)}
-
-
-def _moments(simulation: Simulation, rows: list[dict[str, Any]]) -> Iterator[tuple[_Moment, float]]:
-    while simulation.steps < MOST_STEPS:
-        moment = _look(simulation)
-        last = rows[-1]
-        if simulation.time > last["time"]:
-            moment = replace(moment, rate=(moment.gap - last["gap"]) / (simulation.time - last["time"]))
-        rows.append(_row(simulation, moment))
-        yield moment, float(simulation.edges.minimum_gap[0])
-    raise RunFailed(
-        f"the pair neither separates nor halts within {MOST_STEPS} steps: gap {moment.gap:.3g} m, "
-        f"speed {moment.speed:.3g} m/s at t = {simulation.time:.3g} s; try a larger step_fraction"
-    )
-
-
-def _row(simulation: Simulation, moment: _Moment) -> dict[str, Any]:
-    return {
-        "time": simulation.time,
-        "gap": moment.gap,
-        "normal_speed": moment.normal_speed,
-        "position": simulation.bodies.position.copy(),
-        "velocity": simulation.bodies.velocity.copy(),
-        "spin": simulation.bodies.spin[:, 2].copy(),
-        "force": simulation.bodies.force[0].copy(),
-    }
-
-
-def _step(moment: _Moment, minimum_gap: float, setting: _Setting, cutoff: float, turn: float) -> float:
-    """Next step: a fraction of the Hertz time in contact, a fraction of the gap where only the film acts."""
-    if moment.gap <= minimum_gap:
-        return max(setting.impact_step, _creep_time(moment, minimum_gap, setting) if cutoff > 0.0 else 0.0)
-    room = moment.gap - minimum_gap if moment.normal_speed < 0.0 else moment.gap
-    if moment.gap > cutoff:
-        # the film begins with a full step inside it, which is kept short
-        room = min(room, moment.gap - cutoff + 1e-3 * setting.cutoff_gap) if cutoff > 0.0 else room
-        turn = max(turn, setting.impact_step)
-    stride = min(0.5, max(0.02, 0.05 * abs(moment.normal_speed) / setting.film_speed)) if moment.gap <= cutoff else 1.0
-    return max(setting.impact_step, min(stride * room / max(abs(moment.normal_speed), 1e-300), turn))
-
-
-def _creep_time(moment: _Moment, minimum_gap: float, setting: _Setting) -> float:
-    """A tenth of the time in which a pair pressed below h_min relaxes, where the film overdamps it; else 0."""
-    overlap, mass = minimum_gap - moment.gap, setting.reduced_mass
-    if moment.gap <= 0.0 or overlap <= 0.0 or moment.rate <= 0.0:
-        return 0.0
-    stiffness = 2.5 * contact.hertz_force(setting.stiffness, overlap) / minimum_gap
-    rate = lubrication.film_resistance(setting.film_speed, moment.gap, minimum_gap, setting.cutoff_gap)
-    relaxation = rate * mass / stiffness
-    return 0.1 * min(relaxation, overlap / moment.rate) if rate * rate * mass > 16.0 * stiffness else 0.0
-
-
-def _halted(moment: _Moment, minimum_gap: float, setting: _Setting, full: bool) -> bool:
-    """Whether motion and spring together can no longer change ln h noticeably against the film."""
-    overlap = max(0.0, minimum_gap - moment.gap)
-    share = min(1.0, overlap / minimum_gap)
-    spring_energy = 0.4 * share * contact.hertz_force(setting.stiffness, overlap) * overlap
-    speed = moment.speed if full else abs(moment.normal_speed)
-    return speed + math.sqrt(2.0 * spring_energy / setting.reduced_mass) < COAST * setting.film_speed
-
-
 def _result(
     simulation: Simulation,
-    setting: _Setting,
+    setting: Setting,
     table: np.ndarray,
     history: dict[str, np.ndarray],
     laws: Laws,
@@ -483,7 +300,7 @@ def _result(
     )
 
 
-def _frozen_gap(simulation: Simulation, setting: _Setting) -> float:
+def _frozen_gap(simulation: Simulation, setting: Setting) -> float:
     """The minimum gap of the encounter, from its record or, where it has not ended, from the pair itself."""
     if not simulation.laws.film:
         return 0.0
