@@ -92,7 +92,8 @@ class FluidState:
         total: Array = self._voidage_rate * self.grid.cell_volume
         for d in range(3):
             total = total + np.diff(self.volume_flux(d), axis=2 - d) * self._areas[d]
-        return total * self._open
+        residual: Array = total * self._open
+        return residual
 
     # ------------------------------------------------------------ at points
 
