@@ -102,23 +102,25 @@ def speed_after_film(
     1.0
     """
     total = speed + strength_per_mass * film_potential(accounted_gap, minimum_gap, cutoff_gap)
-    high = total
-    low = total - strength_per_mass * film_potential(cutoff_gap, minimum_gap, cutoff_gap)
-    guess = min(max(speed, low), high)
-    tolerance = 4e-16 * (abs(total) + high - low)
+    lag = total - strength_per_mass * film_potential(gap, minimum_gap, cutoff_gap)
+    guess = lag / (1.0 + step * film_resistance(strength_per_mass, gap, minimum_gap, cutoff_gap))
+    low, high = -math.inf, total
+    tolerance = 1e-13 * (abs(total) + abs(speed) + strength_per_mass)
     for _ in range(100):
         end = gap + step * guess
         excess = guess + strength_per_mass * film_potential(end, minimum_gap, cutoff_gap) - total
+        if abs(excess) <= tolerance:
+            return guess
         if excess > 0.0:
             high = guess
         else:
             low = guess
-        slope = 1.0 + step * film_resistance(strength_per_mass, end, minimum_gap, cutoff_gap)
-        change = excess / slope
-        following = guess - change
+        following = guess - excess / (1.0 + step * film_resistance(strength_per_mass, end, minimum_gap, cutoff_gap))
         if not low < following < high:
+            if low == -math.inf:
+                low = total - strength_per_mass * film_potential(cutoff_gap, minimum_gap, cutoff_gap)
             following = 0.5 * (low + high)
-        if abs(following - guess) <= tolerance:
-            return following
+        if following == guess:
+            return guess
         guess = following
     return guess
