@@ -316,3 +316,32 @@ def test_drag_given_to_the_fluid_is_known_to_round_off(model):
     together.set_velocity((0.1, 0.0, -0.2))
     together.step(1e-3, None, beta, beta[..., None] * np.array([0.1, 0.0, -0.2]))
     assert np.abs(together.drag_exchange()[2]).max() < 1e-12 * beta.max() * 1e-3 * grid.cell_volume
+
+
+def test_a_restored_fluid_goes_on_to_the_same_bits():
+    """Six steps in one go, or three, a checkpoint into a new solver, and three more."""
+    grid = Grid((10, 6, 12), (0.01,) * 3)
+    sides = {
+        "z_low": Inlet(0.3, in_time=lambda t: 1 + t),
+        "z_high": Outlet(),
+        "x_low": Periodic(),
+        "x_high": Periodic(),
+    }
+
+    def fresh():
+        return FluidSolver(
+            grid, sides, density=1.2, viscosity=1.8e-5, smagorinsky=0.1, voidage=moving_voidage(grid, 0.0)
+        )
+
+    def advance(fluid, steps):
+        for _ in range(steps):
+            t = fluid.time + 1e-3
+            fluid.step(1e-3, moving_voidage(grid, t), 100 * moving_voidage(grid, t))
+
+    whole, first, second = fresh(), fresh(), fresh()
+    advance(whole, 6)
+    advance(first, 3)
+    second.restore(first.checkpoint())
+    advance(second, 3)
+    assert whole.time == second.time
+    assert all(np.array_equal(a, b) for a, b in zip(whole.checkpoint().values(), second.checkpoint().values()))

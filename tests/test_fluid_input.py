@@ -57,6 +57,9 @@ REFUSED = {
     "no condition": (lambda: started({"z_low": ["wall"]}), "boundaries.z_low = 'wall': must be a condition"),
     "second condition for the whole side": (
         lambda: started({"z_low": [NoSlip(), Outlet()]}), "later conditions say `where`"),
+    "empty list": (lambda: started({"z_low": []}), "boundaries.z_low: must be a condition or a list"),
+    "checkpoint of another grid": (
+        lambda: started().restore(started(grid=Grid((4, 4, 4), (0.01,) * 3)).checkpoint()), "checkpoint.velocity"),
     "half periodic": (lambda: started({"x_low": Periodic()}), "boundaries.x_low: must be periodic .* opposite side"),
     "two gradients": (lambda: started({"x_low": Periodic(1.0), "x_high": Periodic(2.0)}), "one pressure gradient"),
     "wall that moves out of its plane": (lambda: started({"z_low": NoSlip((0, 0, 1.0))}), "in the plane of the wall"),

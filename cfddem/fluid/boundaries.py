@@ -41,6 +41,7 @@ class Side:
 
     @property
     def inward(self) -> float:
+        """Sign of a normal velocity that points into the box."""
         return -1.0 if self.high else 1.0
 
     def layer(self, array: Any, index: int) -> Any:
@@ -71,6 +72,8 @@ class Boundaries:
                 name = SIDES[2 * axis + high]
                 listed = given.get(name, plain)
                 several = [listed] if isinstance(listed, Condition) else list(listed)
+                if not several:
+                    raise InputError(f"boundaries.{name}", None, "a condition or a list of at least one")
                 if getattr(several[0], "where", None) is not None:
                     several.insert(0, plain)
                 pair.append(Side(name, axis, high, several))
@@ -95,6 +98,7 @@ class Boundaries:
         self.periodic[axis], self.driving[axis] = True, fall.pop()
 
     def _lay_out(self, side: Side) -> None:
+        """Turn the conditions of a side into its arrays."""
         grid, points = self.grid, self._points(side)
         inner = points[0].shape
         side.owner = np.zeros(inner, dtype=np.int64)

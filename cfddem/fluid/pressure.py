@@ -41,6 +41,7 @@ COARSEST = 32
 
 @kernel
 def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
+    """Relax the cells of one colour in a plane; whole rows are worked out, which vectorises, and half is kept."""
     nz, ny, nx = x.shape
     below, above = (k - 1) % nz, (k + 1) % nz
     new = np.empty(nx)
@@ -85,6 +86,7 @@ def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
 
 @kernel
 def _apply_row(k, j, x, ax, ay, az, diagonal, out):
+    """out = L x along one row."""
     nz, ny, nx = x.shape
     below, above, front, back = (k - 1) % nz, (k + 1) % nz, (j - 1) % ny, (j + 1) % ny
     here, west, diag = x[k, j], ax[k, j], diagonal[k, j]

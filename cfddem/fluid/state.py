@@ -6,7 +6,7 @@ advance them. Everything it returns is a plain array, in the index order of `cfd
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,16 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, sample
 from cfddem.fluid.momentum import drag_seen, transport
 from cfddem.fluid.viscosity import eddy_viscosity, rim
+
+_REMEMBERED = {
+    "time": "time",
+    "velocity": "_velocity",
+    "pressure": "_pressure",
+    "voidage": "voidage",
+    "mean_voidage": "_mean_voidage",
+    "voidage_rate": "_voidage_rate",
+}
+"""What a checkpoint holds, and where the fluid keeps it."""
 
 
 class FluidState:
@@ -94,6 +104,22 @@ class FluidState:
             total = total + np.diff(self.volume_flux(d), axis=2 - d) * self._areas[d]
         residual: Array = total * self._open
         return residual
+
+    # ------------------------------------------------------------ checkpoint
+
+    def checkpoint(self) -> dict[str, Array]:
+        """Copies of everything the next step depends on, ghosts included: arrays to store as they are."""
+        return {name: np.array(getattr(self, attribute)) for name, attribute in _REMEMBERED.items()}
+
+    def restore(self, stored: Mapping[str, Array]) -> None:
+        """Go on from a `checkpoint()` of a fluid with the same grid and boundaries, to the same bits."""
+        for name, attribute in _REMEMBERED.items():
+            own = np.asarray(getattr(self, attribute))
+            if np.shape(stored[name]) != own.shape:
+                raise InputError(f"checkpoint.{name}", np.shape(stored[name]), f"of shape {own.shape}, as on this grid")
+            if own.ndim:
+                own[:] = stored[name]
+        self.time = float(stored["time"])
 
     # ------------------------------------------------------------ at points
 
