@@ -12,10 +12,10 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
-import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from numba import get_num_threads, njit, prange, set_num_threads
 from numba.core import event
 
+import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.errors import InputError
 
 __all__ = [
@@ -33,6 +33,16 @@ CHUNKS = 64
 """Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
 
 
+_INLINE: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "forceinline": True,
+    "_nrt": False,
+}
+"""Helpers are never called from outside, always inlined, and count no references: they own no arrays."""
+
+
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a serial loop; kept on disk."""
     return njit(cache=True, error_model="numpy")(function)
@@ -45,9 +55,7 @@ def threaded(function: Callable[..., Any]) -> Any:
 
 def inline(function: Callable[..., Any]) -> Any:
     """Compile a small helper into the loops that call it."""
-    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True, _nrt=False)(
-        function
-    )
+    return njit(**_INLINE)(function)
 
 
 def use_threads(count: int | None) -> int:
@@ -61,9 +69,9 @@ def use_threads(count: int | None) -> int:
 
 
 def _most_threads() -> int:
-    from numba import config
+    import numba
 
-    return int(config.NUMBA_NUM_THREADS)
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
 class _Announcer(event.Listener):

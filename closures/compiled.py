@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from closures.law import SHELF
 
@@ -63,7 +64,7 @@ def _point_compiler_at(folder: Path) -> None:
         sys.modules["numba"].config.CACHE_DIR = str(folder)
 
 
-_OPTIONS = {
+_OPTIONS: Any = {
     "error_model": "numpy",
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,

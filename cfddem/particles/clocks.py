@@ -93,7 +93,7 @@ def _lightest_pairs(bodies: Bodies, table: np.ndarray) -> list[tuple[float, floa
 
 @kernel
 def _largest_rate(bodies, edges, gap, table, laws):
-    """Bound of the squared angular frequency of the contact network: twice the stiffness on a particle over its mass."""
+    """Bound of the contacts' squared angular frequency: twice the stiffness on a particle over its mass."""
     stiffness = np.zeros(len(bodies.radius))
     for k in range(len(gap)):
         overlap = (edges.minimum_gap[k] if laws.film else 0.0) - gap[k]

@@ -28,7 +28,7 @@ class Bodies(NamedTuple):
     resistance: np.ndarray  # (N,) sum of the resistances of the particle's films [kg/s]
 
     @property
-    def count(self) -> int:
+    def count(self) -> int:  # type: ignore[override]
         """Number of particles."""
         return len(self.radius)
 
