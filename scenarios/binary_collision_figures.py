@@ -123,9 +123,7 @@ def roughness(curves: Curves) -> Any:
     axes.axvline(796, color=GREY, lw=1.0, ls="--")
     axes.text(870, 0.02, "spheres of\nYang & Hunt", color=GREY, fontsize=9.5)
     axes.set(xscale="log", xlim=(1, 3e4), ylim=(0, 1.0))
-    label(
-        axes, r"roughness  $\sigma$", "nm", "restitution  $e$", "-", "Delrin of varied roughness meets at 0.1 m/s"
-    )
+    label(axes, r"roughness  $\sigma$", "nm", "restitution  $e$", "-", "Delrin of varied roughness meets at 0.1 m/s")
     legend(axes, loc="lower left", bbox_to_anchor=(0.0, 0.1))
     return figure
 
