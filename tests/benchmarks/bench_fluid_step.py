@@ -1,6 +1,7 @@
 """Time of one full fluid step, beside the memory speed of the machine measured in the same run.
 
     python tests/benchmarks/bench_fluid_step.py [--threads N] [--profile]
+    python -m pytest tests/benchmarks/bench_fluid_step.py
 
 The work: a bed of voidage about 0.45 that moves a little each step fills the lower half of a box, gas enters below at
 0.3 m/s and leaves above, drag 2 000 kg/m3/s, model A, pressure tolerance 1e-9 of the largest face flux in every
@@ -20,6 +21,7 @@ import pstats
 import time
 
 import numpy as np
+import pytest
 
 from cfddem.fluid.conditions import Inlet, Outlet
 from cfddem.fluid.grid import Grid
@@ -80,6 +82,17 @@ def measure(cells: tuple[int, int, int], speed: float, profile: bool, steps: int
     )
     if profile:
         pstats.Stats(profiler).sort_stats("tottime").print_stats(12)
+
+
+@pytest.mark.parametrize("cells", LIMITS, ids=str)
+def bench_fluid_step(benchmark, cells):
+    """The same step under pytest-benchmark, on the threads that are set."""
+    fluid, voidage, drag, momentum = bed(cells)
+    step, fields = 5e-4, iter(range(1, 1000))
+    benchmark.extra_info["triad [GB/s]"] = round(triad() / 1e9, 1)
+    benchmark.pedantic(
+        lambda: fluid.step(step, voidage(step * next(fields)), drag, momentum), rounds=10, warmup_rounds=4
+    )
 
 
 def main() -> None:
