@@ -72,6 +72,31 @@ def film_potential(gap: float, minimum_gap: float, cutoff_gap: float) -> float:
     return math.log(min(gap, cutoff_gap) / minimum_gap) + 0.5
 
 
+@law("lubrication", "difference of the film's potential; its series where the gap changes by less than a thousandth")
+def film_potential_change(gap: float, change: float, minimum_gap: float, cutoff_gap: float) -> float:
+    r"""Change of the film's potential, L(h + x) - L(h), without the logarithm where the change is small.
+
+    .. math:: \ln(1 + q) = q - \tfrac12 q^2 + \tfrac13 q^3 - \dots,\qquad q = x/h
+
+    gap          h [m]
+    change       x, of the gap [m]
+    minimum_gap  h_min, > 0 [m]
+    cutoff_gap   h_co, > h_min [m]
+    returns      L(h + x) - L(h) [-]; to 3e-13 where the series is used
+
+    >>> exact = film_potential(1.0005, 0.1, 2.0) - film_potential(1.0, 0.1, 2.0)
+    >>> abs(film_potential_change(1.0, 0.0005, 0.1, 2.0) - exact) < 1e-13
+    True
+    """
+    end = gap + change
+    if abs(change) < 1e-3 * gap and gap > minimum_gap and end > minimum_gap and gap < cutoff_gap and end < cutoff_gap:
+        part = change / gap
+        return part * (1.0 - part * (0.5 - part * (1.0 / 3.0)))
+    if 0.0 <= gap <= minimum_gap and 0.0 <= end <= minimum_gap:
+        return 0.5 * change * (gap + end) / minimum_gap**2
+    return film_potential(end, minimum_gap, cutoff_gap) - film_potential(gap, minimum_gap, cutoff_gap)
+
+
 @law("lubrication", "implicit in the end gap; monotone, so one root and no limit on the step")
 def speed_after_film(
     speed: float,
@@ -101,25 +126,25 @@ def speed_after_film(
     >>> round(stop / math.exp(-2.0), 6)
     1.0
     """
-    total = speed + strength_per_mass * film_potential(accounted_gap, minimum_gap, cutoff_gap)
-    lag = total - strength_per_mass * film_potential(gap, minimum_gap, cutoff_gap)
-    guess = lag / (1.0 + step * film_resistance(strength_per_mass, gap, minimum_gap, cutoff_gap))
-    low, high = -math.inf, total
-    tolerance = 1e-13 * (abs(total) + abs(speed) + strength_per_mass)
+    total = speed + strength_per_mass * film_potential_change(gap, accounted_gap - gap, minimum_gap, cutoff_gap)
+    guess = total / (1.0 + step * film_resistance(strength_per_mass, gap, minimum_gap, cutoff_gap))
+    low, high = -math.inf, math.inf
     for _ in range(100):
-        end = gap + step * guess
-        excess = guess + strength_per_mass * film_potential(end, minimum_gap, cutoff_gap) - total
-        if abs(excess) <= tolerance:
+        potential = film_potential_change(gap, step * guess, minimum_gap, cutoff_gap)
+        excess = guess + strength_per_mass * potential - total
+        if abs(excess) <= 1e-14 * (abs(total) + abs(guess) + strength_per_mass * abs(potential)):
             return guess
         if excess > 0.0:
             high = guess
         else:
             low = guess
+        end = gap + step * guess
         following = guess - excess / (1.0 + step * film_resistance(strength_per_mass, end, minimum_gap, cutoff_gap))
         if not low < following < high:
-            if low == -math.inf:
-                low = total - strength_per_mass * film_potential(cutoff_gap, minimum_gap, cutoff_gap)
-            following = 0.5 * (low + high)
+            # the potential lies between 0 and its value at the cut-off gap, which brackets the root
+            reach = strength_per_mass * film_potential_change(gap, cutoff_gap - gap, minimum_gap, cutoff_gap)
+            depth = strength_per_mass * film_potential_change(gap, -gap, minimum_gap, cutoff_gap)
+            following = 0.5 * (max(low, total - reach) + min(high, total - depth))
         if following == guess:
             return guess
         guess = following
