@@ -57,7 +57,7 @@ def pour(
     run = Simulation(
         spheres,
         pair_table([material]),
-        planes=sides[:1] if periodic else sides,
+        walls=sides[:1] if periodic else sides,
         gravity=(0.0, 0.0, -gravity),
         box=(width, depth, None) if periodic else (None, None, None),
     )

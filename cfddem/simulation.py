@@ -10,12 +10,13 @@ from cfddem.particles.clocks import Clocks, clocks
 from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.forces import Laws
 from cfddem.particles.guard import guard
+from cfddem.particles.meshes import meet_walls
 from cfddem.particles.motion import march, march_threaded
 from cfddem.particles.neighbours import list_edges, locality_order, wrap
-from cfddem.particles.pairs import Edges, gaps, remember, shifts
+from cfddem.particles.pairs import Edges, gaps, remember, shifts, wall_forces
 from cfddem.particles.state import Bodies
 from cfddem.particles.vectors import flat
-from cfddem.particles.walls import Plane, walls
+from cfddem.particles.walls import Wall, assemble, check_walls
 from cfddem.record.collisions import CollisionRecord
 
 THREADING_PAYS = 1000
@@ -32,7 +33,7 @@ class Simulation:
 
     bodies   the particles, :func:`cfddem.particles.state.bodies`
     table    pair table, :func:`cfddem.materials.pair_table`
-    planes   walls
+    walls    :class:`cfddem.particles.walls.Plane`, `Box`, `Cylinder`, `Cone`, `Mesh`
     laws     which laws hold between two bodies
     gravity  [m/s2]
     free     1 along axes in which positions may change, 0 where they are held
@@ -48,7 +49,7 @@ class Simulation:
         bodies: Bodies,
         table: np.ndarray,
         *,
-        planes: Sequence[Plane] = (),
+        walls: Sequence[Wall] = (),
         laws: Laws | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
         free: tuple[float, float, float] = (1.0, 1.0, 1.0),
@@ -60,7 +61,7 @@ class Simulation:
     ) -> None:
         self.bodies = bodies
         self.table = table
-        self.walls = walls(planes)
+        self.walls = assemble(walls)
         self.laws = laws or Laws()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
@@ -69,6 +70,7 @@ class Simulation:
         self.sort_every = sort_every
         self._lists, self._listed_at = -1, 0
         self.box = np.array([np.inf if length is None else length for length in box])
+        check_walls(walls, self.box, len(table))
         self.time, self.steps = 0.0, 0
         self.collisions = CollisionRecord() if record else None
         wrap(self.bodies.position, self.box)
@@ -88,6 +90,11 @@ class Simulation:
     def refresh(self) -> None:
         """Find the forces at the present places, as after a change of state from outside."""
         self._march(0.0, 0)
+
+    @property
+    def wall_force(self) -> np.ndarray:
+        """Force of all particles on each wall by contact (walls, 3) [N]; the lubricated drift's films apart."""
+        return wall_forces(self.edges, self.walls)
 
     def clocks(self, reference_speed: float = 0.0) -> Clocks:
         """Largest steps that the particles' physics allows now.
@@ -139,6 +146,8 @@ class Simulation:
         self.edges = edges
         self._origin = self.bodies.position.copy()
         self._views = (flat(self.bodies), flat(edges), flat(self.walls), shifts(self.box).reshape(-1))
+        self.walls.travel[:] = 0.0
+        meet_walls(*self._views[:3], self.free, self._reach_ratio)
 
     def _listed(self) -> Edges:
         return list_edges(self.bodies, self.walls, self._reach_ratio, self.skin, self.box, self.collisions is not None)

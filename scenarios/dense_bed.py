@@ -60,7 +60,7 @@ def bed(count: int = 10_000, film: bool = False) -> Simulation:
     return Simulation(
         grains,
         pair_table([GRAIN]),
-        planes=[Plane()],
+        walls=[Plane()],
         laws=Laws(film=film),
         gravity=(0.0, 0.0, -9.81),
         box=(width, depth, None),

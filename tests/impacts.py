@@ -106,7 +106,7 @@ class Pair:
                 viscosity=self.viscosity,
             )
             planes = []
-        return Simulation(made, self.rows, planes=planes, laws=laws, **{"skin": max(self.radii), **options})
+        return Simulation(made, self.rows, walls=planes, laws=laws, **{"skin": max(self.radii), **options})
 
 
 def relative_velocity(run: Simulation) -> np.ndarray:

@@ -41,7 +41,7 @@ def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Simulati
     return Simulation(
         grains,
         pair_table([GLASS]),
-        planes=[Plane()],
+        walls=[Plane()],
         laws=Laws(film=film),
         gravity=(0.0, 0.0, -9.81),
         box=(12 * 2.2 * RADIUS, 12 * 2.2 * RADIUS, None),

@@ -218,7 +218,7 @@ def press(count: int, material: Material, force: float, gaps: list[float], wall:
     if not wall:
         made.applied[0, 0] = force
     planes = [Plane(normal=(1.0, 0.0, 0.0))] if wall else []
-    return Simulation(made, pair_table([material]), planes=planes, laws=Laws(film=True))
+    return Simulation(made, pair_table([material]), walls=planes, laws=Laws(film=True))
 
 
 def weighted_contact_energy(gap: float, minimum_gap: float, stiffness: float) -> float:

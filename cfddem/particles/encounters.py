@@ -7,6 +7,7 @@ import numpy as np
 from cfddem.kernels import inline
 from cfddem.particles.forces import pair_mass_and_radius, pair_row, pair_viscosity, relative_velocity
 from cfddem.particles.pairs import geometry
+from cfddem.particles.surfaces import portion
 from cfddem.particles.vectors import across, at, dot, times
 from closures.friction import dry_or_lubricated
 from closures.numbers import stokes
@@ -36,15 +37,15 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
 
     Of the begin an edge keeps five numbers: time, normal speed, tangential velocity.
     """
-    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
+    separation, distance, gap = geometry(k, bodies, edges, shift)
     reduced_radius, inverse_mass = pair_mass_and_radius(k, bodies, edges)
     reach = laws.cutoff_ratio * reduced_radius if laws.film else 0.0
     entry = 5 * k
     known = not np.isnan(edges.entry[entry])
-    if known == (gap <= reach):
+    if known == (gap <= reach) or portion(edges, k) == 0.0:
         return count
     normal = times(1.0 / distance, separation)
-    velocity = relative_velocity(k, bodies, edges, walls)
+    velocity = relative_velocity(k, bodies, edges)
     normal_speed, tangential = dot(velocity, normal), across(velocity, normal)
     if not known:
         edges.entry[entry], edges.entry[entry + 1] = time, normal_speed
@@ -53,7 +54,7 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
 
     row, materials = rows[count], pair_row(k, bodies, edges, walls, table)
     i, j = edges.first[k], edges.second[k]
-    row.first, row.second = bodies.id[i], bodies.id[j] if k < edges.between_particles else -1 - j
+    row.first, row.second = bodies.id[i], bodies.id[j] if k < edges.between_particles else -1 - walls.wall[j]
     row.begin, row.end = edges.entry[entry], time
     for axis in range(3):
         row.place[axis] = at(bodies.position, i)[axis]

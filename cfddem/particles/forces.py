@@ -7,12 +7,13 @@ that calls it runs on several pairs at once. The film remembers its encounter an
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cfddem.kernels import inline
 from cfddem.particles.pairs import geometry
+from cfddem.particles.surfaces import SURFACE, portion, touched
 from cfddem.particles.vectors import across, at, cross, dot, either, minus, plus, put, times
 from closures.blend import contact_share
 from closures.contact import (
@@ -57,7 +58,8 @@ class Laws(NamedTuple):
     def without_the_absent(self) -> Laws:
         """The same laws with each choice that is not made as None, which a loop compiled for it leaves out."""
         choices = ("film", "integrator", "friction_onset", "contact", "spring")
-        return self._replace(**{name: None for name in choices if not getattr(self, name)})
+        absent: dict[str, Any] = {name: None for name in choices if not getattr(self, name)}
+        return self._replace(**absent)
 
 
 class Meeting(NamedTuple):
@@ -71,11 +73,11 @@ class Meeting(NamedTuple):
     reduced_radius: float  # R* [m]
     inverse_sum: float  # 1 / (R_i + R_j); 1 / R_i at a wall [1/m]
     inverse_mass: float  # 1 / m* [1/kg]
-    turning: float  # 1 where motion turns the normal, 0 at a flat wall
+    turn: tuple[float, float, float]  # rate at which motion turns the normal [1/s]
 
 
 @inline
-def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
+def contact(meeting, rows, which, minimum_gap, spring, laws, step):
     """Force on the first body, couple per radius on both, and the tangential spring afterwards.
 
     Hertz and dashpot, Mindlin and Coulomb, times the share that the solids have in the load. The spring moves
@@ -86,8 +88,7 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
     touching = meeting.gap < minimum_gap
     overlap = max(minimum_gap - meeting.gap, _LEAST)
     share = contact_share(meeting.gap, minimum_gap) if laws.film else 1.0
-    inverse_distance = 1.0 / meeting.distance
-    normal = times(inverse_distance, meeting.separation)
+    normal = times(1.0 / meeting.distance, meeting.separation)
     normal_speed = dot(meeting.velocity, normal)
 
     reduced_mass = 1.0 / meeting.inverse_mass
@@ -114,8 +115,7 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, free, step):
 
     # levers add up to the distance of the centres
     stretch = meeting.distance * meeting.inverse_sum
-    moved = (free[0] * meeting.velocity[0], free[1] * meeting.velocity[1], free[2] * meeting.velocity[2])
-    halfway = minus(normal, times(0.5 * step * inverse_distance * meeting.turning, moved))
+    halfway = minus(normal, times(0.5 * step, meeting.turn))
     halfway = times(1.5 - 0.5 * dot(halfway, halfway), halfway)  # unit length, to second order of the turn
     slip = minus(across(meeting.velocity, halfway), times(stretch, cross(meeting.surface_spin, halfway)))
     before = max(overlap + step * normal_speed, 0.0)
@@ -163,10 +163,10 @@ def pair_mass_and_radius(k, bodies, edges):
 
 
 @inline
-def relative_velocity(k, bodies, edges, walls):
-    """Velocity of the first body's centre against the second's."""
+def relative_velocity(k, bodies, edges):
+    """Velocity of the first body's centre against the second's, or against the surface of a wall."""
     i, j = edges.first[k], edges.second[k]
-    other = at(bodies.velocity, j) if k < edges.between_particles else at(walls.velocity, j)
+    other = at(bodies.velocity, j) if k < edges.between_particles else touched(edges, k, SURFACE)
     return minus(at(bodies.velocity, i), other)
 
 
@@ -198,35 +198,37 @@ def encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row):
 
 @inline
 def wet(k, bodies, edges, walls, shift, table, laws):
-    """Find the resistance of the film of edge k; out of its reach the encounter is forgotten."""
-    _, _, gap = geometry(k, bodies, edges, walls, shift)
+    """Find the resistance of the film of edge k; an encounter begins anew where the pair comes within its reach."""
+    _, _, gap = geometry(k, bodies, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
     row = pair_row(k, bodies, edges, walls, table)
     if gap > laws.cutoff_ratio * reduced_radius:
+        if edges.accounted_gap[k] == np.inf:
+            edges.minimum_gap[k] = row.roughness_gap
         edges.resistance[k] = 0.0
-        edges.approach_speed[k] = 0.0
-        edges.minimum_gap[k] = row.roughness_gap
         edges.accounted_gap[k] = gap
         return
-    if edges.accounted_gap[k] == np.inf:
-        edges.accounted_gap[k] = gap
+    if edges.resistance[k] == 0.0:
+        edges.approach_speed[k] = 0.0
         edges.minimum_gap[k] = row.roughness_gap
+        if edges.accounted_gap[k] == np.inf:
+            edges.accounted_gap[k] = gap
     strength = film_strength(pair_viscosity(k, bodies, edges), reduced_radius)
-    edges.resistance[k] = strength / max(gap, edges.minimum_gap[k])
+    edges.resistance[k] = portion(edges, k) * strength / max(gap, edges.minimum_gap[k])
 
 
 @inline
 def film_force(k, bodies, edges, walls, shift, table, laws):
     """The film of edge k as an explicit force, for plain velocity Verlet."""
-    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
+    separation, distance, gap = geometry(k, bodies, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
     normal = times(1.0 / distance, separation)
-    normal_speed = dot(relative_velocity(k, bodies, edges, walls), normal)
+    normal_speed = dot(relative_velocity(k, bodies, edges), normal)
     viscosity = pair_viscosity(k, bodies, edges)
     encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, pair_row(k, bodies, edges, walls, table))
     strength = film_strength(viscosity, reduced_radius)
     resistance = film_resistance(strength, gap, edges.minimum_gap[k], laws.cutoff_ratio * reduced_radius)
-    return times(-resistance * normal_speed, normal)
+    return times(-portion(edges, k) * resistance * normal_speed, normal)
 
 
 @inline
@@ -239,9 +241,9 @@ def squeeze(k, bodies, edges, walls, shift, table, laws, step):
     if edges.resistance[k] == 0.0:
         return
     i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
+    separation, distance, gap = geometry(k, bodies, edges, shift)
     normal = times(1.0 / distance, separation)
-    normal_speed = dot(relative_velocity(k, bodies, edges, walls), normal)
+    normal_speed = dot(relative_velocity(k, bodies, edges), normal)
     reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
     viscosity = pair_viscosity(k, bodies, edges)
     row = pair_row(k, bodies, edges, walls, table)
@@ -255,7 +257,7 @@ def squeeze(k, bodies, edges, walls, shift, table, laws, step):
         gap,
         edges.accounted_gap[k],
         step,
-        film_strength(viscosity, reduced_radius) * inverse_mass,
+        portion(edges, k) * film_strength(viscosity, reduced_radius) * inverse_mass,
         edges.minimum_gap[k],
         laws.cutoff_ratio * reduced_radius,
     )

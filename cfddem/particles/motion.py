@@ -13,46 +13,50 @@ import numpy as np
 
 from cfddem.kernels import CHUNKS, inline, prange, serial_and_threaded
 from cfddem.particles.encounters import observe
-from cfddem.particles.forces import VERLET, Meeting, contact, film_force, squeeze, wet
+from cfddem.particles.forces import NOTHING, VERLET, Meeting, contact, film_force, relative_velocity, squeeze, wet
+from cfddem.particles.meshes import hand_over, meet_walls
 from cfddem.particles.pairs import between, geometry
+from cfddem.particles.surfaces import TURN, advance_walls, portion, touched
 from cfddem.particles.vectors import at, dot, minus, plus, put, times
 
 
 @inline
-def sphere_meeting(i, j, image, position, velocity, spin, radius, inverse_mass, shift):
+def sphere_meeting(i, j, image, position, velocity, spin, radius, inverse_mass, shift, free):
     """Two spheres as they stand to each other."""
     separation = between(i, j, image, position, shift)
     distance = math.sqrt(dot(separation, separation))
     inverse_sum = 1.0 / (radius[i] + radius[j])
+    relative = minus(at(velocity, i), at(velocity, j))
+    rate = 1.0 / distance
     return Meeting(
         separation,
         distance,
         distance - radius[i] - radius[j],
-        minus(at(velocity, i), at(velocity, j)),
+        relative,
         plus(times(radius[i], at(spin, i)), times(radius[j], at(spin, j))),
         radius[i] * radius[j] * inverse_sum,
         inverse_sum,
         inverse_mass[i] + inverse_mass[j],
-        1.0,
+        (rate * free[0] * relative[0], rate * free[1] * relative[1], rate * free[2] * relative[2]),
     )
 
 
 @inline
-def wall_meeting(k, bodies, edges, walls, shift):
+def wall_meeting(k, bodies, edges, shift):
     """A sphere and a wall as they stand to each other."""
-    i, w = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, bodies, edges, walls, shift)
+    i = edges.first[k]
+    separation, distance, gap = geometry(k, bodies, edges, shift)
     radius = bodies.radius[i]
     return Meeting(
         separation,
         distance,
         gap,
-        minus(at(bodies.velocity, i), at(walls.velocity, w)),
+        relative_velocity(k, bodies, edges),
         times(radius, at(bodies.spin, i)),
         radius,
         1.0 / radius,
         bodies.inverse_mass[i],
-        0.0,
+        touched(edges, k, TURN),
     )
 
 
@@ -136,9 +140,9 @@ def _meet_pair(
     """Contact of one pair of particles."""
     k = np.uint64(edge)
     i, j = first[k], second[k]
-    meeting = sphere_meeting(i, j, image[k], position, velocity, spin, radius, inverse_mass, shift)
+    meeting = sphere_meeting(i, j, image[k], position, velocity, spin, radius, inverse_mass, shift, free)
     which = np.uint64(material[i]) * kinds + np.uint64(material[j])
-    push, turn, memory = contact(meeting, rows, which, minimum_gap[k], at(spring, k), laws, free, step)
+    push, turn, memory = contact(meeting, rows, which, minimum_gap[k], at(spring, k), laws, step)
     put(force, k, push)
     put(couple, k, turn)
     put(spring, k, memory)
@@ -211,6 +215,7 @@ def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps,
     largest = 0.0
     count, pairs, number = len(bodies.radius), edges.between_particles, len(edges.first)
     kinds, rows = np.uint64(len(table)), table.reshape(-1)
+    meshes = pairs < number and len(walls.cell_member) > 0
     films = True if laws.film else False  # noqa: SIM210  a film that is None has no truth of type bool
     drifting = films and laws.integrator != VERLET
     moving = steps > 0
@@ -232,7 +237,12 @@ def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps,
                     if not moved <= far:
                         far = moved
                 farthest[chunk] = far
+            way = advance_walls(walls, step)
+            largest = max(largest, way * way)
             done += 1
+            if meshes:
+                hand_over(edges, walls)
+        meet_walls(bodies, edges, walls, free, laws.cutoff_ratio if films else 0.0)
         if films:
             for k in prange(number):
                 wet(k, bodies, edges, walls, shift, table, laws)
@@ -260,13 +270,16 @@ def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps,
         )
         for edge in range(pairs, number):
             k = np.uint64(edge)
-            meeting = wall_meeting(k, bodies, edges, walls, shift)
+            part = portion(edges, k)
+            if part == 0.0:
+                put(edges.force, k, NOTHING)
+                put(edges.couple, k, NOTHING)
+                continue
+            meeting = wall_meeting(k, bodies, edges, shift)
             which = np.uint64(bodies.material[edges.first[k]]) * kinds + np.uint64(walls.material[edges.second[k]])
-            push, turn, memory = contact(
-                meeting, rows, which, edges.minimum_gap[k], at(edges.spring, k), laws, free, half
-            )
-            put(edges.force, k, push)
-            put(edges.couple, k, turn)
+            push, turn, memory = contact(meeting, rows, which, edges.minimum_gap[k], at(edges.spring, k), laws, half)
+            put(edges.force, k, times(part, push))
+            put(edges.couple, k, times(part, turn))
             put(edges.spring, k, memory)
         if films and not drifting:
             for k in prange(number):

@@ -13,10 +13,11 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.kernels import inline, kernel, prange, threaded
+from cfddem.particles.meshes import near_walls
 from cfddem.particles.pairs import HOME, Edges, edges
 from cfddem.particles.state import Bodies
+from cfddem.particles.surfaces import Walls
 from cfddem.particles.vectors import at, flat
-from cfddem.particles.walls import Walls, height
 
 CLASS_RATIO = 2.0
 """Radii within this factor share a size class."""
@@ -58,7 +59,7 @@ def list_edges(
     first = np.empty(end[-1], np.uint32)
     second, image = np.empty_like(first), np.empty(end[-1], np.uint8)
     _search(flat(bodies), cells, cutoff_ratio, skin, box, end, first, second, image, True)
-    particle, wall = _walls(flat(bodies), flat(walls), cutoff_ratio, skin)
+    particle, wall = near_walls(bodies, walls, cutoff_ratio, skin)
     return edges(
         np.concatenate([first, particle]),
         np.concatenate([second, wall]),
@@ -178,20 +179,6 @@ def _insert(first, second, image, base, found, i, j, code):
         place -= 1
     second[place], image[place] = j, code
     first[base + found] = i
-
-
-@kernel
-def _walls(bodies, walls, cutoff_ratio, skin):
-    """All particles within reach of a wall."""
-    first, second = [], []
-    for i in range(len(bodies.radius)):
-        if bodies.inverse_mass[i] == 0.0:
-            continue
-        for w in range(len(walls.material)):
-            if height(walls, w, at(bodies.position, i)) < (1.0 + cutoff_ratio) * bodies.radius[i] + skin:
-                first.append(i)
-                second.append(w)
-    return np.array(first, dtype=np.uint32), np.array(second, dtype=np.uint32)
 
 
 def wrap(position: np.ndarray, box: np.ndarray) -> None:

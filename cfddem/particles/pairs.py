@@ -13,15 +13,15 @@ import numpy as np
 
 from cfddem.kernels import inline, kernel
 from cfddem.particles.state import Bodies
+from cfddem.particles.surfaces import NORMAL, TOUCH, Walls, in_frame, nearest, touched, touched_distance
 from cfddem.particles.vectors import at, dot, flat, minus, plus, times
-from cfddem.particles.walls import Walls, height
 
 
 class Edges(NamedTuple):
     """The arrays of n edges, as compiled loops take them."""
 
     first: np.ndarray  # (n,) uint32, particle; unsigned, so that compiled loops need not look for negative rows
-    second: np.ndarray  # (n,) uint32, particle; wall in the edges after `between_particles`
+    second: np.ndarray  # (n,) uint32, particle; piece of a wall in the edges after `between_particles`
     image: np.ndarray  # (n,) uint8, across which borders of a periodic box the pair reaches
     between_particles: int
     spring: np.ndarray  # (n, 3) tangential displacement of the contact [m]
@@ -33,6 +33,7 @@ class Edges(NamedTuple):
     resistance: np.ndarray  # (n,) of the film, without lever; 0 out of its reach [kg/s]
     impulse: np.ndarray  # (n, 3) of the film in this step, on the first body [N s]
     entry: np.ndarray  # (n, 5) begin of the encounter, NaN outside one; (0, 5) where none are recorded
+    touch: np.ndarray  # (particle-wall edges, 12) how sphere and wall stand: columns in `surfaces`
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
     incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
 
@@ -82,6 +83,7 @@ def edges(
         np.zeros(films),
         np.empty((films, 3)),
         np.full((number if record else 0, 5), np.nan),
+        np.zeros((number - int(between_particles), TOUCH)),
         start,
         incident,
     )
@@ -156,7 +158,12 @@ def gaps(edges: Edges, bodies: Bodies, walls: Walls, box: np.ndarray) -> np.ndar
 @kernel
 def _gaps(edges, bodies, walls, shift, result):
     for k in range(len(result)):
-        result[k] = geometry(k, bodies, edges, walls, shift)[2]
+        if k < edges.between_particles:
+            result[k] = geometry(k, bodies, edges, shift)[2]
+        else:
+            i, w = edges.first[k], np.int64(edges.second[k])
+            place = in_frame(walls, walls.wall[w], at(bodies.position, i))
+            result[k] = nearest(walls.kind, walls.shape, w, place)[1] - bodies.radius[i]
 
 
 @inline
@@ -166,12 +173,19 @@ def between(i, j, image, position, shift):
 
 
 @inline
-def geometry(k, bodies, edges, walls, shift):
+def geometry(k, bodies, edges, shift):
     """Separation from the second body to the first, its length, and the gap."""
     i, j = edges.first[k], edges.second[k]
     if k < edges.between_particles:
         separation = between(i, j, edges.image[k], bodies.position, shift)
         distance = math.sqrt(dot(separation, separation))
         return separation, distance, distance - bodies.radius[i] - bodies.radius[j]
-    distance = height(walls, j, at(bodies.position, i))
-    return times(distance, at(walls.normal, j)), distance, distance - bodies.radius[i]
+    distance = touched_distance(edges, k)
+    return times(distance, touched(edges, k, NORMAL)), distance, distance - bodies.radius[i]
+
+
+def wall_forces(edges: Edges, walls: Walls) -> np.ndarray:
+    """Force of the particles on each wall, less the impulses of lubricated drifts (M, 3) [N]."""
+    result = np.zeros((len(walls.sweep), 3))
+    np.subtract.at(result, walls.wall[edges.second[edges.between_particles :]], edges.force[edges.between_particles :])
+    return result

@@ -1,59 +1,381 @@
-"""Walls: surfaces that particles meet; a wall is a material like any other."""
+"""Walls: surfaces that particles meet; a wall is a material like any other.
+
+Each shape says of which simple pieces it is made and how fast its surface may leave its place; the loops see
+the arrays of :class:`cfddem.particles.surfaces.Walls` only. Contact, friction and film take every wall as flat
+(R* = R, m* = m): the error is of the order of R over the wall's radius of curvature.
+"""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cfddem.errors import InputError
-from cfddem.kernels import inline
-from cfddem.particles.vectors import at, dot, minus
+from cfddem.particles.meshes import bin_triangles
+from cfddem.particles.surfaces import NUMBERS, PEG, PLANE, REVOLVED, TRIANGLE, Walls
+from cfddem.particles.vectors import Vector, flat
+
+ROUNDING = 1e-9
+"""Directions and places that differ by less than this, relatively, are one."""
 
 
-@dataclass(frozen=True)
-class Plane:
-    """A flat wall.
+@dataclass(frozen=True, kw_only=True)
+class Wall:
+    """What all walls have.
 
-    point     any point of it [m]
-    normal    points to the side of the particles; need not be of unit length
-    velocity  of the wall's surface [m/s]
+    velocity  of the wall as a whole [m/s]
+    spin      of the wall about its centre [rad/s]
+    centre    of the spin, moves with the velocity; a point on the axis or in the middle if not given [m]
     material  row of the pair table
     """
 
-    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity: Vector = (0.0, 0.0, 0.0)
+    spin: Vector = (0.0, 0.0, 0.0)
+    centre: Vector | None = None
     material: int = 0
 
     def __post_init__(self) -> None:
-        if not np.linalg.norm(self.normal) > 0:
-            raise InputError("normal", self.normal, "a direction")
+        for field in ("velocity", "spin", "centre", "point", "low", "high", "axis", "normal"):
+            value = getattr(self, field, None)
+            if value is not None and (np.shape(value) != (3,) or not np.isfinite(value).all()):
+                raise InputError(field, value, "three finite numbers")
+        for field in ("axis", "normal"):
+            if not np.linalg.norm(getattr(self, field, 1.0)) > 0.0:
+                raise InputError(field, getattr(self, field), "a direction")
+        if self.material < 0:
+            raise InputError("material", self.material, "a row of the pair table, 0 or above")
+        self.sweep()
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        """Kind and numbers of each piece, as :func:`cfddem.particles.surfaces.nearest` takes them."""
+        raise NotImplementedError
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        """Points (n, 3) and a radius about them that enclose the wall [m]."""
+        raise NotImplementedError
+
+    def middle(self) -> np.ndarray:
+        """Centre of the spin [m]."""
+        return np.array(self.frame()[0].mean(axis=0) if self.centre is None else self.centre, float)
+
+    def sweep(self) -> float:
+        """Bound of the speed at which the surface leaves the place where it is [m/s]."""
+        points, around = self.frame()
+        turning = np.linalg.norm(np.cross(self.spin, points - self.middle()), axis=1).max()
+        return float(np.linalg.norm(self.velocity) + turning + np.linalg.norm(self.spin) * around)
+
+    def repeats(self, periodic: np.ndarray) -> bool:
+        """Whether the wall is the same in every image of a box with these periodic axes (3,) bool."""
+        return False
+
+    def _spins_along(self, axis: Sequence[float], point: Sequence[float] | None = None) -> bool:
+        """Whether the spin leaves a surface of revolution about this axis in its place."""
+        along = _unit(axis)
+        aside = 0.0 if point is None else np.linalg.norm(np.cross(np.subtract(self.middle(), point), along))
+        across = float(np.linalg.norm(np.cross(self.spin, along)))
+        size = 0.0 if point is None else float(np.abs(point).max() + np.abs(self.middle()).max())
+        return across <= ROUNDING * float(np.linalg.norm(self.spin)) and float(aside) <= ROUNDING * size
 
 
-class Walls(NamedTuple):
-    """The arrays of W walls, as compiled loops take them."""
+@dataclass(frozen=True, kw_only=True)
+class Plane(Wall):
+    """A flat wall without end; a velocity along it drags without moving it.
 
-    point: np.ndarray  # (W, 3) [m]
-    normal: np.ndarray  # (W, 3) unit, towards the particles
-    velocity: np.ndarray  # (W, 3) [m/s]
-    material: np.ndarray  # (W,) int32
+    point   any point of it [m]
+    normal  points to the side of the particles; need not be of unit length
+    """
+
+    point: Vector = (0.0, 0.0, 0.0)
+    normal: Vector = (0.0, 0.0, 1.0)
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        return [(PLANE, [*self.point, *_unit(self.normal)])]
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        return np.array([self.point], float), np.inf
+
+    def repeats(self, periodic: np.ndarray) -> bool:
+        return not np.asarray(self.normal)[periodic].any()
+
+    def sweep(self) -> float:
+        if not self._spins_along(self.normal):
+            raise InputError("spin", self.spin, "along the normal of a plane", "take a mesh for a plate that tilts")
+        return abs(float(np.dot(self.velocity, _unit(self.normal))))
 
 
-def walls(planes: Sequence[Plane] = ()) -> Walls:
+@dataclass(frozen=True, kw_only=True)
+class Box(Wall):
+    """The six sides of a box with particles inside.
+
+    low, high  opposite corners [m]
+    """
+
+    low: Vector
+    high: Vector
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not np.all(np.less(self.low, self.high)):
+            raise InputError("high", self.high, f"above low = {self.low} along every axis")
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        axes = np.eye(3)
+        return [(PLANE, [*corner, *(sign * n)]) for corner, sign in ((self.low, 1), (self.high, -1)) for n in axes]
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        return np.array(list(itertools.product(*zip(self.low, self.high))), float), 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Wall):
+    """A round wall about an axis.
+
+    Without end, or closed by caps, it holds the particles on one side. Finite and open it is a tube that is met
+    from both sides, rims included. Let a tube that stands on a cone or a plane reach a little beyond it, so that
+    no rim lies in the corner.
+
+    point    on the axis; centre of the lower end of a finite one [m]
+    axis     direction, from the lower end; need not be of unit length
+    radius   [m]
+    length   [m]; without end if not given
+    caps     flat ends
+    outside  particles are outside
+    """
+
+    point: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+    radius: float
+    length: float | None = None
+    caps: bool = False
+    outside: bool = False
+
+    def __post_init__(self) -> None:
+        _check_positive(self, "radius", "length")
+        if self.caps and self.length is None:
+            raise InputError("caps", True, "False where no length is given")
+        super().__post_init__()
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        axis = _unit(self.axis)
+        head = [*self.point, *axis, self.radius]
+        if self.length is None:
+            return [(REVOLVED, [*head, 0.0, -1.0 if self.outside else 1.0, -np.inf, np.inf, 0.0])]
+        if not self.caps:
+            return [(REVOLVED, [*head, 0.0, 1.0, 0.0, self.length, 1.0])]
+        if self.outside:
+            return [(PEG, [*head, self.length])]
+        top = np.add(self.point, self.length * axis)
+        side = (REVOLVED, [*head, 0.0, 1.0, -np.inf, np.inf, 0.0])
+        return [side, (PLANE, [*self.point, *axis]), (PLANE, [*top, *-axis])]
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        return np.array([self.point, np.add(self.point, (self.length or 0.0) * _unit(self.axis))]), self.radius
+
+    def repeats(self, periodic: np.ndarray) -> bool:
+        across = np.asarray(self.axis)[~periodic].any()
+        return self.length is None and not across and int(periodic.sum()) == 1
+
+    def sweep(self) -> float:
+        axis, in_place = _unit(self.axis), self._spins_along(self.axis, self.point)
+        if self.length is None and not in_place:
+            raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give it a length")
+        if self.length is None:
+            return float(np.linalg.norm(np.cross(self.velocity, axis)))
+        return float(np.linalg.norm(self.velocity)) if in_place else super().sweep()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cone(Wall):
+    """A round wall whose radius changes along its axis, open at both ends and met from both sides: a hopper.
+
+    point       centre of the lower end [m]
+    axis        direction, from the lower end; need not be of unit length
+    radius      of the lower end, the outlet; may be 0 [m]
+    top_radius  of the upper end [m]
+    length      [m]
+    """
+
+    point: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+    radius: float = 0.0
+    top_radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        _check_positive(self, "top_radius", "length")
+        if not 0.0 <= self.radius < np.inf:
+            raise InputError("radius", self.radius, "at least 0")
+        super().__post_init__()
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        line = np.array([self.top_radius - self.radius, self.length])
+        reach = float(np.linalg.norm(line))
+        return [(REVOLVED, [*self.point, *_unit(self.axis), self.radius, *(line / reach), 0.0, reach, 1.0])]
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        top = np.add(self.point, self.length * _unit(self.axis))
+        return np.array([self.point, top]), max(self.radius, self.top_radius)
+
+    def sweep(self) -> float:
+        return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mesh(Wall):
+    """A surface of triangles, met from both sides.
+
+    Triangles are neighbours where they have corners in common, to the last bit. Surfaces that are to join
+    without a jump belong into one mesh. A plate whose two faces are nearer to each other than a film reaches
+    gives the films of both.
+
+    vertices   (V, 3) [m]
+    triangles  (T, 3) int, rows of `vertices`
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+    def __post_init__(self) -> None:
+        vertices, triangles = np.asarray(self.vertices, float), np.asarray(self.triangles, np.int64)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or not np.isfinite(vertices).all():
+            raise InputError("vertices", vertices.shape, "a table (V, 3) of finite numbers")
+        if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.min(initial=0) < 0:
+            raise InputError("triangles", triangles.shape, "a table (T, 3) of rows of `vertices`")
+        if triangles.max(initial=0) >= len(vertices):
+            raise InputError("triangles", int(triangles.max()), f"below the number of vertices, {len(vertices)}")
+        vertices, names = np.unique(vertices, axis=0, return_inverse=True)
+        triangles = names.reshape(-1)[triangles]
+        a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
+        longest = np.maximum(np.linalg.norm(b - a, axis=1), np.linalg.norm(c - a, axis=1))
+        triangles = triangles[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-12 * longest**2]
+        if len(triangles) == 0:
+            raise InputError("triangles", 0, "at least one with an area")
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "triangles", triangles)
+        super().__post_init__()
+
+    @classmethod
+    def from_stl(cls, path: str | Path, *, scale: float = 1.0, **options: Any) -> Mesh:
+        """Read a surface from a file.
+
+        path     STL, or another format of surfaces that pyvista reads
+        scale    length of the file's unit [m]
+        options  as of :class:`Wall`
+        """
+        import pyvista  # takes a second to load, and few runs need it
+
+        if not Path(path).is_file():
+            raise InputError("mesh", str(path), "a file that exists")
+        surface = pyvista.read(path)
+        if not isinstance(surface, pyvista.PolyData):
+            raise InputError("mesh", str(path), "a file of one surface")
+        surface = surface.triangulate()
+        corners = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
+        return cls(vertices=scale * np.asarray(surface.points, float), triangles=corners, **options)
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        corners = self.vertices[self.triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return [(TRIANGLE, [*abc, *n]) for abc, n in zip(corners.reshape(-1, 9), normal)]
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        return self.vertices, 0.0
+
+    def middle(self) -> np.ndarray:
+        if self.centre is not None:
+            return np.array(self.centre, float)
+        return 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+
+
+def assemble(walls: Sequence[Wall] = ()) -> Walls:
     """Arrays of the given walls."""
-    normal = np.array([plane.normal for plane in planes], float).reshape(-1, 3)
-    return Walls(
-        np.array([plane.point for plane in planes], float).reshape(-1, 3),
-        normal / np.linalg.norm(normal, axis=1, keepdims=True),
-        np.array([plane.velocity for plane in planes], float).reshape(-1, 3),
-        np.array([plane.material for plane in planes], np.int32),
+    pieces = [(number, *piece) for number, wall in enumerate(walls) for piece in wall.pieces()]
+    shape = np.zeros((len(pieces), NUMBERS))
+    for row, (_, _, numbers) in zip(shape, pieces):
+        row[: len(numbers)] = numbers
+    kind = np.array([kind for _, kind, _ in pieces], np.int8)
+    owner = np.array([number for number, _, _ in pieces], np.int32)
+    corner = np.full((len(pieces), 3), -1, np.int32)
+    low, width, number = np.zeros((len(walls), 3)), np.ones(len(walls)), np.zeros((len(walls), 3), np.int64)
+    for m, wall in enumerate(walls):
+        if isinstance(wall, Mesh):
+            corner[owner == m] = wall.triangles
+            low[m], width[m], number[m] = _cells(wall)
+    cells = np.prod(number, axis=1)
+    made = Walls(
+        kind=kind,
+        shape=shape,
+        corner=corner,
+        material=np.array([walls[m].material for m in owner], np.int32),
+        wall=owner,
+        velocity=_vectors([wall.velocity for wall in walls]),
+        spin=_vectors([wall.spin for wall in walls]),
+        centre=_vectors([wall.middle() for wall in walls]),
+        shift=np.zeros((len(walls), 3)),
+        turned=np.tile(np.eye(3).reshape(-1), (len(walls), 1)),
+        sweep=np.array([wall.sweep() for wall in walls], float),
+        travel=np.zeros(len(walls)),
+        single=np.flatnonzero(kind != TRIANGLE).astype(np.int32),
+        cell_low=low,
+        cell_width=width,
+        cell_number=number,
+        cell_offset=np.cumsum(cells) - cells,
+        cell_start=np.zeros(int(cells.sum()) + 1, np.int64),
+        cell_member=np.zeros(0, np.int32),
     )
+    return _with_cells(made) if len(made.single) < len(kind) else made
 
 
-@inline
-def height(walls, w, place):
-    """Distance of a place from wall w, negative behind it."""
-    return dot(minus(place, at(walls.point, w)), at(walls.normal, w))
+def _cells(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
+    """Lower corner, width and number of the cells of a mesh: about as wide as its triangles, and not too many."""
+    corners = mesh.vertices[mesh.triangles]
+    size = float((corners.max(axis=1) - corners.min(axis=1)).max(axis=1).mean())
+    low = mesh.vertices.min(axis=0)
+    span = mesh.vertices.max(axis=0) - low
+    width = max(size, float(np.prod(span) / (8.0 * len(corners))) ** (1.0 / 3.0), float(span.max()) / 256.0)
+    return low, width, np.floor(span / width).astype(np.int64) + 1
+
+
+def _with_cells(walls: Walls) -> Walls:
+    """The same walls with their triangles sorted into cells."""
+    count = np.zeros(len(walls.cell_start) - 1, np.int64)
+    bin_triangles(flat(walls), count, walls.cell_member, False)
+    walls.cell_start[1:] = np.cumsum(count)
+    member = np.empty(walls.cell_start[-1], np.int32)
+    bin_triangles(flat(walls), walls.cell_start[:-1].copy(), member, True)
+    return walls._replace(cell_member=member)
+
+
+def _vectors(rows: Sequence[Any]) -> np.ndarray:
+    return np.array(rows, float).reshape(-1, 3)
+
+
+def _unit(direction: Sequence[float]) -> np.ndarray:
+    return np.asarray(direction, float) / np.linalg.norm(direction)
+
+
+def _check_positive(wall: Wall, *fields: str) -> None:
+    for field in fields:
+        value = getattr(wall, field)
+        if value is not None and not 0.0 < value < np.inf:
+            raise InputError(field, value, "above 0 and finite")
+
+
+def check_walls(walls: Sequence[Wall], box: np.ndarray, materials: int) -> None:
+    """Refuse walls that a run cannot have.
+
+    box        (3,) length of the periodic box, infinite along open axes [m]
+    materials  number of rows of the pair table
+    """
+    periodic = np.isfinite(box)
+    for number, wall in enumerate(walls):
+        if wall.material >= materials:
+            raise InputError(f"material of wall {number}", wall.material, f"below {materials}, the rows of the table")
+        if periodic.any() and not wall.repeats(periodic):
+            raise InputError(f"walls[{number}]", type(wall).__name__, "the same all along the periodic axes of the box")

@@ -1,0 +1,304 @@
+"""Triangulated walls: which triangles are near, and how the triangles of a mesh share one contact.
+
+A sphere may touch many triangles of one smooth surface at once. Two rules make them act as the surface does.
+A triangle whose nearest point lies on a corner or an edge that it shares with a nearer triangle is silent. Two
+triangles that are both touched on their faces, as in a hollow, have a contact each; but where the common edge
+is itself inside the overlap they share one, in the ratio of the distances of their nearest points from that
+edge, so that a force neither jumps when a face is entered nor counts twice where the faces are nearly in one
+plane. A silent triangle keeps the memory of the contact beside it, and goes on with it when its turn comes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cfddem.kernels import inline, kernel
+from cfddem.particles.state import Bodies
+from cfddem.particles.surfaces import (
+    FEATURE,
+    NORMAL,
+    SHARE,
+    TOUCH,
+    TRIANGLE,
+    Walls,
+    in_frame,
+    nearest,
+    touch,
+    touched,
+    touched_distance,
+)
+from cfddem.particles.vectors import at, dot, flat, minus, times
+
+
+def near_walls(bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32."""
+    count = np.zeros(bodies.count, np.int64)
+    nothing = np.zeros(0, np.uint32)
+    _near(flat(bodies), flat(walls), cutoff_ratio, skin, count, nothing, nothing, False)
+    begin = np.cumsum(count) - count
+    first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))
+    _near(flat(bodies), flat(walls), cutoff_ratio, skin, begin, first, second, True)
+    return first, second
+
+
+@kernel
+def _near(bodies, walls, cutoff_ratio, skin, count, first, second, fill):
+    """Count the pieces near each particle, or write them from `count` on."""
+    for i in range(len(bodies.radius)):
+        if bodies.inverse_mass[i] == 0.0:
+            continue
+        reach = (1.0 + cutoff_ratio) * bodies.radius[i] + skin
+        for w in walls.single:
+            _list(i, w, walls.wall[w], bodies, walls, reach, count, first, second, fill)
+        for m in range(len(walls.sweep)):
+            if walls.cell_number[3 * m] > 0:
+                _list_triangles(i, m, bodies, walls, reach, count, first, second, fill)
+
+
+@inline
+def _list(i, w, m, bodies, walls, reach, count, first, second, fill):
+    """Take piece w of wall m if it is within reach of particle i."""
+    if nearest(walls.kind, walls.shape, w, in_frame(walls, m, at(bodies.position, i)))[1] < reach:
+        if fill:
+            first[count[i]], second[count[i]] = i, w
+        count[i] += 1
+
+
+@kernel
+def _list_triangles(i, m, bodies, walls, reach, count, first, second, fill):
+    """Take the triangles of mesh m within reach of particle i; each in the first cell that it shares with the reach."""
+    place = in_frame(walls, m, at(bodies.position, i))
+    low, high = _span(walls, m, place, place, reach)
+    for x in range(max(low[0], 0), min(high[0], walls.cell_number[3 * m] - 1) + 1):
+        for y in range(max(low[1], 0), min(high[1], walls.cell_number[3 * m + 1] - 1) + 1):
+            for z in range(max(low[2], 0), min(high[2], walls.cell_number[3 * m + 2] - 1) + 1):
+                cell = _cell(walls, m, x, y, z)
+                for slot in range(walls.cell_start[cell], walls.cell_start[cell + 1]):
+                    w = walls.cell_member[slot]
+                    begin, _ = _triangle_span(walls, m, w)
+                    if (
+                        x == max(low[0], begin[0], 0)
+                        and y == max(low[1], begin[1], 0)
+                        and z == max(low[2], begin[2], 0)
+                    ):
+                        _list(i, w, m, bodies, walls, reach, count, first, second, fill)
+
+
+@inline
+def _span(walls, m, low, high, reach):
+    """Cells of mesh m between two corners, widened by a reach."""
+    corner, width = at(walls.cell_low, m), walls.cell_width[m]
+    return (
+        (
+            math.floor((low[0] - reach - corner[0]) / width),
+            math.floor((low[1] - reach - corner[1]) / width),
+            math.floor((low[2] - reach - corner[2]) / width),
+        ),
+        (
+            math.floor((high[0] + reach - corner[0]) / width),
+            math.floor((high[1] + reach - corner[1]) / width),
+            math.floor((high[2] + reach - corner[2]) / width),
+        ),
+    )
+
+
+@inline
+def _triangle_span(walls, m, w):
+    """Cells of mesh m that the box around triangle w touches."""
+    a, b, c = at(walls.shape, 4 * w), at(walls.shape, 4 * w + 1), at(walls.shape, 4 * w + 2)
+    low = (min(a[0], b[0], c[0]), min(a[1], b[1], c[1]), min(a[2], b[2], c[2]))
+    high = (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
+    return _span(walls, m, low, high, 0.0)
+
+
+@inline
+def _cell(walls, m, x, y, z):
+    return walls.cell_offset[m] + (x * walls.cell_number[3 * m + 1] + y) * walls.cell_number[3 * m + 2] + z
+
+
+@kernel
+def bin_triangles(walls, count, member, fill):
+    """Count the triangles of each cell, or write them from `count` on."""
+    for w in range(len(walls.kind)):
+        if walls.kind[w] != TRIANGLE:
+            continue
+        m = walls.wall[w]
+        low, high = _triangle_span(walls, m, w)
+        for x in range(low[0], high[0] + 1):
+            for y in range(low[1], high[1] + 1):
+                for z in range(low[2], high[2] + 1):
+                    cell = _cell(walls, m, x, y, z)
+                    if fill:
+                        member[count[cell]] = w
+                    count[cell] += 1
+
+
+@kernel
+def _share(bodies, edges, walls, cutoff_ratio):
+    """Say which part each triangle has in the contact and film of its mesh."""
+    pairs, number = edges.between_particles, len(edges.first)
+    begin = pairs
+    while begin < number:
+        end = begin + 1
+        while end < number and edges.first[end] == edges.first[begin]:
+            end += 1
+        speaking = 0
+        for k in range(begin, end):
+            if _within_reach(k, bodies, edges, walls, cutoff_ratio):
+                silent, other = False, begin
+                while other < end and not silent:
+                    silent = _is_silenced(k, other, edges, walls)
+                    other += 1
+                edges.touch[TOUCH * (k - pairs) + SHARE] = 0.0 if silent else 1.0
+                speaking += 0 if silent else 1
+        if speaking > 1:
+            _divide(begin, end, bodies, edges, walls, cutoff_ratio)
+        begin = end
+
+
+@inline
+def _within_reach(k, bodies, edges, walls, cutoff_ratio):
+    """Whether edge k is of a triangle near enough for its contact or film."""
+    radius = bodies.radius[edges.first[k]]
+    gap = touched_distance(edges, k) - radius
+    return walls.kind[edges.second[k]] == TRIANGLE and gap <= max(cutoff_ratio * radius, edges.minimum_gap[k])
+
+
+@inline
+def _common(k, other, edges, walls):
+    """Corners that the triangles of two edges share, as sums of the corners of the first and of the second."""
+    w, v = np.int64(edges.second[k]), np.int64(edges.second[other])
+    own, theirs = 0, 0
+    if walls.wall[w] == walls.wall[v] and walls.corner[3 * w] >= 0:
+        for a in range(3):
+            for b in range(3):
+                if walls.corner[3 * w + a] == walls.corner[3 * v + b]:
+                    own |= 1 << a
+                    theirs |= 1 << b
+    return own, theirs
+
+
+@inline
+def _feature(edges, k):
+    return int(edges.touch[TOUCH * (k - edges.between_particles) + FEATURE])
+
+
+@inline
+def _is_silenced(k, other, edges, walls):
+    """Whether the nearest point of k lies on what it shares with a nearer triangle, or with an equal earlier one."""
+    if other == k or touched_distance(edges, other) > (1.0 + 1e-9) * touched_distance(edges, k):
+        return False
+    own, theirs = _common(k, other, edges, walls)
+    if own == 0 or _feature(edges, k) & ~own != 0:
+        return False
+    return _feature(edges, other) & ~theirs != 0 or edges.second[other] < edges.second[k]
+
+
+@kernel
+def _divide(begin, end, bodies, edges, walls, cutoff_ratio):
+    """Divide the contact of one particle among the triangles that speak.
+
+    What a triangle yields to another counts only as far as that one does not yield to a third.
+    """
+    pairs = edges.between_particles
+    speaks = np.zeros(end - begin, np.bool_)
+    for k in range(begin, end):
+        share = edges.touch[TOUCH * (k - pairs) + SHARE]
+        speaks[k - begin] = share > 0.0 and _within_reach(k, bodies, edges, walls, cutoff_ratio)
+    for k in range(begin, end):
+        part = 1.0
+        for other in range(begin, end):
+            if other == k or not (speaks[k - begin] and speaks[other - begin]):
+                continue
+            weight = 1.0 - _kept(k, other, bodies, edges, walls)
+            for third in range(begin, end):
+                if weight > 0.0 and third != k and third != other and speaks[third - begin]:
+                    weight *= _kept(other, third, bodies, edges, walls)
+            part *= 1.0 - weight
+        if speaks[k - begin]:
+            edges.touch[TOUCH * (k - pairs) + SHARE] = part
+
+
+@kernel
+def _kept(k, other, bodies, edges, walls):
+    """Part that edge k keeps beside another of the same mesh: 1 where their common edge is outside the overlap."""
+    common, _ = _common(k, other, edges, walls)
+    if common == 0:
+        return 1.0
+    w = np.int64(edges.second[k])
+    m = np.int64(walls.wall[w])
+    place = at(bodies.position, edges.first[k])
+    distance = touched_distance(edges, k)
+    gap = distance - bodies.radius[edges.first[k]]
+    joint = _to_common(walls.shape, w, common, in_frame(walls, m, place)) - distance
+    joint = 1.0 - joint / max(abs(gap), edges.minimum_gap[k], 1e-300)
+    if joint <= 0.0:
+        return 1.0
+    own = in_frame(walls, m, minus(place, times(distance, touched(edges, k, NORMAL))))
+    theirs = in_frame(walls, m, minus(place, times(touched_distance(edges, other), touched(edges, other, NORMAL))))
+    mine, others = _to_common(walls.shape, w, common, own), _to_common(walls.shape, w, common, theirs)
+    return 1.0 - min(joint, 1.0) * others / max(mine + others, 1e-300)
+
+
+@inline
+def _to_common(shape, w, common, place):
+    """Distance from a corner or an edge of triangle w."""
+    a = at(shape, 4 * w + (0 if common & 1 else 1 if common & 2 else 2))
+    b = at(shape, 4 * w + (2 if common & 4 else 1 if common & 2 else 0))
+    along, away = minus(b, a), minus(place, a)
+    length = dot(along, along)
+    if length > 0.0:
+        away = minus(away, times(min(max(dot(away, along) / length, 0.0), 1.0), along))
+    return math.sqrt(dot(away, away))
+
+
+@kernel
+def meet_walls(bodies, edges, walls, free, cutoff_ratio):
+    """Find how particles and walls stand to each other, for all that is asked of particle-wall edges."""
+    touch(bodies, edges, walls, free)
+    if len(walls.cell_member) > 0:
+        _share(bodies, edges, walls, cutoff_ratio)
+
+
+@kernel
+def hand_over(edges, walls):
+    """Give what a contact remembers to the silent triangles beside it."""
+    pairs, number = edges.between_particles, len(edges.first)
+    begin = pairs
+    for k in range(pairs, number):
+        if edges.first[k] != edges.first[begin]:
+            begin = k
+        if edges.touch[TOUCH * (k - pairs) + SHARE] > 0.0:
+            continue
+        own = times(touched_distance(edges, k), touched(edges, k, NORMAL))
+        donor, least, other = -1, np.inf, begin
+        while other < number and edges.first[other] == edges.first[k]:
+            active = edges.touch[TOUCH * (other - pairs) + SHARE] > 0.0
+            if active and walls.wall[edges.second[other]] == walls.wall[edges.second[k]]:
+                way = minus(times(touched_distance(edges, other), touched(edges, other, NORMAL)), own)
+                if dot(way, way) < least:
+                    donor, least = other, dot(way, way)
+            other += 1
+        if donor >= 0:
+            _copy_memory(edges, donor, k)
+
+
+@inline
+def _copy_memory(edges, donor, k):
+    """All that edge k needs to go on for the donor; `resistance` says that the film has begun."""
+    for x in range(3):
+        edges.spring[3 * k + x] = edges.spring[3 * donor + x]
+    if len(edges.resistance) > 0:
+        edges.approach_speed[k] = edges.approach_speed[donor]
+        edges.minimum_gap[k] = edges.minimum_gap[donor]
+        edges.accounted_gap[k] = edges.accounted_gap[donor]
+        edges.resistance[k] = edges.resistance[donor]
+    if len(edges.entry) > 0 and not np.isnan(edges.entry[5 * k]):  # an encounter goes on where the contact is now
+        begin, own = edges.entry[5 * donor], edges.entry[5 * k]
+        moves = np.isnan(begin) or own < begin
+        for x in range(5):
+            if moves:
+                edges.entry[5 * donor + x] = edges.entry[5 * k + x]
+            edges.entry[5 * k + x] = np.nan
