@@ -10,7 +10,7 @@ from cfddem.particles.neighbours import list_edges, wrap
 from cfddem.particles.pairs import Edges, shifts
 from cfddem.particles.state import bodies
 from cfddem.particles.vectors import flat
-from cfddem.particles.walls import walls
+from cfddem.particles.walls import assemble
 
 OVERLAP_LIMIT = 1e-4
 """Largest overlap that a packing may have, over the smaller of the two radii."""
@@ -125,7 +125,7 @@ def random_packing(
     worst = np.inf
     for _ in range(most_sweeps // _SWEEPS + 1):
         wrap(spheres.position, box)
-        graph = list_edges(spheres, walls(), 0.0, skin, box)
+        graph = list_edges(spheres, assemble(), 0.0, skin, box)
         worst = _push_apart(flat(spheres), flat(graph), shifts(box).reshape(-1), _SWEEPS, 0.25 * skin)
         if worst <= OVERLAP_LIMIT:
             wrap(spheres.position, box)
