@@ -8,11 +8,23 @@ from typing import Any
 __version__ = "0.1.0"
 
 _HOME = {
-    "Fluid": "cfddem.materials",
-    "Material": "cfddem.materials",
+    "Box": "cfddem.particles.walls",
     "CfddemError": "cfddem.errors",
+    "Cone": "cfddem.particles.walls",
+    "Cylinder": "cfddem.particles.walls",
+    "Fluid": "cfddem.materials",
+    "FluidSolver": "cfddem.fluid.solver",
+    "Grid": "cfddem.fluid.grid",
+    "Laws": "cfddem.particles.forces",
+    "Material": "cfddem.materials",
+    "Mesh": "cfddem.particles.walls",
+    "Plane": "cfddem.particles.walls",
+    "Simulation": "cfddem.simulation",
+    "bodies": "cfddem.particles.state",
+    "pair_table": "cfddem.materials",
+    "pour": "cfddem.pouring",
 }
-__all__ = ["CfddemError", "Fluid", "Material", "__version__"]
+__all__ = ["__version__", *sorted(_HOME)]
 
 
 def __getattr__(name: str) -> Any:

@@ -128,6 +128,8 @@ def speed_after_film(
     """
     total = speed + strength_per_mass * film_potential_change(gap, accounted_gap - gap, minimum_gap, cutoff_gap)
     guess = total / (1.0 + step * film_resistance(strength_per_mass, gap, minimum_gap, cutoff_gap))
+    if abs(step * guess) < 1e-7 * gap:
+        return guess  # the resistance has not changed by more than rounding
     low, high = -math.inf, math.inf
     for _ in range(100):
         potential = film_potential_change(gap, step * guess, minimum_gap, cutoff_gap)
