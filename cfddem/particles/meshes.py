@@ -11,14 +11,18 @@ plane. A silent triangle keeps the memory of the contact beside it, and goes on 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.kernels import inline, kernel
 from cfddem.particles.state import Bodies
 from cfddem.particles.surfaces import (
+    DISTANCE,
     FEATURE,
+    FOOT,
     NORMAL,
+    PLACE,
     SHARE,
     TOUCH,
     TRIANGLE,
@@ -135,119 +139,128 @@ def bin_triangles(walls, count, member, fill):
                     count[cell] += 1
 
 
+class _Crowd(NamedTuple):
+    """What is asked of the triangles near a particle; few arrays, so that the functions compile fast."""
+
+    pairs: int
+    first: np.ndarray
+    second: np.ndarray
+    minimum_gap: np.ndarray
+    touch: np.ndarray
+    radius: np.ndarray
+    kind: np.ndarray
+    wall: np.ndarray
+    corner: np.ndarray
+    shape: np.ndarray
+
+
 @kernel
-def _share(bodies, edges, walls, cutoff_ratio):
+def _share(crowd, cutoff_ratio):
     """Say which part each triangle has in the contact and film of its mesh."""
-    pairs, number = edges.between_particles, len(edges.first)
-    begin = pairs
+    begin, number = crowd.pairs, len(crowd.first)
     while begin < number:
         end = begin + 1
-        while end < number and edges.first[end] == edges.first[begin]:
+        while end < number and crowd.first[end] == crowd.first[begin]:
             end += 1
         speaking = 0
         for k in range(begin, end):
-            if _within_reach(k, bodies, edges, walls, cutoff_ratio):
+            if _within_reach(k, crowd, cutoff_ratio):
                 silent, other = False, begin
                 while other < end and not silent:
-                    silent = _is_silenced(k, other, edges, walls)
+                    silent = _is_silenced(k, other, crowd)
                     other += 1
-                edges.touch[TOUCH * (k - pairs) + SHARE] = 0.0 if silent else 1.0
+                crowd.touch[_row(k, crowd) + SHARE] = 0.0 if silent else 1.0
                 speaking += 0 if silent else 1
         if speaking > 1:
-            _divide(begin, end, bodies, edges, walls, cutoff_ratio)
+            _divide(begin, end, crowd, cutoff_ratio)
         begin = end
 
 
 @inline
-def _within_reach(k, bodies, edges, walls, cutoff_ratio):
-    """Whether edge k is of a triangle near enough for its contact or film."""
-    radius = bodies.radius[edges.first[k]]
-    gap = touched_distance(edges, k) - radius
-    return walls.kind[edges.second[k]] == TRIANGLE and gap <= max(cutoff_ratio * radius, edges.minimum_gap[k])
+def _row(k, crowd):
+    """Where the columns of edge k begin in `touch`."""
+    return TOUCH * (k - crowd.pairs)
 
 
 @inline
-def _common(k, other, edges, walls):
+def _within_reach(k, crowd, cutoff_ratio):
+    """Whether edge k is of a triangle near enough for its contact or film."""
+    radius = crowd.radius[crowd.first[k]]
+    gap = crowd.touch[_row(k, crowd) + DISTANCE] - radius
+    return crowd.kind[crowd.second[k]] == TRIANGLE and gap <= max(cutoff_ratio * radius, crowd.minimum_gap[k])
+
+
+@inline
+def _common(k, other, crowd):
     """Corners that the triangles of two edges share, as sums of the corners of the first and of the second."""
-    w, v = np.int64(edges.second[k]), np.int64(edges.second[other])
+    w, v = np.int64(crowd.second[k]), np.int64(crowd.second[other])
     own, theirs = 0, 0
-    if walls.wall[w] == walls.wall[v] and walls.corner[3 * w] >= 0:
+    if crowd.wall[w] == crowd.wall[v] and crowd.corner[3 * w] >= 0:
         for a in range(3):
             for b in range(3):
-                if walls.corner[3 * w + a] == walls.corner[3 * v + b]:
+                if crowd.corner[3 * w + a] == crowd.corner[3 * v + b]:
                     own |= 1 << a
                     theirs |= 1 << b
     return own, theirs
 
 
 @inline
-def _feature(edges, k):
-    return int(edges.touch[TOUCH * (k - edges.between_particles) + FEATURE])
-
-
-@inline
-def _is_silenced(k, other, edges, walls):
+def _is_silenced(k, other, crowd):
     """Whether the nearest point of k lies on what it shares with a nearer triangle, or with an equal earlier one."""
-    if other == k or touched_distance(edges, other) > (1.0 + 1e-9) * touched_distance(edges, k):
+    own, theirs = _row(k, crowd), _row(other, crowd)
+    if other == k or crowd.touch[theirs + DISTANCE] > (1.0 + 1e-9) * crowd.touch[own + DISTANCE]:
         return False
-    own, theirs = _common(k, other, edges, walls)
-    if own == 0 or _feature(edges, k) & ~own != 0:
+    mine, others = _common(k, other, crowd)
+    if mine == 0 or int(crowd.touch[own + FEATURE]) & ~mine != 0:
         return False
-    return _feature(edges, other) & ~theirs != 0 or edges.second[other] < edges.second[k]
+    return int(crowd.touch[theirs + FEATURE]) & ~others != 0 or crowd.second[other] < crowd.second[k]
 
 
 @kernel
-def _divide(begin, end, bodies, edges, walls, cutoff_ratio):
+def _divide(begin, end, crowd, cutoff_ratio):
     """Divide the contact of one particle among the triangles that speak.
 
     What a triangle yields to another counts only as far as that one does not yield to a third.
     """
-    pairs = edges.between_particles
     speaks = np.zeros(end - begin, np.bool_)
     for k in range(begin, end):
-        share = edges.touch[TOUCH * (k - pairs) + SHARE]
-        speaks[k - begin] = share > 0.0 and _within_reach(k, bodies, edges, walls, cutoff_ratio)
-    for k in range(begin, end):
+        speaks[k - begin] = crowd.touch[_row(k, crowd) + SHARE] > 0.0 and _within_reach(k, crowd, cutoff_ratio)
+    speaking = begin + np.flatnonzero(speaks)
+    for k in speaking:
         part = 1.0
-        for other in range(begin, end):
-            if other == k or not (speaks[k - begin] and speaks[other - begin]):
-                continue
-            weight = 1.0 - _kept(k, other, bodies, edges, walls)
-            for third in range(begin, end):
-                if weight > 0.0 and third != k and third != other and speaks[third - begin]:
-                    weight *= _kept(other, third, bodies, edges, walls)
+        for other in speaking:
+            weight = 1.0 - _kept(k, other, crowd)
+            for third in speaking:
+                if weight > 0.0 and third != k:
+                    weight *= _kept(other, third, crowd)
             part *= 1.0 - weight
-        if speaks[k - begin]:
-            edges.touch[TOUCH * (k - pairs) + SHARE] = part
+        crowd.touch[_row(k, crowd) + SHARE] = part
 
 
 @kernel
-def _kept(k, other, bodies, edges, walls):
+def _kept(k, other, crowd):
     """Part that edge k keeps beside another of the same mesh: 1 where their common edge is outside the overlap."""
-    common, _ = _common(k, other, edges, walls)
-    if common == 0:
+    common, _ = _common(k, other, crowd)
+    if common == 0 or k == other:
         return 1.0
-    w = np.int64(edges.second[k])
-    m = np.int64(walls.wall[w])
-    place = at(bodies.position, edges.first[k])
-    distance = touched_distance(edges, k)
-    gap = distance - bodies.radius[edges.first[k]]
-    joint = _to_common(walls.shape, w, common, in_frame(walls, m, place)) - distance
-    joint = 1.0 - joint / max(abs(gap), edges.minimum_gap[k], 1e-300)
+    w, row = np.int64(crowd.second[k]), _row(k, crowd)
+    distance = crowd.touch[row + DISTANCE]
+    gap = distance - crowd.radius[crowd.first[k]]
+    beyond = _to_common(crowd, w, common, row + PLACE) - distance
+    joint = 1.0 - beyond / max(abs(gap), crowd.minimum_gap[k], 1e-300)
     if joint <= 0.0:
         return 1.0
-    own = in_frame(walls, m, minus(place, times(distance, touched(edges, k, NORMAL))))
-    theirs = in_frame(walls, m, minus(place, times(touched_distance(edges, other), touched(edges, other, NORMAL))))
-    mine, others = _to_common(walls.shape, w, common, own), _to_common(walls.shape, w, common, theirs)
+    mine = _to_common(crowd, w, common, row + FOOT)
+    others = _to_common(crowd, w, common, _row(other, crowd) + FOOT)
     return 1.0 - min(joint, 1.0) * others / max(mine + others, 1e-300)
 
 
 @inline
-def _to_common(shape, w, common, place):
-    """Distance from a corner or an edge of triangle w."""
-    a = at(shape, 4 * w + (0 if common & 1 else 1 if common & 2 else 2))
-    b = at(shape, 4 * w + (2 if common & 4 else 1 if common & 2 else 0))
-    along, away = minus(b, a), minus(place, a)
+def _to_common(crowd, w, common, x):
+    """Distance of the point at column x of `touch` from a corner or an edge of triangle w."""
+    a = at(crowd.shape, 4 * w + (0 if common & 1 else 1 if common & 2 else 2))
+    b = at(crowd.shape, 4 * w + (2 if common & 4 else 1 if common & 2 else 0))
+    along, away = minus(b, a), minus((crowd.touch[x], crowd.touch[x + 1], crowd.touch[x + 2]), a)
     length = dot(along, along)
     if length > 0.0:
         away = minus(away, times(min(max(dot(away, along) / length, 0.0), 1.0), along))
@@ -259,7 +272,19 @@ def meet_walls(bodies, edges, walls, free, cutoff_ratio):
     """Find how particles and walls stand to each other, for all that is asked of particle-wall edges."""
     touch(bodies, edges, walls, free)
     if len(walls.cell_member) > 0:
-        _share(bodies, edges, walls, cutoff_ratio)
+        crowd = _Crowd(
+            edges.between_particles,
+            edges.first,
+            edges.second,
+            edges.minimum_gap,
+            edges.touch,
+            bodies.radius,
+            walls.kind,
+            walls.wall,
+            walls.corner,
+            walls.shape,
+        )
+        _share(crowd, cutoff_ratio)
 
 
 @kernel

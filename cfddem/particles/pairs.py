@@ -33,7 +33,7 @@ class Edges(NamedTuple):
     resistance: np.ndarray  # (n,) of the film, without lever; 0 out of its reach [kg/s]
     impulse: np.ndarray  # (n, 3) of the film in this step, on the first body [N s]
     entry: np.ndarray  # (n, 5) begin of the encounter, NaN outside one; (0, 5) where none are recorded
-    touch: np.ndarray  # (particle-wall edges, 12) how sphere and wall stand: columns in `surfaces`
+    touch: np.ndarray  # (particle-wall edges, 18) how sphere and wall stand: columns in `surfaces`
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
     incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
 

@@ -20,8 +20,8 @@ PLANE, TRIANGLE, REVOLVED, PEG = 0, 1, 2, 3
 NUMBERS = 12
 """Numbers that describe a piece: see `nearest`."""
 
-NORMAL, DISTANCE, SURFACE, TURN, FEATURE, SHARE, TOUCH = 0, 3, 4, 7, 10, 11, 12
-"""Columns of `Edges.touch`, and their number."""
+NORMAL, DISTANCE, SURFACE, TURN, FEATURE, SHARE, PLACE, FOOT, TOUCH = 0, 3, 4, 7, 10, 11, 12, 15, 18
+"""Columns of `Edges.touch`, and their number; place of the centre and nearest point in the frame of the wall."""
 
 FACE = 7
 """Feature of a triangle as the sum of its corners (1, 2, 4): one for a corner, two for an edge, all for the face."""
@@ -203,9 +203,11 @@ def touch(bodies, edges, walls, free):
         i, w = np.int64(edges.first[k]), np.int64(edges.second[k])
         m = np.int64(walls.wall[w])
         place = at(bodies.position, i)
-        normal, distance, feature, curvature, bend, direction = nearest(
-            walls.kind, walls.shape, w, in_frame(walls, m, place)
-        )
+        seen = in_frame(walls, m, place)
+        normal, distance, feature, curvature, bend, direction = nearest(walls.kind, walls.shape, w, seen)
+        row = TOUCH * (k - pairs)
+        _put(edges.touch, row + PLACE, seen)
+        _put(edges.touch, row + FOOT, minus(seen, times(distance, normal)))
         if walls.sweep[m] != 0.0:
             normal, direction = _rotated(walls.turned, m, normal), _rotated(walls.turned, m, direction)
         velocity, spin = at(walls.velocity, m), at(walls.spin, m)
@@ -215,7 +217,6 @@ def touch(bodies, edges, walls, free):
         moved = (free[0] * moved[0], free[1] * moved[1], free[2] * moved[2])
         moved = minus(moved, plus(velocity, cross(spin, arm)))
         turn = plus(times(curvature, moved), times(bend * dot(moved, direction), direction))
-        row = TOUCH * (k - pairs)
         _put(edges.touch, row + NORMAL, normal)
         edges.touch[row + DISTANCE] = distance
         _put(edges.touch, row + SURFACE, surface)
