@@ -12,11 +12,12 @@ from cfddem.particles.forces import Laws
 from cfddem.particles.guard import guard
 from cfddem.particles.meshes import meet_walls
 from cfddem.particles.motion import march, march_threaded
+from cfddem.particles.near_walls import assemble, check_walls
 from cfddem.particles.neighbours import list_edges, locality_order, wrap
 from cfddem.particles.pairs import Edges, gaps, remember, shifts, wall_forces
 from cfddem.particles.state import Bodies
 from cfddem.particles.vectors import flat
-from cfddem.particles.walls import Wall, assemble, check_walls
+from cfddem.particles.walls import Wall
 from cfddem.record.collisions import CollisionRecord
 
 THREADING_PAYS = 1000

@@ -1,4 +1,4 @@
-"""Triangulated walls: which triangles are near, and how the triangles of a mesh share one contact.
+"""Triangulated walls: how the triangles of a mesh share one contact.
 
 A sphere may touch many triangles of one smooth surface at once. Two rules make them act as the surface does.
 A triangle whose nearest point lies on a corner or an edge that it shares with a nearer triangle is silent. Two
@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.kernels import inline, kernel
-from cfddem.particles.state import Bodies
 from cfddem.particles.surfaces import (
     DISTANCE,
     FEATURE,
@@ -26,117 +25,11 @@ from cfddem.particles.surfaces import (
     SHARE,
     TOUCH,
     TRIANGLE,
-    Walls,
-    in_frame,
-    nearest,
     touch,
     touched,
     touched_distance,
 )
-from cfddem.particles.vectors import at, dot, flat, minus, times
-
-
-def near_walls(bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32."""
-    count = np.zeros(bodies.count, np.int64)
-    nothing = np.zeros(0, np.uint32)
-    _near(flat(bodies), flat(walls), cutoff_ratio, skin, count, nothing, nothing, False)
-    begin = np.cumsum(count) - count
-    first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))
-    _near(flat(bodies), flat(walls), cutoff_ratio, skin, begin, first, second, True)
-    return first, second
-
-
-@kernel
-def _near(bodies, walls, cutoff_ratio, skin, count, first, second, fill):
-    """Count the pieces near each particle, or write them from `count` on."""
-    for i in range(len(bodies.radius)):
-        if bodies.inverse_mass[i] == 0.0:
-            continue
-        reach = (1.0 + cutoff_ratio) * bodies.radius[i] + skin
-        for w in walls.single:
-            _list(i, w, walls.wall[w], bodies, walls, reach, count, first, second, fill)
-        for m in range(len(walls.sweep)):
-            if walls.cell_number[3 * m] > 0:
-                _list_triangles(i, m, bodies, walls, reach, count, first, second, fill)
-
-
-@inline
-def _list(i, w, m, bodies, walls, reach, count, first, second, fill):
-    """Take piece w of wall m if it is within reach of particle i."""
-    if nearest(walls.kind, walls.shape, w, in_frame(walls, m, at(bodies.position, i)))[1] < reach:
-        if fill:
-            first[count[i]], second[count[i]] = i, w
-        count[i] += 1
-
-
-@kernel
-def _list_triangles(i, m, bodies, walls, reach, count, first, second, fill):
-    """Take the triangles of mesh m within reach of particle i; each in the first cell that it shares with the reach."""
-    place = in_frame(walls, m, at(bodies.position, i))
-    low, high = _span(walls, m, place, place, reach)
-    for x in range(max(low[0], 0), min(high[0], walls.cell_number[3 * m] - 1) + 1):
-        for y in range(max(low[1], 0), min(high[1], walls.cell_number[3 * m + 1] - 1) + 1):
-            for z in range(max(low[2], 0), min(high[2], walls.cell_number[3 * m + 2] - 1) + 1):
-                cell = _cell(walls, m, x, y, z)
-                for slot in range(walls.cell_start[cell], walls.cell_start[cell + 1]):
-                    w = walls.cell_member[slot]
-                    begin, _ = _triangle_span(walls, m, w)
-                    if (
-                        x == max(low[0], begin[0], 0)
-                        and y == max(low[1], begin[1], 0)
-                        and z == max(low[2], begin[2], 0)
-                    ):
-                        _list(i, w, m, bodies, walls, reach, count, first, second, fill)
-
-
-@inline
-def _span(walls, m, low, high, reach):
-    """Cells of mesh m between two corners, widened by a reach."""
-    corner, width = at(walls.cell_low, m), walls.cell_width[m]
-    return (
-        (
-            math.floor((low[0] - reach - corner[0]) / width),
-            math.floor((low[1] - reach - corner[1]) / width),
-            math.floor((low[2] - reach - corner[2]) / width),
-        ),
-        (
-            math.floor((high[0] + reach - corner[0]) / width),
-            math.floor((high[1] + reach - corner[1]) / width),
-            math.floor((high[2] + reach - corner[2]) / width),
-        ),
-    )
-
-
-@inline
-def _triangle_span(walls, m, w):
-    """Cells of mesh m that the box around triangle w touches."""
-    a, b, c = at(walls.shape, 4 * w), at(walls.shape, 4 * w + 1), at(walls.shape, 4 * w + 2)
-    low = (min(a[0], b[0], c[0]), min(a[1], b[1], c[1]), min(a[2], b[2], c[2]))
-    high = (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
-    return _span(walls, m, low, high, 0.0)
-
-
-@inline
-def _cell(walls, m, x, y, z):
-    return walls.cell_offset[m] + (x * walls.cell_number[3 * m + 1] + y) * walls.cell_number[3 * m + 2] + z
-
-
-@kernel
-def bin_triangles(walls, count, member, fill):
-    """Count the triangles of each cell, or write them from `count` on."""
-    for w in range(len(walls.kind)):
-        if walls.kind[w] != TRIANGLE:
-            continue
-        m = walls.wall[w]
-        low, high = _triangle_span(walls, m, w)
-        for x in range(low[0], high[0] + 1):
-            for y in range(low[1], high[1] + 1):
-                for z in range(low[2], high[2] + 1):
-                    cell = _cell(walls, m, x, y, z)
-                    if fill:
-                        member[count[cell]] = w
-                    count[cell] += 1
+from cfddem.particles.vectors import at, dot, minus, times
 
 
 class _Crowd(NamedTuple):

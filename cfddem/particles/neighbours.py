@@ -13,7 +13,7 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.kernels import inline, kernel, prange, threaded
-from cfddem.particles.meshes import near_walls
+from cfddem.particles.near_walls import near_walls
 from cfddem.particles.pairs import HOME, Edges, edges
 from cfddem.particles.state import Bodies
 from cfddem.particles.surfaces import Walls

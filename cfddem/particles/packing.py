@@ -6,11 +6,11 @@ import numpy as np
 
 from cfddem.errors import CfddemError, InputError
 from cfddem.kernels import kernel
+from cfddem.particles.near_walls import assemble
 from cfddem.particles.neighbours import list_edges, wrap
 from cfddem.particles.pairs import Edges, shifts
 from cfddem.particles.state import bodies
 from cfddem.particles.vectors import flat
-from cfddem.particles.walls import assemble
 
 OVERLAP_LIMIT = 1e-4
 """Largest overlap that a packing may have, over the smaller of the two radii."""

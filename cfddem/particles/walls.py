@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from cfddem.errors import InputError
-from cfddem.particles.meshes import bin_triangles
-from cfddem.particles.surfaces import NUMBERS, PEG, PLANE, REVOLVED, TRIANGLE, Walls
-from cfddem.particles.vectors import Vector, flat
+from cfddem.particles.surfaces import PEG, PLANE, REVOLVED, TRIANGLE
+from cfddem.particles.vectors import Vector
 
 ROUNDING = 1e-9
 """Directions and places that differ by less than this, relatively, are one."""
@@ -293,69 +292,6 @@ class Mesh(Wall):
         return 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
 
 
-def assemble(walls: Sequence[Wall] = ()) -> Walls:
-    """Arrays of the given walls."""
-    pieces = [(number, *piece) for number, wall in enumerate(walls) for piece in wall.pieces()]
-    shape = np.zeros((len(pieces), NUMBERS))
-    for row, (_, _, numbers) in zip(shape, pieces):
-        row[: len(numbers)] = numbers
-    kind = np.array([kind for _, kind, _ in pieces], np.int8)
-    owner = np.array([number for number, _, _ in pieces], np.int32)
-    corner = np.full((len(pieces), 3), -1, np.int32)
-    low, width, number = np.zeros((len(walls), 3)), np.ones(len(walls)), np.zeros((len(walls), 3), np.int64)
-    for m, wall in enumerate(walls):
-        if isinstance(wall, Mesh):
-            corner[owner == m] = wall.triangles
-            low[m], width[m], number[m] = _cells(wall)
-    cells = np.prod(number, axis=1)
-    made = Walls(
-        kind=kind,
-        shape=shape,
-        corner=corner,
-        material=np.array([walls[m].material for m in owner], np.int32),
-        wall=owner,
-        velocity=_vectors([wall.velocity for wall in walls]),
-        spin=_vectors([wall.spin for wall in walls]),
-        centre=_vectors([wall.middle() for wall in walls]),
-        shift=np.zeros((len(walls), 3)),
-        turned=np.tile(np.eye(3).reshape(-1), (len(walls), 1)),
-        sweep=np.array([wall.sweep() for wall in walls], float),
-        travel=np.zeros(len(walls)),
-        single=np.flatnonzero(kind != TRIANGLE).astype(np.int32),
-        cell_low=low,
-        cell_width=width,
-        cell_number=number,
-        cell_offset=np.cumsum(cells) - cells,
-        cell_start=np.zeros(int(cells.sum()) + 1, np.int64),
-        cell_member=np.zeros(0, np.int32),
-    )
-    return _with_cells(made) if len(made.single) < len(kind) else made
-
-
-def _cells(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
-    """Lower corner, width and number of the cells of a mesh: about as wide as its triangles, and not too many."""
-    corners = mesh.vertices[mesh.triangles]
-    size = float((corners.max(axis=1) - corners.min(axis=1)).max(axis=1).mean())
-    low = mesh.vertices.min(axis=0)
-    span = mesh.vertices.max(axis=0) - low
-    width = max(size, float(np.prod(span) / (8.0 * len(corners))) ** (1.0 / 3.0), float(span.max()) / 256.0)
-    return low, width, np.floor(span / width).astype(np.int64) + 1
-
-
-def _with_cells(walls: Walls) -> Walls:
-    """The same walls with their triangles sorted into cells."""
-    count = np.zeros(len(walls.cell_start) - 1, np.int64)
-    bin_triangles(flat(walls), count, walls.cell_member, False)
-    walls.cell_start[1:] = np.cumsum(count)
-    member = np.empty(walls.cell_start[-1], np.int32)
-    bin_triangles(flat(walls), walls.cell_start[:-1].copy(), member, True)
-    return walls._replace(cell_member=member)
-
-
-def _vectors(rows: Sequence[Any]) -> np.ndarray:
-    return np.array(rows, float).reshape(-1, 3)
-
-
 def _unit(direction: Sequence[float]) -> np.ndarray:
     return np.asarray(direction, float) / np.linalg.norm(direction)
 
@@ -365,17 +301,3 @@ def _check_positive(wall: Wall, *fields: str) -> None:
         value = getattr(wall, field)
         if value is not None and not 0.0 < value < np.inf:
             raise InputError(field, value, "above 0 and finite")
-
-
-def check_walls(walls: Sequence[Wall], box: np.ndarray, materials: int) -> None:
-    """Refuse walls that a run cannot have.
-
-    box        (3,) length of the periodic box, infinite along open axes [m]
-    materials  number of rows of the pair table
-    """
-    periodic = np.isfinite(box)
-    for number, wall in enumerate(walls):
-        if wall.material >= materials:
-            raise InputError(f"material of wall {number}", wall.material, f"below {materials}, the rows of the table")
-        if periodic.any() and not wall.repeats(periodic):
-            raise InputError(f"walls[{number}]", type(wall).__name__, "the same all along the periodic axes of the box")
