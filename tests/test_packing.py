@@ -11,7 +11,8 @@ from cfddem import simulation
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
-from cfddem.particles.neighbours import list_edges, wrap
+from cfddem.particles.near_walls import assemble
+from cfddem.particles.neighbours import wrap
 from cfddem.particles.packing import (
     OVERLAP_LIMIT,
     PackingFailed,
@@ -23,8 +24,7 @@ from cfddem.particles.packing import (
     random_packing,
 )
 from cfddem.particles.pairs import HOME
-from cfddem.particles.state import bodies
-from cfddem.particles.walls import assemble
+from cfddem.particles.state import Bodies, bodies
 from cfddem.simulation import Simulation
 
 
@@ -130,6 +130,13 @@ def test_bad_sizes_are_refused_by_name(make: object, field: str) -> None:
 
 
 INF = math.inf
+GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, roughness=1e-6)
+
+
+def listed(spheres: Bodies, film: bool, skin: float, box: np.ndarray) -> Simulation:
+    """A run over these spheres, as it begins: with its first list."""
+    sides = tuple(length if np.isfinite(length) else None for length in box)
+    return Simulation(spheres, pair_table([GLASS]), laws=Laws(film=film), box=sides, skin=skin)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 15.0])
@@ -151,7 +158,7 @@ def test_list_is_that_of_a_search_through_all_pairs(
     position[:3] = 0.0  # corners belong to the box
     wrap(position, box_size)
     spheres = bodies(position, radius, 1000.0)
-    found = list_edges(spheres, assemble(), film, skin, box_size)
+    found = listed(spheres, film > 0.0, skin, box_size).edges
     apart, shift = nearest_images(spheres.position, box_size)
     touch = radius[:, None] + radius[None]
     reach = touch + film * radius[:, None] * radius[None] / touch + skin
@@ -168,7 +175,7 @@ def test_box_too_small_for_one_image_of_a_pair_is_refused() -> None:
     """Below twice the reach a pair could meet itself in two images."""
     spheres = bodies(np.full((2, 3), 0.5), 0.3, 1000.0)
     with pytest.raises(InputError, match="box"):
-        list_edges(spheres, assemble(), 0.0, 0.01, np.array([1.0, 1.0, 1.0]))
+        listed(spheres, False, 0.01, np.array([1.0, 1.0, 1.0]))
 
 
 @pytest.mark.parametrize("film", [False, True])
@@ -178,11 +185,10 @@ def test_memory_goes_with_the_pair_through_lists_and_sorting(film: bool, monkeyp
     It is odd in the two: where sorting turns a pair round, the spring must change its sign.
     """
     monkeypatch.setattr(simulation, "THREADING_PAYS", 1)
-    glass = Material(density=2500, youngs_modulus=10e6, poisson=0.25, roughness=1e-6)
     centres, box = random_packing(mono(400, 1e-3), 0.55, seed=9)
     shuffled = centres[np.random.default_rng(1).permutation(len(centres))]
     spheres = bodies(shuffled, 0.5e-3, 2500.0, viscosity=1e-3 if film else 0.0)
-    run = Simulation(spheres, pair_table([glass]), laws=Laws(film=film), box=tuple(box), sort_every=1)
+    run = Simulation(spheres, pair_table([GLASS]), laws=Laws(film=film), box=tuple(box), sort_every=1)
 
     def expected() -> tuple[np.ndarray, np.ndarray]:
         one, other = (run.bodies.id[row].astype(float) for row in (run.edges.first, run.edges.second))
@@ -200,7 +206,7 @@ def test_memory_goes_with_the_pair_through_lists_and_sorting(film: bool, monkeyp
     run._relist()
     assert not np.array_equal(ids, run.bodies.id)
     turned_now = run.bodies.id[run.edges.first] > run.bodies.id[run.edges.second]
-    assert 0 < turned.sum() and 0 < turned_now.sum()
+    assert turned.sum() > 0 and turned_now.sum() > 0
     springs, speeds = expected()
     now = zip(*(np.sort([run.bodies.id[run.edges.first], run.bodies.id[run.edges.second]], axis=0).tolist()))
     kept = np.array([pair in pairs_before for pair in now])
