@@ -11,7 +11,6 @@ from cfddem import simulation
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
-from cfddem.particles.near_walls import assemble
 from cfddem.particles.neighbours import wrap
 from cfddem.particles.packing import (
     OVERLAP_LIMIT,
