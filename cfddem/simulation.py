@@ -63,6 +63,7 @@ class Simulation:
         self.bodies = bodies
         self.table = table
         self.walls = assemble(walls)
+        self._walled = True if walls else None
         self.laws = laws or Laws()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
@@ -129,7 +130,9 @@ class Simulation:
         record = self.collisions
         large = self.bodies.count >= THREADING_PAYS
         return (march_threaded if large else march)(  # type: ignore[no-any-return]
-            *self._views,
+            *self._views[:3],
+            self._walled,
+            self._views[3],
             self.table,
             self.laws.without_the_absent() if large else self.laws,
             self.free,
@@ -148,7 +151,8 @@ class Simulation:
         self._origin = self.bodies.position.copy()
         self._views = (flat(self.bodies), flat(edges), flat(self.walls), shifts(self.box).reshape(-1))
         self.walls.travel[:] = 0.0
-        meet_walls(*self._views[:3], self.free, self._reach_ratio)
+        if self._walled:
+            meet_walls(*self._views[:3], self.free, self._reach_ratio)
 
     def _listed(self) -> Edges:
         return list_edges(self.bodies, self.walls, self._reach_ratio, self.skin, self.box, self.collisions is not None)

@@ -203,13 +203,14 @@ def _meet_pairs(
 meet_pairs, meet_pairs_threaded = serial_and_threaded(_meet_pairs)
 
 
-def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps, origin, reach, time, log):
+def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step, steps, origin, reach, time, log):
     """Find the forces at the present places, then advance by up to `steps` steps.
 
     With `steps` = 0 nothing moves. With `steps` > 0 the forces at hand are taken as they are, and the march
     stops early when a particle has moved by `reach` from `origin`, or when `log`, the record of encounters
     ended since `time`, could overflow. Returns the number of steps made, the largest displacement squared
-    (NaN if a position is no number) and the number of rows written.
+    (NaN if a position is no number) and the number of rows written. Where `walled` is None there are no walls,
+    and nothing about them is compiled.
     """
     farthest = np.zeros(CHUNKS)
     largest = 0.0
@@ -237,12 +238,14 @@ def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps,
                     if not moved <= far:
                         far = moved
                 farthest[chunk] = far
-            way = advance_walls(walls, step)
-            largest = max(largest, way * way)
             done += 1
-            if meshes:
-                hand_over(edges, walls)
-        meet_walls(bodies, edges, walls, free, laws.cutoff_ratio if films else 0.0)
+            if walled is not None:
+                way = advance_walls(walls, step)
+                largest = max(largest, way * way)
+                if meshes:
+                    hand_over(edges, walls)
+        if walled is not None:
+            meet_walls(bodies, edges, walls, free, laws.cutoff_ratio if films else 0.0)
         if films:
             for k in prange(number):
                 wet(k, bodies, edges, walls, shift, table, laws)
@@ -268,19 +271,22 @@ def _march(bodies, edges, walls, shift, table, laws, free, gravity, step, steps,
             free,
             half,
         )
-        for edge in range(pairs, number):
-            k = np.uint64(edge)
-            part = portion(edges, k)
-            if part == 0.0:
-                put(edges.force, k, NOTHING)
-                put(edges.couple, k, NOTHING)
-                continue
-            meeting = wall_meeting(k, bodies, edges, shift)
-            which = np.uint64(bodies.material[edges.first[k]]) * kinds + np.uint64(walls.material[edges.second[k]])
-            push, turn, memory = contact(meeting, rows, which, edges.minimum_gap[k], at(edges.spring, k), laws, half)
-            put(edges.force, k, times(part, push))
-            put(edges.couple, k, times(part, turn))
-            put(edges.spring, k, memory)
+        if walled is not None:
+            for edge in range(pairs, number):
+                k = np.uint64(edge)
+                part = portion(edges, k)
+                if part == 0.0:
+                    put(edges.force, k, NOTHING)
+                    put(edges.couple, k, NOTHING)
+                    continue
+                meeting = wall_meeting(k, bodies, edges, shift)
+                which = np.uint64(bodies.material[edges.first[k]]) * kinds + np.uint64(walls.material[edges.second[k]])
+                push, turn, memory = contact(
+                    meeting, rows, which, edges.minimum_gap[k], at(edges.spring, k), laws, half
+                )
+                put(edges.force, k, times(part, push))
+                put(edges.couple, k, times(part, turn))
+                put(edges.spring, k, memory)
         if films and not drifting:
             for k in prange(number):
                 film = film_force(k, bodies, edges, walls, shift, table, laws)

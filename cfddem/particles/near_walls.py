@@ -99,8 +99,10 @@ def check_walls(walls: Sequence[Wall], box: np.ndarray, materials: int) -> None:
 
 def near_walls(bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float) -> tuple[np.ndarray, np.ndarray]:
     """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32."""
-    count = np.zeros(bodies.count, np.int64)
     nothing = np.zeros(0, np.uint32)
+    if len(walls.kind) == 0:
+        return nothing, nothing
+    count = np.zeros(bodies.count, np.int64)
     _near(flat(bodies), flat(walls), cutoff_ratio, skin, count, nothing, nothing, False)
     begin = np.cumsum(count) - count
     first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))

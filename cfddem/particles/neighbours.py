@@ -14,10 +14,13 @@ import numpy as np
 from cfddem.errors import InputError
 from cfddem.kernels import inline, kernel, prange, threaded
 from cfddem.particles.near_walls import near_walls
-from cfddem.particles.pairs import HOME, Edges, edges
+from cfddem.particles.pairs import HOME, Edges, edges, shifts
 from cfddem.particles.state import Bodies
 from cfddem.particles.surfaces import Walls
 from cfddem.particles.vectors import at, flat
+
+FEW = 64
+"""Up to so many particles every pair is looked at."""
 
 CLASS_RATIO = 2.0
 """Radii within this factor share a size class."""
@@ -50,15 +53,8 @@ def list_edges(
     for axis in range(3):
         if box[axis] < 2.0 * reach:
             raise InputError("box", float(box[axis]), f"at least {2.0 * reach:.3g} m, twice the reach of a pair")
-    cells = bin_particles(bodies.position, bodies.radius, cutoff_ratio, skin, box)
-    count = np.zeros(bodies.count, np.int64)
-    nothing = np.zeros(0, np.uint32)
-    images = np.zeros(0, np.uint8)
-    _search(flat(bodies), cells, cutoff_ratio, skin, box, count, nothing, nothing, images, False)
-    end = np.cumsum(count)
-    first = np.empty(end[-1], np.uint32)
-    second, image = np.empty_like(first), np.empty(end[-1], np.uint8)
-    _search(flat(bodies), cells, cutoff_ratio, skin, box, end, first, second, image, True)
+    find = _among_few if bodies.count <= FEW else _among_many
+    first, second, image = find(bodies, cutoff_ratio, skin, box)
     particle, wall = near_walls(bodies, walls, cutoff_ratio, skin)
     return edges(
         np.concatenate([first, particle]),
@@ -69,6 +65,37 @@ def list_edges(
         film=cutoff_ratio > 0.0,
         record=record,
     )
+
+
+def _among_few(
+    bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs within reach, each looked at; nothing needs compiling."""
+    i, j = np.triu_indices(bodies.count, 1)
+    loose = bodies.inverse_mass[i] + bodies.inverse_mass[j] > 0.0
+    i, j = i[loose], j[loose]
+    touch = bodies.radius[i] + bodies.radius[j]
+    near = touch + cutoff_ratio * bodies.radius[i] * bodies.radius[j] / touch + skin
+    apart = (bodies.position[i] - bodies.position[j])[:, None, :] + shifts(box)[None, :, :]
+    within = (apart**2).sum(axis=2) < near[:, None] ** 2
+    if not np.isfinite(box).any():
+        within[:, :HOME] = within[:, HOME + 1 :] = False
+    pair, image = np.nonzero(within)
+    return i[pair].astype(np.uint32), j[pair].astype(np.uint32), image.astype(np.uint8)
+
+
+def _among_many(
+    bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pairs within reach, looked for cell by cell: counted first, then written."""
+    cells = bin_particles(bodies.position, bodies.radius, cutoff_ratio, skin, box)
+    count = np.zeros(bodies.count, np.int64)
+    nothing, images = np.zeros(0, np.uint32), np.zeros(0, np.uint8)
+    _search(flat(bodies), cells, cutoff_ratio, skin, box, count, nothing, nothing, images, False)
+    end = np.cumsum(count)
+    first, second, image = (np.empty(end[-1], kind) for kind in (np.uint32, np.uint32, np.uint8))
+    _search(flat(bodies), cells, cutoff_ratio, skin, box, end, first, second, image, True)
+    return first, second, image
 
 
 def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float, skin: float, box: np.ndarray) -> Cells:

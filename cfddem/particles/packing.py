@@ -126,7 +126,7 @@ def random_packing(
     for _ in range(most_sweeps // _SWEEPS + 1):
         wrap(spheres.position, box)
         graph = list_edges(spheres, assemble(), 0.0, skin, box)
-        worst = _push_apart(flat(spheres), flat(graph), shifts(box).reshape(-1), _SWEEPS, 0.25 * skin)
+        worst = _push_apart(flat(spheres), flat(graph), shifts(box).reshape(-1), _SWEEPS, 0.25 * skin, OVERLAP_LIMIT)
         if worst <= OVERLAP_LIMIT:
             wrap(spheres.position, box)
             return spheres.position, box
@@ -153,12 +153,12 @@ _SWEEPS = 25
 
 
 @kernel
-def _push_apart(bodies, edges, shift, sweeps, reach):
-    """Move overlapping spheres apart, each by half of the overlap; returns the largest one left."""
+def _push_apart(bodies, edges, shift, sweeps, reach, limit):
+    """Move overlapping spheres apart, each by half of the overlap; returns the largest one left, over the radius."""
     position, radius = bodies.position, bodies.radius
     way = np.zeros_like(position)
     worst = 0.0
-    for _ in range(sweeps):
+    for sweep in range(sweeps + 1):
         way[:] = 0.0
         worst = 0.0
         for k in range(edges.between_particles):
@@ -177,7 +177,7 @@ def _push_apart(bodies, edges, shift, sweeps, reach):
                     push *= (position[i + axis] - position[j + axis] + shift[image + axis]) / distance
                     way[i + axis] += push
                     way[j + axis] -= push
-        if worst <= 0.0:
+        if worst <= limit or sweep == sweeps:
             return worst
         for place in range(len(way)):
             position[place] += min(max(way[place], -reach), reach)
