@@ -132,7 +132,9 @@ def test_particle_that_leaves_the_domain_ends_the_run() -> None:
     run = lone(domain=room)
     with pytest.raises(RunFailed) as failure:
         run.advance(1e-5, 100_000)
-    assert re.match(r"particle 0 at \(.*\) m, t = \S+ s, speed \S+ m/s, .* has left the domain .*; ", str(failure.value))
+    assert re.match(
+        r"particle 0 at \(.*\) m, t = \S+ s, speed \S+ m/s, .* has left the domain .*; ", str(failure.value)
+    )
     assert "\n" not in str(failure.value)
     falls = (-0.5 + math.sqrt(0.25 + 2 * 9.81 * 11.5e-3)) / 9.81
     assert run.time == pytest.approx(falls, rel=0.01)

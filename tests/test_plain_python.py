@@ -1,0 +1,73 @@
+"""The compiled pair loop against the same source run by the plain interpreter."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SYSTEM = """
+import sys
+import numpy as np
+from numba import config
+from cfddem.materials import Material, pair_table
+from cfddem.particles.forces import Laws
+from cfddem.particles.packing import lattice
+from cfddem.particles.state import bodies
+from cfddem.particles.walls import Plane
+from cfddem.simulation import Simulation
+
+film, integrator, onset, spring, contact, plain, path = *(int(word) for word in sys.argv[1:7]), sys.argv[7]
+assert bool(config.DISABLE_JIT) == bool(plain)
+glass = Material(density=2500, youngs_modulus=1e7, poisson=0.25, restitution=0.7, friction=0.4, roughness=2e-6,
+                 friction_lubricated=0.1)
+draw = np.random.default_rng(2)
+places = lattice(1e-3, ((0, 0, 0), (4.0e-3, 4.0e-3, 3.0e-3)), 1.0)
+places = places + draw.uniform(-2e-5, 2e-5, places.shape)
+size = 0.5e-3 * draw.uniform(0.97, 1.03, len(places))
+spheres = bodies(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shape),
+                 spin=draw.normal(0, 50.0, places.shape), viscosity=0.01 * film)
+laws = Laws(film=bool(film), integrator=integrator, friction_onset=onset, spring=spring, contact=contact,
+            normal_stiffness=500.0, tangential_stiffness=300.0)
+table = pair_table([glass])
+run = Simulation(spheres, table.view(np.recarray) if plain else table, walls=[Plane()], laws=laws,
+                 gravity=(0.0, 0.0, -9.81), box=(4.0e-3, 4.0e-3, None))
+run.advance(1e-6, 12)
+assert (np.abs(run.edges.spring).max() > 0.0) and len(run.edges.first) > run.edges.between_particles > 50
+np.savez(path, position=spheres.position, velocity=spheres.velocity, spin=spheres.spin, force=spheres.force,
+         torque=spheres.torque, edge_force=run.edges.force, edge_spring=run.edges.spring)
+"""
+
+
+def state(folder: Path, plain: bool, choices: tuple[int, ...]) -> dict[str, np.ndarray]:
+    """Run the system in a process of its own and read its state."""
+    path = folder / f"{plain}.npz"
+    words = [*map(str, choices), str(int(plain)), str(path)]
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": str(int(plain)), "NUMBA_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", SYSTEM, *words], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    with np.load(path) as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        (0, 0, 0, 0, 0),
+        (1, 0, 0, 0, 0),
+        pytest.param((1, 1, 1, 1, 0), marks=pytest.mark.slow),
+        pytest.param((0, 0, 0, 0, 1), marks=pytest.mark.slow),
+    ],
+    ids=["dry", "film", "film, explicit, friction at overlap, rescaled", "linear"],
+)
+def test_compiled_loop_equals_its_plain_source(choices: tuple[int, ...], tmp_path: Path) -> None:
+    """Places, velocities, forces and springs of 48 spheres after 12 steps: within 1e-12 of the largest of each."""
+    compiled, plain = (state(tmp_path, way, choices) for way in (False, True))
+    for name, values in compiled.items():
+        assert np.abs(values - plain[name]).max() <= 1e-12 * np.abs(values).max(), name
