@@ -122,7 +122,7 @@ class Simulation:
             self.time += done * step
             moved_far = not farthest < (0.5 * self.skin) ** 2
             if moved_far or (steps == 0 and self.bodies.count >= THREADING_PAYS):
-                guard(self.bodies, self.edges, self.gap, self.domain, self.time, step)
+                guard(self.bodies, self.edges, self.gap, self.domain, self.time, step, self.walls.wall)
             if moved_far:
                 self._relist()
 

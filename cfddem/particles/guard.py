@@ -12,13 +12,22 @@ CRUSHED = 0.5
 """Overlap over radius beyond which two bodies have gone through each other rather than touched."""
 
 
-def guard(bodies: Bodies, edges: Edges, gap: np.ndarray, domain: np.ndarray | None, time: float, step: float) -> None:
+def guard(
+    bodies: Bodies,
+    edges: Edges,
+    gap: np.ndarray,
+    domain: np.ndarray | None,
+    time: float,
+    step: float,
+    owner: np.ndarray,
+) -> None:
     """Stop the run, naming the particle, where one is lost.
 
     gap     (n,) of every edge [m]
     domain  (2, 3) corners of the room that no centre may leave; None for all of space [m]
     time    [s]
     step    last time step [s]
+    owner   wall that each piece of a wall belongs to
     """
     sound = np.isfinite(bodies.position).all(axis=1) & np.isfinite(bodies.velocity).all(axis=1)
     if not sound.all():
@@ -33,7 +42,7 @@ def guard(bodies: Bodies, edges: Edges, gap: np.ndarray, domain: np.ndarray | No
             row = int(np.argmin(inside))
             raise RunFailed(
                 f"{_place(bodies, row, time, step)} has left the domain {domain[0]} to {domain[1]} m"
-                f"{_last_wall(row, edges)}; close the walls there, enlarge the domain, or take a smaller step"
+                f"{_last_wall(row, edges, owner)}; close the walls there, enlarge the domain, or take a smaller step"
             )
     if len(gap):
         radius = bodies.radius[edges.first]
@@ -42,7 +51,7 @@ def guard(bodies: Bodies, edges: Edges, gap: np.ndarray, domain: np.ndarray | No
         deepest = int(np.argmin(gap / radius))
         if gap[deepest] < -CRUSHED * radius[deepest]:
             row, other = int(edges.first[deepest]), int(edges.second[deepest])
-            what = f"particle {bodies.id[other]}" if deepest < split else f"wall {other}"
+            what = f"particle {bodies.id[other]}" if deepest < split else f"wall {owner[other]}"
             raise RunFailed(
                 f"{_place(bodies, row, time, step)} is pressed into {what} by {-gap[deepest] / radius[deepest]:.2g} "
                 f"radii (limit {CRUSHED:g}); take a smaller step or a stiffer contact, or start without overlaps"
@@ -56,7 +65,7 @@ def _place(bodies: Bodies, row: int, time: float, step: float) -> str:
     return f"{name}, t = {time:.6g} s, speed {speed:.3g} m/s, step {step:.3g} s,"
 
 
-def _last_wall(row: int, edges: Edges) -> str:
+def _last_wall(row: int, edges: Edges, owner: np.ndarray) -> str:
     split = edges.between_particles
     met = edges.second[split:][edges.first[split:] == row]
-    return f", last near wall {int(met[0])}" if len(met) else ""
+    return f", last near wall {int(owner[met[0]])}" if len(met) else ""
