@@ -24,7 +24,10 @@ import numpy as np
 
 from cfddem.errors import InputError
 
-TARGETS: dict[str, str] = {"binary-collision": "scenarios.binary_collision_validation"}
+TARGETS: dict[str, str] = {
+    "binary-collision": "scenarios.binary_collision_validation",
+    "particles": "scenarios.particles_validation",
+}
 """Name of each target, and the module that holds its `study`."""
 
 WIDTH = 100
