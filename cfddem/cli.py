@@ -43,6 +43,7 @@ def collide(
 
     Example: cfddem collide --material delrin --stokes 30 --velocity 0.1
     """
+    _tell_of_compilation()
     from scenarios.binary_collision import MATERIALS
     from scenarios.binary_collision import collide as run
 
@@ -86,6 +87,7 @@ def validate(
 
     Example: cfddem validate binary-collision
     """
+    _tell_of_compilation()
     from scenarios.validation import TARGETS
     from scenarios.validation import validate as run
 
@@ -110,6 +112,7 @@ def bench(
 
     Example: cfddem bench dem --particles 10000
     """
+    _tell_of_compilation()
     from scenarios import dense_bed
 
     if target != "dem":
@@ -120,6 +123,13 @@ def bench(
     else:
         for name, text in dense_bed.rows(result):
             print(f"{name:<20}  {text}")
+
+
+def _tell_of_compilation() -> None:
+    """Say on the terminal when loops are compiled for the first time; loads the compiler."""
+    from cfddem.kernels import announce_compilation
+
+    announce_compilation()
 
 
 def _show(values: dict[str, Any], units: dict[str, str], as_json: bool) -> None:

@@ -78,17 +78,20 @@ class _Announcer(event.Listener):
     """One line of progress while loops compile for the first time."""
 
     def __init__(self) -> None:
-        self.compiled = 0
+        self.compiled, self.depth = 0, 0
 
     def on_start(self, seen: event.Event) -> None:
-        dispatcher = seen.data.get("dispatcher")
-        module = getattr(getattr(dispatcher, "py_func", None), "__module__", "")
-        if module.startswith(("cfddem", "scenarios")):
+        """A compilation begins; those of the helpers inside a loop are part of it."""
+        self.depth += 1
+        if self.depth == 1:
             self.compiled += 1
-            print(f"\rcompiling loop {self.compiled} (kept for next time) ...", end="", file=sys.stderr)
+            print(f"\rcompiling loop {self.compiled} (kept for next time) ...", end="", file=sys.stderr, flush=True)
 
     def on_end(self, seen: event.Event) -> None:
-        print("\r" + " " * 60 + "\r", end="", file=sys.stderr)
+        """A compilation has ended."""
+        self.depth -= 1
+        if self.depth == 0:
+            print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)
 
 
 def announce_compilation() -> None:
