@@ -261,5 +261,8 @@ def squeeze(k, bodies, edges, walls, shift, table, laws, step):
         edges.minimum_gap[k],
         laws.cutoff_ratio * reduced_radius,
     )
+    # what other films left of an earlier step may be made up for, but never by speeding the pair up
+    new_speed = max(new_speed, 0.0) if normal_speed > 0.0 else min(new_speed, 0.0)
+    new_speed = min(new_speed, normal_speed) if normal_speed > 0.0 else max(new_speed, normal_speed)
     edges.accounted_gap[k] = gap + step * new_speed
     put(edges.impulse, k, times((new_speed - normal_speed) / inverse_mass, normal))

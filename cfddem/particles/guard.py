@@ -8,8 +8,8 @@ from cfddem.errors import RunFailed
 from cfddem.particles.pairs import Edges
 from cfddem.particles.state import Bodies
 
-CRUSHED = 0.5
-"""Overlap over radius beyond which two bodies have gone through each other rather than touched."""
+CRUSHED = 1.0
+"""Overlap over radius at which a sphere's centre is in the surface of the other body: it has gone through."""
 
 
 def guard(
