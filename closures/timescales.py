@@ -64,3 +64,38 @@ def film_time(reduced_mass: float, strength: float, gap: float) -> float:
     2.0
     """
     return reduced_mass * gap / strength
+
+
+@law("timescale", "balance of the sphere's inertia and its drag in the normal form of closures.drag")
+def drag_time(diameter: float, density: float, viscosity: float, voidage: float, drag_factor: float) -> float:
+    r"""Time in which drag takes up the slip of a sphere.
+
+    .. math:: \tau = \frac{\rho_p d^2}{18\eta\varepsilon F}
+
+    diameter     d [m]
+    density      rho_p, of the sphere [kg/m3]
+    viscosity    eta, dynamic [Pa s]
+    voidage      eps [-]
+    drag_factor  F, over Stokes drag on the superficial slip [-]
+    returns      tau [s]
+
+    >>> round(drag_time(1e-3, 1800.0, 1e-3, 1.0, 1.0), 9)
+    0.1
+    """
+    return density * diameter * diameter / (18.0 * viscosity * voidage * drag_factor)
+
+
+@law("timescale", "Courant, Friedrichs & Lewy, Math. Ann. 100 (1928) 32")
+def courant_time(cell: float, speed: float) -> float:
+    r"""Time in which a stream crosses a cell; the step over it is the Courant number.
+
+    .. math:: t_C = \Delta x / u
+
+    cell     dx, width of the cell [m]
+    speed    u, > 0 [m/s]
+    returns  t_C [s]
+
+    >>> courant_time(0.5, 2.0)
+    0.25
+    """
+    return cell / speed

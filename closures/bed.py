@@ -1,0 +1,185 @@
+"""Beds of spheres in a stream: pressure gradient, onset of fluidisation, terminal velocity, expansion."""
+
+from __future__ import annotations
+
+import math
+
+from closures.law import law
+
+
+@law("bed", "Ergun, Chem. Eng. Prog. 48 (1952) 89", voidage=(0.36, 0.8))
+def ergun_gradient(velocity: float, diameter: float, density: float, viscosity: float, voidage: float) -> float:
+    r"""Pressure gradient of a packed bed by Ergun.
+
+    .. math:: \frac{\Delta p}{L} = 150\frac{(1-\varepsilon)^2\eta U}{\varepsilon^3d^2}
+              + 1.75\frac{(1-\varepsilon)\rho U^2}{\varepsilon^3d}
+
+    velocity   U, superficial, >= 0 [m/s]
+    diameter   d [m]
+    density    rho, of the fluid [kg/m3]
+    viscosity  eta, dynamic [Pa s]
+    voidage    eps [-]
+    returns    dp/L, without hydrostatic head [Pa/m]
+
+    >>> round(ergun_gradient(0.02, 1e-3, 10.0, 1.5e-3, 0.451335) * 15.6e-3, 1)
+    230.5
+    """
+    scale = (1.0 - voidage) * velocity / (voidage * voidage * voidage * diameter)
+    return scale * (150.0 * (1.0 - voidage) * viscosity / diameter + 1.75 * density * velocity)
+
+
+@law("bed", "Ergun (1952), balanced against the buoyant weight of the bed", voidage=(0.36, 0.8))
+def fluidisation_reynolds_ergun(archimedes: float, voidage: float) -> float:
+    r"""Reynolds number at which the drag of Ergun carries a bed of known voidage.
+
+    .. math:: \frac{1.75}{\varepsilon^3}Re^2 + \frac{150(1-\varepsilon)}{\varepsilon^3}Re = Ar
+
+    archimedes  Ar, >= 0 [-]
+    voidage     eps, of the bed at its onset [-]
+    returns     Re_mf = rho u_mf d / eta [-]
+
+    >>> round(fluidisation_reynolds_ergun(1900 / 0.125, 0.5), 2)      # 1.75 Re^2 + 75 Re = 1900
+    17.88
+    """
+    half = 75.0 * (1.0 - voidage)
+    weight = archimedes * voidage * voidage * voidage
+    return weight / (half + math.sqrt(half * half + 1.75 * weight))
+
+
+@law("bed", "Wen & Yu, AIChE J. 12 (1966) 610, doi:10.1002/aic.690120343")
+def fluidisation_reynolds_wen_yu(archimedes: float) -> float:
+    r"""Reynolds number of minimum fluidisation where the voidage is not known.
+
+    .. math:: Re_{mf} = \sqrt{33.7^2 + 0.0408 Ar} - 33.7
+
+    archimedes  Ar, >= 0 [-]
+    returns     Re_mf = rho u_mf d / eta [-]
+
+    Range: 0.001 < Re < 4000; scatter about 30 %.
+
+    >>> round(fluidisation_reynolds_wen_yu(1e5), 2)
+    38.52
+    """
+    part = 0.0408 * archimedes
+    return part / (math.sqrt(33.7 * 33.7 + part) + 33.7)
+
+
+@law("bed", "Abraham, Phys. Fluids 13 (1970) 2194, solved for Re in the balance Ar = 18 Re F")
+def terminal_reynolds_abraham(archimedes: float) -> float:
+    r"""Reynolds number of a sphere that falls at its terminal velocity with Abraham's drag.
+
+    .. math:: \sqrt{Re}\,(1 + \sqrt{Re}/9.06) = \sqrt{Ar/18}
+
+    archimedes  Ar, >= 0 [-]
+    returns     Re_t [-]
+
+    >>> round(terminal_reynolds_abraham(49.14**2), 1)      # Mordant & Pinton (2000), 0.5 mm glass: measured 41
+    44.5
+    """
+    side = math.sqrt(archimedes / 18.0)
+    root = 2.0 * side / (1.0 + math.sqrt(1.0 + 4.0 * side / 9.06))
+    return root * root
+
+
+@law("bed", "Brown & Lawler, J. Environ. Eng. 129 (2003) 222, solved for Re in the balance Ar = 18 Re F")
+def terminal_reynolds_brown_lawler(archimedes: float) -> float:
+    r"""Reynolds number of a sphere that falls at its terminal velocity with Brown and Lawler's drag.
+
+    .. math:: Ar = 18 Re + 2.7 Re^{1.681} + \frac{0.30525\,Re^3}{Re + 8710}
+
+    archimedes  Ar, >= 0 [-]
+    returns     Re_t [-]
+
+    Newton's method from above, where the balance is convex; 1e-12 relative.
+
+    >>> round(terminal_reynolds_brown_lawler(49.14**2), 1)      # Mordant & Pinton (2000), 0.5 mm glass: measured 41
+    44.7
+    """
+    number = archimedes / 18.0
+    for _ in range(60):
+        pull = 18.0 * number + 2.7 * number**1.681 + 0.30525 * number * number * number / (number + 8710.0)
+        inertia = 0.30525 * number * number * (2.0 * number + 26130.0) / ((number + 8710.0) * (number + 8710.0))
+        number -= (pull - archimedes) / (18.0 + 4.5387 * number**0.681 + inertia)
+    return float(number)
+
+
+@law("bed", "Richardson & Zaki, Trans. Inst. Chem. Eng. 32 (1954) 35")
+def exponent_richardson_zaki(reynolds: float, wall_ratio: float) -> float:
+    r"""Exponent n of the expansion of a bed by Richardson and Zaki.
+
+    .. math:: n = 4.65 + 19.5\tfrac dD,\ (4.35 + 17.5\tfrac dD)Re^{-0.03},\ (4.45 + 18\tfrac dD)Re^{-0.1},\
+              4.45 Re^{-0.1},\ 2.39
+
+    reynolds    Re_t, of the terminal velocity; the pieces meet at 0.2, 1, 200, 500 [-]
+    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    returns     n [-]
+
+    Range: any; the pieces do not meet exactly, by up to 2.3 % in a wide column.
+
+    >>> exponent_richardson_zaki(0.1, 0.0), exponent_richardson_zaki(1000.0, 0.0)
+    (4.65, 2.39)
+    """
+    if reynolds < 0.2:
+        return 4.65 + 19.5 * wall_ratio
+    if reynolds < 1.0:
+        return float((4.35 + 17.5 * wall_ratio) * reynolds**-0.03)
+    if reynolds < 200.0:
+        return float((4.45 + 18.0 * wall_ratio) * reynolds**-0.1)
+    if reynolds < 500.0:
+        return float(4.45 * reynolds**-0.1)
+    return 2.39
+
+
+@law("bed", "Garside & Al-Dibouni, Ind. Eng. Chem. Process Des. Dev. 16 (1977) 206", reynolds=(1e-3, 3e4))
+def exponent_garside(reynolds: float) -> float:
+    r"""Exponent n of the expansion of a bed by Garside and Al-Dibouni.
+
+    .. math:: \frac{5.1-n}{n-2.7} = 0.1 Re^{0.9}
+
+    reynolds  Re_t, of the terminal velocity [-]
+    returns   n [-]
+
+    >>> round(exponent_garside(10.0 ** (1 / 0.9)), 6)      # halfway between 5.1 and 2.7
+    3.9
+    """
+    ratio = 0.1 * reynolds**0.9
+    return float((5.1 + 2.7 * ratio) / (1.0 + ratio))
+
+
+@law("bed", "Khan & Richardson, Chem. Eng. Commun. 78 (1989) 111")
+def exponent_khan_richardson(archimedes: float, wall_ratio: float) -> float:
+    r"""Exponent n of the expansion of a bed by Khan and Richardson, with its wall factor.
+
+    .. math:: \frac{4.8-n}{n-2.4} = 0.043 Ar^{0.57}\,[1 - 1.24(d/D)^{0.27}]
+
+    archimedes  Ar [-]
+    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    returns     n [-]
+
+    Range: d/D < 0.45; the wall factor is not below 0 outside.
+
+    >>> round(exponent_khan_richardson(0.0, 0.0), 6)
+    4.8
+    """
+    wall = max(0.0, 1.0 - 1.24 * wall_ratio**0.27)
+    ratio = 0.043 * archimedes**0.57 * wall
+    return float((4.8 + 2.4 * ratio) / (1.0 + ratio))
+
+
+@law("bed", "Richardson & Zaki, Trans. Inst. Chem. Eng. 32 (1954) 35")
+def expanded_voidage(velocity: float, terminal_velocity: float, exponent: float) -> float:
+    r"""Voidage of a liquid bed at a superficial velocity.
+
+    .. math:: \varepsilon = (U/u_t)^{1/n}
+
+    velocity           U, superficial, >= 0 [m/s]
+    terminal_velocity  u_t [m/s]
+    exponent           n [-]
+    returns            eps [-]; at most 1
+
+    Range: between fluidisation and eps = 0.95.
+
+    >>> expanded_voidage(0.25, 1.0, 2.0)
+    0.5
+    """
+    return float(min(1.0, velocity / terminal_velocity) ** (1.0 / exponent))
