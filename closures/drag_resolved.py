@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from closures.drag_single import dallavalle, schiller_naumann
 from closures.law import law
 
 
@@ -61,29 +60,6 @@ def beetstra(reynolds: float, voidage: float) -> float:
     return float(creeping + 0.413 / (24.0 * square) * top * power / (power + 10.0 ** (3.0 * solids)))
 
 
-@law("drag", "Tenneti, Garg & Subramaniam, Int. J. Multiphase Flow 37 (2011) 1072", voidage=(0.5, 0.9))
-def tenneti(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of Tenneti, Garg and Subramaniam.
-
-    .. math:: \frac{F}{\varepsilon} = \frac{F_{SN}}{\varepsilon^3} + \frac{5.81\phi}{\varepsilon^3}
-              + \frac{0.48\phi^{1/3}}{\varepsilon^4} + \phi^3 Re\left(0.95 + \frac{0.61\phi^3}{\varepsilon^2}\right)
-
-    reynolds  Re, on the superficial slip [-]
-    voidage   eps = 1 - phi [-]
-    returns   F [-]
-
-    Range: Re < 300, 0.1 < phi < 0.5. The published factor is taken as one of the total force, since it then agrees
-    with Hill, Koch and Ladd within 2 % at phi = 0.4, Re = 0; hence the eps on the left.
-
-    >>> round(tenneti(0.0, 0.6) / 0.6, 1)
-    18.1
-    """
-    solids = max(1.0 - voidage, 0.0)
-    cube, solid_cube = voidage * voidage * voidage, solids * solids * solids
-    total = (schiller_naumann(reynolds, 1.0) + 5.81 * solids) / cube + 0.48 * solids ** (1.0 / 3.0) / (cube * voidage)
-    return float(voidage * (total + solid_cube * reynolds * (0.95 + 0.61 * solid_cube / (voidage * voidage))))
-
-
 @law("drag", "Tang, Peters, Kuipers, Kriebitzsch & van der Hoef, AIChE J. 61 (2015) 688", voidage=(0.4, 1.0))
 def tang(reynolds: float, voidage: float) -> float:
     r"""Drag factor of Tang, Peters, Kuipers, Kriebitzsch and van der Hoef.
@@ -106,26 +82,3 @@ def tang(reynolds: float, voidage: float) -> float:
     creeping = 10.0 * solids / square + square * (1.0 + 1.5 * math.sqrt(solids))
     linear = 0.11 * solids * (1.0 + solids) - 0.00456 / (square * square)
     return float(creeping + linear * reynolds + (0.169 * voidage + 0.0644 / (square * square)) * reynolds**0.657)
-
-
-@law("drag", "Rong, Dong & Yu, Chem. Eng. Sci. 99 (2013) 44, doi:10.1016/j.ces.2013.05.036", voidage=(0.37, 0.8))
-def rong(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of Rong, Dong and Yu.
-
-    .. math:: F = F_{Dallavalle}\,\varepsilon^{-\chi},\quad
-              \chi = 2.65(\varepsilon+1) - (5.3-3.5\varepsilon)\varepsilon^2\exp[-(1.5-\log_{10}Re)^2/2]
-
-    reynolds  Re, on the superficial slip [-]
-    voidage   eps [-]
-    returns   F [-]; 0.96 at Re = 0, eps = 1
-
-    Range: Re < 3000. The published drag has eps^2 |u-v|^2 eps^-chi, which is this form; creeping, it lies within 10 %
-    of Ergun at eps = 0.4.
-
-    >>> round(rong(0.0, 0.4), 1)
-    28.7
-    """
-    distance = 1.5 - math.log10(max(reynolds, 1e-12))
-    bell = math.exp(-0.5 * distance * distance)
-    chi = 2.65 * (voidage + 1.0) - (5.3 - 3.5 * voidage) * voidage * voidage * bell
-    return float(dallavalle(reynolds, 1.0) * voidage**-chi)
