@@ -52,7 +52,7 @@ def schiller_naumann(reynolds: float, voidage: float) -> float:
 
 @law("drag", "Dallavalle, Micromeritics (1948)", reynolds=(0.01, 3e3))
 def dallavalle(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a sphere by Dallavalle, the single sphere of Di Felice and of Rong.
+    r"""Drag factor of a sphere by Dallavalle, the single sphere of Di Felice.
 
     .. math:: F = (4.8 + 0.63\sqrt{Re})^2/24
 
