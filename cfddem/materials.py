@@ -72,6 +72,9 @@ PAIR = np.dtype(
 )
 """One row of the table of material pairs."""
 
+SMOOTHEST = 1e-10
+"""No film is thinner than an atom: the least minimum gap of a pair, also of solids without roughness [m]."""
+
 _OVERRIDABLE = ("restitution", "friction", "friction_lubricated", "roughness_gap")
 
 
@@ -106,6 +109,7 @@ def pair_table(
                 raise InputError(f"pair ({i}, {j}).{name}", value, nearest(name, _OVERRIDABLE))
             table[i, j][name] = table[j, i][name] = value
     for row in table.reshape(-1):
+        row["roughness_gap"] = max(float(row["roughness_gap"]), SMOOTHEST)
         row["damping_ratio"] = contact.damping_ratio(float(row["restitution"]))
         row["linear_damping_ratio"] = contact.linear_damping_ratio(float(row["restitution"]))
     return table

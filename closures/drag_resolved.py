@@ -36,6 +36,25 @@ def koch_hill(reynolds: float, voidage: float) -> float:
     return float(voidage * (creeping + 0.5 * inertial * reynolds))
 
 
+@law("drag", "van der Hoef, Beetstra & Kuipers, J. Fluid Mech. 528 (2005) 233", voidage=(0.4, 1.0), reynolds=(0.0, 0.1))
+def van_der_hoef(reynolds: float, voidage: float) -> float:
+    r"""Drag factor of equal spheres in creeping flow by van der Hoef, Beetstra and Kuipers.
+
+    .. math:: F = \frac{10\phi}{\varepsilon^2} + \varepsilon^2(1+1.5\sqrt\phi)
+
+    reynolds  Re; does not matter [-]
+    voidage   eps = 1 - phi [-]
+    returns   F [-]
+
+    Range: Re -> 0, phi < 0.6. Published in this normal form.
+
+    >>> round(van_der_hoef(0.0, 0.6), 2)
+    11.81
+    """
+    solids = max(1.0 - voidage, 0.0)
+    return 10.0 * solids / voidage**2 + voidage**2 * (1.0 + 1.5 * math.sqrt(solids))
+
+
 @law("drag", "Beetstra, van der Hoef & Kuipers, AIChE J. 53 (2007) 489, doi:10.1002/aic.11065", voidage=(0.4, 1.0))
 def beetstra(reynolds: float, voidage: float) -> float:
     r"""Drag factor of Beetstra, van der Hoef and Kuipers for equal spheres.
@@ -54,7 +73,7 @@ def beetstra(reynolds: float, voidage: float) -> float:
     """
     solids = max(1.0 - voidage, 0.0)
     square = voidage * voidage
-    creeping = 10.0 * solids / square + square * (1.0 + 1.5 * math.sqrt(solids))
+    creeping = van_der_hoef(reynolds, voidage)
     power = reynolds ** (0.5 + 2.0 * solids)
     top = (1.0 / voidage + 3.0 * voidage * solids) * reynolds + 8.4 * reynolds**0.657
     return float(creeping + 0.413 / (24.0 * square) * top * power / (power + 10.0 ** (3.0 * solids)))
@@ -79,6 +98,6 @@ def tang(reynolds: float, voidage: float) -> float:
     """
     solids = max(1.0 - voidage, 0.0)
     square = voidage * voidage
-    creeping = 10.0 * solids / square + square * (1.0 + 1.5 * math.sqrt(solids))
+    creeping = van_der_hoef(reynolds, voidage)
     linear = 0.11 * solids * (1.0 + solids) - 0.00456 / (square * square)
     return float(creeping + linear * reynolds + (0.169 * voidage + 0.0644 / (square * square)) * reynolds**0.657)

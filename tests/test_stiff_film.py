@@ -14,7 +14,7 @@ import pytest
 from impacts import STEP, Pair, kinetic_energy, normal_speed
 from scipy.integrate import solve_ivp
 
-from cfddem.materials import Material, pair_table
+from cfddem.materials import SMOOTHEST, Material, pair_table
 from cfddem.particles.forces import DRIFT, VERLET, Laws
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
@@ -312,3 +312,14 @@ def test_stiff_film_under_a_press(row: str, roughness: float, reference_speed: f
 def test_stiff_films_in_rows_under_a_press(row: str, roughness: float, reference_speed: float) -> None:
     """The same for every row, roughness and step."""
     press_until_rest(row, roughness, reference_speed)
+
+
+def test_solids_without_roughness_part_from_rest() -> None:
+    """A film between solids of roughness 0 ends at the size of an atom: a pair at touch, pulled apart, stays finite."""
+    smooth = Material(density=2500, youngs_modulus=1e9, poisson=0.25)
+    pair = bodies([[0.0, 0.0, 0.0], [2.1e-3, 0.0, 0.0]], 1e-3, 2500, velocity=[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    pair.viscosity[:] = 1e-3
+    run = Simulation(pair, pair_table([smooth]), laws=Laws(film=True))
+    run.advance(2e-4, 5)
+    assert 0.0 < run.bodies.velocity[1, 0] < 0.1
+    assert run.edges.minimum_gap[0] == SMOOTHEST

@@ -13,6 +13,8 @@ from cfddem.particles.forces import LINEAR, VERLET, Laws
 from cfddem.particles.pairs import Edges
 from cfddem.particles.state import Bodies
 from closures import contact, lubrication, timescales
+from closures.contact import hertz_stiffness
+from closures.timescales import overlap_period
 
 STEPS_PER_HERTZ_TIME = 50
 """The default step is 2 % of the Hertz time of the fastest approach."""
@@ -105,9 +107,9 @@ def _largest_rate(bodies, edges, gap, table, laws):
         if pair:
             radius = radius * bodies.radius[j] / (radius + bodies.radius[j])
         row = table[bodies.material[i], bodies.material[j] if pair else bodies.material[i]]
-        stiff = 2.0 * row.contact_modulus * math.sqrt(radius * overlap)
-        if laws.contact == LINEAR:
-            stiff = laws.normal_stiffness
+        stiff = laws.normal_stiffness
+        if laws.contact != LINEAR:
+            stiff = overlap_period(1.0, hertz_stiffness(row.contact_modulus, radius), overlap) ** -2
         stiffness[i] += stiff
         if pair:
             stiffness[j] += stiff
