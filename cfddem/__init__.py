@@ -18,11 +18,11 @@ _HOME = {
     "Laws": "cfddem.particles.forces",
     "Material": "cfddem.materials",
     "Mesh": "cfddem.particles.walls",
+    "ParticleSolver": "cfddem.particles.solver",
     "Plane": "cfddem.particles.walls",
-    "Simulation": "cfddem.simulation",
     "bodies": "cfddem.particles.state",
     "pair_table": "cfddem.materials",
-    "pour": "cfddem.pouring",
+    "pour": "cfddem.particles.pouring",
 }
 __all__ = ["__version__", *sorted(_HOME)]
 

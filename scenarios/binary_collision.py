@@ -20,8 +20,8 @@ import numpy as np
 from cfddem.errors import InputError, UnstableStep, nearest
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import CONTACTS, DRIFT, FRICTION_ONSETS, INTEGRATORS, SPRINGS, Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies
-from cfddem.simulation import Simulation
 from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
 from closures.minimum_gap import elastohydrodynamic
@@ -257,7 +257,7 @@ def _film_clock(setting: Setting, laws: Laws, step_fraction: float) -> tuple[str
 
 
 def _result(
-    simulation: Simulation,
+    simulation: ParticleSolver,
     setting: Setting,
     table: np.ndarray,
     history: dict[str, np.ndarray],
@@ -300,7 +300,7 @@ def _result(
     )
 
 
-def _frozen_gap(simulation: Simulation, setting: Setting) -> float:
+def _frozen_gap(simulation: ParticleSolver, setting: Setting) -> float:
     """The minimum gap of the encounter, from its record or, where it has not ended, from the pair itself."""
     if not simulation.laws.film:
         return 0.0

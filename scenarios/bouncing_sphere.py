@@ -16,9 +16,9 @@ import numpy as np
 
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 from closures import contact, timescales
 
 RADIUS, SPEED = 3e-3, 0.518
@@ -42,7 +42,7 @@ def bounce(until: float = 0.045) -> tuple[np.ndarray, np.ndarray]:
         [[0.0, 0.0, 1.999 * RADIUS]], RADIUS, STEEL.density, velocity=[0.0, 0.0, -SPEED], viscosity=VISCOSITY
     )
     weight = -GRAVITY * (1.0 - 1.0 / DENSITY_RATIO)
-    run = Simulation(sphere, table, walls=[Plane()], laws=Laws(film=True), gravity=(0.0, 0.0, weight), skin=RADIUS)
+    run = ParticleSolver(sphere, table, walls=[Plane()], laws=Laws(film=True), gravity=(0.0, 0.0, weight), skin=RADIUS)
     stiffness = contact.hertz_stiffness(float(table[0, 0]["contact_modulus"]), RADIUS)
     step = 0.02 * timescales.hertz_time(float(sphere.mass[0]), stiffness, SPEED)
     time, gap = [0.0], [RADIUS - 0.001 * RADIUS]

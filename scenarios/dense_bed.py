@@ -23,9 +23,9 @@ from cfddem.errors import CfddemError, InputError
 from cfddem.kernels import use_threads
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 
 DATA = Path(__file__).with_name("data")
 DIAMETER, STEP = 1e-3, 1e-5
@@ -53,11 +53,11 @@ def positions(count: int) -> tuple[np.ndarray, tuple[float, float]]:
     return np.concatenate(tiles), (across * side, along * side)
 
 
-def bed(count: int = 10_000, film: bool = False) -> Simulation:
+def bed(count: int = 10_000, film: bool = False) -> ParticleSolver:
     """The bed as a run, dry or with the film of water over its whole reach."""
     centres, (width, depth) = positions(count)
     grains = bodies(centres, 0.5 * DIAMETER, GRAIN.density, viscosity=1e-3 if film else 0.0)
-    return Simulation(
+    return ParticleSolver(
         grains,
         pair_table([GRAIN]),
         walls=[Plane()],

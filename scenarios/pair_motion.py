@@ -12,9 +12,9 @@ import numpy as np
 from cfddem.errors import RunFailed
 from cfddem.materials import Material
 from cfddem.particles.forces import VERLET, Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 from closures import contact, lubrication
 
 COAST = 1e-5
@@ -50,7 +50,7 @@ def stage(
     laws: Laws,
     full: bool,
     spin: tuple[float, float],
-) -> Simulation:
+) -> ParticleSolver:
     """Place striker and target; the line of centres at contact is the x axis, the plane of motion is x-y."""
     velocity = np.array([setting.speed, setting.tangential_speed, 0.0])
     wall = math.isinf(setting.radius[1])
@@ -71,7 +71,7 @@ def stage(
         material=np.arange(number, dtype=np.int32),
         viscosity=setting.viscosity,
     )
-    return Simulation(
+    return ParticleSolver(
         pair,
         table,
         walls=[Plane(normal=(-1.0, 0.0, 0.0), material=1)] if wall else [],
@@ -101,7 +101,7 @@ class _Moment:
     rate: float = 0.0  # mean rate of the gap over the last step
 
 
-def _look(simulation: Simulation) -> _Moment:
+def _look(simulation: ParticleSolver) -> _Moment:
     """Gap and speeds of the pair, as plain numbers."""
     position, velocity = simulation.bodies.position.tolist(), simulation.bodies.velocity.tolist()
     if len(position) == 1:
@@ -114,7 +114,7 @@ def _look(simulation: Simulation) -> _Moment:
     return _Moment(distance - float(simulation.bodies.radius.sum()), approach, math.hypot(*u))
 
 
-def follow(simulation: Simulation, setting: Setting, full: bool) -> dict[str, np.ndarray]:
+def follow(simulation: ParticleSolver, setting: Setting, full: bool) -> dict[str, np.ndarray]:
     """March until the pair has left the film or halted; returns the history as columns.
 
     Where only the film acts its impulse depends on the gap alone, so a step may take up to half of the gap, less
@@ -142,7 +142,7 @@ def follow(simulation: Simulation, setting: Setting, full: bool) -> dict[str, np
     return columns | {"touched": np.array(touched)}
 
 
-def _moments(simulation: Simulation, rows: list[dict[str, Any]]) -> Iterator[tuple[_Moment, float]]:
+def _moments(simulation: ParticleSolver, rows: list[dict[str, Any]]) -> Iterator[tuple[_Moment, float]]:
     while simulation.steps < MOST_STEPS:
         moment = _look(simulation)
         last = rows[-1]
@@ -156,7 +156,7 @@ def _moments(simulation: Simulation, rows: list[dict[str, Any]]) -> Iterator[tup
     )
 
 
-def _row(simulation: Simulation, moment: _Moment) -> dict[str, Any]:
+def _row(simulation: ParticleSolver, moment: _Moment) -> dict[str, Any]:
     return {
         "time": simulation.time,
         "gap": moment.gap,

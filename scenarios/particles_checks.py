@@ -13,10 +13,10 @@ import numpy as np
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import FRICTION_ONSETS, LINEAR, Laws
 from cfddem.particles.packing import lattice, random_packing
+from cfddem.particles.pouring import kinetic_energy, pour
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Cone, Cylinder, Plane
-from cfddem.pouring import kinetic_energy, pour
-from cfddem.simulation import Simulation
 from closures import contact
 
 GRAVITY = 9.81
@@ -35,7 +35,7 @@ def drop(stiffness: float, restitution: float, until: float, samples: int = 400)
     """
     ball = Material(density=BALL_DENSITY, youngs_modulus=1e9, poisson=0.3, restitution=restitution)
     sphere = bodies([[0.0, 0.0, DROP_HEIGHT]], BALL_RADIUS, BALL_DENSITY)
-    run = Simulation(
+    run = ParticleSolver(
         sphere,
         pair_table([ball]),
         walls=[Plane()],
@@ -106,7 +106,7 @@ def slide(friction: float, linear: bool = False, keep: float = 0.05) -> dict[str
     overlap = weight / stiffness if linear else (weight / hertz) ** (2.0 / 3.0)
     laws = Laws(contact=LINEAR, normal_stiffness=stiffness, tangential_stiffness=stiffness) if linear else Laws()
     sphere = bodies([[0.0, 0.0, radius - overlap]], radius, density, velocity=[speed, 0.0, 0.0])
-    run = Simulation(sphere, table, walls=[Plane()], laws=laws, gravity=DOWN)
+    run = ParticleSolver(sphere, table, walls=[Plane()], laws=laws, gravity=DOWN)
     step = 0.5 * run.clocks(0.001).recommended
     slid = False
     while True:  # sliding begins where friction reaches Coulomb's limit, and ends where it falls below
@@ -137,7 +137,7 @@ def strike(angle: float, linear: bool = False) -> dict[str, float]:
     table = pair_table([alumina, glass])
     sphere = bodies([[0.0, 0.0, radius]], radius, alumina.density, velocity=[along, 0.0, -down])
     laws = Laws(contact=LINEAR, normal_stiffness=1.72e7, tangential_stiffness=1.48e7) if linear else Laws()
-    run = Simulation(sphere, table, walls=[Plane(material=1)], laws=laws, skin=radius)
+    run = ParticleSolver(sphere, table, walls=[Plane(material=1)], laws=laws, skin=radius)
     step = run.clocks(down).hertz
     while not (run.time > 10 * step and run.gap[0] > 0.0):
         run.advance(step)
@@ -157,7 +157,7 @@ GRAIN = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.
 class Rest(NamedTuple):
     """A poured bed and what it did after it had come to rest."""
 
-    run: Simulation
+    run: ParticleSolver
     poured: float  # energy it fell with [J]
     settled: float  # time at which it was at rest [s]
     energy: np.ndarray  # kinetic energy afterwards [J]
@@ -218,7 +218,7 @@ def slope(
     grains = bodies(
         places, 0.5 * DIAMETER, glass.density, viscosity=1e-3 if film else 0.0, fixed=places[:, 2] < DIAMETER
     )
-    run = Simulation(
+    run = ParticleSolver(
         grains,
         pair_table([glass]),
         laws=Laws(film=film, friction_onset=FRICTION_ONSETS[onset]),
@@ -258,7 +258,7 @@ def hopper(count: int, outlet: float, seconds: float) -> tuple[float, float]:
         Cone(radius=hole, top_radius=1.1 * drum, length=0.02 * drum),
         Plane(point=(0.0, 0.0, -40.0 * DIAMETER)),
     ]
-    run = Simulation(bodies(places, 0.5 * DIAMETER, grain.density), pair_table([grain]), walls=walls, gravity=DOWN)
+    run = ParticleSolver(bodies(places, 0.5 * DIAMETER, grain.density), pair_table([grain]), walls=walls, gravity=DOWN)
     mass, out = float(run.bodies.mass[0]), []
     for _ in range(20):
         run.advance(2e-5, int(seconds / 20 / 2e-5))
@@ -286,7 +286,9 @@ HELD_APART = float(pair_table([SUSPENDED])[0, 0]["roughness_gap"])
 """Their minimum gap where asperities set it [m]."""
 
 
-def suspension(count: int, solid_fraction: float, fixed: bool, viscosity: float = 1.0) -> tuple[Simulation, np.ndarray]:
+def suspension(
+    count: int, solid_fraction: float, fixed: bool, viscosity: float = 1.0
+) -> tuple[ParticleSolver, np.ndarray]:
     """Random spheres of 100 um in a periodic box, none touching.
 
     fixed   hold two layers, bottom and top, as plates; the box is open between them
@@ -300,7 +302,7 @@ def suspension(count: int, solid_fraction: float, fixed: bool, viscosity: float 
     spheres = bodies(
         places, 0.5 * diameter, SUSPENDED.density, viscosity=viscosity, fixed=(lower | upper) if fixed else False
     )
-    run = Simulation(
+    run = ParticleSolver(
         spheres,
         pair_table([SUSPENDED]),
         laws=Laws(film=True),

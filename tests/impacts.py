@@ -10,9 +10,9 @@ import numpy as np
 
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies, bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 from closures import contact, timescales
 
 DATA = Path(__file__).parents[1] / "scenarios" / "data"
@@ -81,7 +81,7 @@ class Pair:
         """Duration of the undamped impact [s]."""
         return timescales.hertz_time(self.reduced_mass, self.stiffness, self.approach)
 
-    def simulation(self, laws: Laws = DRY, **options: object) -> Simulation:
+    def simulation(self, laws: Laws = DRY, **options: object) -> ParticleSolver:
         """This pair alone; without a wall the centre of mass rests."""
         first, second = self.masses
         velocity = np.array([self.approach, self.slide, 0.0])
@@ -106,16 +106,16 @@ class Pair:
                 viscosity=self.viscosity,
             )
             planes = []
-        return Simulation(made, self.rows, walls=planes, laws=laws, **{"skin": max(self.radii), **options})
+        return ParticleSolver(made, self.rows, walls=planes, laws=laws, **{"skin": max(self.radii), **options})
 
 
-def relative_velocity(run: Simulation) -> np.ndarray:
+def relative_velocity(run: ParticleSolver) -> np.ndarray:
     """Velocity of the first body against the second or the wall [m/s]."""
     velocity = run.bodies.velocity
     return velocity[0] - velocity[1] if len(velocity) > 1 else velocity[0]
 
 
-def normal_speed(run: Simulation) -> float:
+def normal_speed(run: ParticleSolver) -> float:
     """Rate of the gap [m/s]."""
     if run.bodies.count == 1:
         return float(-run.bodies.velocity[0, 0])
@@ -123,7 +123,7 @@ def normal_speed(run: Simulation) -> float:
     return float(relative_velocity(run) @ apart / np.linalg.norm(apart))
 
 
-def until_apart(run: Simulation, step: float, chunk: int = 10) -> Simulation:
+def until_apart(run: ParticleSolver, step: float, chunk: int = 10) -> ParticleSolver:
     """Advance until the bodies have separated after their contact."""
     for _ in range(2000):
         run.advance(step, chunk)

@@ -12,20 +12,20 @@ from cfddem.errors import RunFailed, UnstableStep
 from cfddem.materials import Material, pair_table
 from cfddem.particles.clocks import check_step
 from cfddem.particles.forces import LINEAR, VERLET, Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 from scenarios import dense_bed
 
 GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.9, friction=0.5, roughness=1e-7)
 RADIUS = 0.5e-3
 
 
-def pair(laws: Laws | None = None, overlap: float = 0.0, viscosity: float = 0.0) -> Simulation:
+def pair(laws: Laws | None = None, overlap: float = 0.0, viscosity: float = 0.0) -> ParticleSolver:
     """Two spheres that touch."""
     places = [[0.0, 0.0, 0.0], [2.0 * RADIUS - overlap, 0.0, 0.0]]
     spheres = bodies(places, RADIUS, GLASS.density, viscosity=viscosity)
-    return Simulation(spheres, pair_table([GLASS]), laws=laws)
+    return ParticleSolver(spheres, pair_table([GLASS]), laws=laws)
 
 
 def test_recommended_step_is_two_per_cent_of_the_hertz_time() -> None:
@@ -72,7 +72,7 @@ def energy_gain(share: float) -> float:
     chain = [[2.0 * RADIUS * 0.98 * n, 0.0, 0.0] for n in range(8)]
     fixed = [True, *[False] * 6, True]
     spheres = bodies(chain, RADIUS, GLASS.density, fixed=fixed)
-    run = Simulation(spheres, pair_table([elastic]), skin=10.0 * RADIUS)
+    run = ParticleSolver(spheres, pair_table([elastic]), skin=10.0 * RADIUS)
     run.bodies.velocity[1:7, 0] = 1e-3 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     run.refresh()
     limit = run.clocks().overlap
@@ -111,10 +111,10 @@ def test_step_of_the_standard_bed_passes() -> None:
     check_step(dense_bed.STEP, dense_bed.bed(10_000).clocks())
 
 
-def lone(**options: object) -> Simulation:
+def lone(**options: object) -> ParticleSolver:
     """One sphere above a floor."""
     sphere = bodies([[0.0, 0.0, 3.0 * RADIUS]], RADIUS, GLASS.density, velocity=[0.0, 0.0, -0.5])
-    return Simulation(sphere, pair_table([GLASS]), gravity=(0.0, 0.0, -9.81), **options)  # type: ignore[arg-type]
+    return ParticleSolver(sphere, pair_table([GLASS]), gravity=(0.0, 0.0, -9.81), **options)  # type: ignore[arg-type]
 
 
 def test_particle_that_is_no_number_ends_the_run() -> None:

@@ -17,8 +17,8 @@ from scipy.special import beta
 
 from cfddem.materials import PAIR, Material, pair_table
 from cfddem.particles.forces import RESCALED, TOTAL, Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
-from cfddem.simulation import Simulation
 from closures import contact, timescales
 
 GLASS = Material(density=2800, youngs_modulus=48e9, poisson=0.20, friction=0.35)
@@ -309,7 +309,7 @@ class Contacts:
 
     def gain(self, spring: int) -> np.ndarray:
         """Largest kinetic energy that each pair has shown, over what it brought, less one."""
-        run = Simulation(self.bodies, self.table, laws=Laws(spring=spring), skin=0.5 * self.bodies.radius.min())
+        run = ParticleSolver(self.bodies, self.table, laws=Laws(spring=spring), skin=0.5 * self.bodies.radius.min())
         assert len(run.edges.first) == self.count
         pairs = run.edges.first
         brought = kinetic_energy(self.bodies)

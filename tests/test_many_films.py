@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
-from cfddem.simulation import Simulation
 from scenarios.particles_checks import films_alone, shear
 
 
@@ -153,7 +153,7 @@ def test_stiff_film_among_seven_soft_ones_keeps_its_restitution(stokes: float) -
     exact, _ = exact_rebound(viscosity, leave)
     places, velocity = crowd_of_nine()
     spheres = bodies(places, RADIUS, DENSITY, velocity=velocity, viscosity=viscosity)
-    run = Simulation(spheres, pair_table([BEAD]), laws=Laws(film=True))
+    run = ParticleSolver(spheres, pair_table([BEAD]), laws=Laws(film=True))
     step = run.clocks(SPEED).recommended
     before = (0.0, 0.0)
     ours = math.nan

@@ -19,7 +19,7 @@ from cfddem.particles.forces import Laws
 from cfddem.particles.packing import lattice
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
+from cfddem.particles.solver import ParticleSolver
 
 film, integrator, onset, spring, contact, plain, path = *(int(word) for word in sys.argv[1:7]), sys.argv[7]
 assert bool(config.DISABLE_JIT) == bool(plain)
@@ -34,7 +34,7 @@ spheres = bodies(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shap
 laws = Laws(film=bool(film), integrator=integrator, friction_onset=onset, spring=spring, contact=contact,
             normal_stiffness=500.0, tangential_stiffness=300.0)
 table = pair_table([glass])
-run = Simulation(spheres, table.view(np.recarray) if plain else table, walls=[Plane()], laws=laws,
+run = ParticleSolver(spheres, table.view(np.recarray) if plain else table, walls=[Plane()], laws=laws,
                  gravity=(0.0, 0.0, -9.81), box=(4.0e-3, 4.0e-3, None))
 run.advance(1e-6, 12)
 assert (np.abs(run.edges.spring).max() > 0.0) and len(run.edges.first) > run.edges.between_particles > 50

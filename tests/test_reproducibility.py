@@ -8,9 +8,9 @@ import pytest
 from cfddem.kernels import use_threads
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 
 GLASS = Material(
     density=2500,
@@ -24,7 +24,7 @@ GLASS = Material(
 RADIUS = 0.5e-3
 
 
-def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Simulation:
+def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> ParticleSolver:
     """1 440 grains of several sizes that fall on a floor in a periodic box, with and without water."""
     generator = np.random.default_rng(4)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in (12, 12, 10)), indexing="ij"), axis=-1).reshape(-1, 3)
@@ -38,7 +38,7 @@ def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Simulati
         spin=generator.normal(0.0, 50.0, cells.shape),
         viscosity=1e-3 if film else 0.0,
     )
-    return Simulation(
+    return ParticleSolver(
         grains,
         pair_table([GLASS]),
         walls=[Plane()],
@@ -50,7 +50,7 @@ def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Simulati
     )
 
 
-def by_id(run: Simulation) -> dict[str, np.ndarray]:
+def by_id(run: ParticleSolver) -> dict[str, np.ndarray]:
     """State of the particles in the order of their ids."""
     order = np.argsort(run.bodies.id)
     return {name: getattr(run.bodies, name)[order] for name in ("position", "velocity", "spin", "force", "torque")}

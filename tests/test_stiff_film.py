@@ -16,9 +16,9 @@ from scipy.integrate import solve_ivp
 
 from cfddem.materials import SMOOTHEST, Material, pair_table
 from cfddem.particles.forces import DRIFT, VERLET, Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 from closures import contact
 
 GLASS = Material(density=2540, youngs_modulus=60e9, poisson=0.23, restitution=0.97, friction=0.15, roughness=134e-9)
@@ -207,7 +207,7 @@ def bead(roughness: float) -> Material:
     return BEAD.model_copy(update={"roughness": roughness})
 
 
-def press(count: int, material: Material, force: float, gaps: list[float], wall: bool = False) -> Simulation:
+def press(count: int, material: Material, force: float, gaps: list[float], wall: bool = False) -> ParticleSolver:
     """Beads of 100 um in a row along x in glycerol, pressed from both ends, or against the wall x = 0 [N, m]."""
     first = BEAD_RADIUS + gaps[0] if wall else 0.0
     steps = np.array([2.0 * BEAD_RADIUS + gap for gap in gaps[1 if wall else 0 :][: count - 1]])
@@ -218,7 +218,7 @@ def press(count: int, material: Material, force: float, gaps: list[float], wall:
     if not wall:
         made.applied[0, 0] = force
     planes = [Plane(normal=(1.0, 0.0, 0.0))] if wall else []
-    return Simulation(made, pair_table([material]), walls=planes, laws=Laws(film=True))
+    return ParticleSolver(made, pair_table([material]), walls=planes, laws=Laws(film=True))
 
 
 def weighted_contact_energy(gap: float, minimum_gap: float, stiffness: float) -> float:
@@ -237,7 +237,7 @@ def contact_modulus(material: Material) -> float:
     return float(pair_table([material])[0, 0]["contact_modulus"])
 
 
-def total_energy(run: Simulation) -> float:
+def total_energy(run: ParticleSolver) -> float:
     """Kinetic, stored in contacts, and potential of the press, which is 0 where all touch [J]."""
     modulus = float(run.table[0, 0]["contact_modulus"])
     stored = 0.0
@@ -319,7 +319,7 @@ def test_solids_without_roughness_part_from_rest() -> None:
     smooth = Material(density=2500, youngs_modulus=1e9, poisson=0.25)
     pair = bodies([[0.0, 0.0, 0.0], [2.1e-3, 0.0, 0.0]], 1e-3, 2500, velocity=[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])
     pair.viscosity[:] = 1e-3
-    run = Simulation(pair, pair_table([smooth]), laws=Laws(film=True))
+    run = ParticleSolver(pair, pair_table([smooth]), laws=Laws(film=True))
     run.advance(2e-4, 5)
     assert 0.0 < run.bodies.velocity[1, 0] < 0.1
     assert run.edges.minimum_gap[0] == SMOOTHEST

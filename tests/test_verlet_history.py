@@ -15,8 +15,8 @@ from impacts import STEP, Pair, until_apart
 
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import HERTZ, LINEAR, Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
-from cfddem.simulation import Simulation
 from closures import contact
 
 GRAVITY = 9.81
@@ -30,12 +30,14 @@ STIFF = Laws(contact=LINEAR, normal_stiffness=1e4, tangential_stiffness=8235.0)
 
 def grain_and_large(
     position: list[float], ratio: float, half_distance: float, friction: float, laws: Laws, **options: object
-) -> Simulation:
+) -> ParticleSolver:
     """A grain and two fixed spheres, `ratio` times larger, with centres at x = -half_distance and half_distance."""
     solid = SOLID.model_copy(update={"friction": friction})
     centres = [[-half_distance, 0.0, 0.0], [half_distance, 0.0, 0.0]]
     made = bodies([position, *centres], [GRAIN, ratio * GRAIN, ratio * GRAIN], solid.density, fixed=[False, True, True])
-    return Simulation(made, pair_table([solid]), laws=laws, gravity=(0.0, 0.0, -GRAVITY), skin=ratio * GRAIN, **options)  # type: ignore[arg-type]
+    return ParticleSolver(
+        made, pair_table([solid]), laws=laws, gravity=(0.0, 0.0, -GRAVITY), skin=ratio * GRAIN, **options
+    )  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("laws", [STIFF, Laws(contact=HERTZ)], ids=["linear", "hertz"])
@@ -121,7 +123,7 @@ def oblique(film: bool) -> tuple[Pair, Laws]:
 STATE = ("position", "velocity", "spin", "force", "torque")
 
 
-def after_contact(run: Simulation, pair: Pair) -> Simulation:
+def after_contact(run: ParticleSolver, pair: Pair) -> ParticleSolver:
     """The run once the contact is over."""
     return until_apart(run, STEP * pair.hertz_time)
 
@@ -135,7 +137,9 @@ def test_a_run_repeats_bit_by_bit(film: bool) -> None:
         assert np.array_equal(getattr(first.bodies, name), getattr(again.bodies, name)), name
 
 
-def moved(pair: Pair, laws: Laws, order: list[int], axes: np.ndarray, shift: float, **options: object) -> Simulation:
+def moved(
+    pair: Pair, laws: Laws, order: list[int], axes: np.ndarray, shift: float, **options: object
+) -> ParticleSolver:
     """The same encounter with its bodies listed in another order, axes reflected, and elsewhere."""
     given = pair.simulation(laws).bodies
     reflected = np.prod(axes) * axes  # spins are axial vectors
@@ -148,7 +152,7 @@ def moved(pair: Pair, laws: Laws, order: list[int], axes: np.ndarray, shift: flo
         material=given.material[order],
         viscosity=pair.viscosity,
     )
-    return Simulation(made, pair.rows, laws=laws, **{"skin": max(pair.radii), **options})  # type: ignore[arg-type]
+    return ParticleSolver(made, pair.rows, laws=laws, **{"skin": max(pair.radii), **options})  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("film", [False, True], ids=["dry", "film"])

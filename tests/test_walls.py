@@ -11,9 +11,9 @@ import pytest
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import Laws
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Box, Cone, Cylinder, Mesh, Plane, Wall
-from cfddem.simulation import Simulation
 from closures import contact
 
 RADIUS, GRAVITY = 1e-3, 9.81
@@ -25,10 +25,10 @@ MASS = SOLID.density * 4.0 / 3.0 * math.pi * RADIUS**3
 def sphere(
     place: list[float], walls: list[Wall], *, solid: Material = SOLID, film: float = 0.0, velocity: object = 0.0,
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY), record: bool = False,
-) -> Simulation:  # fmt: skip
+) -> ParticleSolver:  # fmt: skip
     """One sphere and walls; `film` is the viscosity [Pa s]."""
     made = bodies([place], RADIUS, solid.density, velocity=velocity, viscosity=film)  # type: ignore[arg-type]
-    return Simulation(
+    return ParticleSolver(
         made, pair_table([solid]), walls=walls, laws=Laws(film=film > 0.0), gravity=gravity, record=record
     )
 
@@ -251,7 +251,7 @@ def test_a_floor_carries_the_weight(wall: Wall) -> None:
     x = 2.2 * RADIUS * np.arange(-3, 4)
     place = np.stack([*(grid.ravel() for grid in np.meshgrid(x, x)), np.full(49, 1.05 * RADIUS)], axis=1)
     made = bodies(place, RADIUS, solid.density)
-    run = Simulation(made, pair_table([solid]), walls=[wall], gravity=(0.0, 0.0, -GRAVITY))
+    run = ParticleSolver(made, pair_table([solid]), walls=[wall], gravity=(0.0, 0.0, -GRAVITY))
     run.advance(5e-6, 20000)
     assert run.wall_force[0] == pytest.approx([0.0, 0.0, -49.0 * MASS * GRAVITY], rel=1e-4, abs=1e-9)
 
@@ -289,10 +289,10 @@ def test_walls_repeat_in_a_periodic_box() -> None:
     made = bodies([[0.01, 0.0, 0.0]], RADIUS, SOLID.density)
     along = {"box": (0.02, None, None), "skin": 1e-4}
     for wall in (Plane(point=(0.0, 0.0, -RADIUS)), Cylinder(axis=(1.0, 0.0, 0.0), radius=0.02)):
-        Simulation(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]
+        ParticleSolver(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]
     for wall in (Plane(normal=(1.0, 0.0, 0.0)), Cylinder(radius=0.02), sheet(2)):
         with pytest.raises(InputError, match="periodic"):
-            Simulation(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]
+            ParticleSolver(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""A run: the one place where particles, walls and laws are put together and moved."""
+"""The particle solver: particles, walls and laws put together and moved."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SHORT_LIST, LONG_LIST = 40, 200
 _NO_ROWS = np.zeros(0, ENCOUNTER)
 
 
-class Simulation:
+class ParticleSolver:
     """Particles in time.
 
     bodies   the particles, :func:`cfddem.particles.state.bodies`

@@ -10,9 +10,9 @@ import numpy as np
 from cfddem.errors import InputError, RunFailed
 from cfddem.materials import Material, pair_table
 from cfddem.particles.packing import lattice
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies, bodies
 from cfddem.particles.walls import Plane
-from cfddem.simulation import Simulation
 
 AT_REST = 1e-7
 """A bed is at rest when its kinetic energy is below this share of the energy it fell with."""
@@ -30,7 +30,7 @@ def pour(
     gravity: float = 9.81,
     patience: float = 20.0,
     progress: Progress | None = None,
-) -> Simulation:
+) -> ParticleSolver:
     """Let spheres fall into a column with a flat floor at z = 0 until they lie still.
 
     material   of the spheres, the floor and the sides
@@ -54,7 +54,7 @@ def pour(
         Plane(normal=(0.0, 1.0, 0.0)),
         Plane(point=(0.0, depth, 0.0), normal=(0.0, -1.0, 0.0)),
     ]
-    run = Simulation(
+    run = ParticleSolver(
         spheres,
         pair_table([material]),
         walls=sides[:1] if periodic else sides,
