@@ -1,0 +1,298 @@
+"""The folder of a run: snapshots that never change, one small index over them, history, case and provenance.
+
+    run/
+      run.json               format, status, grid, units, versions, seed
+      case.toml              the case as it was run
+      data/00000012.h5       one snapshot: /fluid/<name> (1, nz, ny, nx[, 3]), /particles/Points (n, 3) and <name>
+      run.vtkhdf             all snapshots as one series; ParaView, pyvista and h5py open it
+      history.h5             one dataset per column
+      checkpoint/            full states to go on from
+
+Whatever instant a run is killed at, every file is whole, and what was written up to the last snapshot is there.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time as clock
+from array import array
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.errors import InputError
+from cfddem.record import checkpoint
+from cfddem.record.files import hdf5_in_memory, remove_partial, write_whole
+from cfddem.record.folder import FORMAT, lock, read_about, read_columns, refuse_taken, scan
+from cfddem.record.index import POINTS, Box, Layout, Snapshot, describe, index
+from cfddem.record.quantities import Quantity, quantity
+
+_ALWAYS_INDEXED = 200
+_SHARE_OF_INDEX = 0.02
+"""Beyond so many snapshots the index may lag while writing it would cost more than this share of the run time."""
+
+
+class RunFolder:
+    """Writes a run; made by `RunFolder.create` or, to go on, by `RunFolder.reopen`."""
+
+    def __init__(self, folder: Path, about: dict[str, Any], case_text: str) -> None:
+        self.folder, self.case_text, self.about = folder, case_text, about
+        self.fields = {name: Quantity(*each) for name, each in about["fields"].items()}
+        self.box = None if about["grid"] is None else Box(**{key: tuple(each) for key, each in about["grid"].items()})
+        self.snapshots: list[Snapshot] = []
+        self._layout: Layout | None = None
+        self._real = np.dtype("f4" if about["precision"] == "single" else "f8")
+        self._history: dict[str, array[float]] = {}
+        self._history_is_new = False
+        self._indexed, self._indexed_at, self._index_cost = 0, clock.monotonic(), 0.0
+        self._lock = lock(folder)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path,
+        case_text: str,
+        provenance: Mapping[str, Any],
+        grid: Any = None,
+        fields: Mapping[str, tuple[str, str]] | None = None,
+        precision: str = "single",
+    ) -> RunFolder:
+        """Begin a run in a new folder.
+
+        folder      is made; must not hold a run already
+        case_text   the case in TOML, kept as it is
+        provenance  plain values, as `cfddem.record.provenance.provenance()` gives them
+        grid        with cells, spacing, origin, or None for particles alone
+        fields      name -> (unit, long name) of what is not in `cfddem.record.quantities.KNOWN`
+        precision   of the real fields in snapshots, single or double; history and checkpoints are always double
+        errors      InputError where the folder is taken or cannot be written
+        """
+        folder = Path(folder)
+        if precision not in ("single", "double"):
+            raise InputError("output.precision", precision, "single or double")
+        refuse_taken(folder)
+        about = {
+            "format": FORMAT,
+            "status": "running",
+            "message": "",
+            "precision": precision,
+            "grid": None if grid is None else asdict(_box(grid)),
+            "fields": {name: tuple(each) for name, each in (fields or {}).items()},
+            "provenance": dict(provenance),
+        }
+        try:
+            (folder / "data").mkdir(parents=True)
+        except OSError as refusal:
+            raise InputError(
+                "output", str(folder), "a folder that can be written to", (refusal.strerror or str(refusal)).lower()
+            ) from refusal
+        run = cls(folder, about, case_text)
+        write_whole(folder / "case.toml", case_text.encode())
+        run._write_about()
+        return run
+
+    @classmethod
+    def reopen(cls, folder: Path) -> RunFolder:
+        """Go on with a run that was stopped or killed; everything written is kept until `drop_after`.
+
+        folder  of the run
+        errors  InputError where it holds no run, one of a newer format, or one that is still being written
+        """
+        folder = Path(folder)
+        about = read_about(folder)
+        run = cls(folder, about, (folder / "case.toml").read_text())
+        for place in (folder, folder / "data", folder / "checkpoint"):
+            remove_partial(place)
+        run.snapshots, run._layout = scan(folder)
+        run._history = {name: array("d", column) for name, column in read_columns(folder / "history.h5").items()}
+        about.update(status="running", message="")
+        run._write_about()
+        return run
+
+    # ------------------------------------------------------------ writing
+
+    def write_snapshot(
+        self,
+        time: float,
+        step: int,
+        fluid: Mapping[str, np.ndarray] | None,
+        particles: Mapping[str, np.ndarray] | None,
+        collisions: np.ndarray | None = None,
+    ) -> None:
+        """Write one snapshot, the history so far, and the index; each is whole before the next is begun.
+
+        time, step  of the snapshot [s], [-]
+        fluid       name -> (nz, ny, nx) or (nz, ny, nx, 3), or None where the run has no grid
+        particles   name -> (n,) or (n, 3), `position` among them; rows are put in the order of `id`; may be None
+        collisions  rows of `cfddem.particles.encounters.ENCOUNTER` since the snapshot before, or None
+        errors      InputError for a field without unit or shape; RunFailed where the disk refuses
+        """
+        cells, points = self._cells(fluid or {}), self._points(particles or {})
+        layout = Layout.of(cells, points)
+        if self._layout is not None:
+            self._layout.must_equal(layout)
+        if self.snapshots and time <= self.snapshots[-1].time:
+            raise InputError(
+                "snapshot.time",
+                time,
+                f"after the snapshot before it, {self.snapshots[-1].time:g} s",
+                "drop_after first",
+            )
+        image = io.BytesIO()
+        with hdf5_in_memory(image) as file:
+            file.attrs["time"], file.attrs["step"], file.attrs["format"] = float(time), int(step), FORMAT
+            for block, arrays in (("fluid", cells), ("particles", points), ("collisions", _columns(collisions))):
+                for name, values in arrays.items():
+                    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size else {}
+                    dataset = file.create_dataset(f"{block}/{name}", data=values, **packed)
+                    describe(dataset, quantity("position" if name == POINTS else name, self.fields, block))
+        self.flush_history()
+        number = 1 + int(self.snapshots[-1].name[:8]) if self.snapshots else 0
+        snapshot = Snapshot(f"{number:08d}.h5", float(time), int(step), len(points.get(POINTS, ())))
+        write_whole(self.folder / "data" / snapshot.name, image.getbuffer())
+        self.snapshots.append(snapshot)
+        self._layout = layout
+        lag = clock.monotonic() - self._indexed_at
+        if len(self.snapshots) <= _ALWAYS_INDEXED or self._index_cost < _SHARE_OF_INDEX * lag:
+            self.write_index()
+
+    def write_index(self) -> None:
+        """Make `run.vtkhdf` anew from what is known of the snapshots."""
+        begin = clock.monotonic()
+        if self.snapshots and self._layout is not None:
+            texts = {"case": self.case_text, "provenance": json.dumps(self.about["provenance"])}
+            content = index(self.snapshots, self._layout, self.box, self.fields, texts)
+            write_whole(self.folder / "run.vtkhdf", content)
+        else:
+            (self.folder / "run.vtkhdf").unlink(missing_ok=True)
+        self._indexed, self._indexed_at = len(self.snapshots), clock.monotonic()
+        self._index_cost = self._indexed_at - begin
+
+    def append_history(self, row: Mapping[str, float]) -> None:
+        """Add one row; it is on the disk with the next snapshot, checkpoint or `flush_history`.
+
+        row     column -> number, `time` among them, the same columns every time
+        errors  InputError for other columns, or a column without unit
+        """
+        if not self._history:
+            for name in row:
+                quantity(name, self.fields, "history")
+            self._history = {name: array("d") for name in row}
+        if row.keys() != self._history.keys() or "time" not in row:
+            odd = sorted(row.keys() ^ self._history.keys()) or ["time"]
+            raise InputError(
+                "history", odd, "the same columns in every row, with time", "use NaN for what has no value"
+            )
+        for name, value in row.items():
+            self._history[name].append(value)
+        self._history_is_new = True
+
+    def flush_history(self) -> None:
+        """Write all rows so far."""
+        if not self._history_is_new:
+            return
+        image = io.BytesIO()
+        with hdf5_in_memory(image, track_order=True) as file:
+            for name, column in self._history.items():
+                dataset = file.create_dataset(name, data=np.frombuffer(column))
+                describe(dataset, quantity(name, self.fields, "history"))
+        write_whole(self.folder / "history.h5", image.getbuffer())
+        self._history_is_new = False
+
+    def write_checkpoint(self, state: Mapping[str, Any]) -> None:
+        """Write the history so far, then the full state to go on from (`cfddem.record.checkpoint`)."""
+        self.flush_history()
+        checkpoint.write(self.folder, state)
+
+    def drop_after(self, time: float) -> None:
+        """Forget snapshots and rows later than the state that a run goes on from [s].
+
+        The index goes first, so that it never points to what is gone.
+        """
+        late = [each for each in self.snapshots if each.time > time]
+        self.snapshots = self.snapshots[: len(self.snapshots) - len(late)]
+        if not self.snapshots:
+            self._layout = None
+        self.write_index()
+        for each in reversed(late):
+            (self.folder / "data" / each.name).unlink(missing_ok=True)
+        if self._history:
+            kept = np.frombuffer(self._history["time"]) <= time
+            self._history = {name: array("d", np.frombuffer(each)[kept]) for name, each in self._history.items()}
+            self._history_is_new = True
+            self.flush_history()
+
+    def finish(self, status: str, message: str = "") -> None:
+        """Write what is left and how the run ended.
+
+        status   finished, stopped or failed
+        message  one line for a person
+        """
+        if status not in ("finished", "stopped", "failed"):
+            raise InputError("status", status, "finished, stopped or failed")
+        self.flush_history()
+        if self._indexed != len(self.snapshots):
+            self.write_index()
+        self.about.update(status=status, message=message)
+        self._write_about()
+        self._lock.close()
+
+    # ------------------------------------------------------------ details
+
+    def _write_about(self) -> None:
+        write_whole(self.folder / "run.json", (json.dumps(self.about, indent=1) + "\n").encode())
+
+    def _cells(self, fluid: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cell fields with a leading axis of length one, in the type of the run."""
+        if (self.box is None) != (not fluid):
+            raise InputError("snapshot.fluid", sorted(fluid), "given where the run has a grid, and only there")
+        shaped = {}
+        for name, values in fluid.items():
+            values = np.asarray(values)
+            if self.box is None or values.shape[:3] != self.box.shape or values.shape[3:] not in ((), (3,)):
+                raise InputError(f"snapshot.fluid.{name}", values.shape, "(nz, ny, nx) or (nz, ny, nx, 3) of the grid")
+            shaped[name] = self._stored(values)[None]
+        return shaped
+
+    def _points(self, particles: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Particle fields in the order of ids, positions under the name that VTK knows."""
+        if not particles:
+            if self.box is None:
+                raise InputError("snapshot.particles", None, "given where the run has no grid")
+            return {}
+        if "position" not in particles:
+            raise InputError("snapshot.particles", sorted(particles), "with the field 'position'")
+        count = len(particles["position"])
+        order = np.argsort(particles["id"], kind="stable") if "id" in particles else slice(None)
+        shaped = {}
+        for name, values in particles.items():
+            values = np.asarray(values)
+            if values.ndim not in (1, 2) or len(values) != count:
+                raise InputError(f"snapshot.particles.{name}", values.shape, f"one row for each of {count} particles")
+            shaped[POINTS if name == "position" else name] = self._stored(values[order])
+        return shaped
+
+    def _stored(self, values: np.ndarray) -> np.ndarray:
+        """Reals in the precision of the run, flags as bytes, whole numbers as they are."""
+        kind = self._real if values.dtype.kind == "f" else np.dtype("u1") if values.dtype.kind == "b" else values.dtype
+        return values.astype(kind, copy=False)
+
+
+def _box(grid: Any) -> Box:
+    return Box(
+        tuple(int(n) for n in grid.cells),  # type: ignore[arg-type]
+        tuple(float(h) for h in grid.spacing),  # type: ignore[arg-type]
+        tuple(float(x) for x in grid.origin),  # type: ignore[arg-type]
+    )
+
+
+def _columns(table: np.ndarray | None) -> dict[str, np.ndarray]:
+    """A structured table as columns, flags as bytes."""
+    if table is None:
+        return {}
+    columns = {name: table[name] for name in table.dtype.names or ()}
+    return {name: each.astype("u1") if each.dtype.kind == "b" else each for name, each in columns.items()}
