@@ -8,6 +8,7 @@ Python function; compiled loops call the same function by its name.
 1.9
 """
 
+from closures.check import check
 from closures.law import SHELF, Law, law, page
 
-__all__ = ["SHELF", "Law", "law", "page"]
+__all__ = ["SHELF", "Law", "check", "law", "page"]

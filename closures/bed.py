@@ -183,3 +183,56 @@ def expanded_voidage(velocity: float, terminal_velocity: float, exponent: float)
     0.5
     """
     return float(min(1.0, velocity / terminal_velocity) ** (1.0 / exponent))
+
+
+@law("bed", "Richardson & Zaki, Trans. Inst. Chem. Eng. 32 (1954) 35", wall_ratio=(0.0, 0.1))
+def wall_factor_richardson_zaki(wall_ratio: float) -> float:
+    r"""Velocity at which a bed in a column would reach voidage 1, over the terminal velocity, by Richardson and Zaki.
+
+    .. math:: u_i/u_t = 10^{-d/D}
+
+    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    returns     u_i/u_t [-]
+
+    For fluidisation; in sedimentation u_i = u_t.
+
+    >>> wall_factor_richardson_zaki(0.0), round(wall_factor_richardson_zaki(0.05), 3)
+    (1.0, 0.891)
+    """
+    return float(10.0**-wall_ratio)
+
+
+@law(
+    "bed", "Khan & Richardson, Chem. Eng. Commun. 78 (1989) 111, doi:10.1080/00986448908940189", wall_ratio=(1e-3, 0.2)
+)
+def wall_factor_khan_richardson(wall_ratio: float) -> float:
+    r"""Velocity at which a bed in a column would reach voidage 1, over the terminal velocity, by Khan and Richardson.
+
+    .. math:: u_i/u_t = 1 - 1.15\,(d/D)^{0.6}
+
+    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    returns     u_i/u_t [-]; not below 0
+
+    >>> wall_factor_khan_richardson(0.0), round(wall_factor_khan_richardson(0.05), 3)
+    (1.0, 0.809)
+    """
+    return float(max(0.0, 1.0 - 1.15 * wall_ratio**0.6))
+
+
+@law(
+    "bed", "Khan & Richardson, Chem. Eng. Commun. 62 (1987) 135, doi:10.1080/00986448708912056", archimedes=(1.0, 1e10)
+)
+def terminal_reynolds_khan_richardson(archimedes: float) -> float:
+    r"""Reynolds number of a sphere that falls at its terminal velocity, by Khan and Richardson.
+
+    .. math:: Re_t = (2.33\,Ar^{0.018} - 1.53\,Ar^{-0.016})^{13.3}
+
+    archimedes  Ar, > 0 [-]
+    returns     Re_t [-]; 0 below Ar = 4e-6, where the bracket is negative
+
+    >>> round(terminal_reynolds_khan_richardson(49.14**2), 1)      # Mordant & Pinton (2000), 0.5 mm glass: measured 41
+    44.4
+    """
+    if archimedes <= 0.0:
+        return 0.0
+    return float(max(0.0, 2.33 * archimedes**0.018 - 1.53 * archimedes**-0.016) ** 13.3)

@@ -26,7 +26,7 @@ def wen_yu(reynolds: float, voidage: float) -> float:
 
     Range: eps > 0.8 in gas, > 0.4 in liquid; C_D = 0.44 above Re = 1000. The exchange coefficient
     3/4 C_D eps (1-eps) rho |u-v| eps^-2.65 / d holds C_D = 24 F_1/Re, so one more eps falls to the slip. Wen and Yu's
-    own total force goes as eps^-4.7, which gives eps^-3.7 here.
+    own total force goes as eps^-4.7, which gives eps^-3.7 here. MFIX and OpenFOAM have the common form too.
 
     >>> wen_yu(0.0, 0.5) == 0.5**-3.65
     True

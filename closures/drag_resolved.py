@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from closures.drag_single import dallavalle, schiller_naumann
 from closures.law import law
 
 
@@ -19,6 +20,7 @@ def koch_hill(reynolds: float, voidage: float) -> float:
 
     F_0 = (1 + 3 sqrt(phi/2) + 135/64 phi ln phi + 16.14 phi) / (1 + 0.681 phi - 8.48 phi^2 + 8.16 phi^3) up to
     phi = 0.4 and 10 phi/eps^3 above; it rises by 1 % there. F_0 is of the total force, hence the eps in front.
+    Coefficients as in CFDEMcoupling; MFIX has 17.14 and a blend after Benyahia et al. (2006).
     Range: phi < 0.64; the low-Re branch of single spheres is not included.
 
     >>> round(koch_hill(0.0, 0.5), 3)      # 10 phi / eps^2
@@ -66,7 +68,7 @@ def beetstra(reynolds: float, voidage: float) -> float:
     voidage   eps = 1 - phi [-]
     returns   F [-]
 
-    Range: Re < 1000, phi < 0.6. Published in this normal form.
+    Range: Re < 1000, phi < 0.6. Published in this normal form; coefficients as in MFIX.
 
     >>> round(beetstra(0.0, 0.6), 2)
     11.81
@@ -79,7 +81,12 @@ def beetstra(reynolds: float, voidage: float) -> float:
     return float(creeping + 0.413 / (24.0 * square) * top * power / (power + 10.0 ** (3.0 * solids)))
 
 
-@law("drag", "Tang, Peters, Kuipers, Kriebitzsch & van der Hoef, AIChE J. 61 (2015) 688", voidage=(0.4, 1.0))
+@law(
+    "drag",
+    "Tang, Peters, Kuipers, Kriebitzsch & van der Hoef, AIChE J. 61 (2015) 688, eq. (21), doi:10.1002/aic.14645",
+    voidage=(0.4, 1.0),
+    reynolds=(0.0, 1e3),
+)
 def tang(reynolds: float, voidage: float) -> float:
     r"""Drag factor of Tang, Peters, Kuipers, Kriebitzsch and van der Hoef.
 
@@ -91,7 +98,7 @@ def tang(reynolds: float, voidage: float) -> float:
     voidage   eps = 1 - phi [-]
     returns   F [-]
 
-    Range: Re < 1000, phi < 0.6. Published in this normal form.
+    Range: Re < 1000, phi < 0.6. Published in this normal form; coefficients as in waLBerla.
 
     >>> round(tang(0.0, 0.6), 2)
     11.81
@@ -101,3 +108,91 @@ def tang(reynolds: float, voidage: float) -> float:
     creeping = van_der_hoef(reynolds, voidage)
     linear = 0.11 * solids * (1.0 + solids) - 0.00456 / (square * square)
     return float(creeping + linear * reynolds + (0.169 * voidage + 0.0644 / (square * square)) * reynolds**0.657)
+
+
+@law(
+    "drag",
+    "Beetstra, van der Hoef & Kuipers, AIChE J. 53 (2007) 489, with its erratum, doi:10.1002/aic.11065",
+    voidage=(0.4, 1.0),
+    reynolds=(0.0, 1e3),
+    diameter_ratio=(0.25, 4.0),
+)
+def beetstra_polydisperse(reynolds: float, voidage: float, diameter_ratio: float) -> float:
+    r"""Drag factor of Beetstra, van der Hoef and Kuipers for a sphere among others of unequal size.
+
+    .. math:: F_i = (y_i + 0.064\,y_i^3)\,F(Re_i/y_i,\varepsilon),\qquad y_i = d_i/\langle d\rangle
+
+    reynolds        Re_i, on the superficial slip and the sphere's own diameter [-]
+    voidage         eps [-]
+    diameter_ratio  y, diameter over the Sauter mean of all spheres around, > 0 [-]
+    returns         F_i, over the Stokes drag of the sphere itself [-]
+
+    Range: as beetstra, which is F. The published factor of the total force, eps y + (1 - eps) y^2 + 0.064 eps y^3,
+    contains the share (1 - eps) y^2 of the pressure gradient and falls to this one without it, as in CFDEMcoupling;
+    MFIX leaves out the cubic term. Equal spheres, y = 1, get 6.4 % more than from beetstra: use that one for them.
+
+    >>> round(beetstra_polydisperse(0.0, 0.6, 1.0) / beetstra(0.0, 0.6), 9)
+    1.064
+    """
+    factor = diameter_ratio + 0.064 * diameter_ratio * diameter_ratio * diameter_ratio
+    return float(factor * beetstra(reynolds / diameter_ratio, voidage))
+
+
+@law(
+    "drag",
+    "Tenneti, Garg & Subramaniam, Int. J. Multiphase Flow 37 (2011) 1072, doi:10.1016/j.ijmultiphaseflow.2011.05.010",
+    voidage=(0.5, 1.0),
+    reynolds=(0.0, 300.0),
+)
+def tenneti(reynolds: float, voidage: float) -> float:
+    r"""Drag factor of Tenneti, Garg and Subramaniam.
+
+    .. math:: F = \varepsilon\left[\frac{F_1}{\varepsilon^3} + \frac{5.81\phi}{\varepsilon^3}
+              + \frac{0.48\phi^{1/3}}{\varepsilon^4}
+              + \phi^3 Re\left(0.95 + \frac{0.61\phi^3}{\varepsilon^2}\right)\right]
+
+    reynolds  Re, on the superficial slip [-]
+    voidage   eps = 1 - phi [-]
+    returns   F [-]
+
+    F_1 is that of schiller_naumann. The published sum is of the total force, hence the eps in front, as in waLBerla.
+    Range: 0.01 < Re < 300, 0.1 < phi < 0.5.
+
+    >>> round(tenneti(0.0, 0.6) / 0.6, 2)      # total force, phi = 0.4: Hill, Koch & Ladd have 18.5
+    18.12
+    """
+    solids = max(1.0 - voidage, 0.0)
+    cube = voidage * voidage * voidage
+    creeping = (schiller_naumann(reynolds, 1.0) + 5.81 * solids) / cube + 0.48 * solids ** (1.0 / 3.0) / (
+        cube * voidage
+    )
+    solids_cubed = solids * solids * solids
+    inertial = solids_cubed * reynolds * (0.95 + 0.61 * solids_cubed / (voidage * voidage))
+    return float(voidage * (creeping + inertial))
+
+
+@law(
+    "drag",
+    "Rong, Dong & Yu, Chem. Eng. Sci. 99 (2013) 44, doi:10.1016/j.ces.2013.05.036",
+    voidage=(0.37, 1.0),
+    reynolds=(0.01, 3e3),
+)
+def rong(reynolds: float, voidage: float) -> float:
+    r"""Drag factor of Rong, Dong and Yu: the form of Di Felice with a power fitted to packed beds of equal spheres.
+
+    .. math:: F = F_{Dallavalle}\,\varepsilon^{-\chi},\quad
+              \chi = 2.65(\varepsilon+1) - (5.3 - 3.5\varepsilon)\varepsilon^2\exp[-(1.5-\log_{10}Re)^2/2]
+
+    reynolds  Re, on the superficial slip [-]
+    voidage   eps [-]
+    returns   F [-]; 0.96 at Re = 0, eps = 1
+
+    Range: 0.37 < eps < 1. Towards eps = 1 the power is 5.3 in creeping flow; exponent as in PhasicFlow.
+
+    >>> round(rong(0.0, 0.4), 2), round(150 * 0.6 / (18 * 0.16), 2)      # beside Ergun
+    (28.75, 31.25)
+    """
+    distance = 1.5 - math.log10(max(reynolds, 1e-12))
+    bump = (5.3 - 3.5 * voidage) * voidage * voidage
+    chi = 2.65 * (voidage + 1.0) - bump * math.exp(-0.5 * distance * distance)
+    return float(dallavalle(reynolds, 1.0) * voidage**-chi)

@@ -1,22 +1,24 @@
-"""Drag and bed laws: their limits, their switches, and published numbers."""
+"""Drag, bed, lift and added-mass laws: their limits, their switches, and published numbers."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from closures import bed, drag, drag_resolved, drag_single
+from closures import SHELF, added_mass, balance, bed, check, drag, drag_resolved, drag_single, law, lift
 from closures.drag import ergun
 
 DATA = Path(__file__).parents[1] / "scenarios" / "data"
 Drag = Callable[[float, float], float]
 SINGLE: list[Drag] = [drag_single.stokes, drag_single.schiller_naumann, drag_single.abraham, drag_single.brown_lawler]
+SINGLE += [drag_single.clift]
 BEDS: list[Drag] = [drag.wen_yu, drag_resolved.koch_hill, drag_resolved.beetstra]
-BEDS += [drag_resolved.tang]
-DALLAVALLE: list[Drag] = [drag_single.dallavalle, drag.di_felice]
+BEDS += [drag_resolved.tang, drag_resolved.tenneti]
+DALLAVALLE: list[Drag] = [drag_single.dallavalle, drag.di_felice, drag_resolved.rong]
 
 
 @pytest.mark.parametrize("law", SINGLE + BEDS)
@@ -36,7 +38,7 @@ def test_gidaspow_is_ergun_in_dense_beds(law: Drag, reynolds: float) -> None:
     assert law(reynolds, 0.42) == pytest.approx(ergun(reynolds, 0.42), rel=5e-3)
 
 
-@pytest.mark.parametrize("law", [drag_resolved.koch_hill, drag_resolved.beetstra])
+@pytest.mark.parametrize("law", [drag_resolved.koch_hill, drag_resolved.beetstra, drag_resolved.tenneti])
 def test_creeping_dense_beds_lie_near_ergun(law: Drag) -> None:
     """Carman's constant of the simulations is 180 against Ergun's 150: up to 30 %."""
     assert law(0.0, 0.4) == pytest.approx(ergun(0.0, 0.4), rel=0.3)
@@ -84,14 +86,208 @@ def test_terminal_velocity_of_mordants_glass_bead(law: Callable[[float], float],
 
 @pytest.mark.parametrize("number", [1e-2, 1.0, 1e2, 1e4, 1e6])
 def test_terminal_velocity_balances_weight_and_drag(number: float) -> None:
-    for root, law in [
+    for root, single in [
         (bed.terminal_reynolds_abraham(number), drag_single.abraham),
         (bed.terminal_reynolds_brown_lawler(number), drag_single.brown_lawler),
     ]:
-        assert 18.0 * root * law(root, 1.0) == pytest.approx(number, rel=1e-10)
+        assert 18.0 * root * single(root, 1.0) == pytest.approx(number, rel=1e-10)
 
 
 def test_minimum_fluidisation_balances_weight_and_drag() -> None:
     for number in (1.0, 1e3, 1e6):
         root = bed.fluidisation_reynolds_ergun(number, 0.4)
         assert 18.0 * root * ergun(root, 0.4) / 0.4 == pytest.approx(number, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("law", "limit"),
+    [(drag_single.schiller_naumann, 0.08), (drag_single.brown_lawler, 0.06), (drag_single.abraham, 0.10)],
+)
+def test_single_spheres_lie_on_the_standard_drag_curve(law: Drag, limit: float) -> None:
+    """Up to Re = 1000, against the curve of Clift, Grace & Weber (1978)."""
+    for reynolds in np.geomspace(0.01, 1000.0, 100):
+        assert law(reynolds, 1.0) == pytest.approx(drag_single.clift(reynolds, 1.0), rel=limit)
+
+
+def test_standard_drag_curve_of_the_book() -> None:
+    """Numbers of the library `fluids`, and the bottom of the crisis, C_D = 0.07."""
+    assert 24.0 / 200.0 * drag_single.clift(200.0, 1.0) == pytest.approx(0.7756342422322543, rel=1e-12)
+    assert 24.0 / 4e5 * drag_single.clift(4e5, 1.0) == pytest.approx(0.0702, abs=1e-4)
+    for switch, limit in [(0.01, 0.002), (20.0, 0.008), (260.0, 1e-4), (1500.0, 7e-4), (1.2e4, 1e-4), (3.38e5, 0.006)]:
+        below, above = (drag_single.clift(switch * (1.0 + sign * 1e-12), 1.0) for sign in (-1.0, 1.0))
+        assert abs(above / below - 1.0) < limit
+
+
+@pytest.mark.parametrize("law", [drag_resolved.koch_hill, drag_resolved.tenneti])
+def test_independent_simulations_agree_in_creeping_flow(law: Drag) -> None:
+    """Lattice Boltzmann (Hill, van der Hoef) and immersed boundary (Tenneti): 10 % for 0.1 < phi < 0.5.
+
+    A law of the total force taken for one without the pressure gradient would be 25 to 100 % off.
+    """
+    for voidage in np.linspace(0.5, 0.9, 9):
+        assert law(0.0, voidage) == pytest.approx(drag_resolved.van_der_hoef(0.0, voidage), rel=0.10)
+
+
+def test_polydisperse_drag_has_the_published_total_force() -> None:
+    """Force and share of the pressure gradient add up to eps y + (1 - eps) y^2 + 0.064 eps y^3, over eps, times F."""
+    voidage, diameters, numbers = 0.55, np.array([1.0, 1.7]), np.array([3.0, 1.0])
+    mean = (numbers * diameters**3).sum() / (numbers * diameters**2).sum()
+    ratios = diameters / mean
+    factor = drag_resolved.beetstra(0.0, voidage)
+    forces = np.array([drag_resolved.beetstra_polydisperse(0.0, voidage, ratio) for ratio in ratios])
+    linear = forces - 0.064 * ratios**3 * factor
+    volumes = math.pi / 6.0 * diameters**3
+    gradient = (numbers * 3.0 * math.pi * diameters * linear).sum() / ((numbers * volumes).sum() / (1.0 - voidage))
+    total = forces + volumes * gradient / voidage / (3.0 * math.pi * diameters)
+    published = voidage * ratios + (1.0 - voidage) * ratios**2 + 0.064 * voidage * ratios**3
+    assert total * voidage == pytest.approx(published * factor, rel=1e-12)
+    assert (numbers * diameters * linear).sum() == pytest.approx((numbers * diameters * ratios).sum() * factor)
+
+
+def test_a_laws_own_reynolds_number_is_that_of_the_mean_sphere() -> None:
+    same = drag_resolved.beetstra_polydisperse(20.0, 0.6, 2.0) / (2.0 + 0.064 * 8.0)
+    assert same == pytest.approx(drag_resolved.beetstra(10.0, 0.6), rel=1e-14)
+
+
+@pytest.mark.parametrize("law", [*BEDS, *DALLAVALLE, ergun, drag.gidaspow_smooth], ids=lambda law: law.__name__)
+def test_any_drag_law_balances_weight(law: Drag) -> None:
+    for number in (1e-3, 1.0, 1e4, 1e6):
+        for voidage in (0.42, 0.7) if law is ergun else (0.42, 0.7, 1.0):
+            root = balance.reynolds_in_balance(number, voidage, law)
+            assert 18.0 * root * law(root, voidage) / voidage == pytest.approx(number, rel=1e-10)
+            if voidage != 0.42:
+                assert balance.voidage_in_balance(number, root, law) == pytest.approx(voidage, abs=1e-9)
+
+
+def test_a_bed_at_rest_and_a_sphere_blown_away() -> None:
+    assert balance.voidage_in_balance(1e4, 1e-3, drag.wen_yu, packed_voidage=0.41) == 0.41
+    assert balance.voidage_in_balance(1.0, 1.0, drag.wen_yu) == 1.0
+    assert balance.reynolds_in_balance(0.0, 0.5, drag.wen_yu) == 0.0
+
+
+def test_balance_agrees_with_the_closed_forms() -> None:
+    for number in (1.0, 1e3, 1e6):
+        ours = balance.reynolds_in_balance(number, 0.4, ergun)
+        assert ours == pytest.approx(bed.fluidisation_reynolds_ergun(number, 0.4), rel=1e-10)
+        alone = balance.reynolds_in_balance(number, 1.0, drag_single.brown_lawler)
+        assert alone == pytest.approx(bed.terminal_reynolds_brown_lawler(number), rel=1e-10)
+        assert bed.terminal_reynolds_khan_richardson(number) == pytest.approx(alone, rel=0.06)
+
+
+def test_minimum_fluidisation_of_the_netl_challenge() -> None:
+    """Nylon of 3.256 mm in air, measured 1.05 m/s: Ergun at eps = 0.42 to 4 %; Wen & Yu to 10 %."""
+    ergun_velocity = balance.fluidising_velocity(3.256e-3, 1131.0, 1.2, 1.8e-5, 0.42, ergun)
+    assert ergun_velocity == pytest.approx(1.05, rel=0.04)
+    number = 9.81 * 1.2 * (1131.0 - 1.2) * 3.256e-3**3 / 1.8e-5**2
+    wen_yu_velocity = bed.fluidisation_reynolds_wen_yu(number) * 1.8e-5 / (1.2 * 3.256e-3)
+    assert wen_yu_velocity == pytest.approx(1.05, rel=0.10)
+
+
+@pytest.mark.parametrize("number", [1e-2, 1.0, 1e2, 1e3, 1e4, 1e5, 1e6])
+def test_beds_of_di_felice_expand_as_richardson_and_zaki(number: float) -> None:
+    """Within 0.025 of the voidage, from its own terminal velocity."""
+    alone = balance.reynolds_in_balance(number, 1.0, drag.di_felice)
+    power = bed.exponent_richardson_zaki(bed.terminal_reynolds_brown_lawler(number), 0.0)
+    for voidage in (0.5, 0.6, 0.7, 0.8, 0.9):
+        expanded = balance.voidage_in_balance(number, alone * voidage**power, drag.di_felice)
+        assert expanded == pytest.approx(voidage, abs=0.025)
+
+
+@pytest.mark.parametrize(("law", "power"), [(drag.wen_yu, 4.65), (drag.di_felice, 4.70)])
+def test_creeping_beds_expand_with_the_power_of_the_law(law: Drag, power: float) -> None:
+    ratio = balance.reynolds_in_balance(1e-9, 0.6, law) / balance.reynolds_in_balance(1e-9, 1.0, law)
+    assert math.log(ratio) / math.log(0.6) == pytest.approx(power, abs=1e-3)
+
+
+def test_exponents_of_expansion_have_their_limits() -> None:
+    assert bed.exponent_garside(0.0) == pytest.approx(5.1)
+    assert bed.exponent_garside(1e9) == pytest.approx(2.7, abs=1e-3)
+    assert bed.exponent_khan_richardson(1e14, 0.0) == pytest.approx(2.4, abs=1e-3)
+    assert bed.exponent_richardson_zaki(0.1, 0.02) == pytest.approx(4.65 + 0.39)
+    assert bed.exponent_khan_richardson(1e4, 0.1) > bed.exponent_khan_richardson(1e4, 0.0)
+    for factor in (bed.wall_factor_richardson_zaki, bed.wall_factor_khan_richardson):
+        values = [factor(ratio) for ratio in np.linspace(0.0, 0.2, 21)]
+        assert values[0] == 1.0
+        assert (np.diff(values) < 0.0).all()
+
+
+def test_shear_lift_has_its_limits() -> None:
+    """Saffman's 1.615 in creeping flow; Mei's factor 0.3314 sqrt(beta) far above it; nothing without shear."""
+    scale = 3.0 * math.pi / 1.615
+    assert lift.saffman_mei(1e-8, 1e-12) * scale / 1e-6 == pytest.approx(1.0, rel=1e-6)
+    assert lift.saffman_mei(0.0, 1e-4) * scale / 1e-2 == pytest.approx(1.0, rel=1e-6)
+    assert lift.saffman_mei(39.0, 7.8) * scale / math.sqrt(7.8) == pytest.approx(0.3314 * math.sqrt(0.1), rel=0.19)
+    assert lift.saffman_mei(100.0, 20.0) * scale / math.sqrt(20.0) == pytest.approx(0.0524 * math.sqrt(10.0))
+    assert lift.saffman_mei(10.0, 0.0) == 0.0
+
+
+def test_spin_lift_and_torque_have_their_limits() -> None:
+    assert lift.magnus(0.0) == 1.0
+    assert lift.magnus(1.0 + 1e-12) == pytest.approx(1.0, rel=1e-9)
+    assert lift.magnus(1e3) == pytest.approx(0.2, abs=0.001)
+    assert lift.torque(32.0) == 1.0
+    assert lift.torque(32.0 + 1e-9) == pytest.approx(1.0, abs=0.002)
+    # 12.9 / sqrt(Re) + 128.4 / Re of Dennis et al., against 64 pi / Re
+    assert lift.torque(1000.0) == pytest.approx((12.9 / math.sqrt(1000.0) + 0.1284) / (0.064 * math.pi), rel=1e-12)
+
+
+def test_added_mass_is_one_half_for_a_sphere_alone() -> None:
+    assert added_mass.constant(0.3) == added_mass.constant(1.0) == added_mass.zuber(1.0) == 0.5
+    for solids in (0.01, 0.001):  # 1/2 (1 + 3 phi) in a dilute suspension
+        assert added_mass.zuber(1.0 - solids) == pytest.approx(0.5 * (1.0 + 3.0 * solids), abs=2.0 * solids**2)
+
+
+KNOWN = {
+    "clift": ["force falls with reynolds at reynolds = 3.5", "jumps by -21 % at reynolds = 4e+05"],  # drag crisis
+    "gidaspow": ["jumps by -73 % at voidage = 0.8"],
+    "koch_hill": ["jumps by -1 % at voidage = 0.6"],
+}
+
+
+@pytest.mark.parametrize(
+    "name", [name for name, card in SHELF["drag"].items() if "closures" in card.function.__module__]
+)
+def test_drag_laws_pass_the_check_of_their_kind(name: str) -> None:
+    """But for the jumps and the fall that were published."""
+    complaints = check(SHELF["drag"][name].function)
+    assert len(complaints) == len(KNOWN.get(name, []))
+    for found, expected in zip(complaints, KNOWN.get(name, [])):
+        assert found.startswith(expected)
+
+
+def of_ones_own(kind: str, function: Callable[..., float], **ranges: tuple[float, float]) -> list[str]:
+    """The complaints about a law that a user has just written."""
+    function.__name__ = "of_ones_own"
+    try:
+        return check(law(kind, "a user's notebook", **ranges)(function))
+    finally:
+        del SHELF[kind]["of_ones_own"]
+
+
+def test_a_users_own_law_is_checked() -> None:
+    good = of_ones_own("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-2.7)
+    assert good == []
+    wrong: list[tuple[Drag, str]] = [
+        (lambda reynolds, voidage: 1.15 + 0.15 * reynolds**0.687, "tends to 1.15 and not to 1"),
+        (lambda reynolds, voidage: 24.0 / reynolds, "at reynolds = 0: a particle may rest"),
+        (lambda reynolds, voidage: voidage**2.7, "falls with solid_fraction"),
+        (lambda reynolds, voidage: 1.0 / (1.0 + reynolds * reynolds), "force falls with reynolds"),
+        (lambda reynolds, voidage: 1.0 if voidage > 0.7 else 1.1, "jumps by -9.1 % at voidage = 0.7"),
+        (lambda reynolds, voidage: voidage - 1.0, "drag must be positive"),
+    ]
+    for function, complaint in wrong:
+        found = of_ones_own("drag", function)
+        assert any(complaint in line for line in found), (complaint, found)
+    assert "must take" in of_ones_own("drag", lambda speed: 1.0)[0]
+    assert "inf" in of_ones_own("drag", lambda reynolds, voidage: math.inf)[0]
+    assert "compiled" in of_ones_own("drag", lambda reynolds, voidage: float(str(1.0)))[0]
+
+
+def test_other_kinds_have_rules_of_their_own() -> None:
+    assert "outside" in of_ones_own("minimum_gap", lambda roughness: -roughness)[0]
+    assert "falls with approach_speed" in of_ones_own("minimum_gap", lambda approach_speed: 2.0 - approach_speed)[0]
+    assert "outside" in of_ones_own("restitution", lambda stokes, restitution: restitution + 0.01 * stokes)[0]
+    assert "not 1/2" in of_ones_own("added_mass", lambda voidage: 1.0 / voidage)[0]
+    assert "without shear" in of_ones_own("lift", lambda reynolds, shear_reynolds: 1.0 + shear_reynolds)[0]
+    with pytest.raises(KeyError, match="is no law"):
+        check(lambda reynolds, voidage: 1.0)
