@@ -1,0 +1,179 @@
+"""A sphere on a wet wall: the motion against an independent solution, energy, limits, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfddem.errors import InputError
+from cfddem.materials import Material
+from closures import capillary, layer
+from scenarios.wet_wall import impact, sticking_velocity
+from scenarios.wet_wall_checks import LIQUIDS, SPHERES, independent
+from scenarios.wet_wall_materials import Ball, Liquid
+
+CASES = [  # sphere, liquid, film, half-filling angle, speed, angle, spin, friction
+    ("glass_1.74", "water", 100e-6, 35.0, 0.4, 0.0, 0.0, 0.0),
+    ("glass_1.74", "water", 200e-6, 45.0, 0.5, 0.0, 0.0, 0.0),
+    ("glass_1.74", "water", 200e-6, 45.0, 2.0, 0.0, 0.0, 0.0),
+    ("glass_0.91", "water", 100e-6, 45.0, 0.65, 0.0, 0.0, 0.0),
+    ("glass_1.74", "tween", 100e-6, 35.0, 1.0, 0.0, 0.0, 0.0),
+    ("alumina_1.74", "glycerol_51", 200e-6, 43.0, 2.0, 0.0, 0.0, 0.0),
+    ("alumina_1.74", "tween", 100e-6, 35.0, 1.0, 15.0, 0.0, 0.16),
+    ("alumina_1.74", "tween", 100e-6, 35.0, 1.0, 40.0, -960.0, 0.16),
+    ("alumina_1.74", "tween", 100e-6, 35.0, 1.0, 80.0, 200.0, 0.16),
+    ("alumina_1.74", "glycerol_35", 100e-6, 34.0, 1.0, 30.0, -500.0, 0.14),
+]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}-{case[4]}-{case[5]}")
+def test_an_impact_agrees_with_an_independent_solution(case: tuple[Any, ...]) -> None:
+    """Limit 0.005 in both restitutions; both solutions are converged, so they agree far better."""
+    sphere, liquid, film, filled, speed, angle, spin, friction = case
+    ours = impact(sphere, liquid, film, speed, angle=angle, spin=spin, friction=friction)
+    assert ours.half_filling_angle == filled
+    e, e_t, omega = independent(*case)
+    assert ours.restitution == pytest.approx(e, abs=2e-6)
+    if angle:
+        assert ours.restitution_tangential == pytest.approx(e_t, abs=2e-5)
+        assert ours.spin == pytest.approx(omega, rel=1e-5, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("sphere", "liquid", "film", "published"),
+    [
+        ("glass_1.74", "water", 100e-6, 0.345),
+        ("glass_1.74", "water", 200e-6, 0.456),
+        ("glass_0.91", "water", 100e-6, 0.587),
+        ("alumina_1.74", "tween", 100e-6, 0.549),
+    ],
+)
+def test_spheres_stick_below_a_velocity(sphere: str, liquid: str, film: float, published: float) -> None:
+    """Within 2 % of an earlier solution of the same equations."""
+    assert sticking_velocity(sphere, liquid, film, precision=1e-3) == pytest.approx(published, rel=0.02)
+
+
+@pytest.mark.parametrize("angle", [52.0, 60.0, 75.0, 85.0])
+@pytest.mark.parametrize("spin", [0.0, 200.0])
+def test_a_dry_sphere_that_slides_throughout_follows_coulomb(angle: float, spin: float) -> None:
+    """e_t = 1 - mu (1 + e)/tan(angle), spin changes by -2.5 mu (1 + e) v/R, for steep angles; to 1e-3."""
+    mu, e, radius = 0.195, 0.76, 0.87e-3
+    dry = impact("alumina_1.74", None, angle=angle, spin=spin)
+    assert dry.restitution == pytest.approx(e, abs=1e-4)
+    assert dry.restitution_tangential == pytest.approx(1.0 - mu * (1.0 + e) / math.tan(math.radians(angle)), abs=1e-3)
+    assert dry.spin - spin == pytest.approx(-2.5 * mu * (1.0 + e) / radius, rel=1e-3)
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.5, 5.0])
+def test_a_dry_head_on_impact_has_the_restitution_of_its_solids(speed: float) -> None:
+    assert impact("glass_1.74", None, velocity=speed, gravity=0.0).restitution == pytest.approx(0.96, abs=1e-5)
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case[0]}-{case[1]}-{case[4]}-{case[5]}")
+def test_the_channels_take_all_the_energy_that_is_lost(case: tuple[Any, ...]) -> None:
+    """Kinetic energy of the three motions before, less after, over the mass; by the path of each force."""
+    sphere, liquid, film, _, speed, angle, spin, friction = case
+    result = impact(sphere, liquid, film, speed, angle=angle, spin=spin, friction=friction)
+    speeds = np.array([result.history[name][[0, -1]] for name in ("speed", "speed_along")])
+    turning = 0.4 * (SPHERES[sphere][0] * result.history["spin"][[0, -1]]) ** 2
+    before, after = 0.5 * ((speeds**2).sum(axis=0) + turning)
+    assert sum(result.energy_lost.values()) == pytest.approx(before - after, rel=1e-7)
+    assert result.energy_lost["viscous"] > 0.0
+    assert result.energy_lost["contact"] > 0.0
+
+
+def test_normal_and_tangential_motion_are_superposed() -> None:
+    head_on = impact("alumina_1.74", "tween", 100e-6)
+    for angle, spin in ((20.0, 0.0), (70.0, -960.0)):
+        oblique = impact("alumina_1.74", "tween", 100e-6, angle=angle, spin=spin)
+        assert oblique.restitution == pytest.approx(head_on.restitution, abs=1e-6)
+
+
+def test_thicker_films_more_viscous_liquids_and_slower_impacts_rebound_less() -> None:
+    e = [impact("glass_1.74", "water", film, half_filling_angle=45).restitution for film in (50e-6, 100e-6, 200e-6)]
+    assert e == sorted(e, reverse=True)
+    e = [impact("glass_1.74", liquid, 200e-6, half_filling_angle=45).restitution for liquid in list(LIQUIDS)[::2]]
+    assert e == sorted(e, reverse=True)
+    e = [impact(velocity=speed).restitution for speed in (0.4, 0.6, 1.0, 2.0)]
+    assert e == sorted(e)
+    assert e[-1] < 0.96
+
+
+def test_the_result_does_not_hang_on_the_tolerance() -> None:
+    loose, tight = impact(tolerance=1e-7), impact(tolerance=1e-12)
+    assert loose.restitution == pytest.approx(tight.restitution, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "reading",
+    [{"capillary_phases": "rebound"}, {"capillary_phases": "bridge"}, {"length_from": "wall"}, {"smallest_gap": 5e-6}],
+)
+def test_other_readings_are_options(reading: dict[str, Any]) -> None:
+    assert 1e-4 < abs(impact(**reading).restitution - impact().restitution) < 0.1
+
+
+def test_the_printed_signs_of_the_film_hardly_matter() -> None:
+    case: dict[str, Any] = {"particle": "alumina_1.74", "liquid": "tween", "angle": 45.0}
+    ours, printed = impact(**case), impact(film_signs="printed", **case)
+    assert 0.0 < abs(ours.restitution_tangential - printed.restitution_tangential) < 1e-3
+    assert 0.0 < abs(ours.spin / printed.spin - 1.0) < 0.01
+
+
+def test_a_thick_liquid_holds_a_sphere() -> None:
+    """A stiff film of 10 Pa s: the sphere stops, and the result comes soon."""
+    syrup = Liquid(density=1200, viscosity=10.0, surface_tension=0.06)
+    steel = Material(density=7800, youngs_modulus=200e9, poisson=0.3, restitution=0.95)
+    held = impact(Ball(material=steel, diameter=2e-3), syrup, 100e-6, 0.2, half_filling_angle=40)
+    assert (held.outcome, held.restitution) == ("stick", 0.0)
+
+
+@pytest.mark.parametrize(("sphere", "film"), [("glass_1.74", 400e-6), ("glass_0.91", 200e-6), ("alumina_1.74", 400e-6)])
+def test_a_toroid_that_is_singular_is_refused_by_name(sphere: str, film: float) -> None:
+    with pytest.raises(InputError, match=r"half_filling_angle = .*contact line"):
+        impact(sphere, "water", film)
+    assert impact(sphere, "water", film, 3.0, smallest_arc=5e-6).outcome == "rebound"
+    assert impact(sphere, "water", film, 3.0, capillary_phases="bridge").outcome == "rebound"
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"particle": "wood"}, "particle"),
+        ({"liquid": "watr"}, "did you mean 'water'"),
+        ({"film": -1e-6}, "film"),
+        ({"velocity": 0.0}, "velocity"),
+        ({"velocity": math.nan}, "velocity"),
+        ({"angle": 90.0}, "angle"),
+        ({"spin": math.inf}, "spin"),
+        ({"angle": 30.0}, "friction"),
+        ({"film": 150e-6}, "half_filling_angle.*100 um, 200 um"),
+        ({"half_filling_angle": 91.0}, "half_filling_angle"),
+        ({"capillary_phases": "never"}, "capillary_phases"),
+        ({"smallest_gap": 0.0}, "smallest_gap"),
+        ({"tolerance": 1.0}, "tolerance"),
+    ],
+    ids=lambda value: str(value),
+)
+def test_an_impossible_impact_is_refused_by_name(given: dict[str, Any], field: str) -> None:
+    with pytest.raises(InputError, match=field):
+        impact(**given)
+
+
+def test_a_pendular_bridge_does_the_work_of_its_pull() -> None:
+    """Integral of the pull over the gap, by Simpson's rule."""
+    sigma, theta, radius, volume = 0.07, 0.3, 0.4e-3, 2e-12
+    gap = np.linspace(0.0, 3e-4, 20001)
+    force = np.array([capillary.pendular_pull(sigma, theta, radius, volume, float(h)) for h in gap])
+    weights = np.ones_like(gap)
+    weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
+    work = float((weights * force).sum() * (gap[1] - gap[0]) / 3.0)
+    assert capillary.pendular_energy(sigma, theta, radius, volume, 3e-4) == pytest.approx(work, rel=1e-9)
+
+
+def test_sliding_and_spin_in_the_film_are_reciprocal() -> None:
+    """6 pi (force of spin) = 8 pi (torque of sliding), as the reciprocal theorem asks; the fits hold it to 1e-3."""
+    for ratio in (1e-5, 1e-3, 1e-1):
+        assert 6.0 * layer.spin_force(ratio) == pytest.approx(8.0 * layer.sliding_torque(ratio), abs=1e-3)
