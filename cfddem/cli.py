@@ -77,6 +77,63 @@ _COLLISION_UNITS = {
 
 
 @app.command
+def wet_wall(
+    *,
+    particle: Annotated[str, Parameter(help="glass_0.91, glass_1.74 or alumina_1.74")] = "glass_1.74",
+    liquid: Annotated[str, Parameter(help="water, tween, glycerol_35 or glycerol_51")] = "water",
+    film: Annotated[float, Parameter(help="thickness of the liquid layer; 0 for a dry wall [m]")] = 100e-6,
+    velocity: Annotated[float, Parameter(help="normal speed where the sphere meets the layer [m/s]")] = 1.0,
+    angle: Annotated[float, Parameter(help="between velocity and normal [deg]")] = 0.0,
+    spin: Annotated[float, Parameter(help="before [rad/s]")] = 0.0,
+    half_filling_angle: Annotated[
+        float | None, Parameter(help="of the bridge; the measured one if known [deg]")
+    ] = None,
+    friction: Annotated[float | None, Parameter(help="of the contact; the published one if known")] = None,
+    capillary_phases: Annotated[str, Parameter(help="always, rebound or bridge")] = "always",
+    length_from: Annotated[str, Parameter(help="length of the bridge from the surface or the wall")] = "surface",
+    smallest_arc: Annotated[float | None, Parameter(help="floor of the toroid's arc in thick layers [m]")] = None,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Let a sphere strike a wall under a thin liquid layer.
+
+    Example: cfddem wet-wall --particle glass_1.74 --film 2e-4 --velocity 0.6
+    """
+    from scenarios.wet_wall import impact
+
+    result = impact(
+        particle,
+        liquid,
+        film,
+        velocity,
+        angle=angle,
+        spin=spin,
+        half_filling_angle=half_filling_angle,
+        friction=friction,
+        capillary_phases=capillary_phases,
+        length_from=length_from,
+        smallest_arc=smallest_arc,
+    )
+    values = result.summary()
+    if not json:
+        values |= {f"{name}_lost": energy for name, energy in values.pop("energy_lost").items()}
+    _show(values, _WET_WALL_UNITS, json)
+
+
+_WET_WALL_UNITS = {
+    "spin": "rad/s",
+    "half_filling_angle": "deg",
+    "contact_speed": "m/s",
+    "bridge_volume": "m3",
+    "rupture_length": "m",
+    "duration": "s",
+    "contact_lost": "J/kg",
+    "viscous_lost": "J/kg",
+    "capillary_lost": "J/kg",
+    "gravity_lost": "J/kg",
+}
+
+
+@app.command
 def validate(
     target: Annotated[str, Parameter(help="binary-collision, or all")] = "all",
     *,
