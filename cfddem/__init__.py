@@ -21,6 +21,7 @@ _HOME = {
     "ParticleSolver": "cfddem.particles.solver",
     "Plane": "cfddem.particles.walls",
     "bodies": "cfddem.particles.state",
+    "open_run": "cfddem.record.reading",
     "pair_table": "cfddem.materials",
     "pour": "cfddem.particles.pouring",
 }

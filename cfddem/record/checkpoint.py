@@ -25,7 +25,7 @@ FORMAT = 1
 KEPT = 2
 
 _HEAD = 512
-_WORDS = "cfddem checkpoint, format {}, sha256 of what follows byte 512: {}\n"
+_WORDS = "cfddem checkpoint, format {}, sha256 of this number, a line end and all beyond byte 512: {}\n"
 _log = logging.getLogger("cfddem")
 
 
@@ -46,8 +46,7 @@ def write(folder: Path, state: Mapping[str, Any]) -> Path:
     with hdf5_in_memory(image, userblock_size=_HEAD, track_order=True) as file:
         _put(file, state, "state")
     content = image.getbuffer()
-    head = _WORDS.format(FORMAT, hashlib.sha256(content[_HEAD:]).hexdigest()).encode()
-    content[:_HEAD] = head.ljust(_HEAD, b"\0")
+    content[:_HEAD] = _words(FORMAT, content).encode().ljust(_HEAD, b"\0")
 
     earlier = _files(home)
     number = 1 + int(earlier[0].stem) if earlier else 0
@@ -70,13 +69,17 @@ def newest(folder: Path) -> dict[str, Any]:
     home = Path(folder) / "checkpoint"
     found = _files(home)
     if not found:
-        raise InputError("folder", str(folder), "one with a checkpoint", "run the case from its start")
+        raise InputError(
+            "folder", str(folder), "one with a checkpoint", "remove the folder and run the case from its start"
+        )
     for path in found:
         fault = _fault(path)
         if fault is None:
             return _get_all(path)
         _log.warning("%s: %s; the checkpoint before it is used", path, fault)
-    raise RunFailed(f"{home}: no checkpoint is whole ({len(found)} damaged); run the case from its start")
+    raise RunFailed(
+        f"{home}: no checkpoint is whole ({len(found)} damaged); remove the folder and run the case from its start"
+    )
 
 
 def _files(home: Path) -> list[Path]:
@@ -94,15 +97,21 @@ def _fault(path: Path) -> str | None:
     except OSError as refusal:
         return (refusal.strerror or str(refusal)).lower()
     words = content[:_HEAD].rstrip(b"\0").decode("ascii", "replace")
-    known = words.startswith("cfddem checkpoint, format ")
-    number = words.removeprefix("cfddem checkpoint, format ").split(",")[0]
-    if known and number.isdigit() and int(number) > FORMAT:
+    number = words.removeprefix(_WORDS.split("{")[0]).split(",")[0]
+    if not number.isdecimal() or words != _words(int(number), memoryview(content)):
+        return "is damaged, its checksum does not hold"
+    if int(number) > FORMAT:
         raise InputError(
             f"{path}: format", int(number), f"at most {FORMAT}", "it was written by a newer cfddem; update this one"
         )
-    if words != _WORDS.format(FORMAT, hashlib.sha256(memoryview(content)[_HEAD:]).hexdigest()):
-        return "is damaged, its checksum does not hold"
     return None
+
+
+def _words(number: int, content: memoryview) -> str:
+    """The line at the head of a checkpoint: its format, and the checksum of that and of all that follows."""
+    checksum = hashlib.sha256(f"{number}\n".encode())
+    checksum.update(content[_HEAD:])
+    return _WORDS.format(number, checksum.hexdigest())
 
 
 def _put(group: Any, values: Mapping[str, Any], where: str) -> None:
@@ -112,7 +121,7 @@ def _put(group: Any, values: Mapping[str, Any], where: str) -> None:
         if not isinstance(name, str) or not name or "/" in name or name == ".":
             raise InputError(here, None, "named by a text without '/'")
         if isinstance(value, Mapping):
-            _put(group.create_group(name), value, here)
+            _put(group.create_group(name, track_order=True), value, here)
         elif isinstance(value, np.ndarray | np.generic):
             if value.dtype.hasobject or value.dtype.kind in "USMm":
                 raise InputError(here, str(value.dtype), "an array of numbers, flags or records of these")

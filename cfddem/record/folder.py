@@ -16,7 +16,7 @@ from cfddem.record.index import POINTS, Layout, Snapshot
 FORMAT = 1
 """Of the run folder; a reader refuses a newer one."""
 
-OWN = ("run.json", "case.toml", "run.vtkhdf", "history.h5", "data", "checkpoint")
+OWN = ("run.json", "run.vtkhdf", "history.h5", "checkpoint")
 """Names that make a folder a run."""
 
 
@@ -82,11 +82,18 @@ def read_columns(path: Path) -> dict[str, np.ndarray]:
         raise RunFailed(f"{path}: is no whole history ({damage}); move it out of the folder and go on") from damage
 
 
-def refuse_taken(folder: Path) -> None:
-    """Never write into a folder that holds a run, or a file where the folder should be."""
+def refuse_taken(folder: Path, case_text: str) -> None:
+    """Never write into a folder that holds a run, or a file where the folder should be.
+
+    A run that was killed before its first byte of data is no run: the same case may begin there again.
+    """
     if folder.exists() and not folder.is_dir():
         raise InputError("output", str(folder), "a folder", "a file of that name is there")
     taken = [name for name in OWN if (folder / name).exists()]
+    if any((folder / "data").glob("*.h5")):
+        taken.append("data")
+    if (folder / "case.toml").exists() and (folder / "case.toml").read_text() != case_text:
+        taken.append("case.toml")
     if taken:
         raise InputError(
             "output",

@@ -74,7 +74,7 @@ class RunFolder:
         folder = Path(folder)
         if precision not in ("single", "double"):
             raise InputError("output.precision", precision, "single or double")
-        refuse_taken(folder)
+        refuse_taken(folder, case_text)
         about = {
             "format": FORMAT,
             "status": "running",
@@ -85,7 +85,7 @@ class RunFolder:
             "provenance": dict(provenance),
         }
         try:
-            (folder / "data").mkdir(parents=True)
+            (folder / "data").mkdir(parents=True, exist_ok=True)
         except OSError as refusal:
             raise InputError(
                 "output", str(folder), "a folder that can be written to", (refusal.strerror or str(refusal)).lower()

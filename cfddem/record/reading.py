@@ -1,0 +1,234 @@
+"""A run that was written: its times, fields, particles and history as numpy arrays, a snapshot as pyvista objects.
+
+>>> from cfddem import open_run                     # doctest: +SKIP
+>>> run = open_run("bed-run")                       # doctest: +SKIP
+>>> run.history["bed_height"][-1], run.fluid("voidage").min(), run.track(17)["position"]  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfddem.errors import InputError, RunFailed, nearest
+from cfddem.record.folder import look, read_about, read_columns
+from cfddem.record.index import POINTS, Box, Snapshot, listed
+
+if TYPE_CHECKING:
+    import pyvista
+
+_log = logging.getLogger("cfddem")
+
+
+def open_run(folder: str | Path) -> Run:
+    """Open the folder of a run, finished or still being written.
+
+    folder   of the run
+    returns  Run; fields are read when they are asked for
+    errors   InputError where the folder holds no run, or one that a newer cfddem has written
+    """
+    return Run(Path(folder))
+
+
+class Run:
+    """What a run has written. Snapshots are named by their place in time: 0 the first, -1 the last."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.about = read_about(folder)
+        grid = self.about["grid"]
+        self.grid = None if grid is None else Box(**{key: tuple(each) for key, each in grid.items()})
+        self.snapshots, self.missing = self._find()
+        if self.missing:
+            shown = ", ".join(self.missing[:3]) + (" ..." if len(self.missing) > 3 else "")
+            _log.warning("%s: %d snapshots are missing, %s", folder / "data", len(self.missing), shown)
+
+    def __repr__(self) -> str:
+        ends = f"{self.times[0]:g} to {self.times[-1]:g} s" if len(self.snapshots) else "no time"
+        return f"Run({str(self.folder)!r}: {self.status}, {len(self.snapshots)} snapshots, {ends})"
+
+    # ------------------------------------------------------------ about
+
+    @property
+    def status(self) -> str:
+        """running, finished, stopped or failed; a run that was killed is still called running."""
+        return str(self.about["status"])
+
+    @property
+    def message(self) -> str:
+        """What the run said at its end."""
+        return str(self.about["message"])
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Versions, platform and random seed."""
+        return dict(self.about["provenance"])
+
+    @cached_property
+    def case_text(self) -> str:
+        """The case in TOML as it was run."""
+        return (self.folder / "case.toml").read_text()
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Time of each snapshot [s]."""
+        return np.array([each.time for each in self.snapshots])
+
+    @cached_property
+    def steps(self) -> np.ndarray:
+        """Number of the step of each snapshot."""
+        return np.array([each.step for each in self.snapshots], np.int64)
+
+    @property
+    def fluid_fields(self) -> list[str]:
+        """Names of the fields of the fluid."""
+        return self._names["fluid"]
+
+    @property
+    def particle_fields(self) -> list[str]:
+        """Names of the fields of the particles."""
+        return ["position" if name == POINTS else name for name in self._names["particles"]]
+
+    def unit(self, name: str) -> str:
+        """Unit of a field, or of a column of the history."""
+        return self._units[name]
+
+    # ------------------------------------------------------------ values
+
+    def fluid(self, name: str, snapshot: int = -1) -> np.ndarray:
+        """A cell field (nz, ny, nx) or (nz, ny, nx, 3) of one snapshot."""
+        self._must_know(name, self.fluid_fields, "fluid")
+        with self._opened(snapshot) as file:
+            return np.asarray(file[f"fluid/{name}"][0])
+
+    def particles(self, snapshot: int = -1) -> dict[str, np.ndarray]:
+        """All particle fields of one snapshot, one row a particle, in the order of ids."""
+        with self._opened(snapshot) as file:
+            return {
+                "position" if name == POINTS else name: np.asarray(each[:])
+                for name, each in file.get("particles", {}).items()
+            }
+
+    def track(self, particle: int) -> dict[str, np.ndarray]:
+        """One particle through all snapshots that hold it: `time` and every field, one row a snapshot.
+
+        particle  its id
+        """
+        self._must_know("id", self.particle_fields, "particles")
+        rows: dict[str, list[Any]] = {"time": []}
+        for place, time in enumerate(self.times):
+            with self._opened(place) as file:
+                group = file["particles"]
+                at = int(np.searchsorted(group["id"][:], particle))
+                if at < len(group["id"]) and group["id"][at] == particle:
+                    rows["time"].append(time)
+                    for name, each in group.items():
+                        rows.setdefault("position" if name == POINTS else name, []).append(each[at])
+        if not rows["time"]:
+            raise InputError("particle", particle, "the id of a particle of this run")
+        return {name: np.array(values) for name, values in rows.items()}
+
+    @cached_property
+    def history(self) -> dict[str, np.ndarray]:
+        """Measures in time, name -> column; `pandas.DataFrame(run.history)` is a table."""
+        return read_columns(self.folder / "history.h5")
+
+    @cached_property
+    def collisions(self) -> dict[str, np.ndarray]:
+        """All encounters that have ended, name -> column; empty where the run records none."""
+        parts: dict[str, list[np.ndarray]] = {}
+        for place in range(len(self.snapshots)):
+            with self._opened(place) as file:
+                for name, each in file.get("collisions", {}).items():
+                    parts.setdefault(name, []).append(each[:])
+        return {name: np.concatenate(each) for name, each in parts.items()}
+
+    def mesh(self, snapshot: int = -1) -> pyvista.MultiBlock:
+        """One snapshot as pyvista objects: `fluid`, an ImageData with cell fields, and `particles`, a PolyData."""
+        import pyvista
+
+        blocks = pyvista.MultiBlock()
+        if self.grid is not None:
+            image = pyvista.ImageData(
+                dimensions=[n + 1 for n in self.grid.cells], spacing=self.grid.spacing, origin=self.grid.origin
+            )
+            for name in self.fluid_fields:
+                values = self.fluid(name, snapshot)
+                image.cell_data[name] = values.reshape(-1, *values.shape[3:])
+            blocks["fluid"] = image
+        particles = self.particles(snapshot)
+        if particles:
+            points = pyvista.PolyData(particles.pop("position"))
+            for name, values in particles.items():
+                points.point_data[name] = values
+            blocks["particles"] = points
+        return blocks
+
+    # ------------------------------------------------------------ details
+
+    def _find(self) -> tuple[list[Snapshot], list[str]]:
+        """The snapshots that are there, by the index and beyond it, and the names of those that should be."""
+        there = {path.name for path in (self.folder / "data").glob("[0-9]*.h5")}
+        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf")}
+        found = [known[name] if name in known else look(self.folder / "data" / name)[0] for name in sorted(there)]
+        return found, sorted(known.keys() - there)
+
+    @cached_property
+    def _names(self) -> dict[str, list[str]]:
+        if not self.snapshots:
+            return {"fluid": [], "particles": []}
+        with self._opened(-1) as file:
+            return {block: sorted(file.get(block, {})) for block in ("fluid", "particles")}
+
+    @cached_property
+    def _units(self) -> dict[str, str]:
+        import h5py
+
+        units = {}
+        if self.snapshots:
+            with self._opened(-1) as file:
+                for block in ("fluid", "particles"):
+                    for name, each in file.get(block, {}).items():
+                        units["position" if name == POINTS else name] = str(each.attrs["unit"])
+        if (self.folder / "history.h5").exists():
+            with h5py.File(self.folder / "history.h5", "r") as file:
+                units |= {name: str(each.attrs["unit"]) for name, each in file.items()}
+        return units
+
+    @contextmanager
+    def _opened(self, snapshot: int) -> Iterator[Any]:
+        """The file of a snapshot."""
+        import h5py
+
+        if not self.snapshots:
+            raise InputError("folder", str(self.folder), "a run with a snapshot", "it was ended before its first one")
+        if not -len(self.snapshots) <= snapshot < len(self.snapshots):
+            raise InputError("snapshot", snapshot, f"from 0 to {len(self.snapshots) - 1}, or -1 for the last")
+        path = self.folder / "data" / self.snapshots[snapshot].name
+        try:
+            file = h5py.File(path, "r")
+        except OSError as damage:
+            raise RunFailed(f"{path}: cannot be read ({damage})") from damage
+        with file:
+            yield file
+
+    def _must_know(self, name: str, known: list[str], where: str) -> None:
+        if name not in known:
+            raise InputError(f"{where} field", name, nearest(name, known))
+
+
+def _indexed(path: Path) -> list[Snapshot]:
+    """What the index knows; nothing where there is none or it cannot be read: the snapshots speak for themselves."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return listed(file)
+    except (OSError, KeyError):
+        return []
