@@ -80,7 +80,7 @@ def independent(
         gamma = alpha * math.sqrt(m * k) * d**0.25
         normal = k * d**1.5 - gamma * v
         force = -(8.0 * G_star * math.sqrt(R * d) * slid + gamma * (vt + w * R))
-        if abs(force) > mu * normal:
+        if abs(force) > mu * abs(normal):
             force = mu * normal * math.copysign(1.0, force)
         return [v, normal / m - 9.81, force / m, force * R / (0.4 * m * R**2), vt + w * R]
 

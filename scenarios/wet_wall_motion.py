@@ -133,8 +133,8 @@ def film_along(wet: Wet, height: float, along: float, spin: float) -> tuple[floa
 def touch(wet: Wet, state: Any) -> tuple[float, float]:
     """Normal force and force along the wall of the contact [N].
 
-    Coulomb's limit has the sign of the normal force, also in the weak pull that ends a damped contact: so the impulse
-    of a contact that slides throughout is the friction times the normal impulse.
+    A contact that slides carries friction times the normal force, also, with its sign, in the weak pull that ends a
+    damped contact: so the impulse of one that slides throughout is friction times the normal impulse.
     """
     overlap = max(wet.radius - state[HEIGHT], 0.0)
     damping = contact.hertz_damping(wet.damping_ratio, wet.mass, wet.stiffness, overlap)
@@ -142,8 +142,8 @@ def touch(wet: Wet, state: Any) -> tuple[float, float]:
     slip = state[ALONG] + state[SPIN] * wet.radius
     spring = contact.mindlin_stiffness(wet.shear_modulus, wet.radius, overlap) * state[DISPLACEMENT]
     along = -(spring + damping * slip)
-    limit = math.copysign(coulomb_limit(wet.friction, normal), normal)
-    return normal, along if abs(along) <= limit else math.copysign(limit, along) * math.copysign(1.0, limit)
+    sliding = abs(along) > coulomb_limit(wet.friction, normal)
+    return normal, math.copysign(wet.friction * normal, along * normal) if sliding else along
 
 
 def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
