@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from closures.law import law
 
 
@@ -41,3 +43,29 @@ def elastohydrodynamic(viscosity: float, approach_speed: float, reduced_modulus:
     35
     """
     return float(0.37 * (viscosity * approach_speed / reduced_modulus) ** 0.4 * reduced_radius**0.6)
+
+
+@law(
+    "minimum_gap",
+    "Donahue et al., J. Fluid Mech. 650 (2010) 479; Punch et al., AIChE J. 69 (2023) e17989, eq. (14)",
+)
+def glass_transition(
+    viscosity: float, approach_speed: float, transition_pressure: float, reduced_radius: float, film: float
+) -> float:
+    r"""Gap at which the pressure in a film has turned a viscous liquid to glass, which then turns the bodies back.
+
+    .. math:: h_g = \min\left(\sqrt{3\eta R^* v / P_g},\ d\right)
+
+    viscosity            eta, dynamic, of the film [Pa s]
+    approach_speed       v, normal approach speed where the film begins, >= 0 [m/s]
+    transition_pressure  P_g, at which the liquid turns to glass [Pa]
+    reduced_radius       R* [m]
+    film                 d, thickness of the liquid on both bodies together, which no gap exceeds [m]
+    returns              h_g [m]
+
+    Range: very viscous liquids; P_g is fitted to head-on collisions, 2 to 23 MPa for silicone oil of 10 Pa s.
+
+    >>> round(glass_transition(10.0, 0.3564, 23e6, 6.35e-3, 270e-6) * 1e6)       # inch steel spheres, St = 1.6
+    54
+    """
+    return min(math.sqrt(3.0 * viscosity * reduced_radius * approach_speed / transition_pressure), film)

@@ -1,0 +1,166 @@
+r"""Films of finite extent: the liquid that coats two bodies and joins them in a bridge when they come close.
+
+A film begins to act at the gap d at which the liquid on both surfaces touches, and its resistance falls to
+nothing there, because the bridge is small against the pressure field of an immersed pair.
+"""
+
+from __future__ import annotations
+
+import math
+
+from closures.law import law
+
+
+@law("bridge", "Kantak & Davis, Powder Technol. 168 (2006) 42; Punch et al., AIChE J. 69 (2023) e17989, eq. (7)")
+def static_share(gap: float, film: float) -> float:
+    r"""Share of the immersed pair's resistance in a bridge that the displaced liquid does not swell.
+
+    .. math:: (1 - h/d)^2
+
+    gap      h, surface to surface [m]
+    film     d, thickness of the liquid on both bodies together [m]
+    returns  share of A/h [-]; 0 for h > d
+
+    >>> static_share(0.5, 1.0), static_share(2.0, 1.0)
+    (0.25, 0.0)
+    """
+    return max(1.0 - gap / film, 0.0) ** 2
+
+
+@law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis, Phys. Fluids 35 (2023) 103328, eq. (3)")
+def deforming_share(gap: float, film: float) -> float:
+    r"""Share of the immersed pair's resistance in a bridge that swells with the liquid squeezed out.
+
+    .. math:: \left(1 - \frac{h}{2d-h}\right)^2
+
+    gap      h, surface to surface [m]
+    film     d, thickness of the liquid on both bodies together [m]
+    returns  share of A/h [-]; 0 for h > d
+
+    >>> round(deforming_share(0.5, 1.0) * 9, 12), deforming_share(2.0, 1.0)
+    (4.0, 0.0)
+    """
+    return (1.0 - gap / (2.0 * film - gap)) ** 2 if gap < film else 0.0
+
+
+@law("bridge", "integral of Punch et al. (2023), eq. (7), over the gap")
+def static_potential(gap: float, film: float) -> float:
+    r"""Potential of a static bridge: its impulse between two gaps is -A times the difference.
+
+    .. math:: L = \ln\frac hd + 2\left(1 - \frac hd\right) - \tfrac12\left(1 - \frac{h^2}{d^2}\right)
+
+    gap      h, > 0 [m]
+    film     d [m]
+    returns  L [-]; 0 from h = d on
+
+    >>> round(static_potential(0.2, 1.0), 4)
+    -0.4894
+    """
+    share = min(gap / film, 1.0)
+    return math.log(share) + 2.0 * (1.0 - share) - 0.5 * (1.0 - share * share)
+
+
+@law("bridge", "integral of Davis (2023), eq. (3), over the gap; cf. eq. (42)")
+def deforming_potential(gap: float, film: float) -> float:
+    r"""Potential of a deforming bridge: its impulse between two gaps is -A times the difference.
+
+    .. math:: L = \ln x + 3\ln(2-x) + \frac{2}{2-x} - 2,\qquad x = h/d
+
+    gap      h, > 0 [m]
+    film     d [m]
+    returns  L [-]; 0 from h = d on
+
+    >>> round(deforming_potential(0.05, 1.0), 4)        # h_min of a twentieth of the film
+    -1.9666
+    """
+    share = min(gap / film, 1.0)
+    return math.log(share) + 3.0 * math.log(2.0 - share) + 2.0 / (2.0 - share) - 2.0
+
+
+@law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis (2023), eq. (4)")
+def davis_tangential(viscosity: float, reduced_radius: float, gap: float, film: float) -> float:
+    r"""Resistance of a bridge to the sliding of two surfaces, from the shear stress over its extent.
+
+    .. math:: c_t = 2\pi\eta R^*\ln\frac{2d-h}{h}
+
+    viscosity       eta, dynamic [Pa s]
+    reduced_radius  R* [m]
+    gap             h, > 0 [m]
+    film            d [m]
+    returns         c_t, force per relative speed of the surfaces [kg/s]; 0 for h > d
+
+    >>> round(davis_tangential(1.0, 1.0, 0.5, 1.0) / (2 * math.pi), 4)
+    1.0986
+    """
+    return 2.0 * math.pi * viscosity * reduced_radius * math.log((2.0 * film - gap) / gap) if gap < film else 0.0
+
+
+@law("bridge", "Nase et al., Powder Technol. 116 (2001) 214; Goldman, Cox & Brenner, Chem. Eng. Sci. 22 (1967) 637")
+def nase_tangential(viscosity: float, reduced_radius: float, gap: float, film: float) -> float:
+    r"""Resistance to sliding of two immersed surfaces, used between wet spheres up to where the films part.
+
+    .. math:: c_t = 6\pi\eta R^*\left(\tfrac{8}{15}\ln\frac{R^*}{h} + 0.9588\right)
+
+    viscosity       eta, dynamic [Pa s]
+    reduced_radius  R* [m]
+    gap             h, > 0 [m]
+    film            d [m]
+    returns         c_t, force per relative speed of the surfaces [kg/s]; 0 for h > d, where it jumps
+
+    Range: gap << R*; derived for a sphere beside a plane in a liquid without end.
+
+    >>> round(nase_tangential(1.0, 1.0, 0.01, 0.1) / (6 * math.pi), 4)
+    3.4149
+    """
+    if gap > film:
+        return 0.0
+    return 6.0 * math.pi * viscosity * reduced_radius * (8.0 / 15.0 * math.log(reduced_radius / gap) + 0.9588)
+
+
+@law("bridge", "Punch et al., AIChE J. 69 (2023) e17989, eq. (12)")
+def zero_cut(resistance: float, gap: float, minimum_gap: float) -> float:
+    r"""Resistance of a film that carries nothing once the solids have met.
+
+    .. math:: c\ (h \ge h_{min}),\qquad 0\ (h < h_{min})
+
+    resistance   c, of the film at this gap [kg/s]
+    gap          h [m]
+    minimum_gap  h_min [m]
+    returns      resistance, the same unit [kg/s]
+
+    >>> zero_cut(2.0, 0.1, 0.2), zero_cut(2.0, 0.3, 0.2)
+    (0.0, 2.0)
+    """
+    return resistance if gap >= minimum_gap else 0.0
+
+
+@law("bridge", "Punch et al., AIChE J. 69 (2023) e17989, eq. (13)")
+def constant_cut(gap: float, minimum_gap: float) -> float:
+    r"""Gap at which a film is evaluated that keeps the resistance of the minimum gap below it.
+
+    .. math:: \max(h, h_{min})
+
+    gap          h [m]
+    minimum_gap  h_min [m]
+    returns      gap [m]
+
+    >>> constant_cut(-0.1, 0.2), constant_cut(0.3, 0.2)
+    (0.2, 0.3)
+    """
+    return max(gap, minimum_gap)
+
+
+@law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis (2023), eq. (3)")
+def constant_capillary(surface_tension: float, reduced_radius: float) -> float:
+    r"""Capillary pull of a thin bridge of a wetting liquid between two spheres, the same at every gap.
+
+    .. math:: F_c = 8\pi\sigma R^*
+
+    surface_tension  sigma [N/m]
+    reduced_radius   R* [m]
+    returns          F_c, attractive [N]
+
+    >>> round(constant_capillary(0.0205, 6.35e-3) * 1e3, 2)     # silicone oil between inch spheres
+    3.27
+    """
+    return 8.0 * math.pi * surface_tension * reduced_radius
