@@ -1,0 +1,362 @@
+"""Measures of a bed and of its history, each on a synthetic field whose answer is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfddem.errors import InputError
+from cfddem.record import bubbles, measures, mixing, series
+
+SPACING = (0.01, 0.02, 0.005)
+
+
+def random(seed: int = 1) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+# ---------------------------------------------------------------- height, profiles, pressure
+
+
+def test_bed_height_of_a_stack_of_layers() -> None:
+    """A hundred layers of touching spheres: 99 % of the volume lies below 99 diameters."""
+    position = np.column_stack([np.zeros((100, 2)), 0.5 + np.arange(100.0)])
+    assert measures.bed_height(position, np.full(100, 0.5)) == pytest.approx(99.0, abs=1e-6)
+
+
+def test_bed_height_of_unequal_spheres_cuts_them() -> None:
+    """The volume below the height, integrated slice by slice, is the share."""
+    radius = random().uniform(0.2, 1.0, 300)
+    position = random(2).uniform(0.0, 5.0, (300, 3))
+    for share in (0.1, 0.5, 0.99):
+        height = measures.bed_height(position, radius, share)
+        slices = np.linspace(-1.0, 6.0, 70_001)
+        area = np.zeros_like(slices)
+        for centre, size in zip(position[:, 2], radius):
+            area += np.pi * np.maximum(size**2 - (slices - centre) ** 2, 0.0)
+        below = area[slices <= height].sum() / area.sum()
+        assert below == pytest.approx(share, abs=1e-4)
+
+
+def test_bed_height_of_nothing_and_of_half_a_sphere() -> None:
+    assert np.isnan(measures.bed_height(np.zeros((0, 3)), np.zeros(0)))
+    assert measures.bed_height(np.array([[0, 0, 2.0]]), np.array([0.3]), 0.5) == pytest.approx(2.0, abs=1e-9)
+    with pytest.raises(InputError, match="share"):
+        measures.bed_height(np.zeros((1, 3)), np.ones(1), 1.0)
+
+
+@pytest.mark.parametrize(("along", "axis"), [("x", 2), ("y", 1), ("z", 0)])
+def test_profiles_keep_one_direction(along: str, axis: int) -> None:
+    field = random().random((4, 5, 6))
+    gone = tuple({0, 1, 2} - {axis})
+    assert measures.profile(field, along) == pytest.approx(field.mean(axis=gone))
+    vector = random().random((4, 5, 6, 3))
+    assert measures.profile(vector, along) == pytest.approx(vector.mean(axis=gone))
+
+
+def test_profiles_leave_out_solid_cells_and_what_stands_in_them() -> None:
+    field = np.arange(8.0).reshape(2, 2, 2)
+    field[0, 0, 0] = np.nan
+    open_cells = np.ones((2, 2, 2), bool)
+    open_cells[0, 0, 0] = open_cells[1] = False
+    values = measures.voidage_profile(field, open_cells)
+    assert values[0] == pytest.approx(2.0)
+    assert np.isnan(values[1])
+    with pytest.raises(InputError, match="shape"):
+        measures.profile(field, "z", np.ones((2, 2), bool))
+
+
+def test_superficial_velocity_is_the_same_in_every_layer_of_a_bed() -> None:
+    voidage = np.linspace(0.4, 1.0, 10).reshape(10, 1, 1) * np.ones((10, 3, 3))
+    velocity = np.zeros((10, 3, 3, 3))
+    velocity[..., 2] = 0.3 / voidage
+    found = measures.fluid_velocity_profile(velocity, voidage)
+    assert found.superficial[:, 2] == pytest.approx(0.3)
+    assert found.between[:, 2] == pytest.approx(0.3 / voidage[:, 0, 0])
+
+
+def test_pressure_drop_of_a_bed_below_a_freeboard() -> None:
+    """1 000 Pa/m up to 0.1 m, nothing above; heights between centres, at the floor and at the lid."""
+    z = (np.arange(40) + 0.5) * SPACING[2]
+    pressure = np.maximum(0.1 - z, 0.0).reshape(40, 1, 1) * 1000.0 * np.ones((40, 4, 4))
+    assert measures.pressure_drop(pressure, SPACING, 0.0, 0.2) == pytest.approx(100.0)
+    assert measures.pressure_drop(pressure, SPACING, 0.0111, 0.0523) == pytest.approx(41.2)
+    assert measures.pressure_drop(pressure, SPACING, 1.0, 1.2, origin=(0, 0, 1.0)) == pytest.approx(100.0)
+    open_cells = np.ones(pressure.shape, bool)
+    open_cells[:, 0, 0] = False
+    pressure[:, 0, 0] = 1e9
+    assert measures.pressure_drop(pressure, SPACING, 0.0, 0.2, open_cells=open_cells) == pytest.approx(100.0)
+    with pytest.raises(InputError, match=r"high = 0\.3"):
+        measures.pressure_drop(pressure, SPACING, 0.0, 0.3)
+
+
+def test_velocity_profile_of_particles_in_shear() -> None:
+    position = random().uniform(0.0, 1.0, (200_000, 3))
+    velocity = np.zeros_like(position)
+    velocity[:, 2] = 3.0 * position[:, 0] - 1.0
+    edges = np.linspace(0.0, 1.2, 13)
+    found = measures.particle_profile(velocity, position, np.ones(len(position)), edges, "x")
+    assert found[:10, 2] == pytest.approx(3.0 * (edges[:10] + 0.05) - 1.0, abs=2e-3)
+    assert np.isnan(found[10:]).all()
+    assert found[:10, :2] == pytest.approx(0.0)
+
+
+def test_profiles_of_particles_are_weighted_by_volume() -> None:
+    position = np.zeros((2, 3))
+    values = measures.particle_profile(np.array([1.0, 10.0]), position, np.array([2.0, 1.0]), np.array([-1.0, 1.0]))
+    assert values == pytest.approx([18.0 / 9.0])
+    empty = measures.particle_profile(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.array([0.0, 1.0]))
+    assert empty.shape == (1, 3)
+    assert np.isnan(empty).all()
+
+
+def test_flux_of_a_rising_core_and_a_sinking_annulus() -> None:
+    """2 000 kg/m3 at solid fraction 0.1: 0.04 of the volume at 3 m/s up, 0.06 at 1 m/s down, net 120 kg/(m2 s)."""
+    count, area, height = 100_000, 0.5, 2.0
+    position = random().uniform(0.0, height, (count, 3))
+    rising = np.arange(count) < 0.4 * count
+    velocity = np.zeros((count, 3))
+    velocity[:, 2] = np.where(rising, 3.0, -1.0)
+    mass = np.full(count, 2000.0 * 0.1 * area * height / count)
+    found = measures.solids_flux(position, velocity, mass, np.linspace(0.0, height, 5), area)
+    assert found.up == pytest.approx(240.0, rel=0.02)
+    assert found.down == pytest.approx(120.0, rel=0.02)
+    assert found.net == pytest.approx(120.0, rel=0.05)
+
+
+# ---------------------------------------------------------------- granular temperature, mixing
+
+
+@pytest.mark.parametrize("count", [100, 100_000])
+def test_granular_temperature_does_not_feel_the_mean_flow_nor_the_number(count: int) -> None:
+    """Fluctuations of 0.2 m/s in each direction: 0.04 m2/s2, also with hardly two particles in a cell."""
+    cells, total, fields = (4, 5, 5), 0.0, []
+    for seed in range(200_000 // (2 * count)):
+        generator = random(seed)
+        position = generator.uniform(0.0, 1.0, (count, 3)) * (5.0, 5.0, 4.0)
+        flow = np.floor(position) @ np.array([[0.0, 1.0, 5.0], [2.0, 0.0, 1.0], [0.0, 7.0, 3.0]])
+        velocity = flow + generator.normal(0.0, 0.2, (count, 3))
+        found = measures.granular_temperature(velocity, measures.cells_of(position, cells, (1.0, 1.0, 1.0)))
+        total += found.mean
+        fields.append(found.cells)
+    assert total / len(fields) == pytest.approx(0.04, rel=0.01)
+    assert np.nanmean(fields) == pytest.approx(0.04, rel=0.02)
+    assert fields[0].shape == cells
+
+
+def test_a_cell_with_one_particle_has_no_temperature() -> None:
+    cells = measures.cells_of(np.array([[0.5, 0.5, 0.5], [0.5, 0.5, 1.5], [9.0, 0.0, 0.0]]), (2, 1, 1), (1.0, 1.0, 1.0))
+    assert cells.inside.tolist() == [True, True, False]
+    found = measures.granular_temperature(np.ones((3, 3)), cells)
+    assert np.isnan(found.cells).all()
+    assert np.isnan(found.mean)
+
+
+def test_cells_are_counted_in_the_order_of_fields() -> None:
+    cells = measures.cells_of(np.array([[2.5, 1.5, 0.5], [0.1, 0.1, 1.9]]), (2, 2, 3), (1.0, 1.0, 1.0))
+    assert np.unravel_index(cells.cell, cells.shape)[0].tolist() == [0, 1]
+    assert np.unravel_index(cells.cell, cells.shape)[2].tolist() == [2, 0]
+
+
+def test_mixing_indices_of_a_bed_apart_and_mixed() -> None:
+    lacey, nearest = [], []
+    position = random().uniform(0.0, 1.0, (2000, 3))
+    cells = measures.cells_of(position, (5, 5, 5), (0.2, 0.2, 0.2))
+    apart = position[:, 2] > 0.4
+    assert mixing.lacey_index(apart, cells) == pytest.approx(0.0, abs=1e-9)
+    assert mixing.neighbour_mixing_index(apart, position) < 0.2
+    for seed in range(100):
+        mixed = random(seed).permutation(apart)
+        lacey.append(mixing.lacey_index(mixed, cells))
+        nearest.append(mixing.neighbour_mixing_index(mixed, position))
+    for values in (lacey, nearest):
+        assert np.mean(values) == pytest.approx(1.0, abs=3.0 * np.std(values) / 10.0)
+        assert np.std(values) < 0.03
+    half = np.where(position[:, 0] < 0.5, apart, random().permutation(apart)).astype(bool)
+    assert 0.3 < mixing.neighbour_mixing_index(half, position) < 0.7
+
+
+def test_an_ordered_mixture_is_better_than_random() -> None:
+    grid = np.stack(np.meshgrid(*[np.arange(10.0)] * 3), -1).reshape(-1, 3)
+    board = grid.sum(axis=1) % 2 == 0
+    assert mixing.neighbour_mixing_index(board, grid, neighbours=6) > 1.5
+    assert mixing.lacey_index(board, measures.cells_of(grid, (5, 5, 5), (2.0, 2.0, 2.0))) > 1.0
+    assert np.isnan(mixing.neighbour_mixing_index(np.ones(1000, bool), grid))
+    assert np.isnan(mixing.lacey_index(np.ones(1000, bool), measures.cells_of(grid, (5, 5, 5), (2.0, 2.0, 2.0))))
+
+
+# ---------------------------------------------------------------- bubbles
+
+
+def bed_with(spheres: list[tuple[float, float, float, float]], shift: float = 0.0) -> np.ndarray:
+    """Voidage 0.4 up to 0.8 m and 1 above, cells of 0.02 m, with empty spheres (x, y, z, diameter) in it."""
+    z, y, x = np.meshgrid((np.arange(50) + 0.5) * 0.02, *[(np.arange(20) + 0.5) * 0.02] * 2, indexing="ij")
+    voidage = np.where(z < 0.8, 0.4, 1.0)
+    for cx, cy, cz, diameter in spheres:
+        dx = (x - cx - shift + 0.2) % 0.4 - 0.2  # as if x repeated
+        voidage[dx**2 + (y - cy) ** 2 + (z - cz) ** 2 < 0.25 * diameter**2] = 0.95
+    return voidage
+
+
+def test_bubbles_have_their_size_and_place_and_the_freeboard_is_none() -> None:
+    known = [(0.11, 0.21, 0.3, 0.14), (0.27, 0.15, 0.55, 0.18)]
+    found = bubbles.find_bubbles(bed_with(known), (0.02, 0.02, 0.02))
+    assert len(found) == 2
+    for bubble, (x, y, z, diameter) in zip(found, known):
+        assert bubble["centroid"] == pytest.approx([x, y, z], abs=0.003)
+        assert bubble["diameter"] == pytest.approx(diameter, rel=0.03)
+        assert bubble["volume"] == pytest.approx(np.pi / 6.0 * bubble["diameter"] ** 3)
+
+
+def test_a_bubble_that_breaks_through_the_surface_is_none() -> None:
+    field = bed_with([(0.2, 0.2, 0.3, 0.1), (0.2, 0.2, 0.76, 0.16)])
+    assert len(bubbles.find_bubbles(field, (0.02, 0.02, 0.02))) == 1
+    assert len(bubbles.find_bubbles(field, (0.02, 0.02, 0.02), surface=0.8)) == 1
+    assert len(bubbles.find_bubbles(field, (0.02, 0.02, 0.02), surface=0.32)) == 0
+    assert len(bubbles.find_bubbles(np.full((4, 4, 4), 0.5), (1.0, 1.0, 1.0))) == 0
+    assert len(bubbles.find_bubbles(field, (0.02, 0.02, 0.02), smallest=1000)) == 0
+
+
+def test_solid_cells_are_no_bubbles() -> None:
+    field = bed_with([(0.2, 0.2, 0.3, 0.1)])
+    open_cells = np.ones(field.shape, bool)
+    open_cells[:, :3] = False
+    field[:30, :3] = 1.0
+    assert len(bubbles.find_bubbles(field, (0.02, 0.02, 0.02), open_cells=open_cells)) == 1
+
+
+def test_a_bubble_across_a_periodic_side_is_one() -> None:
+    field = bed_with([(0.39, 0.2, 0.3, 0.14)])
+    cut = bubbles.find_bubbles(field, (0.02, 0.02, 0.02), origin=(1.0, 0.0, 0.0))
+    whole = bubbles.find_bubbles(field, (0.02, 0.02, 0.02), origin=(1.0, 0.0, 0.0), periodic=(True, False))
+    assert len(cut) == 2
+    assert len(whole) == 1
+    assert whole["centroid"][0] == pytest.approx([1.39, 0.2, 0.3], abs=0.003)
+    assert whole["volume"][0] == pytest.approx(cut["volume"].sum())
+
+
+def test_a_flat_bed_has_discs() -> None:
+    z, _, x = np.meshgrid((np.arange(60) + 0.5) * 0.01, [0.5, 1.5], (np.arange(40) + 0.5) * 0.01, indexing="ij")
+    field = np.where((x - 0.2) ** 2 + (z - 0.3) ** 2 < 0.01, 0.9, 0.5)
+    found = bubbles.find_bubbles(field, (0.01, 0.004, 0.01), flat=True)
+    assert found["diameter"] == pytest.approx([0.2], rel=0.01)
+
+
+def test_rise_velocity_of_bubbles_that_pass_each_other() -> None:
+    """One rises at 0.5, the other at 0.9 m/s and drifts; a third appears and a fourth is gone."""
+    before = bed_with([(0.1, 0.2, 0.30, 0.14), (0.3, 0.2, 0.28, 0.12), (0.2, 0.3, 0.6, 0.12)])
+    after = bed_with([(0.1, 0.2, 0.35, 0.14), (0.32, 0.2, 0.37, 0.12), (0.2, 0.1, 0.1, 0.12)])
+    first, second = (bubbles.find_bubbles(field, (0.02, 0.02, 0.02)) for field in (before, after))
+    found = bubbles.follow_bubbles(first, second, 0.1, fastest=1.5)
+    assert len(found.velocity) == 2
+    order = np.argsort(first["diameter"][found.before])
+    assert found.velocity[order] == pytest.approx(np.array([[0.2, 0.0, 0.9], [0.0, 0.0, 0.5]]), abs=0.04)
+    nothing = bubbles.follow_bubbles(first, np.zeros(0, bubbles.BUBBLE), 0.1, fastest=1.5)
+    assert len(nothing.velocity) == 0
+    assert len(bubbles.follow_bubbles(first, second, 0.1, fastest=0.01).velocity) == 0
+
+
+def test_number_and_size_of_bubbles_against_height() -> None:
+    rows = np.zeros(300, bubbles.BUBBLE)
+    rows["centroid"][:, 2] = random().uniform(0.0, 1.0, 300)
+    rows["diameter"] = 0.1 + 0.2 * np.floor(2.0 * rows["centroid"][:, 2])
+    found = bubbles.bubble_profile(np.array_split(rows, 50), np.array([0.0, 0.5, 1.0, 2.0]))
+    assert found.number.sum() == pytest.approx(6.0)
+    assert found.diameter[:2] == pytest.approx([0.1, 0.3])
+    assert found.error[:2] == pytest.approx([0.0, 0.0], abs=1e-8)
+    assert found.number[2] == 0.0
+    assert np.isnan(found.diameter[2])
+
+
+# ---------------------------------------------------------------- series in time
+
+
+def with_memory(count: int, memory: float, seed: int) -> np.ndarray:
+    """A series of unit variance whose correlation falls by `memory` from value to value."""
+    noise = random(seed).normal(0.0, np.sqrt(1.0 - memory**2), count)
+    values = np.empty(count)
+    values[0] = random(seed + 10_000).normal()
+    for k in range(1, count):
+        values[k] = memory * values[k - 1] + noise[k]
+    return values
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_error_of_a_mean_is_that_of_the_memory(memory: float) -> None:
+    """Known: sqrt((1 + r)/(1 - r)/n). Found within 10 % on average, and right about as often as a normal error is."""
+    known = np.sqrt((1.0 + memory) / (1.0 - memory) / 4000.0)
+    found = [series.block_average(with_memory(4000, memory, seed)) for seed in range(60)]
+    assert np.mean([average.error for average in found]) == pytest.approx(known, rel=0.10)
+    hits = np.mean([abs(average.mean) < average.error for average in found])
+    assert 0.68 - 0.18 < hits < 0.68 + 0.18
+    assert np.mean([average.independent for average in found]) == pytest.approx(1.0 / known**2, rel=0.25)
+
+
+def test_a_record_too_short_for_an_error_says_so() -> None:
+    assert np.isnan(series.block_average(np.arange(10.0)).error)
+    assert np.isnan(series.block_average(np.sin(np.linspace(0.0, 1.0, 200))).error)
+    assert series.block_average(np.full(50, 3.0)) == (3.0, 0.0, 1, 50.0)
+    assert str(series.block_average(np.full(50, 3.0))) == "3 +- 0"
+
+
+def test_start_up_is_found() -> None:
+    """A bed that settles within a time of 100 values about a noisy level: cut between 2 and 8 such times."""
+    time = np.arange(4000.0)
+    for seed in range(10):
+        found = series.stationarity(5.0 * np.exp(-time / 100.0) + 0.2 * with_memory(4000, 0.8, seed))
+        assert found.stationary
+        assert 200 <= found.start <= 800
+
+
+def test_a_steady_record_is_kept_and_a_drifting_one_refused() -> None:
+    time = np.arange(4000.0)
+    steady = [series.stationarity(with_memory(4000, 0.8, seed)) for seed in range(30)]
+    assert sum(found.stationary for found in steady) >= 28
+    assert np.median([found.start for found in steady]) < 400
+    for seed in range(10):
+        assert not series.stationarity(time / 1000.0 + 0.3 * with_memory(4000, 0.8, seed)).stationary
+    assert not series.stationarity(np.arange(5.0)).stationary
+    assert not series.stationarity(np.exp(time / 1000.0)).stationary
+
+
+def test_main_frequency_of_a_noisy_wave() -> None:
+    """2.63 Hz in as much noise, 10 s at 100 Hz."""
+    time = np.arange(1000) * 0.01
+    values = 7.0 + np.sin(2.0 * np.pi * 2.63 * time) + random().normal(0.0, 0.7, 1000)
+    found = series.spectrum(values, 0.01)
+    assert found.main == pytest.approx(2.63, abs=0.03)
+    assert np.sum(found.density) * found.frequency[1] == pytest.approx(np.var(values), rel=0.15)
+    assert np.isnan(series.spectrum(np.full(100, 2.0), 0.01).main)
+    with pytest.raises(InputError, match="at least 16"):
+        series.spectrum(np.zeros(5), 0.01)
+
+
+def test_crossings_of_few_periods() -> None:
+    time = np.arange(200) * 0.01
+    assert series.crossing_frequency(np.sin(2.0 * np.pi * 2.6 * time), 0.01) == pytest.approx(2.6, rel=0.01)
+    assert np.isnan(series.crossing_frequency(np.arange(10.0), 0.01))
+
+
+def test_even_intervals() -> None:
+    interval, values = series.even(np.array([0.0, 1.0, 4.0]), np.array([0.0, 1.0, 4.0]), 5)
+    assert interval == 1.0
+    assert values == pytest.approx(np.arange(5.0))
+    with pytest.raises(InputError, match="rising"):
+        series.even(np.array([0.0, 0.0]), np.array([1.0, 2.0]))
+
+
+def test_residence_times_of_known_visits() -> None:
+    inside = np.array([[0, 1, 1, 0, 0, 1, 0], [1, 1, 0, 0, 1, 1, 1], [0, 0, 1, 1, 1, 1, 0]], bool).T
+    times = series.residence_times(np.arange(7.0) * 0.5, inside)
+    assert sorted(times) == pytest.approx([0.5, 1.0, 2.0])
+    assert len(series.residence_times(np.arange(3.0), np.ones((3, 4), bool))) == 0
+
+
+def test_mean_residence_time_is_not_low_for_long_stays() -> None:
+    """Plug flow with stays of 8 s, seen for 10 s: hardly a visit lies in the record whole."""
+    time = np.linspace(0.0, 10.0, 201)
+    entries = random().uniform(-8.0, 10.0, 20_000)
+    inside = (time[:, None] >= entries) & (time[:, None] < entries + 8.0)
+    assert series.mean_residence_time(time, inside) == pytest.approx(8.0, rel=0.02)
+    assert len(series.residence_times(time, inside)) < 0.15 * len(entries)
+    assert series.mean_residence_time(time, np.ones((201, 3), bool)) == np.inf
