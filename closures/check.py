@@ -7,6 +7,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator
 
+from closures.drag import ergun
 from closures.law import Law, page
 
 Curve = Callable[[float], float]
@@ -42,9 +43,10 @@ def check(law: Callable[..., float]) -> list[str]:
     returns  sentences that say what was found, and where
 
     Every law must give finite numbers in its range, and the same ones when compiled. Drag must be finite at rest, tend
-    to Stokes drag within 5 %, rise with velocity and crowding, and not jump by more than 0.5 %. A minimum gap must be
-    positive and not fall with viscosity, speed or roughness. Added mass must start at 1/2 and not fall with crowding.
-    Restitution must stay between 0 and 1 and not fall with the Stokes number. Shear lift must vanish with the shear.
+    to Stokes drag within 5 %, rise with velocity and crowding, not jump by more than 0.5 %, and be between 0.3 and 2
+    times Ergun's in a creeping dense bed. A minimum gap must be positive and not fall with viscosity, speed or
+    roughness. Added mass must start at 1/2 and not fall with crowding. Restitution must stay between 0 and 1 and not
+    fall with the Stokes number. Shear lift must vanish with the shear.
 
     >>> from closures.drag import di_felice, gidaspow
     >>> check(di_felice)
@@ -158,6 +160,8 @@ def _drag(card: Law) -> Iterator[str]:
     if voidages[-1] == 1.0 and not sizes and abs(alone - 1.0) > 0.05:
         yield f"tends to {alone:.3g} and not to 1, Stokes drag, for a slow sphere alone"
 
+    yield from _creeping_bed(voidages, lambda voidage: factor(numbers[0], voidage))
+
     def at_voidage(voidage: float) -> Curve:
         return lambda reynolds: factor(reynolds, voidage)
 
@@ -176,6 +180,19 @@ def _drag(card: Law) -> Iterator[str]:
     yield from _first_fall("falls with", "solid_fraction", solids, "reynolds", some_numbers, crowded)
     yield from _worst_jump("reynolds", numbers, "voidage", some_voidages, at_voidage)
     yield from _worst_jump("voidage", voidages, "reynolds", some_numbers, at_reynolds)
+
+
+def _creeping_bed(voidages: list[float], factor: Curve) -> Iterator[str]:
+    """A dense bed is near Ergun; two and a half times as much is the mark of a law of the total force."""
+    dense = max(voidages[0], 0.45)
+    if dense > 0.6 or factor(dense) == factor(voidages[-1]):
+        return
+    share = factor(dense) / ergun(0.0, dense)
+    if not 0.3 < share < 2.0:
+        yield (
+            f"is {share:.2g} times Ergun's in a creeping bed of voidage {dense:.2g}: F is of the force without the "
+            "pressure gradient, voidage times the total, over 3 pi eta d U with the superficial slip U"
+        )
 
 
 def _first_fall(

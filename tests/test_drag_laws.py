@@ -38,6 +38,13 @@ def test_gidaspow_is_ergun_in_dense_beds(law: Drag, reynolds: float) -> None:
     assert law(reynolds, 0.42) == pytest.approx(ergun(reynolds, 0.42), rel=5e-3)
 
 
+def test_the_smooth_switch_of_gidaspow_is_one_hundredth_wide() -> None:
+    """Half of each law at eps = 0.8; at 0.81 a share of 1/2 + arctan(2.625)/pi of Wen & Yu."""
+    for voidage, share in [(0.8, 0.5), (0.81, 0.8840), (0.79, 0.1160)]:
+        mixture = share * drag.wen_yu(10.0, voidage) + (1.0 - share) * ergun(10.0, voidage)
+        assert drag.gidaspow_smooth(10.0, voidage) == pytest.approx(mixture, rel=1e-5)
+
+
 @pytest.mark.parametrize("law", [drag_resolved.koch_hill, drag_resolved.beetstra, drag_resolved.tenneti])
 def test_creeping_dense_beds_lie_near_ergun(law: Drag) -> None:
     """Carman's constant of the simulations is 180 against Ergun's 150: up to 30 %."""
@@ -113,6 +120,8 @@ def test_standard_drag_curve_of_the_book() -> None:
     """Numbers of the library `fluids`, and the bottom of the crisis, C_D = 0.07."""
     assert 24.0 / 200.0 * drag_single.clift(200.0, 1.0) == pytest.approx(0.7756342422322543, rel=1e-12)
     assert 24.0 / 4e5 * drag_single.clift(4e5, 1.0) == pytest.approx(0.0702, abs=1e-4)
+    assert 24.0 / 2e6 * drag_single.clift(2e6, 1.0) == pytest.approx(0.15)
+    assert 24.0 / 1e-3 * drag_single.clift(1e-3, 1.0) == pytest.approx(24e3 + 0.1875, rel=1e-9)
     for switch, limit in [(0.01, 0.002), (20.0, 0.008), (260.0, 1e-4), (1500.0, 7e-4), (1.2e4, 1e-4), (3.38e5, 0.006)]:
         below, above = (drag_single.clift(switch * (1.0 + sign * 1e-12), 1.0) for sign in (-1.0, 1.0))
         assert abs(above / below - 1.0) < limit
@@ -265,8 +274,9 @@ def of_ones_own(kind: str, function: Callable[..., float], **ranges: tuple[float
 
 
 def test_a_users_own_law_is_checked() -> None:
-    good = of_ones_own("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-2.7)
-    assert good == []
+    ranges = {"reynolds": (0.01, 300.0), "voidage": (0.5, 0.9)}
+    assert of_ones_own("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-2.7, **ranges) == []
+    assert of_ones_own("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-3.7) == []
     wrong: list[tuple[Drag, str]] = [
         (lambda reynolds, voidage: 1.15 + 0.15 * reynolds**0.687, "tends to 1.15 and not to 1"),
         (lambda reynolds, voidage: 24.0 / reynolds, "at reynolds = 0: a particle may rest"),
@@ -274,6 +284,7 @@ def test_a_users_own_law_is_checked() -> None:
         (lambda reynolds, voidage: 1.0 / (1.0 + reynolds * reynolds), "force falls with reynolds"),
         (lambda reynolds, voidage: 1.0 if voidage > 0.7 else 1.1, "jumps by -9.1 % at voidage = 0.7"),
         (lambda reynolds, voidage: voidage - 1.0, "drag must be positive"),
+        (lambda reynolds, voidage: drag_resolved.tenneti(reynolds, voidage) / voidage, "is 2.5 times Ergun's"),
     ]
     for function, complaint in wrong:
         found = of_ones_own("drag", function)
@@ -291,3 +302,46 @@ def test_other_kinds_have_rules_of_their_own() -> None:
     assert "without shear" in of_ones_own("lift", lambda reynolds, shear_reynolds: 1.0 + shear_reynolds)[0]
     with pytest.raises(KeyError, match="is no law"):
         check(lambda reynolds, voidage: 1.0)
+
+
+AS_OTHERS: list[tuple[Drag, float, float, float]] = [
+    (drag_resolved.beetstra, 1.0, 0.5, 20.53869),  # MFIX, drag_gs.f
+    (drag_resolved.beetstra, 100.0, 0.5, 50.41343),
+    (drag_resolved.beetstra, 20.0, 0.85, 4.949023),
+    (drag.gidaspow, 1.0, 0.5, 17.05556),
+    (drag.gidaspow, 100.0, 0.5, 55.55556),
+    (drag.gidaspow, 20.0, 0.85, 3.935547),
+    (drag.wen_yu, 1.0, 0.5, 14.43635),
+    (drag.wen_yu, 100.0, 0.5, 57.10366),
+    (drag_resolved.koch_hill, 1.0, 0.5, 20.22893),  # CFDEMcoupling, KochHillDrag.C
+    (drag_resolved.koch_hill, 100.0, 0.5, 42.8925),
+    (drag_resolved.koch_hill, 20.0, 0.85, 4.584273),
+    (drag_resolved.tang, 1.0, 0.5, 21.63961),  # waLBerla, discrete particle methods
+    (drag_resolved.tang, 100.0, 0.5, 44.44313),
+    (drag_resolved.tang, 20.0, 0.85, 5.334413),
+    (drag_resolved.tenneti, 1.0, 0.5, 19.34625),
+    (drag_resolved.tenneti, 100.0, 0.5, 40.70708),
+    (drag_resolved.tenneti, 20.0, 0.85, 4.686045),
+    (drag.di_felice, 1.0, 0.5, 13.79351),  # PhasicFlow, DiFelice and Rong
+    (drag.di_felice, 100.0, 0.5, 44.82992),
+    (drag.di_felice, 20.0, 0.85, 3.977214),
+    (drag_resolved.rong, 1.0, 0.5, 15.82148),
+    (drag_resolved.rong, 100.0, 0.5, 46.90914),
+    (drag_resolved.rong, 20.0, 0.85, 4.103855),
+    (drag_single.brown_lawler, 1.0, 1.0, 1.150002),  # Fluidity, flow past a sphere
+    (drag_single.brown_lawler, 100.0, 1.0, 4.471412),
+]
+
+
+@pytest.mark.parametrize(("law", "reynolds", "voidage", "factor"), AS_OTHERS)
+def test_drag_is_what_other_codes_compute(law: Drag, reynolds: float, voidage: float, factor: float) -> None:
+    """The formulas of public codes, brought to the normal form and evaluated apart from ours."""
+    assert law(reynolds, voidage) == pytest.approx(factor, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("reynolds", "shear_reynolds", "factor"), [(1.0, 0.5, 0.1115476), (20.0, 4.0, 0.07743626), (80.0, 16.0, 0.1015869)]
+)
+def test_shear_lift_is_what_openfoam_computes(reynolds: float, shear_reynolds: float, factor: float) -> None:
+    """SaffmanMeiLiftForce, brought to the lift over Stokes drag."""
+    assert lift.saffman_mei(reynolds, shear_reynolds) == pytest.approx(factor, rel=1e-6)
