@@ -42,7 +42,7 @@ def magnus(reynolds: float) -> float:
     reynolds  Re, on the slip [-]
     returns   lift factor [-]
 
-    Range: Re < 1000; continuous at Re = 1.
+    Range: Re < 1000; continuous at Re = 1. The spin omega is relative to half the fluid's vorticity.
 
     >>> magnus(0.5), round(magnus(1.0000001), 6)
     (1.0, 1.0)
@@ -61,7 +61,8 @@ def torque(spin_reynolds: float) -> float:
     spin_reynolds  Re_r = rho d^2 omega / eta [-]
     returns        torque factor [-]
 
-    Range: Re_r < 1000; it rises by 0.2 % at 32.
+    Range: Re_r < 1000; it rises by 0.2 % at 32. The spin omega is relative to half the fluid's vorticity; published as
+    C = 64 pi / Re_r and 12.9 / sqrt(Re_r) + 128.4 / Re_r over rho/2 (d/2)^5 omega^2, coefficients as in Kratos.
 
     >>> torque(1.0)
     1.0
