@@ -36,6 +36,17 @@ def open_run(folder: str | Path) -> Run:
     return Run(Path(folder))
 
 
+def newest_run(place: Path) -> Path:
+    """The run in a folder, or in a folder within it, that was last written to.
+
+    errors  InputError where there is none
+    """
+    found = [path for path in (place / "run.json", *place.glob("*/run.json")) if path.exists()]
+    if not found:
+        raise InputError("folder", None, "the folder of a run", f"none is in {place.resolve()}")
+    return max(found, key=lambda path: max(path.stat().st_mtime, path.with_name("data").stat().st_mtime)).parent
+
+
 class Run:
     """What a run has written. Snapshots are named by their place in time: 0 the first, -1 the last."""
 
@@ -193,7 +204,7 @@ class Run:
         units = {}
         if self.snapshots:
             with self._opened(-1) as file:
-                for block in ("fluid", "particles"):
+                for block in ("collisions", "fluid", "particles"):
                     for name, each in file.get(block, {}).items():
                         units["position" if name == POINTS else name] = str(each.attrs["unit"])
         if (self.folder / "history.h5").exists():

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cfddem.errors import InputError, nearest
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -49,6 +51,17 @@ def panels(columns: int = 1, *, width: float = 8.0, height: float = 4.6, **optio
     options        handed to `Figure.subplots`, such as sharey=True
     returns        the figure, and its panel or array of panels
     """
+    figure, axes = blank(1, columns, width=width, height=height, **options)
+    return figure, axes if columns > 1 else axes[0]
+
+
+def blank(rows: int, columns: int, *, width: float, height: float, **options: Any) -> tuple[Figure, Any]:
+    """A figure with rows and columns of panels.
+
+    width, height  of the figure [inch]
+    options        handed to `Figure.subplots`
+    returns        the figure, and its panels in one array, row by row
+    """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -56,7 +69,58 @@ def panels(columns: int = 1, *, width: float = 8.0, height: float = 4.6, **optio
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(width, height))
         FigureCanvasAgg(figure)
-        return figure, figure.subplots(1, columns, **options)
+        return figure, figure.subplots(rows, columns, squeeze=False, **options).ravel()
+
+
+def placed(size: tuple[float, float], boxes: Sequence[tuple[float, float, float, float]]) -> tuple[Figure, list[Axes]]:
+    """A figure with panels exactly where they are wanted.
+
+    size     width and height of the figure [inch]
+    boxes    left, bottom, width, height of each panel [inch]
+    returns  the figure, and its panels
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    wide, high = size
+    with mpl.rc_context(_STYLE | {"figure.constrained_layout.use": False}):
+        figure = Figure(figsize=size)
+        FigureCanvasAgg(figure)
+        return figure, [figure.add_axes((x / wide, y / high, w / wide, h / high)) for x, y, w, h in boxes]
+
+
+def history(folder: str | Path, output: str | Path | None = None, columns: Sequence[str] = ()) -> Path:
+    """Curves in time from the history of a run, one panel a column.
+
+    folder   of a run
+    output   PNG; NAME-history.png in this folder if not given
+    columns  of the history; bed height and pressure drop if there, else all
+    returns  the file
+    errors   InputError for a column that the run has not
+    """
+    from cfddem.record.reading import open_run
+
+    run = open_run(folder)
+    known = [name for name in run.history if name not in ("time", "step")]
+    if not known:
+        raise InputError("folder", str(folder), "a run with a history", "it ended before its first row")
+    for name in columns:
+        if name not in known:
+            raise InputError("columns", name, nearest(name, known))
+    usual = [name for name in ("bed_height", "pressure_drop") if name in known]
+    names = list(columns) or usual or known
+    figure, axes = blank(len(names), 1, width=8.0, height=0.7 + 2.1 * len(names), sharex=True)
+    for name, each in zip(names, axes):
+        each.plot(run.history["time"], run.history[name], color=BLUE)
+        unit = run.unit(name)
+        label(each, "", "", name.replace("_", " "), "-" if unit == "1" else unit)
+        each.set_xlabel("")
+    axes[-1].set_xlabel("time  [s]")
+    figure.suptitle(run.folder.resolve().name, fontsize=12, fontweight="bold")
+    output = Path(f"{run.folder.resolve().name}-history.png" if output is None else output)
+    save(figure, output)
+    return output
 
 
 def label(axes: Axes, x: str, x_unit: str, y: str, y_unit: str, title: str = "") -> None:

@@ -1,0 +1,260 @@
+"""Pictures: what is drawn stands where it is, in its colour; formats of others hold the same numbers."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from cfddem.errors import InputError, RunFailed
+from cfddem.record.export import export
+from cfddem.record.output import RunFolder
+from cfddem.record.reading import newest_run, open_run
+from cfddem.view import rendering
+from cfddem.view.pictures import movie, picture
+from cfddem.view.plots import history
+from cfddem.view.stage import BUBBLE, Stage, _bubbles
+from cfddem.view.window import scene, window
+
+GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
+BOUNDS = np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]])
+
+
+@pytest.fixture
+def renders() -> None:
+    """Skips, with the reason, where this machine cannot render."""
+    fault = rendering.why_not()
+    if fault:
+        pytest.skip(fault)
+
+
+@pytest.fixture(scope="module")
+def bed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bed with a bubble, half the column full, of three snapshots."""
+    folder = tmp_path_factory.mktemp("runs") / "bed"
+    run = RunFolder.create(folder, 'name = "small bed"\n', {}, GRID)
+    points = np.random.default_rng(1).random((300, 3)) * [0.1, 0.04, 0.1]
+    z, y, x = np.meshgrid(*[0.01 * (np.arange(n) + 0.5) for n in (20, 4, 10)], indexing="ij")
+    for k in range(3):
+        away = np.sqrt((x - 0.05) ** 2 + (y - 0.02) ** 2 + (z - 0.04 - 0.01 * k) ** 2)
+        voidage = np.where((z > 0.1) | (away < 0.02), 1.0, 0.42)
+        particles = {"id": np.arange(300), "position": points, "velocity": points * k, "radius": np.full(300, 2e-3)}
+        fluid = {"voidage": voidage, "velocity": np.stack([x, y, z + 0.1], axis=-1)}
+        run.append_history({"time": 0.1 * k, "bed_height": 0.1, "pressure_drop": 900.0 + k})
+        run.write_snapshot(0.1 * k, k, fluid, particles)
+    run.finish("finished")
+    return folder
+
+
+def drawn(position: list, radius: list, values: list, depth: int = 1) -> np.ndarray:
+    """Spheres in the box 1 x 2 x 3, a hundred pixels a metre."""
+    return rendering.spheres(
+        np.array(position, float), np.array(radius), np.array(values), BOUNDS, depth, (0.0, 1.0),
+        mpl.colormaps["viridis"], (100 if depth == 1 else 200, 300),
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------- spheres
+
+
+@pytest.mark.parametrize("depth", [0, 1])
+def test_a_sphere_stands_where_it_is_and_is_as_large_as_it_is(renders, depth):
+    image = drawn([(0.25, 0.5, 2.5)], [0.2], [0.0], depth)
+    seen = np.argwhere((image < 250).any(axis=2))
+    row, column = seen.mean(axis=0)
+    assert row == pytest.approx(50.0, abs=1.0)  # 0.5 m below the top
+    assert column == pytest.approx(50.0 if depth == 0 else 25.0, abs=1.0)
+    assert len(seen) == pytest.approx(np.pi * 20.0**2, rel=0.04)
+
+
+def test_the_nearer_sphere_hides_the_other(renders):
+    """Seen along y from the front, against x from the far side."""
+    for depth, places in ((1, [(0.5, 0.2, 1.5), (0.5, 1.8, 1.5)]), (0, [(0.9, 1.0, 1.5), (0.1, 1.0, 1.5)])):
+        for first in (0, 1):
+            image = drawn([places[first], places[1 - first]], [0.3, 0.3], [float(first == 1), float(first == 0)], depth)
+            red, _, blue = (int(each) for each in image[150, 100 // (depth + 1)])
+            near_is_slow = blue > red  # viridis begins blue and ends yellow
+            assert near_is_slow
+
+
+def test_colour_shows_the_value_and_nothing_is_white(renders):
+    image = drawn([(0.5, 1.0, 2.0), (0.5, 1.0, 1.0)], [0.3, 0.3], [0.0, 1.0])
+    low, high = image[100, 50], image[200, 50]
+    assert np.abs(low - 255.0 * np.array(mpl.colormaps["viridis"](0.0)[:3])).max() < 12
+    assert np.abs(high - 255.0 * np.array(mpl.colormaps["viridis"](1.0)[:3])).max() < 12
+    assert (drawn([], [], []) == 255).all()
+
+
+# ---------------------------------------------------------------- pictures of a run
+
+
+def test_picture_movie_and_window(renders, bed, tmp_path):
+    import matplotlib.image
+    from PIL import Image
+
+    path = picture(bed, tmp_path / "bed.png", show=("spheres", "voidage", "bubbles", "streamlines"))
+    image = matplotlib.image.imread(path)
+    assert image.shape[1] == 1280 and image[..., :3].std() > 0.1
+    film = Image.open(movie(bed, tmp_path / "bed.gif", show=("spheres",)))
+    assert film.n_frames == 3 and film.size[0] <= 800  # type: ignore[attr-defined]
+    assert not list(tmp_path.glob(".*"))
+    plotter = scene(open_run(bed), off_screen=True)
+    assert plotter.screenshot(return_img=True).std() > 1.0
+    plotter.close()
+
+
+def test_a_film_as_mp4(renders, bed, tmp_path):
+    pytest.importorskip("imageio_ffmpeg", reason="needs `pip install 'cfddem[movie]'`")
+    import imageio
+
+    frames = [each for each in imageio.get_reader(movie(bed, tmp_path / "bed.mp4", show=("voidage",)))]  # noqa: C416, a list() would ask for its endless length
+    assert len(frames) == 3 and frames[0].shape[1] <= 800 and np.std(frames[0]) > 10.0  # type: ignore[attr-defined]
+
+
+def test_axes_colour_bar_and_title_speak(renders, bed):
+    stage = Stage.of(open_run(bed), [2], (), "speed", None)
+    figure = stage.figure(2)
+    assert figure.get_suptitle() == "small bed,  t = 0.2 s"
+    labels = {each.get_xlabel() for each in figure.axes} | {each.get_ylabel() for each in figure.axes}
+    assert labels == {"", "x  [m]", "z  [m]", "speed  [m/s]", "voidage  [-]"}
+    assert figure.axes[0].get_xlim() == (0.0, 0.1) and figure.axes[0].get_ylim() == (0.0, 0.2)
+
+
+def test_a_run_of_particles_alone_is_framed_by_them(renders, tmp_path):
+    run = RunFolder.create(tmp_path / "run", "", {})
+    points = {"position": np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 3.0]]), "radius": np.array([0.1, 0.2])}
+    run.write_snapshot(0.0, 0, None, points | {"velocity": np.zeros((2, 3))})
+    stage = Stage.of(open_run(run.folder), [0], (), "speed", None)
+    assert stage.panels == ("spheres",) and stage.depth == 1
+    assert stage.bounds[:, 0] == pytest.approx(np.array([-0.1, -0.1, -0.1]), abs=0.07)
+    assert stage.bounds[:, 1] == pytest.approx(np.array([1.2, 0.7, 3.2]), abs=0.07)
+    assert picture(run.folder, tmp_path / "two.png").exists()
+
+
+def test_the_bubble_and_the_freeboard_are_told_apart(bed):
+    run = open_run(bed)
+    bubble, freeboard = _bubbles(run.fluid("voidage", 0), run.grid)
+    assert bubble.bounds[5] < 0.07 and bubble.center == pytest.approx((0.05, 0.02, 0.04), abs=0.006)
+    assert freeboard.bounds[4] == pytest.approx(0.1, abs=0.01)
+    assert not any(each.n_points for each in _bubbles(np.full((20, 4, 10), BUBBLE - 0.1), run.grid))
+
+
+def test_curves_of_the_history(bed, tmp_path):
+    assert history(bed, tmp_path / "curves.png").stat().st_size > 10_000
+    with pytest.raises(InputError, match="did you mean 'bed_height'"):
+        history(bed, tmp_path / "other.png", ["bed_hight"])
+
+
+def test_wrong_wishes_are_one_line(renders, bed, tmp_path):
+    with pytest.raises(InputError, match="did you mean 'bubbles'"):
+        picture(bed, tmp_path / "a.png", show=("bubles",))
+    with pytest.raises(InputError, match="did you mean 'radius'"):
+        picture(bed, tmp_path / "a.png", colour="radus")
+    with pytest.raises(InputError, match=r"ends in \.png"):
+        picture(bed, tmp_path / "a.jpg")
+    with pytest.raises(InputError, match=r"ends in \.gif or \.mp4"):
+        movie(bed, tmp_path / "a.avi")
+
+
+# ---------------------------------------------------------------- machines without
+
+
+def test_where_nothing_renders_the_remedy_is_named(bed, tmp_path, monkeypatch):
+    """A missing library ends a process; the probe dies in a process of its own."""
+    monkeypatch.setattr(rendering, "_PROBE", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    monkeypatch.delenv("VTK_DEFAULT_OPENGL_WINDOW", raising=False)
+    rendering.why_not.cache_clear()
+    try:
+        with pytest.raises(RunFailed, match="apt-get install -y --no-install-recommends libegl1 libgl1") as failure:
+            picture(bed, tmp_path / "a.png")
+        assert "\n" not in str(failure.value)
+    finally:
+        rendering.why_not.cache_clear()
+
+
+def test_without_a_screen_the_window_says_so(bed, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(RunFailed, match="no screen here"):
+        window(bed)
+
+
+def test_a_missing_package_is_named(bed, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(InputError, match=r"meshio installed; `pip install 'cfddem\[export\]'`"):
+        export(bed, "vtu", tmp_path)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install 'cfddem\[movie\]'"):
+        movie(bed, tmp_path / "bed.mp4")
+
+
+# ---------------------------------------------------------------- formats of others
+
+
+def test_vtu_holds_the_same_cells_and_particles(bed, tmp_path):
+    pytest.importorskip("meshio", reason="needs `pip install 'cfddem[export]'`")
+    import pyvista
+
+    files = export(bed, "vtu", tmp_path / "out", [-1])
+    assert [path.name for path in files] == ["particles-00000002.vtu", "fluid-00000002.vtu"]
+    own, other = open_run(bed).mesh(2)["fluid"], pyvista.read(files[1])
+    assert np.abs(own.cell_centers().points - other.cell_centers().points).max() < 1e-12  # type: ignore[union-attr]
+    assert other.volume == pytest.approx(own.volume)  # type: ignore[union-attr]
+    assert np.array_equal(own["voidage"], other["voidage"])  # type: ignore[index]
+    assert np.array_equal(pyvista.read(files[0]).points, open_run(bed).particles(2)["position"])
+
+
+def test_csv_names_units_and_holds_the_same_numbers(bed, tmp_path):
+    pandas = pytest.importorskip("pandas", reason="needs `pip install 'cfddem[export]'`")
+    export(bed, "csv", tmp_path / "out")
+    table = pandas.read_csv(tmp_path / "out/particles-00000001.csv")
+    assert np.array_equal(table["velocity_y [m/s]"].astype("f4"), open_run(bed).particles(1)["velocity"][:, 1])
+    assert pandas.read_csv(tmp_path / "out/history.csv")["pressure_drop [Pa]"].tolist() == [900.0, 901.0, 902.0]
+    frame = pandas.DataFrame(open_run(bed).history)
+    assert frame.columns.tolist() == ["time", "bed_height", "pressure_drop"]
+
+
+def test_netcdf_holds_the_fluid_in_time(bed, tmp_path):
+    xarray = pytest.importorskip("xarray", reason="needs `pip install 'cfddem[export]'`")
+    pytest.importorskip("h5netcdf", reason="needs `pip install 'cfddem[export]'`")
+    export(bed, "netcdf", tmp_path / "out")
+    with xarray.open_dataset(tmp_path / "out/fluid.nc", engine="h5netcdf") as fluid:
+        assert fluid["velocity"].dims == ("time", "z", "y", "x", "component")
+        assert fluid["velocity"].attrs["units"] == "m/s"
+        at = fluid["velocity"].sel(time=0.2, component="z").sel(z=0.105, x=0.015, y=0.005, method="nearest")
+        assert float(at) == pytest.approx(0.205)
+    with xarray.open_dataset(tmp_path / "out/particles-00000000.nc", engine="h5netcdf") as particles:
+        assert np.array_equal(particles["position"], open_run(bed).particles(0)["position"])
+
+
+def test_an_unknown_format_or_snapshot_is_one_line(bed, tmp_path):
+    with pytest.raises(InputError, match="did you mean 'netcdf'"):
+        export(bed, "netcdff", tmp_path)
+    with pytest.raises(InputError, match="from 0 to 2"):
+        export(bed, "csv", tmp_path, [3])
+
+
+# ---------------------------------------------------------------- command line
+
+
+def test_the_newest_run_is_found(bed, tmp_path):
+    assert newest_run(bed.parent) == bed and newest_run(bed) == bed
+    with pytest.raises(InputError, match="none is in"):
+        newest_run(tmp_path)
+
+
+def test_commands_view_and_export(bed, tmp_path):
+    def command(*words: str) -> subprocess.CompletedProcess:
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        line = [sys.executable, "-m", "cfddem.cli", *words]
+        return subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True)
+
+    assert command("view", str(bed), "--history").stdout == "bed-history.png\n"
+    assert (tmp_path / "bed-history.png").exists()
+    wrong = command("export", str(bed), "--to", "xls")
+    assert wrong.returncode == 2 and wrong.stderr.startswith("cfddem: to = 'xls': must be one of vtu, csv, netcdf")
