@@ -172,6 +172,9 @@ def test_a_missing_snapshot_is_reported_and_reads_as_no_number(tmp_path, caplog)
     seen = open_run(run.folder)
     assert seen.missing == ["00000001.h5"] and len(seen.times) == 2
     assert "00000001.h5" in caplog.text
+    (run.folder / "run.vtkhdf").rename(run.folder / "lost")
+    assert open_run(run.folder).missing == ["00000001.h5"]
+    (run.folder / "lost").rename(run.folder / "run.vtkhdf")
     voidage = [blocks["fluid"].cell_data["voidage"] for _, blocks in series(run.folder / "run.vtkhdf")]
     assert np.isnan(voidage[1]).all() and not np.isnan(voidage[2]).any()
 
@@ -326,6 +329,7 @@ def test_a_full_disk_is_one_line_and_the_good_data_stay(small_disk):
     assert np.array_equal(seen.fluid("voidage", written - 1), fluid(written - 1)["voidage"].astype("f4"))
     assert len(list(series(run.folder / "run.vtkhdf"))) >= written
     assert not list(run.folder.rglob("*.partial"))
+    run.finish("failed", "the disk is full")  # no second failure hides the first
 
 
 def test_a_read_only_folder_is_one_line(small_disk):

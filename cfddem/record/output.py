@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.errors import InputError
+from cfddem.errors import InputError, RunFailed
 from cfddem.record import checkpoint
 from cfddem.record.files import hdf5_in_memory, remove_partial, write_whole
 from cfddem.record.folder import FORMAT, lock, read_about, read_columns, refuse_taken, scan
@@ -234,12 +234,17 @@ class RunFolder:
         """
         if status not in ("finished", "stopped", "failed"):
             raise InputError("status", status, "finished, stopped or failed")
-        self.flush_history()
-        if self._indexed != len(self.snapshots):
-            self.write_index()
         self.about.update(status=status, message=message)
-        self._write_about()
-        self._lock.close()
+        try:
+            self.flush_history()
+            if self._indexed != len(self.snapshots):
+                self.write_index()
+            self._write_about()
+        except RunFailed:
+            if status != "failed":  # else what ended the run, perhaps this very disk, is what the user must hear
+                raise
+        finally:
+            self._lock.close()
 
     # ------------------------------------------------------------ details
 

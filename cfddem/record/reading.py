@@ -184,11 +184,15 @@ class Run:
     # ------------------------------------------------------------ details
 
     def _find(self) -> tuple[list[Snapshot], list[str]]:
-        """The snapshots that are there, by the index and beyond it, and the names of those that should be."""
+        """The snapshots that are there, by the index and beyond it, and the names of those that should be.
+
+        Snapshots are numbered without a gap, so a gap is a loss.
+        """
         there = {path.name for path in (self.folder / "data").glob("[0-9]*.h5")}
         known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf")}
         found = [known[name] if name in known else look(self.folder / "data" / name)[0] for name in sorted(there)]
-        return found, sorted(known.keys() - there)
+        last = max((int(name[:8]) for name in {*there, *known}), default=-1)
+        return found, [name for name in (f"{k:08d}.h5" for k in range(last + 1)) if name not in there]
 
     @cached_property
     def _names(self) -> dict[str, list[str]]:
