@@ -136,6 +136,20 @@ class FluidState:
             gradient[d] -= self.boundaries.driving[d]
         return self._at(self._continued(gradient), AT_FACES, points)
 
+    def cell_pressure_gradient(self) -> Array:
+        """grad p' of every cell, mean of its two faces as the momentum balance sees them (3, nz, ny, nx) [Pa/m]."""
+        gradient = np.zeros((3, *self.grid.shape))
+        self.boundaries.fill_pressure(self._pressure)
+        for d in range(3):
+            faces = (self._pressure - np.roll(self._pressure, 1, axis=2 - d)) * self._inverse[d]
+            faces = (faces - self.boundaries.driving[d]) * self._solved[d]
+            other = np.roll(faces, -1, axis=2 - d)
+            faces, other = self.grid.inner(faces), self.grid.inner(other)
+            low, high = self.grid.inner(self._solved[d]), self.grid.inner(np.roll(self._solved[d], -1, axis=2 - d))
+            # next to a face that is held the other face stands for both
+            gradient[d] = (faces + other) / np.maximum(low + high, 1.0)
+        return gradient
+
     def viscous_force_at(self, points: Array) -> Array:
         """div tau, the stress of the fluid between the particles (not times eps), at points (N, 3): (N, 3) [N/m3]."""
         self._thicken(self._velocity, np.ones_like(self._mean_voidage))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -125,6 +126,35 @@ class ParticleSolver:
                 guard(self.bodies, self.edges, self.gap, self.domain, self.time, step, self.walls.wall)
             if moved_far:
                 self._relist()
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Everything the next step depends on, age and order of the list included."""
+        return {
+            "bodies": self.bodies._asdict(),
+            "edges": self.edges._asdict(),
+            "walls": self.walls._asdict(),
+            "origin": self._origin,
+            "clock": {
+                "time": self.time, "steps": self.steps, "skin": self.skin,
+                "lists": self._lists, "listed_at": self._listed_at,
+            },
+        }  # fmt: skip
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a `checkpoint()` of a solver made for the same bodies, walls and laws, to the same bits."""
+        for own, kept in zip(self.bodies, state["bodies"].values()):
+            own[:] = kept
+        walls = dict(zip(self.walls._fields, self.walls)) | state["walls"]
+        self.walls = type(self.walls)(**{name: np.array(each) for name, each in walls.items()})
+        edges = {name: each if np.ndim(each) else int(each) for name, each in state["edges"].items()}
+        clock = state["clock"]
+        self.time, self.steps, self.skin = float(clock["time"]), int(clock["steps"]), float(clock["skin"])
+        self._lists, self._listed_at = int(clock["lists"]), int(clock["listed_at"])
+        travel = self.walls.travel.copy()
+        self._take_list(Edges(**edges))
+        self._origin[:] = state["origin"]
+        self.walls.travel[:] = travel
+        self.edges.touch[:] = state["edges"]["touch"]
 
     def _march(self, step: float, steps: int) -> tuple[int, float, int]:
         record = self.collisions

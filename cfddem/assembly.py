@@ -1,0 +1,285 @@
+"""From a case to the things that move: grid, boundaries, walls, materials, particles and solvers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.case import Case, Column, Jet
+from cfddem.coupling.exchange import Exchange
+from cfddem.coupling.voidage import Spreading
+from cfddem.errors import InputError, nearest
+from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
+from cfddem.fluid.grid import Array, Grid, outside_cylinder
+from cfddem.fluid.solver import FluidSolver
+from cfddem.materials import pair_table
+from cfddem.particles.forces import CONTACTS, FRICTION_ONSETS, Laws
+from cfddem.particles.packing import lattice, mono, normal
+from cfddem.particles.pouring import pour_into
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import Bodies
+from cfddem.particles.state import bodies as make_bodies
+from cfddem.particles.walls import Cylinder, Plane, Wall
+from closures.law import SHELF, Law
+
+POURED_SOLID_FRACTION = 0.58
+"""Solid fraction of a poured bed, by which a bed's height is turned into a number of particles."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Everything a run is made of."""
+
+    particles: ParticleSolver
+    fluid: FluidSolver | None
+    exchange: Exchange | None
+
+
+def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodies: Bodies | None = None) -> Parts:
+    """Build the parts of a run.
+
+    progress  is told what is being done
+    bodies    the particles, where they are known already
+    """
+    table, walls, laws = materials_of(case), walls_of(case), laws_of(case)
+    spheres = bodies
+    if spheres is None:
+        diameters = particle_diameters(case)
+        if case.bed.start == "poured":
+            progress(f"pouring {len(diameters)} particles")
+        spheres = particles_of(case, diameters, table, walls, laws)
+    solver = ParticleSolver(
+        spheres,
+        table,
+        walls=walls,
+        laws=laws,
+        gravity=case.laws.gravity if case.fluid is None else (0.0, 0.0, 0.0),
+        box=periodic_box(case),
+        domain=_domain(case),
+    )
+    if case.fluid is None:
+        return Parts(solver, None, None)
+    grid = grid_of(case.column)
+    boundaries = boundaries_of(case)
+    fluid = FluidSolver(
+        grid,
+        boundaries,
+        density=case.fluid.density,
+        viscosity=case.fluid.viscosity,
+        gravity=case.laws.gravity,
+        model=case.laws.model,
+        convection=case.laws.convection,
+    )
+    spreading = Spreading(
+        grid,
+        periodic_directions(case),
+        mapping=case.laws.mapping,
+        smoothing=case.laws.smoothing * float(2.0 * spheres.radius.mean()),
+    )
+    fluid.set_voidage(1.0 - spreading.solid_fraction(spreading.place(spheres.position, spheres.radius)))
+    exchange = Exchange(fluid, spreading, drag_of(case), added_mass=case.laws.added_mass, own_wind=case.laws.own_wind)
+    return Parts(solver, fluid, exchange)
+
+
+# ---------------------------------------------------------------- particles
+
+
+def particle_diameters(case: Case) -> Array:
+    """Diameter of every particle (N,) [m]."""
+    bed, column = case.bed, case.column
+    count = bed.count or len(bed.positions)
+    if bed.height is not None:
+        width, depth, _ = column.size
+        area = 0.25 * math.pi * width**2 if column.shape == "cylinder" else width * depth
+        count = int(POURED_SOLID_FRACTION * area * bed.height / (math.pi / 6.0 * bed.diameter**3))
+    if count < 1:
+        raise InputError("bed.height", bed.height, "high enough for one particle")
+    if bed.spread == 0.0:
+        return mono(count, bed.diameter)
+    return normal(count, bed.diameter, bed.spread * bed.diameter, bed.seed)
+
+
+def particles_of(case: Case, diameters: Array, table: np.ndarray, walls: list[Wall], laws: Laws) -> Bodies:
+    """The particles at the start."""
+    bed, size = case.bed, case.column.size
+    kind = list(case.material).index(bed.material or next(iter(case.material)))
+    viscosity = case.fluid.viscosity if case.fluid else 0.0
+    density = case.solid.density
+    if bed.start == "poured":
+        spheres = pour_into(
+            table, diameters, density, walls, *_room(case, float(diameters.max())), box=periodic_box(case),
+            seed=bed.seed, material=kind, gravity=abs(case.laws.gravity[2]), laws=laws._replace(film=False),
+        )  # fmt: skip
+        places, diameters = spheres.position, 2.0 * spheres.radius
+    elif bed.start == "at":
+        places = np.array(bed.positions, float)
+    else:
+        places = _suspended(len(diameters), float(diameters.max()), size, bed.seed)
+    made = make_bodies(
+        places, 0.5 * diameters, density, velocity=np.array(bed.velocity), material=kind, viscosity=viscosity,
+        fixed=bed.fixed,
+    )  # fmt: skip
+    outside = ~((made.position >= 0.0) & (made.position <= np.array(size))).all(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise InputError(
+            f"position of particle {row}", made.position[row].tolist(), f"inside the column, 0 to {size} m"
+        )
+    return made
+
+
+def _suspended(count: int, largest: float, size: tuple[float, float, float], seed: int) -> Array:
+    """Particles spread evenly over the column: a shaken lattice of as many places, thinned at random."""
+    volume = size[0] * size[1] * size[2]
+    pitch = (volume / count) ** (1.0 / 3.0)
+    for _ in range(200):
+        if pitch < 1.02 * largest:
+            break
+        places = lattice(largest, ((0.0, 0.0, 0.0), size), spacing=pitch / largest, seed=seed)
+        if len(places) >= count:
+            chosen = np.random.default_rng(seed).permutation(len(places))[:count]
+            return np.ascontiguousarray(places[np.sort(chosen)])
+        pitch *= 0.99
+    fraction = count * math.pi / 6.0 * largest**3 / volume
+    raise InputError("bed.count", count, f"below what a lattice holds; the solid fraction would be {fraction:.2f}")
+
+
+def _room(case: Case, largest: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Corner and size of the room that particles are poured into."""
+    width, depth, height = case.column.size
+    if case.column.shape == "box":
+        return (0.0, 0.0, 0.0), (width, depth, height)
+    side = width / math.sqrt(2.0)
+    corner = 0.5 * (width - side)
+    return (corner, corner, 0.0), (side, side, height)
+
+
+def materials_of(case: Case) -> np.ndarray:
+    """Pair table of the case's materials, in the order of the case."""
+    return pair_table(list(case.material.values()))
+
+
+def walls_of(case: Case) -> list[Wall]:
+    """What keeps the particles in: floor and lid where the ends are not periodic, sides where they are walls."""
+    width, depth, height = case.column.size
+    names = list(case.material)
+    solid = names.index(case.column.material or case.bed.material or names[0])
+    walls: list[Wall] = []
+    if case.column.ends != "periodic":
+        walls.append(Plane(material=solid))
+        walls.append(Plane(point=(0.0, 0.0, height), normal=(0.0, 0.0, -1.0), material=solid))
+    if case.column.shape == "cylinder":
+        walls.append(Cylinder(point=(0.5 * width, 0.5 * width, 0.0), radius=0.5 * width, material=solid))
+        return walls
+    for axis, length, repeats in zip((0, 1), (width, depth), periodic_directions(case)):
+        if not repeats:
+            inward = np.eye(3)[axis]
+            walls.append(Plane(normal=tuple(inward), material=solid))
+            walls.append(Plane(point=tuple(length * inward), normal=tuple(-inward), material=solid))
+    return walls
+
+
+def laws_of(case: Case) -> Laws:
+    """Switches of the particle loop."""
+    wet = case.fluid is not None and case.fluid.viscosity > 0.0 and case.laws.lubrication == "nijssen"
+    return Laws(
+        film=wet,
+        friction_onset=FRICTION_ONSETS[case.laws.friction_onset],
+        contact=CONTACTS[case.laws.contact],
+        normal_stiffness=case.laws.normal_stiffness,
+        tangential_stiffness=case.laws.tangential_stiffness,
+    )
+
+
+def periodic_directions(case: Case) -> tuple[bool, bool, bool]:
+    """Which of x, y, z repeat."""
+    column = case.column
+    return column.sides == "periodic", (column.front or column.sides) == "periodic", column.ends == "periodic"
+
+
+def periodic_box(case: Case) -> tuple[float | None, float | None, float | None]:
+    """Lengths of the periodic directions, None along the others [m]."""
+    x, y, z = (length if repeats else None for length, repeats in zip(case.column.size, periodic_directions(case)))
+    return x, y, z
+
+
+def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Corners of the room that no centre may leave; endless along periodic directions [m]."""
+    repeats, size = periodic_directions(case), case.column.size
+    low = tuple(-math.inf if each else 0.0 for each in repeats)
+    high = tuple(math.inf if each else length for each, length in zip(repeats, size))
+    return low, high  # type: ignore[return-value]
+
+
+# ---------------------------------------------------------------- fluid
+
+
+def grid_of(column: Column) -> Grid:
+    """Cells of the column; those outside a cylinder are solid."""
+    width, _, _ = column.size
+    solid = None
+    if column.shape == "cylinder":
+        solid = outside_cylinder((0.5 * width, 0.5 * width, 0.0), 0.5 * width)
+    return Grid.of_size(column.size, column.cell, solid=solid)
+
+
+def boundaries_of(case: Case) -> dict[str, Condition | list[Condition]]:
+    """Conditions of the fluid on the six sides."""
+    kinds = {"no_slip": NoSlip, "free_slip": FreeSlip, "periodic": Periodic}
+    column = case.column
+    sides, front = kinds[column.sides](), kinds[column.front or column.sides]()
+    conditions: dict[str, Condition | list[Condition]] = {
+        "x_low": sides, "x_high": sides, "y_low": front, "y_high": front,
+    }  # fmt: skip
+    if column.ends == "periodic":
+        conditions |= {"z_low": Periodic(), "z_high": Periodic()}
+    elif column.ends == "closed":
+        conditions |= {"z_low": NoSlip(), "z_high": NoSlip()}
+    else:
+        conditions |= {"z_low": _inlet(case), "z_high": Outlet()}
+    return conditions
+
+
+def _inlet(case: Case) -> list[Condition]:
+    """The floor that the fluid enters through: all of it, and a jet in its middle."""
+    velocity = case.bed.inlet_velocity
+    if isinstance(velocity, float):
+        inlets: list[Condition] = [Inlet(velocity)]
+    else:
+        times, speeds = np.array(velocity).T
+        inlets = [Inlet(1.0, in_time=lambda t: float(np.interp(t, times, speeds)))]
+    if case.bed.jet is not None:
+        inlets.append(Inlet(case.bed.jet.velocity, where=_hole(case.bed.jet, case.column)))
+    return inlets
+
+
+def _hole(jet: Jet, column: Column) -> Callable[..., np.ndarray]:
+    width, depth, height = column.size
+    if jet.round:
+        return discs([(0.5 * width, 0.5 * depth)], diameter=jet.width)
+    half_x, half_y = 0.5 * jet.width, 0.5 * (jet.depth or depth)
+    low = (0.5 * width - half_x, 0.5 * depth - half_y, -height)
+    return rectangle(low, (0.5 * width + half_x, 0.5 * depth + half_y, height))
+
+
+def drag_of(case: Case) -> Law | None:
+    """The drag law of the case."""
+    import closures.drag
+    import closures.drag_resolved
+    import closures.drag_single  # noqa: F401  puts the laws on the shelf
+
+    chosen = case.laws.drag
+    if chosen is None or chosen == "none":
+        return None
+    if callable(chosen):
+        return next((card for card in SHELF["drag"].values() if card.function is chosen), None) or _own(chosen)
+    if chosen not in SHELF["drag"]:
+        raise InputError("laws.drag", chosen, nearest(chosen, SHELF["drag"]))
+    return SHELF["drag"][chosen]
+
+
+def _own(function: Callable[[float, float], float]) -> Law:
+    raise InputError("laws.drag", getattr(function, "__name__", function), "a law; decorate it with @closures.law(...)")

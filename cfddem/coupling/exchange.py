@@ -1,0 +1,255 @@
+r"""What fluid and particles do to each other over a fluid step; every conversion between the two stands here.
+
+The force of the fluid on a particle of volume V and diameter d, at the velocity v in a fluid of velocity u:
+
+.. math:: \text{model A:}\quad b(u-v) - V\nabla p' - \rho V g, \qquad b = 3\pi\eta d\,\varepsilon F
+.. math:: \text{model B:}\quad \tfrac{1}{\varepsilon}\, b(u-v) - \rho V g
+
+with F(Re, eps) the drag factor of the law chosen. A cell feels :math:`\beta = \sum b / V_{cell}`.
+
+**Implicit on both sides.** Over a step h a particle of mass m also feels the mean of all its other forces f
+(weight, contacts), known from the step before. With the drag taken between the ends of the step,
+
+.. math:: J = h\,b^*(u - v^*),\qquad b^* = \frac{b}{1+\theta\lambda},\quad v^* = v + \theta\frac{hf}{m},\quad
+          \lambda = \frac{hb}{m},\quad \theta=\frac{1+\lambda}{2+\lambda}
+
+which is of second order for weak drag and never passes the fluid's velocity for strong. The fluid takes b* and v*
+into its own implicit step; the impulse that it has then given, cell by cell, is the one that the particle gets, as
+a constant force. What one side loses the other receives to round-off, whatever the stiffness of either.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.coupling.own_wind import MODES, OwnWind
+from cfddem.coupling.voidage import Placement, Spreading
+from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.kernels import prange
+from cfddem.particles.state import Bodies
+from closures.law import Law
+
+LEAST_VOIDAGE = 0.2
+"""Below this no packing of spheres exists: particles overlap, or the kernel is too narrow for its cells."""
+
+
+class Offer(NamedTuple):
+    """What particles bring into a fluid step."""
+
+    step: float  # [s]
+    place: Placement
+    voidage: Array  # (nz, ny, nx)
+    drag_coefficient: Array  # beta* (nz, ny, nx) [kg/m3/s]
+    drag_momentum: Array  # beta* v* (nz, ny, nx, 3) [N/m3]
+    source: Array | None  # force on the fluid (nz, ny, nx, 3) [N/m3]
+    resistance: Array  # b* (N,) [kg/s]
+    target: Array  # v* (N, 3) [m/s]
+    slip: Array  # u - v (N, 3) [m/s]
+
+    @property
+    def fields(self) -> tuple[Array, Array, Array, Array | None]:
+        """The arguments of the fluid's step after its length."""
+        return self.voidage, self.drag_coefficient, self.drag_momentum, self.source
+
+
+class Exchange:
+    """Drag, pressure force and buoyancy between a fluid and its particles.
+
+    fluid       the solver; its model, "A" or "B", holds for the exchange
+    spreading   how particles spread over cells
+    drag        card of a drag law; None for none
+    added_mass  coefficient C of the added mass C rho V; 0 for none
+    own_wind    take the velocity and the voidage that a lone particle itself makes out of what it meets
+    """
+
+    def __init__(
+        self,
+        fluid: FluidSolver,
+        spreading: Spreading,
+        drag: Law | None,
+        *,
+        added_mass: float = 0.0,
+        own_wind: bool = True,
+    ) -> None:
+        self.fluid, self.spreading, self.drag = fluid, spreading, drag
+        self.added_mass = float(added_mass)
+        self.own_wind = OwnWind(spreading) if own_wind else None
+        self.outside = 0  # how often the drag law was asked outside of its range
+        self._factors = _drag_loop(drag.function) if drag else None
+        self._ranges = _ranges(drag)
+        self._memory = np.zeros((0, 6))  # by id: velocity and drag impulse of the last step
+        self._winds = np.zeros((0, MODES, 3))  # by id: own winds [m/s]
+        self._trail: list[Array] = []  # positions by id at the two steps before
+        self._last_step = 0.0
+        self.carried = np.zeros(3)  # momentum under way between the phases [N s]
+        self._return: Array | None = None  # force per volume that the fluid still has to get [N/m3]
+
+    # ------------------------------------------------------------ around one fluid step
+
+    def offer(self, bodies: Bodies, step: float) -> Offer:
+        """What the particles bring into the coming fluid step of a length [s]: volume, drag and momentum."""
+        spreading = self.spreading
+        self._make_room(bodies)
+        place = spreading.place(bodies.position, bodies.radius)
+        solid = spreading.solid_fraction(place)
+        slip, voidage, wind = self._what_they_meet(bodies, place, solid)
+        resistance = self._resistance(bodies, slip, voidage)
+        inertia = self.inertia(bodies)
+        stiffness = step * resistance / inertia
+        theta = (1.0 + stiffness) / (2.0 + stiffness)
+        implicit = resistance / (1.0 + theta * stiffness)
+        target = bodies.velocity + wind + (theta * step / inertia)[:, None] * self._other_force(bodies, inertia)
+        carried = np.column_stack([implicit, implicit[:, None] * target])
+        drag = spreading.smooth(spreading.deposit(place, carried)) / self.fluid.grid.cell_volume
+        momentum = np.moveaxis(drag[1:], 0, -1)
+        return Offer(step, place, 1.0 - solid, drag[0], momentum, self._return, implicit, target, slip)
+
+    def answer(self, bodies: Bodies, offer: Offer, gravity: Array) -> None:
+        """Leave in `bodies.applied` what the fluid, having made its step, does to every particle meanwhile.
+
+        gravity  (3,) [m/s2]; weight and buoyancy are among the forces applied
+        """
+        rows, place, spreading = bodies.id, offer.place, self.spreading
+        weight, seen, _ = self.fluid.drag_exchange()
+        fields = np.moveaxis(np.concatenate([weight, weight * seen], axis=-1), -1, 0)
+        at = spreading.gather(place, spreading.smooth(fields))
+        drag = offer.resistance[:, None] * (at[:, 3:] - at[:, :3] * offer.target)
+        volume = (4.0 / 3.0) * math.pi * bodies.radius**3
+        weight_left = (bodies.mass - self.fluid.density * volume)[:, None] * gravity
+
+        force = (
+            drag
+            + self._pressure_force(bodies, place, volume)
+            + weight_left
+        )  # fmt: skip
+        self._memory[rows, :3] = bodies.velocity
+        self._memory[rows, 3:6] = offer.step * drag
+        if self.own_wind is not None:
+            fluid, winds = self.fluid, self._winds[rows]
+            self._winds[rows] = self.own_wind.advance(
+                place, winds, -drag, offer.slip, fluid.density, fluid.viscosity, offer.step
+            )
+        self._trail = [self._trail[-1], _by_id(bodies.position, rows)]
+        self._last_step = offer.step
+        bodies.force[:] += force - bodies.applied  # the sum of forces at hand changes by as much
+        bodies.applied[:] = force
+
+    @property
+    def drag_impulse(self) -> Array:
+        """Impulse of drag on every particle in the last fluid step, by id (n, 3) [N s]."""
+        return self._memory[:, 3:]
+
+    def inertia(self, bodies: Bodies) -> Array:
+        """Mass and added mass of every particle (N,) [kg]."""
+        return bodies.mass * (1.0 + self.added_mass * self.fluid.density / bodies.density)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next step depends on beside fluid and particles."""
+        return {
+            "memory": self._memory,
+            "winds": self._winds,
+            "trail": {str(n): each for n, each in enumerate(self._trail)},
+            "last_step": self._last_step,
+            "outside": self.outside,
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Go on from a `checkpoint()`."""
+        self._memory, self._winds = np.array(state["memory"]), np.array(state["winds"])
+        self._trail = [np.array(state["trail"][name]) for name in sorted(state["trail"])]
+        self._last_step, self.outside = float(state["last_step"]), int(state["outside"])
+
+    # ------------------------------------------------------------ terms
+
+    def _what_they_meet(self, bodies: Bodies, place: Placement, solid: Array) -> tuple[Array, Array, Array]:
+        """Slip u - v (N, 3) [m/s] and voidage (N,) around every particle, and the own wind in what it sees (N, 3)."""
+        spreading = self.spreading
+        seen = spreading.gather(place, spreading.smooth(np.moveaxis(self.fluid.velocity, -1, 0)))
+        solids = spreading.gather(place, solid[None])[:, 0]
+        wind = np.zeros_like(seen)
+        if self.own_wind is not None:
+            own, share = self.own_wind.share(place, solids)
+            wind = share[:, None] * self._winds[bodies.id].sum(axis=1)
+            solids = np.maximum(solids - share * own, 0.0)
+        return seen - wind - bodies.velocity, 1.0 - solids, wind
+
+    def _resistance(self, bodies: Bodies, slip: Array, voidage: Array) -> Array:
+        """Drag over slip, b (N,) [kg/s]; of the fluid's model."""
+        fluid, diameter = self.fluid, 2.0 * bodies.radius
+        speed = np.sqrt(np.einsum("nd,nd->n", slip, slip))
+        reynolds = fluid.density * diameter * voidage * speed / max(fluid.viscosity, 1e-300)
+        if self._factors is None:
+            return np.zeros(bodies.count)
+        factor = np.empty(bodies.count)
+        self.outside += self._factors(reynolds, voidage, *self._ranges, factor)
+        resistance: Array = 3.0 * math.pi * fluid.viscosity * diameter * voidage * factor
+        return resistance / voidage if fluid.model == "B" else resistance
+
+    def _other_force(self, bodies: Bodies, inertia: Array) -> Array:
+        """Mean of all forces but drag over the step before (N, 3) [N]; at the start, those at hand."""
+        if self._last_step == 0.0:
+            return bodies.force.copy()
+        before = self._memory[bodies.id]
+        gained = inertia[:, None] * (bodies.velocity - before[:, :3])
+        force: Array = (gained - before[:, 3:6]) / self._last_step
+        return force
+
+    def _pressure_force(self, bodies: Bodies, place: Placement, volume: Array) -> Array:
+        r"""Force of the fluid's mean pressure, :math:`-V\nabla p'` of model A (N, 3) [N].
+
+        The fluid has felt the voidage of the last three placements, 1/4, 1/2 and 1/4 of them; so do the particles.
+        """
+        if self.fluid.model == "B":
+            return np.zeros((bodies.count, 3))
+        gradient = self.spreading.smooth(self.fluid.cell_pressure_gradient())
+        force = np.zeros((bodies.count, 3))
+        for share, trail in zip((0.25, 0.5), self._trail):
+            at = self.spreading.place(trail[bodies.id], bodies.radius)
+            force -= share * volume[:, None] * self.spreading.gather(at, gradient)
+        return force - 0.25 * volume[:, None] * self.spreading.gather(place, gradient)
+
+    def _make_room(self, bodies: Bodies) -> None:
+        """Rows for particles seen for the first time: as fast as they are now, with no drag yet."""
+        most = int(bodies.id.max(initial=-1)) + 1
+        if most > len(self._memory):
+            grown = np.zeros((most, 6))
+            grown[: len(self._memory)] = self._memory
+            fresh = bodies.id >= len(self._memory)
+            grown[bodies.id[fresh], :3] = bodies.velocity[fresh]
+            self._memory = grown
+            self._winds = np.concatenate([self._winds, np.zeros((most - len(self._winds), MODES, 3))])
+            here = _by_id(bodies.position, bodies.id)
+            self._trail = [np.concatenate([trail, here[len(trail) :]]) for trail in self._trail or [here[:0]] * 2]
+
+
+def _by_id(values: Array, rows: np.ndarray) -> Array:
+    sorted_values = np.empty((int(rows.max(initial=-1)) + 1, values.shape[1]))
+    sorted_values[rows] = values
+    return sorted_values
+
+
+def _ranges(drag: Law | None) -> tuple[float, float, float, float]:
+    card = drag.ranges if drag else {}
+    return (*card.get("reynolds", (0.0, math.inf)), *card.get("voidage", (0.0, 1.0)))
+
+
+def _drag_loop(law: Callable[..., float]) -> Any:
+    """The loop that asks a law for every particle; small, and compiled for the law that a run has chosen."""
+
+    @njit(parallel=True, error_model="numpy")
+    def factors(reynolds, voidage, least_reynolds, most_reynolds, least_voidage, most_voidage, factor):
+        outside = 0
+        for n in prange(len(reynolds)):
+            factor[n] = law(reynolds[n], voidage[n])
+            beyond = reynolds[n] < least_reynolds or reynolds[n] > most_reynolds
+            outside += 1 if beyond or voidage[n] < least_voidage or voidage[n] > most_voidage else 0
+        return outside
+
+    return factors

@@ -1,0 +1,160 @@
+r"""The wind and the voidage that a lone particle makes itself, and that it must not take for those it meets.
+
+A particle's force, spread over cells, drives a flow that the same cells then show to the particle; its own volume
+lowers the voidage there. Drag laws want the fluid without the particle. Both disturbances are known: the kernel is,
+and the equations of the grid are. Per force, at a place f within its cell (0 to 1 along each axis),
+
+.. math:: M_d(f) = \sum_{\Delta} G_d(\Delta) \prod_e A_e(\Delta_e),\qquad
+          A(0) = (1-f)^2 + f^2,\ A(\pm1) = f(1-f)
+
+where G is the flow of the grid's own Stokes equations, smoothing included, between cells that lie Delta apart. A
+moving particle leaves its wind behind (Oseen): M falls by :func:`closures.disturbance.oseen_share`. The wind takes
+time to build up, as momentum diffuses out of the kernel of width s, and less where the particle moves on:
+
+.. math:: u_s(t) = M F\left[1 - (1 + \nu t/s^2)^{-1/2}\right],\qquad
+          (1+x)^{-1/2} = \int_0^\infty \frac{e^{-y(1+x)}}{\sqrt{\pi y}}\,dy \approx \sum_k w_k e^{-y_k x}
+
+The kernel of a grid is no Gaussian, so its width is the one with which the wind begins as the grid's own does:
+:math:`s^2 = M\eta/(2 a_0)`, where F a_0/rho is the acceleration that the force gives to the kernel at first. The wind
+is so a sum of few winds, each of which relaxes at its own rate, (nu/s^2)(y_k + 3/8 R^2/(R + 2.6)), with R = U s/nu; the
+second part is what the moving particle leaves behind.
+
+Where particles are many, drag laws are made for means that count every particle, this one too, and nothing is
+taken out: the disturbance counts with the share that the particle has in the solids that it sees.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from cfddem.coupling.voidage import Placement, Spreading
+from cfddem.fluid.grid import Array
+from cfddem.kernels import prange, threaded
+from closures.disturbance import oseen_share
+
+CELLS = 48
+"""Cells along the shortest edge of the lattice on which a kernel's flow is tabulated."""
+
+_PERIODIC_STOKES = 2.837297
+"""Hasimoto: in a cubic array of pitch L a force moves slower by this over 6 pi eta L."""
+
+
+LEFT_BEHIND, LEFT_AT = 0.375, 2.6
+"""Rate at which a moving particle leaves its wind: the winds' steady sum then is Oseen's share within 3 %."""
+
+
+def _modes() -> tuple[Array, Array]:
+    """Rates y_k and weights w_k: the trapezoidal rule in log y, scaled to add up to one."""
+    logarithm = np.linspace(-9.8, 1.5, 9)
+    rates = np.exp(logarithm)
+    weights = np.exp(-rates) * np.sqrt(rates)
+    return rates, weights / weights.sum()
+
+
+_MODES = _modes()
+MODES = len(_MODES[0])
+"""Number of winds of a particle."""
+
+
+class OwnWind:
+    """Disturbances of one particle, by the place in its cell.
+
+    spreading  how particles spread over cells
+    """
+
+    def __init__(self, spreading: Spreading) -> None:
+        self._origin, self._inverse = np.array(spreading.grid.origin), 1.0 / np.array(spreading.grid.spacing)
+        self._linear = spreading.mapping == "linear"
+        self._flow, self._density = _tables(spreading)
+
+    def share(self, place: Placement, solid: Array) -> tuple[Array, Array]:
+        """Own solid fraction that a particle sees (N,), and its share in all that it sees, 0 to 1 (N,)."""
+        volume = (4.0 / 3.0) * math.pi * place.radius**3
+        own = volume * self._at(place, self._density[None])[:, 0]
+        return own, np.clip(own / np.maximum(solid, 1e-300), 0.0, 1.0)
+
+    def advance(
+        self, place: Placement, winds: Array, force: Array, slip: Array, density: float, viscosity: float, step: float
+    ) -> Array:
+        """The own winds (N, MODES, 3) [m/s] after a step [s] in which the particles have pushed the fluid.
+
+        force  on the fluid (N, 3) [N]
+        slip   u - v, without the own wind (N, 3) [m/s]
+        """
+        if viscosity <= 0.0:
+            return np.zeros_like(winds)
+        new = np.empty_like(winds)
+        _build_up(winds, force, slip, self._at(place, self._flow), density, viscosity, step, *_MODES, new)
+        return new
+
+    def _at(self, place: Placement, tables: Array) -> Array:
+        """Tables (m, 2, 2, 2) at the place of every particle within its cell (N, m)."""
+        cells = (place.position - self._origin) * self._inverse - 0.5
+        shift = np.where(self._linear, cells - np.floor(cells), 0.0)
+        apart = 2.0 * shift * (1.0 - shift)  # both neighbours, to which symmetry gives the same
+        own = 1.0 - apart
+        values = np.zeros((len(cells), len(tables)))
+        for k, j, i in itertools.product((0, 1), repeat=3):
+            weight = (apart if i else own)[:, 0] * (apart if j else own)[:, 1] * (apart if k else own)[:, 2]
+            values += weight[:, None] * tables[:, k, j, i]
+        return values
+
+
+def _tables(spreading: Spreading) -> tuple[Array, Array]:
+    """What a force does to cells so many cells apart, and the own volume there (2, 2, 2) [1/m3].
+
+    Of a force along x, y, z: steady velocity times viscosity [1/m], then first acceleration times density [1/m3]; as
+    one table (6, 2, 2, 2).
+
+    Fourier sums over a lattice large enough to be endless but for the mean flow of its images, which is known.
+    """
+    grid = spreading.grid
+    spacing = np.array(grid.spacing)
+    flat = np.array(grid.cells) == 1
+    spacing = np.where(flat, spacing[~flat].min() if (~flat).any() else spacing[0], spacing)
+    length = CELLS * spacing.max()
+    counts = np.rint(length / spacing).astype(int)
+    waves = np.meshgrid(*(2.0 * np.pi * np.fft.fftfreq(n) for n in counts[::-1]), indexing="ij")[::-1]
+    steps = [2.0 * np.sin(0.5 * wave) / h for wave, h in zip(waves, spacing)]
+    laplacian = sum(step**2 for step in steps)
+    laplacian[0, 0, 0] = np.inf
+    smoothing = 1.0 - sum(a * (h * step) ** 2 for a, h, step in zip(spreading.strength, spacing, steps))
+    kernel = smoothing**spreading.sweeps
+    volume = float(np.prod(spacing))
+
+    def near(symbol: Array) -> Array:
+        values = np.fft.ifftn(symbol).real[:2, :2, :2]
+        return values / volume
+
+    mobility, acceleration = [], []
+    for d in range(3):
+        # half of a cell's force acts on each of its faces, and a cell sees the mean of its faces
+        seen = kernel**2 * np.cos(0.5 * waves[d]) ** 2
+        images = _PERIODIC_STOKES / (6.0 * math.pi * float(np.cbrt(np.prod(counts * spacing))))
+        along = seen * (1.0 - steps[d] ** 2 / laplacian)
+        mobility.append(near(along / laplacian) + images)
+        acceleration.append(near(along))
+    return np.array(mobility + acceleration), near(kernel)
+
+
+@threaded
+def _build_up(winds, force, slip, flow, density, viscosity, step, rates, weights, new):
+    """Exact relaxation of every wind towards what a steady force would make of it."""
+    for n in prange(len(winds)):
+        speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
+        for d in range(3):
+            creeping = flow[n, d] / viscosity
+            width = math.sqrt(0.5 * flow[n, d] / flow[n, 3 + d])
+            reynolds = density * speed * width / viscosity
+            blown = LEFT_BEHIND * reynolds * reynolds / (reynolds + LEFT_AT)
+            total = 0.0
+            for k in range(len(rates)):
+                total += weights[k] * rates[k] / (rates[k] + blown)
+            scale = creeping * oseen_share(reynolds) / total * force[n, d]
+            for k in range(len(rates)):
+                steady = scale * weights[k] * rates[k] / (rates[k] + blown)
+                left = math.exp(-step * viscosity / (density * width * width) * (rates[k] + blown))
+                new[n, k, d] = steady + left * (winds[n, k, d] - steady)

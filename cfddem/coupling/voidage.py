@@ -1,0 +1,356 @@
+r"""From particles to cells and back: who spreads what over which cells.
+
+A particle spreads its volume, drag and momentum over cells with weights that add up to one; what cells hold
+comes back to the particle with the same weights. The pair is adjoint, so what the one side gives the other
+receives. Spreading has two stages: weights at the particle (`mapping`), then a diffusion of the cell field until
+the whole kernel has the wanted standard deviation, whatever the cell:
+
+.. math:: \varphi_c V = \sum_c' S_{cc'} \sum_p w_{c'p} V_p, \qquad S = (1 + a \nabla_h^2)^n, \qquad
+          \sigma^2 = h^2/6 + 2 n a h^2
+
+S is symmetric, keeps sums, and never passes a wall or a solid cell: what would lie behind a wall lies in the
+cell before it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from cfddem.errors import InputError, nearest
+from cfddem.fluid.grid import Array, Grid
+from cfddem.kernels import inline, kernel, prange, threaded
+
+MAPPINGS = ("linear", "centroid", "divided")
+"""A cloud as large as a cell; all in the cell of the centre; the sphere cut into equal pieces, each in its cell."""
+
+PIECES = 32
+SLAB = 4
+"""Layers of cells that one thread fills at a time, at least; slabs that are filled together never touch."""
+
+
+class Placement(NamedTuple):
+    """Particles among the cells at one instant."""
+
+    position: Array  # (N, 3) [m]
+    radius: Array  # (N,) [m]
+    order: np.ndarray  # rows sorted by slab
+    start: np.ndarray  # (slabs + 1,) where the rows of a slab begin in `order`
+
+
+class Spreading:
+    """Spreads what particles carry over the cells of a grid, and gathers what cells hold for particles.
+
+    grid       cells, some of them solid
+    periodic   directions (x, y, z) that repeat
+    mapping    "linear", "centroid" or "divided"
+    smoothing  standard deviation of the whole kernel [m]; 0 leaves the mapping as it is
+    """
+
+    def __init__(
+        self, grid: Grid, periodic: Sequence[bool], *, mapping: str = "linear", smoothing: float = 0.0
+    ) -> None:
+        if mapping not in MAPPINGS:
+            raise InputError("laws.mapping", mapping, nearest(mapping, MAPPINGS))
+        if not (np.isfinite(smoothing) and smoothing >= 0.0):
+            raise InputError("laws.smoothing", smoothing, "zero or positive, in m")
+        self.grid, self.mapping, self.smoothing = grid, mapping, float(smoothing)
+        self._periodic = np.array(periodic, bool)
+        self._linear = 1.0 if mapping == "linear" else 0.0
+        self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
+        self._origin, self._inverse = np.array(grid.origin), 1.0 / np.array(grid.spacing)
+        self._home = _homes(grid, self._periodic)
+        self._gates = _gates(grid, self._periodic)
+        self.sweeps, self.strength = self._diffusion()
+
+    def _diffusion(self) -> tuple[int, Array]:
+        """How many sweeps, and how strong each is in each direction, to widen the mapping's kernel to the wanted."""
+        spacing = np.array(self.grid.spacing)
+        own = spacing**2 / 6.0  # mean variance of the linear mapping, and of a point's place in its cell twice over
+        missing = np.maximum(self.smoothing**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
+        total = missing / (2.0 * spacing**2)
+        sweeps = math.ceil(2.0 * float(total.sum()) - 1e-9)
+        return sweeps, total / max(sweeps, 1)
+
+    # ------------------------------------------------------------ particles to cells
+
+    def place(self, position: Array, radius: Array) -> Placement:
+        """Where particles stand among the cells."""
+        layers = np.floor((position[:, 2] - self._origin[2]) * self._inverse[2]).astype(np.int64)
+        slabs = max(self.grid.cells[2] // SLAB, 1)
+        slab = np.clip(layers // SLAB, 0, slabs - 1)
+        order = np.argsort(slab, kind="stable")
+        start = np.concatenate(([0], np.cumsum(np.bincount(slab, minlength=slabs))))
+        return Placement(position.copy(), radius, order, start)
+
+    def deposit(self, place: Placement, values: Array) -> Array:
+        """Sum over particles of weight times value: values (N, m) give fields (m, nz, ny, nx)."""
+        fields = np.zeros((math.prod(self.grid.cells), values.shape[1]))
+        spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
+        _deposit(place.position, place.radius, place.order, place.start, np.ascontiguousarray(values), *spread, fields)
+        return np.ascontiguousarray(fields.T).reshape(-1, *self.grid.shape)
+
+    def gather(self, place: Placement, fields: Array) -> Array:
+        """Weighted mean of fields (m, nz, ny, nx) around every particle: (N, m). The adjoint of `deposit`."""
+        cells = np.ascontiguousarray(fields.reshape(len(fields), -1).T)
+        values = np.empty((len(place.position), len(fields)))
+        spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
+        _gather(place.position, place.radius, cells, *spread, values)
+        return values
+
+    def smooth(self, fields: Array) -> Array:
+        """Diffuse fields (m, nz, ny, nx) to the wanted width; sums stay, and the operation is its own adjoint."""
+        now = np.array(fields, float)
+        other = np.empty_like(now)
+        for _ in range(self.sweeps):
+            _sweep(now, other, self.strength, *self._gates)
+            now, other = other, now
+        return now
+
+    def solid_fraction(self, place: Placement) -> Array:
+        """Volume of particles over volume of cell (nz, ny, nx) [-]."""
+        volume = (4.0 / 3.0) * math.pi * place.radius**3
+        solid: Array = self.smooth(self.deposit(place, volume[:, None]))[0] / self.grid.cell_volume
+        return solid
+
+    # ------------------------------------------------------------ flux
+
+    def solid_flux(self, old: Placement, new: Placement, step: float) -> list[Array]:
+        r"""Volume of particles through every face per area and time, while they moved from one place to the next.
+
+        .. math:: (\varphi^{new} - \varphi^{old})/\Delta t + \nabla\cdot q = 0
+
+        to round-off, because the flux follows each particle along its path and is spread as its volume is. A
+        particle may move by less than a cell.
+
+        old, new  placements of the same particles, in the same order
+        step      time between them [s]
+        returns   along x, y, z: (nz, ny, nx+1), (nz, ny+1, nx), (nz+1, ny, nx) [m/s]
+        """
+        grid = self.grid
+        moved = new.position - old.position
+        moved -= self._periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
+        farthest = np.abs(moved * self._inverse)
+        if len(moved) and farthest.max() >= 1.0:
+            row = int(np.argmax(farthest.max(axis=1)))
+            raise InputError(
+                f"way of particle row {row} in cells",
+                float(farthest[row].max()),
+                "below 1",
+                "take a smaller fluid step",
+            )
+        if grid.solid is not None:
+            raise InputError("solid_flux", None, "asked for on a grid without solid cells")
+        flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
+        volume = (4.0 / 3.0) * math.pi * new.radius**3
+        _flux(
+            old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
+            self._periodic, *flux,
+        )  # fmt: skip
+        change = self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None])
+        passed = np.zeros_like(change)
+        for _ in range(self.sweeps):
+            passed += change
+            other = np.empty_like(change)
+            _sweep(change, other, self.strength, *self._gates)
+            change = other
+        for axis in range(3):
+            self._add_diffused(flux[axis], passed[0], axis)
+            flux[axis] /= grid.face_area(axis) * step
+        return flux
+
+    def _add_diffused(self, flux: Array, passed: Array, axis: int) -> None:
+        """What diffusion has carried through the faces normal to an axis: the fall of the field times strength."""
+        at, gate = 2 - axis, np.moveaxis(self._gates[axis], 2 - axis, 0)
+        field, out = np.moveaxis(passed, at, 0), np.moveaxis(flux, at, 0)
+        fall = np.roll(field, 1, axis=0) - field
+        out[:-1] += self.strength[axis] * gate * fall
+        out[-1] = out[0] if self._periodic[axis] else out[-1]
+
+
+def _pieces(count: int) -> Array:
+    """Centres of equal pieces of a unit sphere: shells of equal volume, spread evenly by the golden angle."""
+    number = np.arange(count) + 0.5
+    radius = np.cbrt((np.arange(count) * 0.6180339887498949) % 1.0)
+    height, angle = 1.0 - 2.0 * number / count, number * math.pi * (3.0 - math.sqrt(5.0))
+    ring = np.sqrt(1.0 - height**2)
+    points = radius[:, None] * np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
+    return np.ascontiguousarray(points - points.mean(axis=0))
+
+
+def _homes(grid: Grid, periodic: np.ndarray) -> np.ndarray:
+    """For every cell and a rim of ghosts, where what is put there goes: itself, its image, or the nearest open cell."""
+    inside = np.pad(grid.open, [(0, 0) if periodic[2 - d] else (1, 1) for d in range(3)])
+    nearest_open = distance_transform_edt(~inside, sampling=grid.spacing[::-1], return_indices=True)[1]
+    flat = np.zeros(inside.shape, np.int64)
+    for d in range(3):
+        low = 0 if periodic[2 - d] else 1
+        flat = flat * grid.shape[d] + nearest_open[d] - low
+    wrapped = np.pad(flat, [(1, 1) if periodic[2 - d] else (0, 0) for d in range(3)], mode="wrap")
+    return np.ascontiguousarray(wrapped)
+
+
+def _gates(grid: Grid, periodic: np.ndarray) -> tuple[Array, Array, Array]:
+    """1 on the low face of every cell through which diffusion may pass, 0 at walls and solid cells."""
+    gates = []
+    for axis in range(3):
+        at = 2 - axis
+        gate = (grid.open & np.roll(grid.open, 1, axis=at)).astype(float)
+        if not periodic[axis]:
+            np.moveaxis(gate, at, 0)[0] = 0.0
+        gates.append(gate)
+    return gates[0], gates[1], gates[2]
+
+
+# ---------------------------------------------------------------- loops
+
+
+@inline
+def cell_and_share(coordinate, linear):
+    """Cell in which a cloud begins, and the share of it in the next; coordinate in cells from the low wall."""
+    start = math.floor(coordinate - 0.5 * linear)
+    return start, linear * (coordinate - 0.5 * linear - start)
+
+
+@threaded
+def _deposit(position, radius, order, start, values, offsets, linear, origin, inverse, home, fields):
+    """Slabs of even number together, then odd ones, then a last one that would touch the first round a period."""
+    slabs = len(start) - 1
+    even = slabs - slabs % 2
+    for phase in range(3):
+        first, last = (phase, even) if phase < 2 else (even, slabs)
+        for half in prange((last - first + 1) // 2):
+            slab = first + 2 * half
+            for place in range(start[slab], start[slab + 1]):
+                _spread(order[place], position, radius, values, offsets, linear, origin, inverse, home, fields)
+
+
+@kernel
+def _spread(n, position, radius, values, offsets, linear, origin, inverse, home, fields):
+    """Add what one particle carries to its cells."""
+    pz, py, px = home.shape
+    share = 1.0 / len(offsets)
+    for s in range(len(offsets)):
+        i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
+        j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
+        k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
+        for corner in range(8):
+            di, dj, dk = corner & 1, (corner >> 1) & 1, corner >> 2
+            weight = share * (a if di else 1.0 - a) * (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
+            if weight != 0.0:
+                pk, pj, pi = min(max(k + dk + 1, 0), pz - 1), min(max(j + dj + 1, 0), py - 1), i + di + 1
+                cell = home[pk, pj, min(max(pi, 0), px - 1)]
+                for m in range(values.shape[1]):
+                    fields[cell, m] += weight * values[n, m]
+
+
+@threaded
+def _gather(position, radius, cells, offsets, linear, origin, inverse, home, values):
+    """Every particle takes from its cells, with the weights of `_spread`."""
+    pz, py, px = home.shape
+    share = 1.0 / len(offsets)
+    for n in prange(len(position)):
+        for m in range(values.shape[1]):
+            values[n, m] = 0.0
+        for s in range(len(offsets)):
+            i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
+            j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
+            k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
+            for corner in range(8):
+                di, dj, dk = corner & 1, (corner >> 1) & 1, corner >> 2
+                weight = share * (a if di else 1.0 - a) * (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
+                if weight != 0.0:
+                    pk, pj, pi = min(max(k + dk + 1, 0), pz - 1), min(max(j + dj + 1, 0), py - 1), i + di + 1
+                    cell = home[pk, pj, min(max(pi, 0), px - 1)]
+                    for m in range(values.shape[1]):
+                        values[n, m] += weight * cells[cell, m]
+
+
+@threaded
+def _sweep(fields, out, strength, gate_x, gate_y, gate_z):
+    """One sweep of diffusion: what leaves a cell through an open face enters its neighbour."""
+    fold = fields.shape[0] * fields.shape[1]
+    nz, ny, nx = fields.shape[1:]
+    for plane in prange(fold):
+        m, k = plane // nz, plane % nz
+        below, above = k - 1 if k > 0 else nz - 1, k + 1 if k < nz - 1 else 0
+        for j in range(ny):
+            front, back = j - 1 if j > 0 else ny - 1, j + 1 if j < ny - 1 else 0
+            for i in range(nx):
+                left, right = i - 1 if i > 0 else nx - 1, i + 1 if i < nx - 1 else 0
+                here = fields[m, k, j, i]
+                out[m, k, j, i] = here + (
+                    strength[0] * gate_x[k, j, i] * (fields[m, k, j, left] - here)
+                    + strength[0] * gate_x[k, j, right] * (fields[m, k, j, right] - here)
+                    + strength[1] * gate_y[k, j, i] * (fields[m, k, front, i] - here)
+                    + strength[1] * gate_y[k, back, i] * (fields[m, k, back, i] - here)
+                    + strength[2] * gate_z[k, j, i] * (fields[m, below, j, i] - here)
+                    + strength[2] * gate_z[above, j, i] * (fields[m, above, j, i] - here)
+                )
+
+
+@kernel
+def _window(coordinate, linear, first, cells, periodic, weights):
+    """Weights of a cloud in a window of cells that begins at `first`; behind a wall they fall into the last cell."""
+    weights[:] = 0.0
+    start, share = cell_and_share(coordinate, linear)
+    for step in range(2):
+        cell = start + step
+        if not periodic:
+            cell = min(max(cell, 0), cells - 1)
+        weights[cell - first] += share if step else 1.0 - share
+
+
+@kernel
+def _flux(position, moved, radius, volume, offsets, linear, origin, inverse, periodic, flux_x, flux_y, flux_z):
+    """Volume [m3] that every particle carries through every face on its straight way.
+
+    Esirkepov's split: along each axis the change of the one-dimensional weights, times the mean of the weights of
+    the two other axes at both ends, so that the three fluxes together give exactly the change of the product.
+    """
+    nz, ny, nx = flux_x.shape[0], flux_x.shape[1], flux_y.shape[2]
+    old_x, new_x, old_y = np.zeros(6), np.zeros(6), np.zeros(6)
+    new_y, old_z, new_z = np.zeros(6), np.zeros(6), np.zeros(6)
+    for n in range(len(position)):
+        for s in range(len(offsets)):
+            x = (position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0]
+            y = (position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1]
+            z = (position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2]
+            i, j, k = math.floor(x) - 2, math.floor(y) - 2, math.floor(z) - 2
+            _window(x, linear, i, nx, periodic[0], old_x)
+            _window(x + moved[n, 0] * inverse[0], linear, i, nx, periodic[0], new_x)
+            _window(y, linear, j, ny, periodic[1], old_y)
+            _window(y + moved[n, 1] * inverse[1], linear, j, ny, periodic[1], new_y)
+            _window(z, linear, k, nz, periodic[2], old_z)
+            _window(z + moved[n, 2] * inverse[2], linear, k, nz, periodic[2], new_z)
+            part = volume[n] / len(offsets)
+            _carry(part, i, j, k, nx, ny, nz, old_x, new_x, old_y, new_y, old_z, new_z, 0, flux_x)
+            _carry(part, j, i, k, ny, nx, nz, old_y, new_y, old_x, new_x, old_z, new_z, 1, flux_y)
+            _carry(part, k, i, j, nz, nx, ny, old_z, new_z, old_x, new_x, old_y, new_y, 2, flux_z)
+
+
+@kernel
+def _carry(part, first, first_b, first_c, cells, cells_b, cells_c, old, new, old_b, new_b, old_c, new_c, axis, flux):
+    """Add the volume that one piece carries through the faces normal to one axis."""
+    for c in range(6):
+        for b in range(6):
+            across = (old_b[b] * old_c[c] + new_b[b] * new_c[c]) / 3.0
+            across += (old_b[b] * new_c[c] + new_b[b] * old_c[c]) / 6.0
+            if across == 0.0:
+                continue
+            passed = 0.0
+            for a in range(5):
+                passed -= part * (new[a] - old[a]) * across
+                if passed == 0.0:
+                    continue
+                face, other, third = (first + a + 1) % cells, (first_b + b) % cells_b, (first_c + c) % cells_c
+                if axis == 0:
+                    flux[third, other, face] += passed
+                elif axis == 1:
+                    flux[third, face, other] += passed
+                else:
+                    flux[face, third, other] += passed
