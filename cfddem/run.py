@@ -176,6 +176,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
     column = simulation.case.column
     height = bed_height(bodies.position, bodies.radius)
     grid = grid_of(column)
+    cells = cells_of(bodies.position, grid.shape, grid.spacing)
     row = {
         "time": simulation.time,
         "bed_height": height,

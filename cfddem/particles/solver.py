@@ -146,7 +146,7 @@ class ParticleSolver:
             own[:] = kept
         walls = dict(zip(self.walls._fields, self.walls)) | state["walls"]
         self.walls = type(self.walls)(**{name: np.array(each) for name, each in walls.items()})
-        edges = {name: each if np.ndim(each) else int(each) for name, each in state["edges"].items()}
+        edges: dict[str, Any] = {name: each if np.ndim(each) else int(each) for name, each in state["edges"].items()}
         clock = state["clock"]
         self.time, self.steps, self.skin = float(clock["time"]), int(clock["steps"]), float(clock["skin"])
         self._lists, self._listed_at = int(clock["lists"]), int(clock["listed_at"])
