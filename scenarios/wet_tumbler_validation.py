@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.view.plots import label, legend, panels, save, shades
+from cfddem.view.plots import decades, label, legend, panels, save, shades
 from scenarios.validation import Columns, Row, Tell, worst, write_histories
 from scenarios.wet_tumbler import Tumbling, tumble
 
@@ -70,6 +70,10 @@ def _draw_growth(path: Path, runs: list[Tumbling]) -> None:
         numbers, [run.late(run.weighed_size) for run in runs], "s--", color="#e07b00", label="that a sphere is in"
     )
     label(axes[1], "capillary number of the stirring", "-", "size, later half of the run", "spheres")
+    decades(axes[1], *numbers)
+    axes[1].set_yticks(marks := [2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000], [f"{mark}" for mark in marks])
+    axes[1].set_ylim(1.0, None)
+    axes[1].minorticks_off()
     legend(axes[1])
     save(figure, path)
 

@@ -20,13 +20,16 @@ import numpy as np
 
 from cfddem.errors import InputError, nearest
 from cfddem.materials import Material, pair_table
-from closures import capillary, contact
+from closures import capillary, contact, timescales
 from scenarios import wet_wall_motion as motion
 from scenarios.wet_wall_materials import BALLS, GLASS, LIQUIDS, Ball, Liquid, half_filling, sliding_friction
 from scenarios.wet_wall_motion import COLUMNS, Path, Wet, follow
 
 PULLED_IN = {"always": ("I", "III", "IV"), "rebound": ("III", "IV"), "bridge": ("IV",)}
 """Phases with a capillary force, by name; the source does not say whether the first is among them."""
+
+CUTTING = 1e-4
+"""Time in which the spring of a sliding contact follows Coulomb's limit, over the Hertz time."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,7 @@ def impact(
     capillary_phases: str = "always",
     length_from: str = "surface",
     film_signs: str = "goldman",
+    spring: str = "kept",
     smallest_arc: float | None = None,
     smallest_gap: float = 0.5e-6,
     gravity: float = 9.81,
@@ -87,6 +91,8 @@ def impact(
     capillary_phases    "always" where there is liquid, on "rebound" only, or on the "bridge" only
     length_from         where the length of the bridge counts from: the "surface" of the layer, or the "wall"
     film_signs          of the coupling of sliding and spin in the film: "goldman" (1967), or as "printed"
+    spring              of the contact along the wall while it slides: "kept" as the whole displacement, as printed, or
+                        "cut" to Coulomb's limit, as the particle engine does
     smallest_arc        floor of r_m for layers in which the toroid is singular; such layers are refused without [m]
     smallest_gap        below it the film's resistance no longer grows [m]
     gravity             towards the wall [m/s2]
@@ -116,6 +122,8 @@ def impact(
     )
     if wetted and smallest_arc is None and capillary_phases != "bridge":
         _refuse_the_singular(wet)
+    if _named("spring", spring, {"kept": False, "cut": True}):
+        wet = wet._replace(cutting_time=CUTTING * timescales.hertz_time(wet.mass, wet.stiffness, velocity))
     path = follow(wet, velocity, along, spin, tolerance)
     return _result(path, wet, velocity, along, spin, filled, rubs)
 
@@ -176,6 +184,7 @@ def _wet(
         pulled_in=(),
         length_from=film,
         printed_signs=False,
+        cutting_time=0.0,
     )
 
 

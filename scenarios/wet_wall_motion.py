@@ -67,6 +67,7 @@ class Wet(NamedTuple):
     pulled_in: tuple[str, ...]  # phases with a capillary force
     length_from: float  # height of the sphere's lowest point from which the length of the bridge counts [m]
     printed_signs: bool  # of the coupling of sliding and spin in the film
+    cutting_time: float  # in which the spring of a sliding contact is cut to Coulomb's limit; 0: it is kept [s]
 
 
 class Bridge(NamedTuple):
@@ -130,20 +131,27 @@ def film_along(wet: Wet, height: float, along: float, spin: float) -> tuple[floa
     return -6.0 * math.pi * strength * force, -8.0 * math.pi * strength * wet.radius * torque
 
 
-def touch(wet: Wet, state: Any) -> tuple[float, float]:
-    """Normal force and force along the wall of the contact [N].
+def touch(wet: Wet, state: Any) -> tuple[float, float, float]:
+    """Normal force and force along the wall of the contact [N], and the rate of its spring's displacement [m/s].
 
     A contact that slides carries friction times the normal force, also, with its sign, in the weak pull that ends a
-    damped contact: so the impulse of one that slides throughout is friction times the normal impulse.
+    damped contact: so the impulse of one that slides throughout is friction times the normal impulse. A spring that
+    is cut follows Coulomb's limit, less what the dashpot carries, within a small part of the contact time.
     """
     overlap = max(wet.radius - state[HEIGHT], 0.0)
     damping = contact.hertz_damping(wet.damping_ratio, wet.mass, wet.stiffness, overlap)
     normal = contact.hertz_force(wet.stiffness, overlap) - damping * state[SPEED]
     slip = state[ALONG] + state[SPIN] * wet.radius
-    spring = contact.mindlin_stiffness(wet.shear_modulus, wet.radius, overlap) * state[DISPLACEMENT]
-    along = -(spring + damping * slip)
-    sliding = abs(along) > coulomb_limit(wet.friction, normal)
-    return normal, math.copysign(wet.friction * normal, along * normal) if sliding else along
+    stiffness = contact.mindlin_stiffness(wet.shear_modulus, wet.radius, overlap)
+    pulled = stiffness * state[DISPLACEMENT] + damping * slip
+    limit = coulomb_limit(wet.friction, normal)
+    if abs(pulled) <= limit:
+        return normal, -pulled, slip
+    rate = slip
+    if wet.cutting_time > 0.0 and stiffness > 0.0:
+        carried = max(limit - math.copysign(damping, pulled) * slip, 0.0)
+        rate -= (state[DISPLACEMENT] - math.copysign(carried / stiffness, pulled)) / wet.cutting_time
+    return normal, -math.copysign(wet.friction * normal, pulled * normal), rate
 
 
 def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
@@ -154,7 +162,7 @@ def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
 
     def of(_: float, state: Any) -> list[float]:
         height, speed, along, spin = state[HEIGHT], state[SPEED], state[ALONG], state[SPIN]
-        pressed = sideways = couple = touched = drawn = viscous = rubbed = 0.0
+        pressed = sideways = couple = touched = drawn = viscous = rubbed = stretched = 0.0
         if wetted:
             above = max(height, wet.radius)  # the layer's phases end there; only trial steps look below
             viscous = -resistance(wet, above, speed) * speed
@@ -164,7 +172,7 @@ def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
                 sideways, couple = film_along(wet, above, along, spin)
             rubbed = viscous * speed + sideways * along + couple * spin
         else:
-            pressed, sideways = touch(wet, state)
+            pressed, sideways, stretched = touch(wet, state)
             couple = wet.radius * sideways
             touched = pressed * speed + sideways * along + couple * spin
         weight = wet.mass + (wet.liquid_density * volume(wet, height) if on_bridge else 0.0)
@@ -175,7 +183,7 @@ def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
             along,
             sideways / wet.mass,
             couple / inertia,
-            along + spin * wet.radius,
+            stretched,
             -touched / wet.mass,
             -rubbed / wet.mass,
             -drawn * speed / wet.mass,

@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from cfddem.view.plots import BLUE, GREEN, GREY, ORANGE, RED, SKY, label, legend, panels, save, shades
+from scenarios.binary_collision import collide
 from scenarios.validation import Columns, Row, Tell, worst, write_histories
 from scenarios.wet_wall import Impact, impact, sticking_velocity
 from scenarios.wet_wall_checks import independent
+from scenarios.wet_wall_materials import ALUMINA, FRICTION, GLASS
 
 Curves = dict[str, Columns]
 CHANNELS = {"viscous": BLUE, "capillary": SKY, "contact": ORANGE, "gravity": GREY}
@@ -184,6 +186,9 @@ def oblique(folder: Path, curves: Curves) -> list[Row]:
                 small[name] = results[2].restitution_tangential  # at 6 degrees
             _plot(axes, results, colour, line, f"{name}, {spin:g} rad/s")
             curves[f"oblique/{name}/{spin:g}"] = _columns(results)
+    cut = _sweep("alumina_1.74", None, 0.0, 0.0, spring="cut")
+    _plot(axes, cut, GREEN, "-", "dry, 0 rad/s, spring cut")
+    curves["oblique/dry/cut"] = _columns(cut)
     axes[1].set_ylim(-0.5, 2.5)
     legend(axes[0], loc="lower left")
     save(figure, folder / "wet_wall_oblique.png")
@@ -197,6 +202,8 @@ def oblique(folder: Path, curves: Curves) -> list[Row]:
     return [
         worst("wet wall: dry sliding, e_t = 1 - mu (1 + e)/tan", points, 1e-3),
         worst("wet wall: dry sliding, spin over -2.5 mu (1 + e) v/R", turned, 1e-3),
+        worst("wet wall: dry e_t, spring cut, against the particle engine", _beside_the_engine("cut")),
+        worst("wet wall: dry e_t, spring kept, against the particle engine", _beside_the_engine("kept")),
         Row("wet wall: e_t at 60 deg, Tween 20 against dry", wetter[0], dryer[0], note="less friction"),
         Row("wet wall: e_t at 89 deg, Tween 20 against dry", wetter[1], dryer[1], note="the film drags more"),
         Row("wet wall: e_t at 6 deg, dry", small["dry"], 0.82, 0.01, note="about 0.82 in the text"),
@@ -248,9 +255,21 @@ def liquids(folder: Path, curves: Curves) -> list[Row]:
     return [Row("wet wall: restitution, spread over all angles", spread, 0.0, 1e-6)]
 
 
-def _sweep(sphere: str, liquid: str | None, film: float, spin: float) -> list[Impact]:
+def _beside_the_engine(spring: str) -> list[tuple[float, float, float]]:
+    """Dry tangential restitution here and in the particle engine, whose springs are cut to Coulomb's limit."""
+    points = []
+    solids = tuple(solid.model_copy(update={"friction": FRICTION[None]}) for solid in (ALUMINA, GLASS))
+    for angle in (5.0, 10.0, 20.0, 30.0, 40.0, 60.0):
+        dry = {"velocity": 1.0, "viscosity": 0.0, "angle": angle, "against": "wall", "step_fraction": 2e-3}
+        engine = collide(solids, diameter=1.74e-3, **dry)  # type: ignore[arg-type]
+        here = impact("alumina_1.74", None, angle=angle, spring=spring, tolerance=1e-8)
+        points.append((angle, here.restitution_tangential, engine.restitution_tangential))
+    return points
+
+
+def _sweep(sphere: str, liquid: str | None, film: float, spin: float, **options: Any) -> list[Impact]:
     """Impacts at 1 m/s along the normal, over the angles."""
-    return [impact(sphere, liquid, film, angle=float(angle), spin=spin, tolerance=1e-9) for angle in ANGLES]
+    return [impact(sphere, liquid, film, angle=float(a), spin=spin, tolerance=1e-8, **options) for a in ANGLES]
 
 
 _SHOWN = {

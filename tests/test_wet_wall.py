@@ -122,6 +122,24 @@ def test_the_printed_signs_of_the_film_hardly_matter() -> None:
     assert 0.0 < abs(ours.spin / printed.spin - 1.0) < 0.01
 
 
+@pytest.mark.parametrize(("angle", "engine"), [(10.0, 0.8133), (20.0, 0.7085), (30.0, 0.6633), (40.0, 0.6546)])
+def test_a_spring_that_is_cut_acts_as_in_the_particle_engine(angle: float, engine: float) -> None:
+    """The engine's restitution of the same dry impact, at 0.2 % of the Hertz time; its dashpot slides otherwise."""
+    cut = impact("alumina_1.74", None, angle=angle, spring="cut", tolerance=1e-8)
+    assert cut.restitution_tangential == pytest.approx(engine, abs=0.012)
+    assert cut.restitution == pytest.approx(0.76, abs=1e-4)
+
+
+def test_cutting_the_spring_matters_only_where_a_contact_slides_for_a_part() -> None:
+    differences = {}
+    for angle in (3.0, 30.0, 60.0):
+        kept, cut = (impact("alumina_1.74", None, angle=angle, spring=s, tolerance=1e-8) for s in ("kept", "cut"))
+        differences[angle] = abs(kept.restitution_tangential - cut.restitution_tangential)
+    assert differences[3.0] < 5e-3
+    assert differences[30.0] > 0.2
+    assert differences[60.0] < 1e-6
+
+
 def test_a_thick_liquid_holds_a_sphere() -> None:
     """A stiff film of 10 Pa s: the sphere stops, and the result comes soon."""
     syrup = Liquid(density=1200, viscosity=10.0, surface_tension=0.06)
@@ -152,6 +170,7 @@ def test_a_toroid_that_is_singular_is_refused_by_name(sphere: str, film: float) 
         ({"film": 150e-6}, "half_filling_angle.*100 um, 200 um"),
         ({"half_filling_angle": 91.0}, "half_filling_angle"),
         ({"capillary_phases": "never"}, "capillary_phases"),
+        ({"spring": "cutt"}, "spring"),
         ({"smallest_gap": 0.0}, "smallest_gap"),
         ({"tolerance": 1.0}, "tolerance"),
     ],
