@@ -36,6 +36,7 @@ class Material(Checked):
     poisson: float = Field(gt=-1, le=0.5, description="nu [-]")
     restitution: float = Field(1.0, gt=0, le=1, description="e, dry and normal [-]")
     friction: float = Field(0.0, ge=0, description="mu, dry [-]")
+    rolling_friction: float = Field(0.0, ge=0, description="mu_r, lever of the resistance to rolling over R* [-]")
     friction_lubricated: float | None = Field(
         None, ge=0, description="mu where a film keeps the solids apart; the dry one if not given [-]"
     )
@@ -66,6 +67,7 @@ PAIR = np.dtype(
         ("linear_damping_ratio", "f8"),  # zeta of the linear dashpot [-]
         ("friction", "f8"),  # mu, dry [-]
         ("friction_lubricated", "f8"),  # mu, where a film holds [-]
+        ("rolling_friction", "f8"),  # mu_r [-]
         ("roughness_gap", "f8"),  # h_sigma [m]
     ],
     align=True,
@@ -75,7 +77,7 @@ PAIR = np.dtype(
 SMOOTHEST = 1e-10
 """No film is thinner than an atom: the least minimum gap of a pair, also of solids without roughness [m]."""
 
-_OVERRIDABLE = ("restitution", "friction", "friction_lubricated", "roughness_gap")
+_OVERRIDABLE = ("restitution", "friction", "friction_lubricated", "rolling_friction", "roughness_gap")
 
 
 def pair_table(
@@ -83,7 +85,7 @@ def pair_table(
 ) -> np.ndarray:
     """What each two materials do to each other.
 
-    Unless `overrides` says otherwise, unlike materials take the lower restitution and friction, the mean
+    Unless `overrides` says otherwise, unlike materials take the lower restitution and frictions, the mean
     roughness, and the reduced moduli.
 
     materials  the solids of a run, walls among them
@@ -102,6 +104,7 @@ def pair_table(
             row["restitution"] = min(first.restitution, second.restitution)
             row["friction"] = min(first.friction, second.friction)
             row["friction_lubricated"] = min(_lubricated(first), _lubricated(second))
+            row["rolling_friction"] = min(first.rolling_friction, second.rolling_friction)
             row["roughness_gap"] = minimum_gap.asperities(first.roughness, second.roughness)
     for (i, j), values in (overrides or {}).items():
         for name, value in values.items():

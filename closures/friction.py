@@ -1,6 +1,8 @@
-"""What resists sliding: Coulomb's limit, and whether the film has taken the solids apart."""
+"""What resists sliding and rolling: Coulomb's limit, whether a film has taken the solids apart, and rolling torques."""
 
 from __future__ import annotations
+
+import math
 
 from closures.law import law
 
@@ -42,3 +44,58 @@ def dry_or_lubricated(minimum_gap: float, roughness_gap: float, dry: float, lubr
     (0.02, 0.11)
     """
     return lubricated if minimum_gap > roughness_gap else dry
+
+
+@law("friction", "Ai, Chen, Rotter & Ooi, Powder Technol. 206 (2011) 269, model A, doi:10.1016/j.powtec.2010.09.030")
+def rolling_limit(rolling_friction: float, reduced_radius: float, normal_force: float) -> float:
+    r"""Largest torque with which a contact resists rolling.
+
+    .. math:: M_{max} = \mu_r\,R^*\,|F_n|
+
+    rolling_friction  mu_r [-]
+    reduced_radius    R*; the radius itself on a wall [m]
+    normal_force      F_n, of the solid contact [N]
+    returns           M_max [N m]
+
+    As a constant torque it slows a sphere that rolls on a floor by 5/7 mu_r g.
+
+    >>> rolling_limit(0.1, 2.0, -5.0)
+    1.0
+    """
+    return rolling_friction * reduced_radius * abs(normal_force)
+
+
+@law("friction", "Ai, Chen, Rotter & Ooi, Powder Technol. 206 (2011) 269, model C, doi:10.1016/j.powtec.2010.09.030")
+def rolling_stiffness(normal_stiffness: float, rolling_friction: float, reduced_radius: float) -> float:
+    r"""Stiffness of the spring that turns back a contact which has rolled too little to yield.
+
+    .. math:: k_r = 2.25\,k_n\,\mu_r^2\,R^{*\,2}
+
+    normal_stiffness  k_n, normal force over overlap [N/m]
+    rolling_friction  mu_r [-]
+    reduced_radius    R* [m]
+    returns           k_r, torque per angle [N m/rad]
+
+    2.25 is the factor of spheres.
+
+    >>> rolling_stiffness(16.0, 0.5, 1.0)
+    9.0
+    """
+    return 2.25 * normal_stiffness * (rolling_friction * reduced_radius) ** 2
+
+
+@law("friction", "Ai, Chen, Rotter & Ooi, Powder Technol. 206 (2011) 269, model C, doi:10.1016/j.powtec.2010.09.030")
+def rolling_damping(damping_ratio: float, inertia: float, stiffness: float) -> float:
+    r"""Resistance of the dashpot beside the rolling spring.
+
+    .. math:: C_r = 2\,\eta_r\sqrt{I_r k_r}
+
+    damping_ratio  eta_r, 1 at critical damping [-]
+    inertia        I_r, reduced, of both spheres about the contact point [kg m2]
+    stiffness      k_r, from :func:`rolling_stiffness` [N m/rad]
+    returns        C_r, torque per rate of the angle [N m s]
+
+    >>> rolling_damping(0.5, 4.0, 9.0)
+    6.0
+    """
+    return 2.0 * damping_ratio * math.sqrt(inertia * stiffness)

@@ -45,6 +45,28 @@ def elastohydrodynamic(viscosity: float, approach_speed: float, reduced_modulus:
     return float(0.37 * (viscosity * approach_speed / reduced_modulus) ** 0.4 * reduced_radius**0.6)
 
 
+@law("minimum_gap", "inverse of Davis, Serayssol & Hinch (1986)")
+def elastohydrodynamic_speed(gap: float, viscosity: float, reduced_modulus: float, reduced_radius: float) -> float:
+    r"""Approach speed from which on the film's own pressure turns two smooth spheres back before a given gap.
+
+    .. math:: v = \frac{E^*R^*}{\eta}\left(\frac{h}{0.37\,R^*}\right)^{5/2}
+
+    gap              h [m]
+    viscosity        eta, dynamic, of the film [Pa s]
+    reduced_modulus  E*, of the real solids, never softened [Pa]
+    reduced_radius   R* [m]
+    returns          v, the speed at which :func:`elastohydrodynamic` is h [m/s]
+
+    Range: smooth spheres, h << R*.
+
+    >>> v = elastohydrodynamic_speed(35e-9, 1e-3, 1.6e9, 3.175e-3)
+    >>> round(elastohydrodynamic(1e-3, v, 1.6e9, 3.175e-3) * 1e9, 9)
+    35.0
+    """
+    part = gap / (0.37 * reduced_radius)
+    return reduced_modulus * reduced_radius * part * part * math.sqrt(part) / viscosity
+
+
 @law(
     "minimum_gap",
     "Donahue et al., J. Fluid Mech. 650 (2010) 479; Punch et al., AIChE J. 69 (2023) e17989, eq. (14)",

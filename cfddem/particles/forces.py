@@ -1,7 +1,7 @@
-"""What two bodies do to each other: contact and friction, and the film.
+"""What two bodies do to each other where they touch: contact and friction.
 
 The contact of a pair is a function of numbers alone, without arrays and without branches, so that the loop
-that calls it runs on several pairs at once. The film remembers its encounter and works on its edge.
+that calls it runs on several pairs at once.
 """
 
 from __future__ import annotations
@@ -9,12 +9,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from cfddem.kernels import inline
-from cfddem.particles.pairs import geometry
-from cfddem.particles.surfaces import SURFACE, portion, touched
-from cfddem.particles.vectors import across, at, cross, dot, either, minus, plus, put, times
+from cfddem.particles.surfaces import SURFACE, touched
+from cfddem.particles.vectors import across, at, cross, dot, either, minus, plus, times
 from closures.blend import contact_share
 from closures.contact import (
     hertz_damping,
@@ -23,14 +20,13 @@ from closures.contact import (
     linear_damping,
     mindlin_stiffness,
 )
-from closures.friction import coulomb_limit, dry_or_lubricated
-from closures.lubrication import film_resistance, film_strength, speed_after_film
-from closures.minimum_gap import elastohydrodynamic
+from closures.friction import coulomb_limit, dry_or_lubricated, rolling_damping, rolling_limit, rolling_stiffness
 
 DRIFT, VERLET = 0, 1
 FILM, OVERLAP = 0, 1
 HERTZ, LINEAR = 0, 1
 TOTAL, RESCALED = 0, 1
+FREE, CONSTANT_TORQUE, SPRING_DASHPOT = 0, 1, 2
 ROLLING = 3.5
 """How much easier the contact point of two solid spheres is moved along the surface than their centres apart."""
 
@@ -38,9 +34,10 @@ INTEGRATORS = {"drift": DRIFT, "verlet": VERLET}
 FRICTION_ONSETS = {"film": FILM, "overlap": OVERLAP}
 CONTACTS = {"hertz": HERTZ, "linear": LINEAR}
 SPRINGS = {"total": TOTAL, "rescaled": RESCALED}
+ROLLINGS = {"free": FREE, "constant_torque": CONSTANT_TORQUE, "spring_dashpot": SPRING_DASHPOT}
 
 NOTHING = (0.0, 0.0, 0.0)
-_LEAST = 1e-300  # keeps divisions of pairs that do not touch finite; their results are dropped
+LEAST = 1e-300  # keeps divisions of pairs that do not touch finite; their results are dropped
 
 
 class Laws(NamedTuple):
@@ -51,13 +48,15 @@ class Laws(NamedTuple):
     friction_onset: int = FILM  # where friction starts: at h_min, or at geometric overlap
     contact: int = HERTZ
     spring: int = TOTAL  # tangential force from the total displacement, or rescaled while loading
+    rolling: int = FREE  # what resists rolling: nothing, a constant torque, a spring that yields and a dashpot
     cutoff_ratio: float = 1.0  # h_co / R*
     normal_stiffness: float = 0.0  # of the linear contact [N/m]
     tangential_stiffness: float = 0.0  # of the linear contact [N/m]
+    rolling_damping: float = 0.3  # of the rolling dashpot, over critical; 0.3 as in Ai et al. (2011) [-]
 
     def without_the_absent(self) -> Laws:
         """The same laws with each choice that is not made as None, which a loop compiled for it leaves out."""
-        choices = ("film", "integrator", "friction_onset", "contact", "spring")
+        choices = ("film", "integrator", "friction_onset", "contact", "spring", "rolling")
         absent: dict[str, Any] = {name: None for name in choices if not getattr(self, name)}
         return self._replace(**absent)
 
@@ -74,6 +73,8 @@ class Meeting(NamedTuple):
     inverse_sum: float  # 1 / (R_i + R_j); 1 / R_i at a wall [1/m]
     inverse_mass: float  # 1 / m* [1/kg]
     turn: tuple[float, float, float]  # rate at which motion turns the normal [1/s]
+    relative_spin: tuple[float, float, float]  # of the first body against the second [rad/s]
+    inverse_inertia: float  # sum over both bodies, each about its centre [1/(kg m2)]
 
 
 @inline
@@ -86,7 +87,7 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
     """
     row = rows[which]
     touching = meeting.gap < minimum_gap
-    overlap = max(minimum_gap - meeting.gap, _LEAST)
+    overlap = max(minimum_gap - meeting.gap, LEAST)
     share = contact_share(meeting.gap, minimum_gap) if laws.film else 1.0
     normal = times(1.0 / meeting.distance, meeting.separation)
     normal_speed = dot(meeting.velocity, normal)
@@ -105,7 +106,7 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
     )
     # in the steps in which the surfaces meet and part, the dashpot lasts for a part of the step only; there
     # Hertz' grows as the fourth root of the overlap, and its mean is 4/5 of its present value
-    stride = max(abs(step * normal_speed), _LEAST)
+    stride = max(abs(step * normal_speed), LEAST)
     lasted = overlap / stride
     damping *= 0.5 + (0.8 if hertz else 1.0) * lasted if lasted < 1.0 else 1.0
     # a dashpot acts on the speed at the middle of the kick, which it changes itself
@@ -136,11 +137,11 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
     limit = coulomb_limit(friction, normal_force)
     size = math.sqrt(dot(pull, pull))
     sliding = size > limit
-    pull = times(limit / max(size, _LEAST) if sliding else 1.0, pull)
+    pull = times(limit / max(size, LEAST) if sliding else 1.0, pull)
     # a sliding spring carries what the dashpot leaves of Coulomb's limit, and never more than the limit
     carried = minus(pull, times(damping, slip))
     carried = either(dot(carried, carried) > limit * limit, pull, carried)
-    spring = either(sliding, times(1.0 / max(tangential_stiffness, _LEAST), carried), spring)
+    spring = either(sliding, times(1.0 / max(tangential_stiffness, LEAST), carried), spring)
 
     gripping = touching and (laws.friction_onset != OVERLAP or meeting.gap < 0.0)
     pull = either(gripping, pull, NOTHING)
@@ -150,6 +151,40 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
         times(share * stretch, cross(normal, pull)),
         either(gripping, spring, NOTHING),
     )
+
+
+@inline
+def resist_rolling(meeting, row, minimum_gap, force, roll, laws, step):
+    """Moment on the first body, the second has its opposite, and the angle of the rolling spring afterwards.
+
+    force  of the contact on the first body [N]
+    roll   angle by which the bodies have rolled on each other and not yielded [rad]
+    """
+    touching = meeting.gap < minimum_gap
+    overlap = max(minimum_gap - meeting.gap, LEAST)
+    share = contact_share(meeting.gap, minimum_gap) if laws.film else 1.0
+    normal = times(1.0 / meeting.distance, meeting.separation)
+    rate = across(meeting.relative_spin, normal)
+    limit = rolling_limit(row.rolling_friction, meeting.reduced_radius, dot(force, normal))
+    if laws.rolling == CONSTANT_TORQUE:
+        # a resistance can stop the bodies within a step, but not turn them round
+        speed = math.sqrt(dot(rate, rate))
+        stopping = speed / max(step * meeting.inverse_inertia, LEAST)
+        moment = times(-min(limit, stopping) / max(speed, LEAST), rate)
+        roll = NOTHING
+    else:
+        secant = hertz_stiffness(row.contact_modulus, meeting.reduced_radius) * math.sqrt(overlap)
+        secant = share * (secant if laws.contact != LINEAR else laws.normal_stiffness)
+        stiffness = rolling_stiffness(secant, row.rolling_friction, meeting.reduced_radius)
+        roll = across(plus(roll, times(step, rate)), normal)
+        size = stiffness * math.sqrt(dot(roll, roll))
+        yields = size > limit
+        roll = times(limit / max(size, LEAST) if yields else 1.0, roll)
+        # a sphere that rolls turns about the contact: 7/2 of its inertia about the centre
+        inertia = 3.5 / max(meeting.inverse_inertia, LEAST)
+        damping = 0.0 if yields else rolling_damping(laws.rolling_damping, inertia, stiffness)
+        moment = times(-1.0, plus(times(stiffness, roll), times(damping, rate)))
+    return either(touching, moment, NOTHING), either(touching, roll, NOTHING)
 
 
 @inline
@@ -185,84 +220,3 @@ def pair_viscosity(k, bodies, edges):
     if k < edges.between_particles:
         return 0.5 * (bodies.viscosity[i] + bodies.viscosity[j])
     return bodies.viscosity[i]
-
-
-@inline
-def encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row):
-    """Remember the largest approach speed, and the minimum gap that belongs to it."""
-    if -normal_speed > edges.approach_speed[k] and gap > edges.minimum_gap[k]:
-        edges.approach_speed[k] = -normal_speed
-        deformed = elastohydrodynamic(viscosity, -normal_speed, row.film_modulus, reduced_radius)
-        edges.minimum_gap[k] = max(row.roughness_gap, deformed)
-
-
-@inline
-def wet(k, bodies, edges, walls, shift, table, laws):
-    """Find the resistance of the film of edge k; an encounter begins anew where the pair comes within its reach."""
-    _, _, gap = geometry(k, bodies, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
-    row = pair_row(k, bodies, edges, walls, table)
-    if gap > laws.cutoff_ratio * reduced_radius:
-        if edges.accounted_gap[k] == np.inf:
-            edges.minimum_gap[k] = row.roughness_gap
-        edges.resistance[k] = 0.0
-        edges.accounted_gap[k] = gap
-        return
-    if edges.resistance[k] == 0.0:
-        edges.approach_speed[k] = 0.0
-        edges.minimum_gap[k] = row.roughness_gap
-        if edges.accounted_gap[k] == np.inf:
-            edges.accounted_gap[k] = gap
-    strength = film_strength(pair_viscosity(k, bodies, edges), reduced_radius)
-    edges.resistance[k] = portion(edges, k) * strength / max(gap, edges.minimum_gap[k])
-
-
-@inline
-def film_force(k, bodies, edges, walls, shift, table, laws):
-    """The film of edge k as an explicit force, for plain velocity Verlet."""
-    separation, distance, gap = geometry(k, bodies, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
-    normal = times(1.0 / distance, separation)
-    normal_speed = dot(relative_velocity(k, bodies, edges), normal)
-    viscosity = pair_viscosity(k, bodies, edges)
-    encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, pair_row(k, bodies, edges, walls, table))
-    strength = film_strength(viscosity, reduced_radius)
-    resistance = film_resistance(strength, gap, edges.minimum_gap[k], laws.cutoff_ratio * reduced_radius)
-    return times(-portion(edges, k) * resistance * normal_speed, normal)
-
-
-@inline
-def squeeze(k, bodies, edges, walls, shift, table, laws, step):
-    """Impulse of the film of edge k over the coming step.
-
-    Each body gives this film the part of its mass that the film has in the body's total resistance. The
-    pair so made is solved exactly; the sum over all films conserves momentum and never raises energy.
-    """
-    if edges.resistance[k] == 0.0:
-        return
-    i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, bodies, edges, shift)
-    normal = times(1.0 / distance, separation)
-    normal_speed = dot(relative_velocity(k, bodies, edges), normal)
-    reduced_radius, _ = pair_mass_and_radius(k, bodies, edges)
-    viscosity = pair_viscosity(k, bodies, edges)
-    row = pair_row(k, bodies, edges, walls, table)
-    encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row)
-
-    inverse_mass = bodies.inverse_mass[i] * bodies.resistance[i] / edges.resistance[k]
-    if k < edges.between_particles:
-        inverse_mass += bodies.inverse_mass[j] * bodies.resistance[j] / edges.resistance[k]
-    new_speed = speed_after_film(
-        normal_speed,
-        gap,
-        edges.accounted_gap[k],
-        step,
-        portion(edges, k) * film_strength(viscosity, reduced_radius) * inverse_mass,
-        edges.minimum_gap[k],
-        laws.cutoff_ratio * reduced_radius,
-    )
-    # what other films left of an earlier step may be made up for, but never by speeding the pair up
-    new_speed = max(new_speed, 0.0) if normal_speed > 0.0 else min(new_speed, 0.0)
-    new_speed = min(new_speed, normal_speed) if normal_speed > 0.0 else max(new_speed, normal_speed)
-    edges.accounted_gap[k] = gap + step * new_speed
-    put(edges.impulse, k, times((new_speed - normal_speed) / inverse_mass, normal))

@@ -208,6 +208,8 @@ def _copy_memory(edges, donor, k):
     """All that edge k needs to go on for the donor; `resistance` says that the film has begun."""
     for x in range(3):
         edges.spring[3 * k + x] = edges.spring[3 * donor + x]
+        if len(edges.roll) > 0:
+            edges.roll[3 * k + x] = edges.roll[3 * donor + x]
     if len(edges.resistance) > 0:
         edges.approach_speed[k] = edges.approach_speed[donor]
         edges.minimum_gap[k] = edges.minimum_gap[donor]

@@ -7,42 +7,28 @@ in a fixed order: no two threads write the same number, and the result does not 
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from cfddem.kernels import CHUNKS, inline, prange, serial_and_threaded
 from cfddem.particles.encounters import observe
-from cfddem.particles.forces import NOTHING, VERLET, Meeting, contact, film_force, relative_velocity, squeeze, wet
+from cfddem.particles.films import film_force, squeeze, wet
+from cfddem.particles.forces import NOTHING, VERLET, Meeting, contact, relative_velocity, resist_rolling
 from cfddem.particles.meshes import hand_over, meet_walls
-from cfddem.particles.pairs import between, geometry
+from cfddem.particles.pair_loops import (
+    meet_pairs,
+    meet_pairs_threaded,
+    squeeze_pairs,
+    squeeze_pairs_threaded,
+    wet_pairs,
+    wet_pairs_threaded,
+)
+from cfddem.particles.pairs import geometry
 from cfddem.particles.surfaces import TURN, advance_walls, portion, touched
 from cfddem.particles.vectors import at, dot, minus, plus, put, times
 
 
 @inline
-def sphere_meeting(i, j, image, position, velocity, spin, radius, inverse_mass, shift, free):
-    """Two spheres as they stand to each other."""
-    separation = between(i, j, image, position, shift)
-    distance = math.sqrt(dot(separation, separation))
-    inverse_sum = 1.0 / (radius[i] + radius[j])
-    relative = minus(at(velocity, i), at(velocity, j))
-    rate = 1.0 / distance
-    return Meeting(
-        separation,
-        distance,
-        distance - radius[i] - radius[j],
-        relative,
-        plus(times(radius[i], at(spin, i)), times(radius[j], at(spin, j))),
-        radius[i] * radius[j] * inverse_sum,
-        inverse_sum,
-        inverse_mass[i] + inverse_mass[j],
-        (rate * free[0] * relative[0], rate * free[1] * relative[1], rate * free[2] * relative[2]),
-    )
-
-
-@inline
-def wall_meeting(k, bodies, edges, shift):
+def wall_meeting(k, bodies, edges, walls, shift):
     """A sphere and a wall as they stand to each other."""
     i = edges.first[k]
     separation, distance, gap = geometry(k, bodies, edges, shift)
@@ -57,30 +43,38 @@ def wall_meeting(k, bodies, edges, shift):
         1.0 / radius,
         bodies.inverse_mass[i],
         touched(edges, k, TURN),
+        minus(at(bodies.spin, i), at(walls.spin, walls.wall[edges.second[k]])),
+        2.5 * bodies.inverse_mass[i] / radius**2,
     )
 
 
 @inline
-def gather_forces(i, bodies, edges, gravity, films):
-    """Sum what the edges of particle i do to it, with weight and outside force."""
-    force, couple, resistance = at(bodies.applied, i), (0.0, 0.0, 0.0), 0.0
+def _role(edge):
+    """Row of an incident edge, and 1 where the particle is its first body, -1 where it is its second."""
+    second = np.int64(edge) >> 63
+    return np.uint64(np.int64(edge) ^ second), 1.0 + 2.0 * second
+
+
+@inline
+def gather_forces(i, bodies, edges, gravity, films, rolling, near):
+    """Sum what the edges of particle i do to it, with weight and outside force; pairs from `near` on do not touch."""
+    force, couple, moment, resistance = at(bodies.applied, i), NOTHING, NOTHING, 0.0
     for place in range(edges.start[i], edges.start[i + 1]):
-        edge = edges.incident[place]
-        if edge >= 0:
-            k = np.uint64(edge)
-            force = plus(force, at(edges.force, k))
-        else:
-            k = np.uint64(-1 - edge)
-            force = minus(force, at(edges.force, k))
-        couple = plus(couple, at(edges.couple, k))
+        k, sign = _role(edges.incident[place])
         if films:
             resistance += edges.resistance[k]
+            if near <= k < edges.between_particles:
+                continue
+        force = plus(force, times(sign, at(edges.force, k)))
+        couple = plus(couple, at(edges.couple, k))
+        if rolling:
+            moment = plus(moment, times(sign, at(edges.moment, k)))
     if bodies.inverse_mass[i] > 0.0:
         force = plus(force, times(1.0 / bodies.inverse_mass[i], gravity))
     put(bodies.force, i, force)
-    put(bodies.torque, i, times(bodies.radius[i], couple))
+    put(bodies.torque, i, plus(times(bodies.radius[i], couple), moment))
     if films:
-        bodies.resistance[i] = resistance
+        bodies.film_rate[i] = bodies.inverse_mass[i] * resistance
 
 
 @inline
@@ -97,10 +91,8 @@ def brake(i, bodies, edges):
     """Give particle i the impulses of its films."""
     impulse = (0.0, 0.0, 0.0)
     for place in range(edges.start[i], edges.start[i + 1]):
-        edge = edges.incident[place]
-        k = edge if edge >= 0 else -1 - edge
-        if edges.resistance[k] != 0.0:
-            impulse = plus(impulse, at(edges.impulse, k)) if edge >= 0 else minus(impulse, at(edges.impulse, k))
+        k, sign = _role(edges.incident[place])
+        impulse = plus(impulse, times(sign, at(edges.impulse, k)))
     put(bodies.velocity, i, plus(at(bodies.velocity, i), times(bodies.inverse_mass[i], impulse)))
 
 
@@ -112,95 +104,6 @@ def drift(i, bodies, free, step, origin):
     put(bodies.position, i, plus(at(bodies.position, i), way))
     moved = minus(at(bodies.position, i), at(origin, i))
     return dot(moved, moved)
-
-
-@inline
-def _meet_pair(
-    edge,
-    first,
-    second,
-    image,
-    minimum_gap,
-    spring,
-    force,
-    couple,
-    position,
-    velocity,
-    spin,
-    radius,
-    inverse_mass,
-    material,
-    shift,
-    rows,
-    kinds,
-    laws,
-    free,
-    step,
-):
-    """Contact of one pair of particles."""
-    k = np.uint64(edge)
-    i, j = first[k], second[k]
-    meeting = sphere_meeting(i, j, image[k], position, velocity, spin, radius, inverse_mass, shift, free)
-    which = np.uint64(material[i]) * kinds + np.uint64(material[j])
-    push, turn, memory = contact(meeting, rows, which, minimum_gap[k], at(spring, k), laws, step)
-    put(force, k, push)
-    put(couple, k, turn)
-    put(spring, k, memory)
-
-
-def _meet_pairs(
-    pairs,
-    first,
-    second,
-    image,
-    minimum_gap,
-    spring,
-    force,
-    couple,
-    position,
-    velocity,
-    spin,
-    radius,
-    inverse_mass,
-    material,
-    shift,
-    rows,
-    kinds,
-    laws,
-    free,
-    step,
-):
-    """Contact of every pair of particles.
-
-    The arrays come one by one and the body is a single call: only so does the compiler see that no array
-    overlaps another, and works on several pairs at once.
-    """
-    for edge in prange(pairs):
-        _meet_pair(
-            edge,
-            first,
-            second,
-            image,
-            minimum_gap,
-            spring,
-            force,
-            couple,
-            position,
-            velocity,
-            spin,
-            radius,
-            inverse_mass,
-            material,
-            shift,
-            rows,
-            kinds,
-            laws,
-            free,
-            step,
-        )
-
-
-meet_pairs, meet_pairs_threaded = serial_and_threaded(_meet_pairs)
 
 
 def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step, steps, origin, reach, time, log):
@@ -218,7 +121,9 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
     kinds, rows = np.uint64(len(table)), table.reshape(-1)
     meshes = pairs < number and len(walls.cell_member) > 0
     films = True if laws.film else False  # noqa: SIM210  a film that is None has no truth of type bool
+    rolling = True if laws.rolling else False  # noqa: SIM210
     drifting = films and laws.integrator != VERLET
+    near = edges.near if drifting else pairs
     moving = steps > 0
     half = step if moving else 0.0
     done, noted = 0, 0
@@ -227,8 +132,28 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
             for i in prange(count):
                 kick(i, bodies, step)
             if drifting:
+                squeeze_pairs(
+                    pairs,
+                    edges.first,
+                    edges.second,
+                    edges.image,
+                    edges.minimum_gap,
+                    edges.resistance,
+                    edges.approach_speed,
+                    edges.accounted_gap,
+                    edges.impulse,
+                    edges.hard,
+                    bodies.position,
+                    bodies.velocity,
+                    bodies.radius,
+                    bodies.film_rate,
+                    shift,
+                    laws,
+                    step,
+                )
                 for k in prange(number):
-                    squeeze(k, bodies, edges, walls, shift, table, laws, step)
+                    if k >= pairs or edges.hard[k]:
+                        squeeze(k, bodies, edges, walls, shift, table, laws, step)
             for chunk in prange(CHUNKS):
                 far = 0.0
                 for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
@@ -247,10 +172,29 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
         if walled is not None:
             meet_walls(bodies, edges, walls, free, laws.cutoff_ratio if films else 0.0)
         if films:
-            for k in prange(number):
+            wet_pairs(
+                near,
+                pairs,
+                edges.first,
+                edges.second,
+                edges.image,
+                edges.minimum_gap,
+                edges.resistance,
+                edges.approach_speed,
+                edges.accounted_gap,
+                bodies.position,
+                bodies.radius,
+                bodies.material,
+                bodies.viscosity,
+                shift,
+                rows,
+                kinds,
+                laws,
+            )
+            for k in range(pairs, number):
                 wet(k, bodies, edges, walls, shift, table, laws)
         meet_pairs(
-            pairs,
+            near,
             edges.first,
             edges.second,
             edges.image,
@@ -258,12 +202,18 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
             edges.spring,
             edges.force,
             edges.couple,
+            edges.roll,
+            edges.moment,
+            edges.resistance,
+            edges.approach_speed,
+            edges.accounted_gap,
             bodies.position,
             bodies.velocity,
             bodies.spin,
             bodies.radius,
             bodies.inverse_mass,
             bodies.material,
+            bodies.viscosity,
             shift,
             rows,
             kinds,
@@ -278,12 +228,19 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                 if part == 0.0:
                     put(edges.force, k, NOTHING)
                     put(edges.couple, k, NOTHING)
+                    if rolling:
+                        put(edges.moment, k, NOTHING)
                     continue
-                meeting = wall_meeting(k, bodies, edges, shift)
+                meeting = wall_meeting(k, bodies, edges, walls, shift)
                 which = np.uint64(bodies.material[edges.first[k]]) * kinds + np.uint64(walls.material[edges.second[k]])
                 push, turn, memory = contact(
                     meeting, rows, which, edges.minimum_gap[k], at(edges.spring, k), laws, half
                 )
+                if rolling:
+                    held = edges.minimum_gap[k]
+                    torque, rolled = resist_rolling(meeting, rows[which], held, push, at(edges.roll, k), laws, half)
+                    put(edges.moment, k, times(part, torque))
+                    put(edges.roll, k, rolled)
                 put(edges.force, k, times(part, push))
                 put(edges.couple, k, times(part, turn))
                 put(edges.spring, k, memory)
@@ -292,7 +249,7 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                 film = film_force(k, bodies, edges, walls, shift, table, laws)
                 put(edges.force, k, plus(at(edges.force, k), film))
         for i in prange(count):
-            gather_forces(i, bodies, edges, gravity, films)
+            gather_forces(i, bodies, edges, gravity, films, rolling, near)
             if moving:
                 kick(i, bodies, step)
         for chunk in range(CHUNKS):
@@ -305,4 +262,6 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
             return done, largest, noted
 
 
-march, march_threaded = serial_and_threaded(_march, meet_pairs=meet_pairs_threaded)
+march, march_threaded = serial_and_threaded(
+    _march, meet_pairs=meet_pairs_threaded, wet_pairs=wet_pairs_threaded, squeeze_pairs=squeeze_pairs_threaded
+)

@@ -14,7 +14,7 @@ import numpy as np
 from cfddem.errors import InputError
 from cfddem.kernels import inline, kernel, prange, threaded
 from cfddem.particles.near_walls import near_walls
-from cfddem.particles.pairs import HOME, Edges, edges, shifts
+from cfddem.particles.pairs import HOME, Edges, edges, near_first, shifts
 from cfddem.particles.state import Bodies
 from cfddem.particles.surfaces import Walls
 from cfddem.particles.vectors import at, flat
@@ -39,7 +39,14 @@ class Cells(NamedTuple):
 
 
 def list_edges(
-    bodies: Bodies, walls: Walls, cutoff_ratio: float, skin: float, box: np.ndarray, record: bool = False
+    bodies: Bodies,
+    walls: Walls,
+    cutoff_ratio: float,
+    skin: float,
+    box: np.ndarray,
+    record: bool = False,
+    roughness: float = 0.0,
+    rolling: bool = False,
 ) -> Edges:
     """A fresh pair graph of all that is closer than the reach of the film plus a skin.
 
@@ -47,6 +54,8 @@ def list_edges(
     skin          allowance for motion until the next list [m]
     box           (3,) length of the periodic box; infinite along axes that are open [m]
     record        keep the begin of encounters, for a record of them
+    roughness     largest gap at which asperities hold a pair apart [m]
+    rolling       keep what resists rolling
     """
     largest = float(bodies.radius.max())
     reach = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
@@ -55,6 +64,9 @@ def list_edges(
             raise InputError("box", float(box[axis]), f"at least {2.0 * reach:.3g} m, twice the reach of a pair")
     find = _among_few if bodies.count <= FEW else _among_many
     first, second, image = find(bodies, cutoff_ratio, skin, box)
+    near = len(first)
+    if cutoff_ratio > 0.0:
+        first, second, image, near = near_first(first, second, image, bodies, box, skin + roughness)
     particle, wall = near_walls(bodies, walls, cutoff_ratio, skin)
     return edges(
         np.concatenate([first, particle]),
@@ -62,8 +74,10 @@ def list_edges(
         np.concatenate([image, np.full(len(wall), HOME, np.uint8)]),
         len(first),
         bodies.count,
+        near=near,
         film=cutoff_ratio > 0.0,
         record=record,
+        rolling=rolling,
     )
 
 

@@ -1,7 +1,8 @@
 """The pair graph: who is near whom, and what each pair remembers.
 
 An edge joins two particles, or a particle and a wall. Edges of particles come first, sorted by their first
-particle and then their second; edges of walls follow. Each neighbour is found once.
+particle and then their second; edges of walls follow. Each neighbour is found once. With films, pairs too
+far apart to touch before the next list follow those that may.
 """
 
 from __future__ import annotations
@@ -24,14 +25,18 @@ class Edges(NamedTuple):
     second: np.ndarray  # (n,) uint32, particle; piece of a wall in the edges after `between_particles`
     image: np.ndarray  # (n,) uint8, across which borders of a periodic box the pair reaches
     between_particles: int
+    near: int  # edges of particles that may touch before the next list; those after it have films alone
     spring: np.ndarray  # (n, 3) tangential displacement of the contact [m]
     approach_speed: np.ndarray  # (n,) largest approach speed of this encounter [m/s]
     minimum_gap: np.ndarray  # (n,) h_min of this encounter; 0 without a film [m]
     accounted_gap: np.ndarray  # (n,) gap up to which the film's impulse has been given [m]
     force: np.ndarray  # (n, 3) on the first body [N]
     couple: np.ndarray  # (n, 3) torque per radius, the same on both bodies [N]
+    roll: np.ndarray  # (n, 3) angle of the rolling spring, (0, 3) where nothing resists rolling [rad]
+    moment: np.ndarray  # (n, 3) torque against rolling on the first body, its opposite on the second [N m]
     resistance: np.ndarray  # (n,) of the film, without lever; 0 out of its reach [kg/s]
     impulse: np.ndarray  # (n, 3) of the film in this step, on the first body [N s]
+    hard: np.ndarray  # (n,) bool, where the film changes so much in this step that its equation is solved with care
     entry: np.ndarray  # (n, 5) begin of the encounter, NaN outside one; (0, 5) where none are recorded
     touch: np.ndarray  # (particle-wall edges, 18) how sphere and wall stand: columns in `surfaces`
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
@@ -40,6 +45,9 @@ class Edges(NamedTuple):
 
 HOME = 13
 """Image of a pair that does not reach across a periodic border: 9 (x + 1) + 3 (y + 1) + (z + 1), in boxes."""
+
+
+_LAST, _1, _2 = np.uint64(3 * 26), np.uint64(1), np.uint64(2)
 
 
 def shifts(box: np.ndarray) -> np.ndarray:
@@ -56,15 +64,19 @@ def edges(
     between_particles: int,
     count: int,
     *,
+    near: int | None = None,
     film: bool,
     record: bool = False,
+    rolling: bool = False,
 ) -> Edges:
     """A fresh graph over `count` particles; pairs that have never met.
 
     first, second, image  (n,) as in :class:`Edges`
     between_particles     number of edges that join two particles
+    near                  leading edges between particles that may touch; all of them if not given
     film                  keep what films remember
     record                keep the begin of encounters, for a record of them
+    rolling               keep what resists rolling
     """
     number = len(first)
     films = number if film else 0
@@ -74,19 +86,43 @@ def edges(
         second,
         image,
         int(between_particles),
+        int(between_particles) if near is None else near,
         np.zeros((number, 3)),
         np.zeros(films),
         np.zeros(number),
         np.full(films, np.inf),
         np.zeros((number, 3)),
         np.zeros((number, 3)),
+        np.zeros((number if rolling else 0, 3)),
+        np.zeros((number if rolling else 0, 3)),
         np.zeros(films),
-        np.empty((films, 3)),
+        np.zeros((films, 3)),
+        np.zeros(films, bool),
         np.full((number if record else 0, 5), np.nan),
         np.zeros((number - int(between_particles), TOUCH)),
         start,
         incident,
     )
+
+
+THICKEST = 0.02
+"""No minimum gap is larger than this share of the reduced radius, but where asperities are."""
+
+
+def near_first(
+    first: np.ndarray, second: np.ndarray, image: np.ndarray, bodies: Bodies, box: np.ndarray, allowance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Put the pairs that may touch before the next list before those that cannot.
+
+    allowance  skin and height of asperities [m]
+    returns    first, second and image in the new order, and the number of pairs that may touch
+    """
+    apart = bodies.position[first] - bodies.position[second] + shifts(box)[image]
+    radii = bodies.radius[first] + bodies.radius[second]
+    gap = np.sqrt(np.einsum("ij,ij->i", apart, apart)) - radii
+    far = gap >= allowance + THICKEST * bodies.radius[first] * bodies.radius[second] / radii
+    order = np.argsort(far, kind="stable")
+    return first[order], second[order], image[order], int(np.count_nonzero(~far))
 
 
 @kernel
@@ -136,6 +172,10 @@ def remember(old, new, old_row, new_row):
                     new.spring[k, axis] = sign * old.spring[before, axis]
                     new.force[k, axis] = sign * old.force[before, axis]
                     new.couple[k, axis] = old.couple[before, axis]
+                if len(new.roll) > 0:
+                    for axis in range(3):
+                        new.roll[k, axis] = sign * old.roll[before, axis]
+                        new.moment[k, axis] = sign * old.moment[before, axis]
                 if len(new.resistance) > 0:
                     new.approach_speed[k] = old.approach_speed[before]
                     new.minimum_gap[k] = old.minimum_gap[before]
@@ -169,7 +209,13 @@ def _gaps(edges, bodies, walls, shift, result):
 @inline
 def between(i, j, image, position, shift):
     """Separation from particle j to particle i, across a periodic border where the image says so."""
-    return plus(minus(at(position, i), at(position, j)), at(shift, image))
+    # the three digits of the image by whole numbers: faster than to look them up
+    code = np.int64(image)
+    x = (code * 57) >> 9
+    y = ((code - 9 * x) * 11) >> 5
+    z = code - 9 * x - 3 * y
+    away = (shift[_LAST] * (x - 1.0), shift[_LAST + _1] * (y - 1.0), shift[_LAST + _2] * (z - 1.0))
+    return plus(minus(at(position, i), at(position, j)), away)
 
 
 @inline

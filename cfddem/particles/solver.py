@@ -185,7 +185,9 @@ class ParticleSolver:
             meet_walls(*self._views[:3], self.free, self._reach_ratio)
 
     def _listed(self) -> Edges:
-        return list_edges(self.bodies, self.walls, self._reach_ratio, self.skin, self.box, self.collisions is not None)
+        record, roughness = self.collisions is not None, float(self.table["roughness_gap"].max())
+        ratio, rolling = self._reach_ratio, bool(self.laws.rolling)
+        return list_edges(self.bodies, self.walls, ratio, self.skin, self.box, record, roughness, rolling)
 
     def _relist(self) -> None:
         """Find the pairs anew; what they remember and the forces at hand are carried over."""

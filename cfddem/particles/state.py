@@ -25,7 +25,7 @@ class Bodies(NamedTuple):
     applied: np.ndarray  # (N, 3) force from outside: gravity, fluid, a hand [N]
     force: np.ndarray  # (N, 3) sum of all forces at the last step [N]
     torque: np.ndarray  # (N, 3) [N m]
-    resistance: np.ndarray  # (N,) sum of the resistances of the particle's films [kg/s]
+    film_rate: np.ndarray  # (N,) resistance of all the particle's films over its mass [1/s]
 
     @property
     def count(self) -> int:  # type: ignore[override]
@@ -94,5 +94,5 @@ def bodies(
         applied=vectors(0.0),
         force=vectors(0.0),
         torque=vectors(0.0),
-        resistance=scalars(0.0),
+        film_rate=scalars(0.0),
     )
