@@ -134,6 +134,77 @@ _WET_WALL_UNITS = {
 
 
 @app.command
+def three_spheres(
+    *,
+    stokes: Annotated[float, Parameter(help="of the normal speed of impact")] = 8.0,
+    theta12: Annotated[float, Parameter(help="line of centres 1-2 against the velocity [deg]")] = 45.0,
+    theta23: Annotated[float, Parameter(help="line of centres 2-3 against the velocity [deg]")] = 0.0,
+    film_ratio: Annotated[float, Parameter(help="film of the first pair over the diameter")] = 0.01,
+    minimum_gap: Annotated[float, Parameter(help="gap at which solids touch, over the film")] = 0.05,
+    capillary_number: Annotated[float, Parameter(help="infinite for no capillary pull")] = float("inf"),
+    friction: Annotated[float, Parameter(help="of the solids")] = 0.0,
+    restitution: Annotated[float, Parameter(help="of the solids, dry")] = 1.0,
+    gap23: Annotated[float, Parameter(help="first gap of 2 and 3 over the film")] = 1.0,
+    film23: Annotated[float, Parameter(help="film of 2 and 3 over that of 1 and 2")] = 1.0,
+    film13: Annotated[float, Parameter(help="film of 1 and 3 over that of 1 and 2")] = 1.0,
+    spheres: Annotated[int, Parameter(help="3, or 2 without the third")] = 3,
+    until: Annotated[float, Parameter(help="way of the striker at its first speed, in diameters")] = 8.0,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Let a wet sphere strike a resting pair of wet spheres.
+
+    Example: cfddem three-spheres --stokes 12 --theta12 30
+    """
+    given = {name: value for name, value in locals().items() if name != "json"}
+    _tell_of_compilation()
+    from scenarios.three_spheres import simulate
+
+    values = simulate(**given).summary()
+    if not json:
+        events, contacts = values.pop("events"), values.pop("contacts")
+        values |= {f"contacts{pair}": count for pair, count in contacts.items()}
+    _show(values, {}, json)
+    if not json:
+        for event in events:
+            print("t = {time:<9.4f} t* = {time_star:<8.4f} {pair} {kind:<8} at {speed:.4f}".format(**event))
+
+
+@app.command
+def wet_pair(
+    *,
+    stokes: Annotated[float, Parameter(help="of the normal speed of impact")] = 2.0,
+    angle: Annotated[float, Parameter(help="between velocity and line of centres [deg]")] = 0.0,
+    bridge: Annotated[str, Parameter(help="deforming or static")] = "deforming",
+    cut: Annotated[str, Parameter(help="film below the minimum gap: zero or constant")] = "zero",
+    tangential: Annotated[str, Parameter(help="film across the line of centres: davis, nase or none")] = "davis",
+    friction: Annotated[float, Parameter(help="of the solids")] = 0.0,
+    capillary: Annotated[bool, Parameter(help="with a capillary pull", negative="")] = False,
+    glass_transition_pressure: Annotated[
+        float | None, Parameter(help="that sets the minimum gap; the fitted one if not given [Pa]")
+    ] = None,
+    film: Annotated[float, Parameter(help="on both spheres together [m]")] = 270e-6,
+    viscosity: Annotated[float, Parameter(help="of the film [Pa s]")] = 10.0,
+    radius: Annotated[float, Parameter(help="of the spheres [m]")] = 12.7e-3,
+    restitution: Annotated[float, Parameter(help="of the solids, dry")] = 0.9,
+    duration: Annotated[float, Parameter(help="after which a pair counts as stuck [s]")] = 1.0,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Let a wet steel sphere strike another that rests.
+
+    Example: cfddem wet-pair --stokes 1.2 --angle 60
+    """
+    given = {name: value for name, value in locals().items() if name not in ("json", "tangential")}
+    _tell_of_compilation()
+    from scenarios.wet_pair import collide_wet
+
+    result = collide_wet(**given, tangential=None if tangential == "none" else tangential)
+    _show(result.summary(), _WET_PAIR_UNITS, json)
+
+
+_WET_PAIR_UNITS = {"spin": "rad/s", "separation_time": "s", "minimum_gap": "m", "velocity": "m/s", "turned": "deg"}
+
+
+@app.command
 def validate(
     target: Annotated[str, Parameter(help="binary-collision, or all")] = "all",
     *,
@@ -180,6 +251,78 @@ def bench(
     else:
         for name, text in dense_bed.rows(result):
             print(f"{name:<20}  {text}")
+
+
+@app.command
+def run(
+    case: Annotated[Path | None, Parameter(help="TOML file, or a name of the gallery; the only one here")] = None,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; NAME-run")] = None,
+    set: Annotated[list[str] | None, Parameter(help="key=value in place of the file's; repeat for more")] = None,
+    threads: Annotated[int | None, Parameter(help="of the machine; all if not given")] = None,
+) -> None:
+    """Run a case into a folder, and report what came out.
+
+    Example: cfddem run liquid-bed -o bed --set run.until=0.1
+    """
+    from cfddem.case import Case
+    from cfddem.gallery import find_case, overrides
+    from cfddem.kernels import use_threads
+    from cfddem.progress import live_line
+    from cfddem.report import lines
+    from cfddem.report import report as summary
+    from cfddem.run import Run
+
+    path = find_case(case)
+    described = Case.from_toml(path, overrides(set or []))
+    folder = output or Path(f"{path.stem}-run")
+    use_threads(threads)
+    with live_line() as line:
+        text = described.to_toml() if set else path.read_text()
+        Run.begin(described, folder, text=text, report=line.update, progress=line.say).go()
+    print("\n".join(lines(summary(folder))))
+    print(f"\nwritten to {folder}; see it with: cfddem view {folder}")
+
+
+@app.command
+def resume(
+    folder: Annotated[Path | None, Parameter(help="of a run; the newest one here if not given")] = None,
+    *,
+    until: Annotated[float | None, Parameter(help="new end [s]")] = None,
+    threads: Annotated[int | None, Parameter(help="of the machine; all if not given")] = None,
+) -> None:
+    """Go on with a run that was stopped or killed, to the same bits.
+
+    Example: cfddem resume bed --until 0.12
+    """
+    from cfddem.kernels import use_threads
+    from cfddem.progress import live_line
+    from cfddem.record.reading import newest_run
+    from cfddem.run import Run
+
+    use_threads(threads)
+    folder = folder or newest_run(Path())
+    with live_line() as line:
+        Run.resume(folder, until=until, report=line.update, progress=line.say).go()
+    print(f"written to {folder}")
+
+
+@app.command
+def report(
+    folder: Annotated[Path | None, Parameter(help="of a run; the newest one here if not given")] = None,
+    *,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Means of a run with their errors, beside the laws of beds.
+
+    Example: cfddem report bed
+    """
+    from cfddem.record.reading import newest_run
+    from cfddem.report import lines
+    from cfddem.report import report as summary
+
+    result = summary(folder or newest_run(Path()))
+    print(_json.dumps(result, allow_nan=True) if json else "\n".join(lines(result)))
 
 
 @app.command

@@ -1,0 +1,149 @@
+"""Three wet spheres: printed numbers, the analytic law of two, a second solution, and what must hold always."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from test_command_line import cfddem
+
+from cfddem.errors import InputError
+from closures.restitution import davis_sitison
+from scenarios import wet_validation as study
+from scenarios.three_spheres import centres, outcomes, simulate
+from scenarios.validation import Row
+from scenarios.wet_checks import cartesian
+
+
+def failed(rows: list[Row]) -> list[object]:
+    return [row.card() for row in rows if row.verdict == "FAILS"]
+
+
+@pytest.mark.parametrize("part", [study.printed, study.thresholds, study.two_spheres], ids=lambda part: part.__name__)
+def test_published_numbers_hold(part, tmp_path) -> None:
+    """Within 0.5 % of Davis (2023), and 1e-4 of the analytic law of Davis & Sitison (2020)."""
+    assert failed(part(tmp_path, {})) == []
+
+
+@pytest.mark.parametrize("conditions", study.UNPRINTED, ids=lambda each: f"St {each['stokes']:g}")
+def test_a_second_solution_in_other_coordinates_agrees(conditions: dict[str, float]) -> None:
+    """Events in the same order; times within 0.2 %, normal speeds within 0.005."""
+    ours, theirs = simulate(**conditions, until=2.0).events, cartesian(**conditions)
+    assert len(theirs) >= 2
+    for a, (kind, pair, time, speed) in zip(ours, theirs, strict=False):
+        assert (a.kind, a.pair) == (kind, pair)
+        assert a.time == pytest.approx(time, rel=2e-3)
+        assert a.speed == pytest.approx(speed, abs=5e-3)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_endless_bouncing_does_not_depend_on_where_it_is_cut(friction: float) -> None:
+    """St 2: sphere 3 presses 1 and 2 together, which bounce ever faster; the partings come out the same."""
+    runs = [simulate(2.0, 45.0, friction=friction, slowest_bounce=slowest) for slowest in (1e-3, 1e-4, 1e-5)]
+    contacts = [run.summary()["contacts"]["12"] for run in runs]
+    assert contacts[0] < contacts[1] < contacts[2]
+    assert contacts[2] > 100
+    for kind, pair in (("meet", 13), ("separate", 12), ("separate", 13)):
+        times = [study.of(run, f"{kind} t_star", pair) for run in runs]
+        assert max(times) - min(times) < 1e-6
+
+
+def test_solids_never_come_closer_than_the_minimum_gap() -> None:
+    """Also where a capillary pull keeps all three pressed together."""
+    for conditions in ({"stokes": 2.0, "theta12": 45.0}, {"stokes": 3.5, "theta12": 45.0, "capillary_number": 100.0}):
+        history = simulate(**conditions).history
+        for pair in ("12", "23", "13"):
+            assert history[f"gap{pair}"].min() > 0.05 - 1e-8
+
+
+def momentum_of_turning(history: dict[str, np.ndarray], film_ratio: float) -> np.ndarray:
+    """Angular momentum about the common centre, over mass, diameter and delta_12/v_n0."""
+    place = centres(history, film_ratio) / film_ratio
+    # velocities from the rates of the pairs, the centre at rest
+    steps = []
+    for pair in ("12", "23"):
+        angle = np.radians(history[f"angle{pair}"])
+        c, s = np.cos(angle), np.sin(angle)
+        across = (1.0 / film_ratio + history[f"gap{pair}"]) * history[f"turning{pair}"]
+        steps.append(
+            np.stack([-history[f"approach{pair}"] * c - across * s, -history[f"approach{pair}"] * s + across * c], 1)
+        )
+    velocity = np.stack([np.zeros_like(steps[0]), steps[0], steps[0] + steps[1]], 1)
+    orbit = (place[..., 0] * velocity[..., 1] - place[..., 1] * velocity[..., 0]).sum(1)
+    orbit -= 3.0 * (place.mean(1)[:, 0] * velocity.mean(1)[:, 1] - place.mean(1)[:, 1] * velocity.mean(1)[:, 0])
+    spin = sum(history[f"spin{sphere}"] for sphere in (1, 2, 3)) * 0.1 / film_ratio**2
+    return np.asarray(orbit + spin)
+
+
+def test_angular_momentum_changes_only_by_the_arms_of_the_film() -> None:
+    """Without friction and film across it is kept to 1e-9; the torque of the film acts at a R, half a gap short."""
+    turning = momentum_of_turning(simulate(8.0, 45.0, friction=0.2, until=3.0).history, 0.01)
+    assert np.ptp(turning) / abs(turning[0]) < 1e-3
+    head_on = momentum_of_turning(simulate(8.0, 0.0, until=3.0).history, 0.01)
+    assert np.abs(head_on).max() < 1e-9 * 100.0
+
+
+def test_energy_falls() -> None:
+    """Films and contacts only take: the speeds squared fall from event to event."""
+    history = simulate(6.0, 30.0, friction=0.1, restitution=0.9, until=2.0).history
+    squares = []
+    for pair in ("12", "23"):
+        squares.append(
+            history[f"approach{pair}"] ** 2 + ((100.0 + history[f"gap{pair}"]) * history[f"turning{pair}"]) ** 2
+        )
+    first, second = (np.array(each) for each in squares)
+    angle = np.radians(history["angle23"] - history["angle12"])
+    ahead = [history["approach12"], (100.0 + history["gap12"]) * history["turning12"]]
+    after = [history["approach23"], (100.0 + history["gap23"]) * history["turning23"]]
+    dot = (ahead[0] * after[0] + ahead[1] * after[1]) * np.cos(angle) + (
+        ahead[0] * after[1] - ahead[1] * after[0]
+    ) * np.sin(angle)
+    # kinetic energy about the common centre of three equal masses, by the two relative velocities
+    energy = (first + second + dot) / 3.0 + 0.05e4 * sum(history[f"spin{sphere}"] ** 2 for sphere in (1, 2, 3))
+    assert np.diff(energy).max() < 1e-8 * energy[0]
+    assert energy[-1] < 0.8 * energy[0]
+
+
+def test_the_outcomes_have_their_names() -> None:
+    """FA, PA1, PA2, PA3 and FS, each where the source finds it."""
+    assert simulate(2.0, 45.0).outcome == "PA1"
+    assert simulate(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
+    assert simulate(8.0, 0.0).outcome == "PA3"
+    assert simulate(4.0, 0.0).outcome == "FA"
+    assert simulate(10.0, 45.0).outcome == "FS"
+    assert simulate(10.0, 0.0, spheres=2).outcome == "FS"
+    assert simulate(3.0, 0.0, spheres=2).outcome == "FA"
+
+
+def test_a_map_equals_single_runs() -> None:
+    table = outcomes([3.0, 9.0], [10.0, 50.0], friction=0.1)
+    for row, angle in enumerate((10.0, 50.0)):
+        for column, stokes in enumerate((3.0, 9.0)):
+            run = simulate(stokes, angle, friction=0.1)
+            assert table["outcome"][row, column] == run.outcome
+            assert table["restitution12"][row, column] == run.restitution12
+            assert table["restitution23"][row, column] == run.restitution23
+
+
+def test_two_spheres_head_on_follow_the_law_to_rounding_of_the_integrator() -> None:
+    assert simulate(10.0, 0.0, spheres=2).restitution12 == pytest.approx(davis_sitison(10.0, 1.0, 0.05), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("stokes", 0.0), ("stokes", math.nan), ("theta12", 90.0), ("minimum_gap", 1.0), ("film_ratio", -0.01),
+     ("gap23", 0.01), ("capillary_number", 0.0), ("restitution", 1.1), ("friction", -0.1), ("spheres", 4),
+     ("until", 0.0), ("theta23", 180.0)],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=name):
+        simulate(**{"stokes": 5.0, "theta12": 30.0, name: value})  # type: ignore[arg-type]
+
+
+def test_the_command_prints_json() -> None:
+    done = cfddem("three-spheres", "--stokes", "20", "--theta12", "30", "--json")
+    result = json.loads(done.stdout)
+    assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
+    assert result["events"][0]["pair"] == 12
