@@ -27,6 +27,7 @@ from cfddem.errors import InputError
 TARGETS: dict[str, str] = {
     "binary-collision": "scenarios.binary_collision_validation",
     "particles": "scenarios.particles_validation",
+    "wet-tumbler": "scenarios.wet_tumbler_validation",
     "wet": "scenarios.wet_validation",
 }
 """Name of each target, and the module that holds its `study`."""
