@@ -41,6 +41,7 @@ def study(folder: Path, tell: Tell) -> list[Row]:
         name = f"Ca = {run.capillary_number:g}: mean size, later half"
         rows += [
             Row(name, size, unit="spheres"),
+            Row(f"Ca = {run.capillary_number:g}: share of spheres in the largest", run.late(run.largest_size) / COUNT),
             Row(f"Ca = {run.capillary_number:g}: bridges per sphere, later half", run.late(run.bridges)),
             Row(f"Ca = {run.capillary_number:g}: bridges broken over formed", run.broken / run.formed),
         ]

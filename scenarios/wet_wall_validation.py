@@ -269,7 +269,7 @@ def _beside_the_engine(spring: str) -> list[tuple[float, float, float]]:
 
 def _sweep(sphere: str, liquid: str | None, film: float, spin: float, **options: Any) -> list[Impact]:
     """Impacts at 1 m/s along the normal, over the angles."""
-    return [impact(sphere, liquid, film, angle=float(a), spin=spin, tolerance=1e-8, **options) for a in ANGLES]
+    return [impact(sphere, liquid, film, angle=float(a), spin=spin, tolerance=1e-9, **options) for a in ANGLES]
 
 
 _SHOWN = {
