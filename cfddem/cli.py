@@ -149,15 +149,20 @@ def three_spheres(
     film13: Annotated[float, Parameter(help="film of 1 and 3 over that of 1 and 2")] = 1.0,
     spheres: Annotated[int, Parameter(help="3, or 2 without the third")] = 3,
     until: Annotated[float, Parameter(help="way of the striker at its first speed, in diameters")] = 8.0,
+    map: Annotated[Path | None, Parameter(help="picture of the outcomes at all St and angles, PNG")] = None,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
     """Let a wet sphere strike a resting pair of wet spheres.
 
     Example: cfddem three-spheres --stokes 12 --theta12 30
     """
-    given = {name: value for name, value in locals().items() if name != "json"}
+    given = {name: value for name, value in locals().items() if name not in ("json", "map")}
     _tell_of_compilation()
     from scenarios.three_spheres import simulate
+    from scenarios.three_spheres_figures import draw_map
+
+    if map is not None:
+        draw_map(map, given)
 
     values = simulate(**given).summary()
     if not json:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cfddem.view.plots import BLUE, GREEN, GREY, ORANGE, RED, SKY, label, legend, panels
-from scenarios.three_spheres import OUTCOMES, Triplet, centres
+from cfddem.view.plots import BLUE, GREEN, GREY, ORANGE, RED, SKY, label, legend, panels, save
+from scenarios.three_spheres import OUTCOMES, Triplet, centres, outcomes
 
 COLOURS = {"FA": "#3b3b3b", "PA1": BLUE, "PA2": RED, "PA3": ORANGE, "FS": "#dcebf5"}
 MEANINGS = {
@@ -36,6 +37,13 @@ def outcome_map(stokes: np.ndarray, theta12: np.ndarray, table: dict[str, np.nda
     label(axes, "Stokes number  $St_n$", "-", r"angle of impact  $\theta_{12}$", "deg", title)
     legend(axes, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
+
+
+def draw_map(path: Path, conditions: dict[str, Any], count: int = 40) -> None:
+    """Write the map of outcomes for Stokes numbers up to 20 and all angles, other conditions as given to `simulate`."""
+    stokes, theta12 = np.linspace(0.5, 20.0, count), np.linspace(0.0, 85.0, count)
+    kept = {name: value for name, value in conditions.items() if name not in ("stokes", "theta12")}
+    save(outcome_map(stokes, theta12, outcomes(stokes, theta12, **kept)), path)
 
 
 def restitution_contours(stokes: np.ndarray, theta12: np.ndarray, table: dict[str, np.ndarray]) -> Any:

@@ -232,7 +232,7 @@ def three_sphere_figures(folder: Path, curves: Curves) -> list[Row]:
         save(figures.outcome_map(stokes, angles, table, title), folder / f"{name}.png")
         for key in ("restitution12", "restitution23"):
             curves[f"{name}/{key}"] = {"value": (table[key], "-"), "stokes": (stokes, "-"), "angle": (angles, "deg")}
-    fine, finer = np.linspace(0.5, 20.0, 79), np.linspace(2.0, 88.0, 44)
+    fine, finer = np.linspace(0.5, 20.0, 79), np.linspace(2.0, 88.0, 87)
     save(
         figures.restitution_contours(fine, finer, outcomes(fine, finer, until=3.0)),
         folder / "three_spheres_contours.png",
