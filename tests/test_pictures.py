@@ -38,7 +38,7 @@ def renders() -> None:
 def bed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bed with a bubble, half the column full, of three snapshots."""
     folder = tmp_path_factory.mktemp("runs") / "bed"
-    run = RunFolder.create(folder, 'name = "small bed"\n', {}, GRID)
+    run = RunFolder.create(folder, 'title = "small bed"\n', {}, GRID)
     points = np.random.default_rng(1).random((300, 3)) * [0.1, 0.04, 0.1]
     z, y, x = np.meshgrid(*[0.01 * (np.arange(n) + 0.5) for n in (20, 4, 10)], indexing="ij")
     for k in range(3):

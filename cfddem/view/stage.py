@@ -287,8 +287,8 @@ def _bounds(run: Run, snapshots: Sequence[int]) -> np.ndarray:
 
 
 def _title(run: Run) -> str:
-    """The name that the case gives itself, or the folder's."""
-    name = tomllib.loads(run.case_text).get("name")
+    """The title that the case gives itself, or the name of the folder."""
+    name = tomllib.loads(run.case_text).get("title")
     return name if isinstance(name, str) else run.folder.resolve().name
 
 
