@@ -1,0 +1,1 @@
+"""The commands of the command line, in groups; what a command needs is loaded when it is called."""

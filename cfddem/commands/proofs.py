@@ -1,0 +1,60 @@
+"""Commands that compare: with published results, and with other codes."""
+
+from __future__ import annotations
+
+import json as _json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from cfddem.commands.printing import tell_of_compilation
+from cfddem.errors import InputError, nearest
+
+
+def validate(
+    target: Annotated[str, Parameter(help="binary-collision, or all")] = "all",
+    *,
+    output: Annotated[Path, Parameter(help="folder for figures, tables and histories")] = Path("results/validation"),
+    json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
+) -> None:
+    """Redraw published results and compare; exits 1 if a limit does not hold.
+
+    Example: cfddem validate binary-collision
+    """
+    tell_of_compilation()
+    from scenarios.validation import TARGETS
+    from scenarios.validation import validate as run
+
+    if target != "all" and target not in TARGETS:
+        raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
+    names = list(TARGETS) if target == "all" else [target]
+    held = [run(name, output, json) for name in names]  # every target runs, whatever the ones before it say
+    if not all(held):
+        sys.exit(1)
+
+
+def bench(
+    target: Annotated[str, Parameter(help="dem")] = "dem",
+    *,
+    particles: Annotated[int, Parameter(help="10000, 100000 or 1000000")] = 10_000,
+    threads: Annotated[int, Parameter(help="of each code")] = 1,
+    film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Measure this machine on standard work, beside LAMMPS where it is installed.
+
+    Example: cfddem bench dem --particles 10000
+    """
+    tell_of_compilation()
+    from scenarios import dense_bed
+
+    if target != "dem":
+        raise InputError("target", target, nearest(target, ["dem"]))
+    result = dense_bed.bench(particles, threads, film)
+    if json:
+        print(_json.dumps(result))
+    else:
+        for name, text in dense_bed.rows(result):
+            print(f"{name:<20}  {text}")
