@@ -13,7 +13,7 @@ What you'll learn: how viscous and capillary forces, contact and gravity share t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,9 @@ from scenarios.wet_wall_motion import COLUMNS, Path, Wet, follow
 
 PULLED_IN = {"always": ("I", "III", "IV"), "rebound": ("III", "IV"), "bridge": ("IV",)}
 """Phases with a capillary force, by name; the source does not say whether the first is among them."""
+
+SLENDER = 0.01
+"""Arc of the toroid over the radius of the sphere, below which the suction just before contact decides."""
 
 CUTTING = 1e-4
 """Time in which the spring of a sliding contact follows Coulomb's limit, over the Hertz time."""
@@ -50,6 +53,7 @@ class Impact:
     duration: float  # until the bridge breaks, or the sphere has come to rest [s]
     time: np.ndarray  # [s]
     history: dict[str, np.ndarray] = field(repr=False)  # columns of wet_wall_motion.COLUMNS, and the phase, 1 to 4
+    warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The result without its histories, ready for JSON."""
@@ -125,7 +129,7 @@ def impact(
     if _named("spring", spring, {"kept": False, "cut": True}):
         wet = wet._replace(cutting_time=CUTTING * timescales.hertz_time(wet.mass, wet.stiffness, velocity))
     path = follow(wet, velocity, along, spin, tolerance)
-    return _result(path, wet, velocity, along, spin, filled, rubs)
+    return replace(_result(path, wet, velocity, along, spin, filled, rubs), warnings=_nearly_singular(wet))
 
 
 def sticking_velocity(
@@ -203,6 +207,19 @@ def _refuse_the_singular(wet: Wet) -> None:
     )
 
 
+def _nearly_singular(wet: Wet) -> tuple[str, ...]:
+    """Say where the suction grows so much before contact that the result hangs on the arc of the toroid there."""
+    if wet.film == 0.0 or wet.pulled_in == PULLED_IN["bridge"]:
+        return ()
+    arc = motion.bridge(wet, wet.radius).meridional
+    if arc > SLENDER * wet.radius:
+        return ()
+    return (
+        f"the arc of the toroid shrinks to {arc * 1e6:.2g} um at contact (below {SLENDER:g} of the radius): suction "
+        "there, and with it the result, hangs on it; compare with smallest_arc=5e-6",
+    )
+
+
 def _result(
     path: Path, wet: Wet, velocity: float, along: float, spin: float, filled: float | None, friction: float | None
 ) -> Impact:
@@ -267,6 +284,8 @@ def _named(name: str, value: Any, known: dict[str, Any]) -> Any:
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, tuple):
+        return list(value)
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return value

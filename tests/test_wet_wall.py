@@ -156,6 +156,16 @@ def test_a_toroid_that_is_singular_is_refused_by_name(sphere: str, film: float) 
     assert impact(sphere, "water", film, 3.0, capillary_phases="bridge").outcome == "rebound"
 
 
+def test_a_toroid_that_is_nearly_singular_is_said_to_be() -> None:
+    """Alumina under 100 um of water, 28 degrees: an arc of 1 um at contact; the others have 22 um and more."""
+    case = ("alumina_1.74", "water", 100e-6)
+    assert "smallest_arc" in impact(*case).warnings[0]
+    assert impact(*case, smallest_arc=10e-6).warnings == impact(*case, capillary_phases="bridge").warnings == ()
+    for sphere, liquid, film in (("glass_1.74", "water", 200e-6), ("alumina_1.74", "glycerol_51", 200e-6)):
+        assert impact(sphere, liquid, film).warnings == ()
+    assert sticking_velocity(*case, precision=1e-3, smallest_arc=5e-6) == pytest.approx(0.652, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("given", "field"),
     [
