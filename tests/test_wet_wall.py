@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any
 
@@ -206,3 +207,16 @@ def test_sliding_and_spin_in_the_film_are_reciprocal() -> None:
     """6 pi (force of spin) = 8 pi (torque of sliding), as the reciprocal theorem asks; the fits hold it to 1e-3."""
     for ratio in (1e-5, 1e-3, 1e-1):
         assert 6.0 * layer.spin_force(ratio) == pytest.approx(8.0 * layer.sliding_torque(ratio), abs=1e-3)
+
+
+def test_the_command_prints_the_result_and_refuses_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    from cfddem.cli import app, wet_wall
+
+    app(["wet-wall", "--film", "2e-4", "--velocity", "0.6", "--json"], result_action="return_value")
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["restitution"] == pytest.approx(impact(film=200e-6, velocity=0.6).restitution, abs=1e-9)
+    assert printed["restitution_tangential"] is None
+    wet_wall(film=100e-6)
+    assert "contact_lost" in capsys.readouterr().out
+    with pytest.raises(InputError, match="half_filling_angle"):
+        wet_wall(film=400e-6)
