@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -119,4 +120,24 @@ def gaps(runs: dict[str, Triplet], minimum_gap: float) -> Any:
     axes.set(xlim=(0, 6), ylim=(0, 1.02))
     label(axes, r"time  $t\,v_{n0}/\delta_{12}$", "-", r"gap  $h/\delta_{12}$", "-", "Through the film and back")
     legend(axes, loc="upper right")
+    return figure
+
+
+def soft_and_hard(hard: Triplet, soft: Any, overlaps: Sequence[float], errors: dict[str, np.ndarray]) -> Any:
+    """Gaps in the particle engine beside those of hard spheres, and their difference against softness."""
+    figure, (left, right) = panels(2, width=10.0, height=4.4)
+    for pair, colour in (("12", BLUE), ("23", ORANGE)):
+        title = f"spheres {pair[0]} and {pair[1]}"
+        left.plot(hard.history["time"], hard.history[f"gap{pair}"], color=colour, label=f"{title}, hard, polar")
+        some = slice(None, None, 120)
+        left.plot(soft.history["time"][some], soft.history[f"gap{pair}"][some], "o", mfc="white", color=colour, ms=4,
+                  label=f"{title}, soft, engine")  # fmt: skip
+        right.loglog(overlaps, errors[pair], "o-", color=colour, label=title)
+    left.set(xlim=(0, 8), ylim=(0, 1.02))
+    label(
+        left, r"time  $t\,v_{n0}/\delta_{12}$", "-", r"gap  $h/\delta_{12}$", "-", "St = 12, 30 deg; overlap 0.02 $h_m$"
+    )
+    label(right, r"deepest overlap over $h_m$", "-", "difference of restitution", "-", "Softer solids differ more")
+    legend(left, loc="center right")
+    legend(right, loc="upper left")
     return figure

@@ -11,7 +11,8 @@ from test_command_line import cfddem
 
 from cfddem.errors import InputError
 from closures.restitution import davis_sitison
-from scenarios import wet_validation as study
+from scenarios import three_spheres_engine as engine
+from scenarios import three_spheres_validation as study
 from scenarios.three_spheres import centres, outcomes, simulate
 from scenarios.validation import Row
 from scenarios.wet_checks import cartesian
@@ -25,6 +26,17 @@ def failed(rows: list[Row]) -> list[object]:
 def test_published_numbers_hold(part, tmp_path) -> None:
     """Within 0.5 % of Davis (2023), and 1e-4 of the analytic law of Davis & Sitison (2020)."""
     assert failed(part(tmp_path, {})) == []
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+def test_soft_spheres_of_the_particle_engine_do_the_same(friction: float) -> None:
+    """Cartesian coordinates, Hertz contacts, films laid over: times within 0.2 %, restitution within 0.005."""
+    conditions = {"stokes": 8.0, "theta12": 45.0, "friction": friction}
+    soft, hard = engine.simulate(**conditions, until=3.2), simulate(**conditions)
+    assert [(e.kind, e.pair) for e in soft.events] == [(e.kind, e.pair) for e in hard.events[:3]]
+    for a, b in zip(soft.events, hard.events):
+        assert a.time == pytest.approx(b.time, rel=2e-3)
+    assert soft.restitution12 == pytest.approx(hard.restitution12, abs=5e-3)
 
 
 @pytest.mark.parametrize("conditions", study.UNPRINTED, ids=lambda each: f"St {each['stokes']:g}")
