@@ -180,9 +180,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
     row = {
         "time": simulation.time,
         "bed_height": height,
-        "granular_temperature": granular_temperature(
-            bodies.velocity, cells_of(bodies.position, grid.shape, grid.spacing)
-        ).mean,
+        "granular_temperature": granular_temperature(bodies.velocity, cells).mean,
         "kinetic_energy": kinetic_energy(bodies),
         "fastest": float(np.sqrt((bodies.velocity**2).sum(axis=1).max(initial=0.0))),
         "particle_count": float(bodies.count),

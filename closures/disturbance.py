@@ -41,7 +41,7 @@ def oseen_share(reynolds: float) -> float:
 
     Range: disturbances that are small against U, as those of kernels wider than the sphere are.
 
-    >>> oseen_share(0.0), round(oseen_share(1.0), 4)
+    >>> round(oseen_share(0.0), 12), round(oseen_share(1.0), 4)
     (1.0, 0.5903)
     """
     if reynolds < 0.05:

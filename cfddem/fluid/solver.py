@@ -45,6 +45,9 @@ from cfddem.fluid.state import FluidState
 LOOSE = 1e-6
 """Pressure tolerance of the first stage: it only shapes the convecting flux of the second."""
 
+ROUND_OFF = 1e-6
+"""Times the tolerance of 1e-9: change of voidage that is no change [-]."""
+
 STIFF = 1.0
 """beta h/(eps rho) above which the second stage may be repeated, until the velocity moves by less than SETTLED."""
 
@@ -146,7 +149,7 @@ class FluidSolver(FluidState):
         self._pad(self.grid.inner(self._other_mean) - step * self._voidage_rate, self._stored)
         self._transport(self._velocity, self._mean_voidage, self._rate_a)
         self._predict(0.0, step, self._stage)
-        scale = self._flux_scale(voidage_rate)
+        scale = self._flux_scale(voidage_rate, step)
         iterations = [self._project(self._stage, voidage_rate, scale, max(LOOSE, self.tolerance), fresh=True)]
 
         # Stage two: the average of start and end; again while drag is stiff and the end still moves.
@@ -201,11 +204,13 @@ class FluidSolver(FluidState):
         )  # fmt: skip
         self.boundaries.fill_velocity(new)
 
-    def _flux_scale(self, voidage_rate: Array) -> float:
+    def _flux_scale(self, voidage_rate: Array, step: float) -> float:
         """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or
         displaced by the change of voidage in a cell."""
         old, predicted = self._clocks(self._velocity, self._mean_voidage), self._clocks(self._stage, self._other_mean)
         displaced = self.grid.cell_volume * max(float(voidage_rate.max()), -float(voidage_rate.min()))
+        # a voidage is known to its last digits only, and so is its rate
+        displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * voidage_rate.size**0.5 / step)
         return max(float(self._areas.max()) * max(old[2], 0.01 * predicted[2]), displaced)
 
     def _project(self, velocity: Array, voidage_rate: Array, scale: float, tolerance: float, fresh: bool) -> int:
@@ -314,6 +319,6 @@ class FluidSolver(FluidState):
         np.multiply(self._solved, share / self.density, out=self._mobility)
         kept = self.pressure.copy()
         np.copyto(self._stage, self._velocity)
-        scale = self._flux_scale(self._voidage_rate)
+        scale = self._flux_scale(self._voidage_rate, np.inf)
         self._project(self._velocity, self._voidage_rate, scale, self.tolerance, fresh=True)
         self.pressure[:] = kept

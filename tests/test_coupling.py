@@ -1,0 +1,215 @@
+"""Particles and fluid: what one loses the other gets, whatever the stiffness; and what is deposited is all there is."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from cfddem.case import Case
+from cfddem.coupling.voidage import MAPPINGS, Spreading
+from cfddem.errors import InputError
+from cfddem.fluid.grid import Grid, outside_cylinder
+from cfddem.simulation import Simulation
+from closures.drag import wen_yu
+
+SPACING = (0.010, 0.012, 0.009)
+
+
+def cloud(size: tuple[float, float, float], count: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """Places and radii of spheres of very different size anywhere in a box."""
+    random = np.random.default_rng(3)
+    return random.uniform(0.0, 1.0, (count, 3)) * np.array(size), 2e-3 * random.uniform(0.5, 1.5, count)
+
+
+@pytest.mark.parametrize("mapping", MAPPINGS)
+@pytest.mark.parametrize("masked", [False, True])
+def test_deposited_volume_is_the_volume_of_the_particles(mapping: str, masked: bool) -> None:
+    """Beside walls, masks and periodic borders alike; and nothing lies in a solid cell."""
+    grid = Grid((8, 7, 13), SPACING)
+    grid = grid.with_solid(outside_cylinder((0.04, 0.042, 0.0), 0.035)) if masked else grid
+    spreading = Spreading(grid, (False, False, True), mapping=mapping, smoothing=0.012)
+    places, radius = cloud(grid.size)
+    solid = spreading.solid_fraction(spreading.place(places, radius))
+    volume = float((4.0 / 3.0 * math.pi * radius**3).sum())
+    assert solid.sum() * grid.cell_volume == pytest.approx(volume, rel=1e-12)
+    assert (solid[~grid.open] == 0.0).all()
+    assert solid.min() >= 0.0
+
+
+@pytest.mark.parametrize("mapping", MAPPINGS)
+@pytest.mark.parametrize("periodic", [(True, True, True), (False, False, False), (True, False, True)])
+def test_voidage_changes_by_the_flux_of_the_particles(mapping: str, periodic: tuple[bool, bool, bool]) -> None:
+    """d(eps)/dt = -div(flux) of the fluid's complement, to round-off, smoothing included."""
+    grid = Grid((6, 7, 13), SPACING)
+    spreading = Spreading(grid, periodic, mapping=mapping, smoothing=0.012)
+    places, radius = cloud(grid.size)
+    way = np.random.default_rng(5).uniform(-0.008, 0.008, places.shape)
+    moved = places + way
+    for axis, repeats in enumerate(periodic):
+        length = grid.size[axis]
+        moved[:, axis] = moved[:, axis] % length if repeats else moved[:, axis].clip(0.0, length)
+    before, after = spreading.place(places, radius), spreading.place(moved, radius)
+    flux = spreading.solid_flux(before, after, 1e-3)
+    outflow = sum(np.diff(flux[axis], axis=2 - axis) * grid.face_area(axis) for axis in range(3))
+    gained = (spreading.solid_fraction(after) - spreading.solid_fraction(before)) * grid.cell_volume / 1e-3
+    assert np.abs(gained + outflow).max() < 1e-12 * np.abs(outflow).max()
+
+
+def test_gathering_is_the_adjoint_of_spreading() -> None:
+    """The sum over particles of what they carry times what they see is that over cells."""
+    grid = Grid((8, 7, 13), SPACING).with_solid(outside_cylinder((0.04, 0.042, 0.0), 0.035))
+    spreading = Spreading(grid, (False, False, True), smoothing=0.02)
+    place = spreading.place(*cloud(grid.size))
+    random = np.random.default_rng(1)
+    carried, field = random.normal(size=(200, 2)), random.normal(size=(2, *grid.shape))
+    there = (spreading.smooth(spreading.deposit(place, carried)) * field).sum()
+    back = (carried * spreading.gather(place, spreading.smooth(field))).sum()
+    assert there == pytest.approx(back, rel=1e-12)
+
+
+def test_width_of_the_kernel_does_not_depend_on_the_cell() -> None:
+    """Second moment of the deposited volume of one sphere, averaged over its place in the cell."""
+    widths = []
+    for cell in (0.5e-3, 1e-3):
+        count = round(20e-3 / cell)
+        grid = Grid((count, 1, count), (cell, 1e-3, cell))
+        spreading = Spreading(grid, (True, True, True), smoothing=1.5e-3)
+        x, _, z = grid.centres()
+        square = []
+        for a, b in itertools.product(np.linspace(0.05, 0.95, 7), repeat=2):
+            centre = np.array([[10e-3 + a * cell, 0.5e-3, 10e-3 + b * cell]])
+            solid = spreading.solid_fraction(spreading.place(centre, np.array([0.3e-3])))
+            offset = (x - centre[0, 0]) ** 2 + (z - centre[0, 2]) ** 2
+            square.append(float((solid * offset).sum() / solid.sum() / 2.0))
+        widths.append(math.sqrt(np.mean(square)))
+    assert widths == pytest.approx([1.5e-3, 1.5e-3], rel=0.01)
+
+
+def suspension(**changes: object) -> Case:
+    """Two hundred grains in a periodic box of water, without weight."""
+    values: dict[str, object] = {
+        "fluid.density": 1000.0,
+        "fluid.viscosity": 1e-3,
+        "material.sand": {"density": 2500.0, "youngs_modulus": 1e6, "poisson": 0.25, "friction": 0.3},
+        "column": {"width": 0.01, "height": 0.02, "cell": 0.0025, "sides": "periodic", "ends": "periodic"},
+        "bed": {"diameter": 1e-3, "count": 1200, "start": "suspended"},
+        "laws": {"gravity": (0.0, 0.0, 0.0), "lubrication": "none"},
+        "run": {"until": 1.0, "reference_speed": 0.1},
+    }
+    return Case.from_text("", overrides=values | changes)
+
+
+def stirred(case: Case) -> Simulation:
+    """The case with particles that fly in all directions, and on."""
+    simulation = Simulation(case)
+    velocity = simulation.particles.bodies.velocity
+    velocity[:] = np.random.default_rng(7).normal(0.0, 0.02, velocity.shape) + 0.01
+    simulation.particles.refresh()
+    return simulation
+
+
+def momentum(simulation: Simulation) -> np.ndarray:
+    bodies = simulation.particles.bodies
+    assert simulation.fluid is not None
+    total: np.ndarray = (bodies.mass[:, None] * bodies.velocity).sum(axis=0) + simulation.fluid.momentum()
+    return total
+
+
+@pytest.mark.parametrize("model", ["A", "B"])
+@pytest.mark.parametrize("viscosity", [1e-3, 1.0])
+def test_momentum_of_fluid_and_particles_is_kept(model: str, viscosity: float) -> None:
+    """In a periodic box, for weak drag and for drag that stops a grain within a step."""
+    case = suspension(**{"laws.model": model, "fluid.viscosity": viscosity})
+    simulation = stirred(case)
+    bodies = simulation.particles.bodies
+    scale = float((bodies.mass * np.linalg.norm(bodies.velocity, axis=1)).sum())
+    before = momentum(simulation)
+    for _ in range(30):
+        simulation.step()
+    assert np.abs(momentum(simulation) - before).max() < 1e-12 * scale
+    assert np.abs(simulation.particles.bodies.velocity).max() < 0.12
+
+
+def test_rest_stays_rest() -> None:
+    """Particles of the fluid's own density, at rest in a closed box under gravity: nothing moves."""
+    case = suspension(
+        **{
+            "column": {"width": 0.01, "height": 0.02, "cell": 0.0025, "ends": "closed"},
+            "material.sand.density": 1000.0,
+            "laws": {"lubrication": "none"},
+        }
+    )
+    simulation = Simulation(case)
+    assert simulation.fluid is not None
+    for _ in range(5):
+        simulation.step()
+    assert np.abs(simulation.fluid.velocity).max() < 1e-10 * math.sqrt(9.81 * 0.02)
+    assert np.abs(simulation.particles.bodies.velocity).max() < 1e-10 * math.sqrt(9.81 * 0.02)
+
+
+def test_stiff_drag_is_stable_and_right() -> None:
+    """50 um grains in syrup, beta dt/(eps rho) of 1e4: they move with the fluid, at the balance of weight and drag."""
+    case = suspension(
+        **{
+            "fluid.viscosity": 1.0,
+            "column": {"width": 0.5e-3, "height": 1e-3, "cell": 0.125e-3, "sides": "periodic", "ends": "periodic"},
+            "bed": {"diameter": 50e-6, "count": 1200, "start": "suspended"},
+            "laws": {"lubrication": "none", "drag": "wen_yu", "own_wind": False},
+            "run": {"until": 1.0, "step": 2e-5, "fluid_step": 1e-3, "reference_speed": 1e-6},
+        }
+    )
+    simulation = Simulation(case)
+    fluid = simulation.fluid
+    assert fluid is not None
+    for _ in range(20):
+        simulation.step()
+    velocity = simulation.particles.bodies.velocity[:, 2].mean()
+    fluid_mean = float((fluid.voidage * fluid.velocity[..., 2]).sum() / fluid.voidage.sum())
+    voidage = float(fluid.voidage.mean())
+    solids = 1.0 - voidage
+    factor = wen_yu(0.0, voidage)
+    exchange_coefficient = 18.0 * voidage * solids * factor / (50e-6) ** 2
+    assert exchange_coefficient * 1e-3 / (voidage * 1000.0) > 5e3
+    # nothing holds the box: it falls as a whole, and drag gives the fluid its share of the acceleration
+    fall = solids * 1500.0 * 9.81 / (solids * 2500.0 + voidage * 1000.0)
+    assert fluid_mean - velocity == pytest.approx(1000.0 * voidage * fall / exchange_coefficient, rel=0.03)
+
+
+def test_resumed_simulation_goes_on_to_the_same_bits() -> None:
+    """With contacts, films and the fluid alive."""
+    case = suspension(**{"laws.lubrication": "nijssen"})
+    simulation = stirred(case)
+    for _ in range(6):
+        simulation.step()
+    state = simulation.checkpoint()
+    kept = _copied(state)
+    for _ in range(6):
+        simulation.step()
+    again = Simulation.restored(case, kept)
+    for _ in range(6):
+        again.step()
+    assert simulation.fluid is not None and again.fluid is not None
+    assert (simulation.particles.bodies.id == again.particles.bodies.id).all()
+    for name in ("position", "velocity", "spin"):
+        assert (getattr(simulation.particles.bodies, name) == getattr(again.particles.bodies, name)).all(), name
+    assert (simulation.fluid.pressure == again.fluid.pressure).all()
+    assert (simulation.fluid.velocity == again.fluid.velocity).all()
+
+
+def _copied(state: dict) -> dict:
+    return {
+        name: _copied(each) if isinstance(each, dict) else np.array(each) if isinstance(each, np.ndarray) else each
+        for name, each in state.items()
+    }
+
+
+def test_a_particle_that_crosses_a_cell_in_a_step_is_refused() -> None:
+    grid = Grid((6, 7, 13), SPACING)
+    spreading = Spreading(grid, (True, True, True))
+    here = spreading.place(np.array([[0.01, 0.01, 0.01]]), np.array([1e-3]))
+    there = spreading.place(np.array([[0.025, 0.01, 0.01]]), np.array([1e-3]))
+    with pytest.raises(InputError, match="fluid step"):
+        spreading.solid_flux(here, there, 1e-3)
