@@ -209,14 +209,16 @@ def test_sliding_and_spin_in_the_film_are_reciprocal() -> None:
         assert 6.0 * layer.spin_force(ratio) == pytest.approx(8.0 * layer.sliding_torque(ratio), abs=1e-3)
 
 
-def test_the_command_prints_the_result_and_refuses_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    from cfddem.cli import app, wet_wall
+def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    from cfddem.cli import app
 
-    app(["wet-wall", "--film", "2e-4", "--velocity", "0.6", "--json"], result_action="return_value")
-    printed = json.loads(capsys.readouterr().out)
+    def say(*words: str) -> str:
+        app(["wet-wall", *words], result_action="return_value")
+        return str(capsys.readouterr().out)
+
+    printed = json.loads(say("--film", "2e-4", "--velocity", "0.6", "--json"))
     assert printed["restitution"] == pytest.approx(impact(film=200e-6, velocity=0.6).restitution, abs=1e-9)
     assert printed["restitution_tangential"] is None
-    wet_wall(film=100e-6)
-    assert "contact_lost" in capsys.readouterr().out
+    assert "contact_lost" in say()
     with pytest.raises(InputError, match="half_filling_angle"):
-        wet_wall(film=400e-6)
+        say("--film", "4e-4")
