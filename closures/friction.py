@@ -1,4 +1,4 @@
-"""What resists sliding and rolling: Coulomb's limit, whether a film has taken the solids apart, and rolling torques."""
+"""What resists sliding and rolling: Coulomb's limit, whether a film has taken the solids apart, and torques."""
 
 from __future__ import annotations
 
@@ -99,3 +99,20 @@ def rolling_damping(damping_ratio: float, inertia: float, stiffness: float) -> f
     6.0
     """
     return 2.0 * damping_ratio * math.sqrt(inertia * stiffness)
+
+
+@law("friction", "Coulomb's limit over Hertz' pressure; Johnson, Contact Mechanics (1985) ch. 4")
+def twisting_limit(friction: float, contact_radius: float, normal_force: float) -> float:
+    r"""Largest torque with which a contact resists twisting about its normal.
+
+    .. math:: M_{max} = \tfrac{3\pi}{16}\,\mu\,a\,|F_n|
+
+    friction        mu [-]
+    contact_radius  a = sqrt(R* delta) [m]
+    normal_force    F_n, of the solid contact [N]
+    returns         M_max [N m]
+
+    >>> round(twisting_limit(16.0, 1.0, 1.0) / math.pi, 12)
+    3.0
+    """
+    return 3.0 * math.pi / 16.0 * friction * contact_radius * abs(normal_force)

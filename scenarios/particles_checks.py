@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import FRICTION_ONSETS, LINEAR, Laws
+from cfddem.particles.forces import FREE, FRICTION_ONSETS, LINEAR, SPRING_DASHPOT, Laws
 from cfddem.particles.packing import lattice, random_packing
 from cfddem.particles.pouring import kinetic_energy, pour
 from cfddem.particles.solver import ParticleSolver
@@ -164,8 +164,13 @@ class Rest(NamedTuple):
     weight: np.ndarray  # vertical force on the walls over the weight of the bed, afterwards [-]
 
 
-def rest(count: int, width: float, watch: float, periodic: bool = True, samples: int = 100) -> Rest:
+def rest(
+    count: int, width: float, watch: float, periodic: bool = True, samples: int = 100, rolling_friction: float = 0.1
+) -> Rest:
     """Pour a bed and watch it lie.
+
+    Grains that nothing keeps from rolling and twisting roll and spin for ever: rolling is resisted by a spring that
+    yields and a dashpot.
 
     width     of the square column [m]
     watch     time to look at the bed after it has come to rest [s]
@@ -173,11 +178,12 @@ def rest(count: int, width: float, watch: float, periodic: bool = True, samples:
     """
     fallen: list[float] = []
     run = pour(
-        GRAIN,
+        GRAIN.model_copy(update={"rolling_friction": rolling_friction}),
         np.full(count, DIAMETER),
         (width, width),
         seed=1,
         periodic=periodic,
+        laws=Laws(rolling=SPRING_DASHPOT if rolling_friction > 0.0 else FREE),
         progress=lambda time, share: fallen.append(share),
     )
     settled, weight = run.time, GRAVITY * float(run.bodies.mass.sum())

@@ -20,7 +20,14 @@ from closures.contact import (
     linear_damping,
     mindlin_stiffness,
 )
-from closures.friction import coulomb_limit, dry_or_lubricated, rolling_damping, rolling_limit, rolling_stiffness
+from closures.friction import (
+    coulomb_limit,
+    dry_or_lubricated,
+    rolling_damping,
+    rolling_limit,
+    rolling_stiffness,
+    twisting_limit,
+)
 
 DRIFT, VERLET = 0, 1
 FILM, OVERLAP = 0, 1
@@ -48,7 +55,7 @@ class Laws(NamedTuple):
     friction_onset: int = FILM  # where friction starts: at h_min, or at geometric overlap
     contact: int = HERTZ
     spring: int = TOTAL  # tangential force from the total displacement, or rescaled while loading
-    rolling: int = FREE  # what resists rolling: nothing, a constant torque, a spring that yields and a dashpot
+    rolling: int = FREE  # what resists rolling: nothing, a constant torque, or a spring that yields and a dashpot
     cutoff_ratio: float = 1.0  # h_co / R*
     normal_stiffness: float = 0.0  # of the linear contact [N/m]
     tangential_stiffness: float = 0.0  # of the linear contact [N/m]
@@ -157,6 +164,8 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
 def resist_rolling(meeting, row, minimum_gap, force, roll, laws, step):
     """Moment on the first body, the second has its opposite, and the angle of the rolling spring afterwards.
 
+    Where rolling is resisted, twisting is too, by the friction of the contact; nothing else would stop a top.
+
     force  of the contact on the first body [N]
     roll   angle by which the bodies have rolled on each other and not yielded [rad]
     """
@@ -165,12 +174,20 @@ def resist_rolling(meeting, row, minimum_gap, force, roll, laws, step):
     share = contact_share(meeting.gap, minimum_gap) if laws.film else 1.0
     normal = times(1.0 / meeting.distance, meeting.separation)
     rate = across(meeting.relative_spin, normal)
-    limit = rolling_limit(row.rolling_friction, meeting.reduced_radius, dot(force, normal))
+    pressed = dot(force, normal)
+    limit = rolling_limit(row.rolling_friction, meeting.reduced_radius, pressed)
+    # a resistance of constant size stops the bodies and does not turn them round; each of a dozen contacts of a
+    # body may take a tenth of what would stop it within the step
+    softly = 0.1 / max(step * meeting.inverse_inertia, LEAST)
+    friction = row.friction
+    if laws.film:
+        friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
+    twist = dot(meeting.relative_spin, normal)
+    twisting = twisting_limit(friction, math.sqrt(meeting.reduced_radius * overlap), pressed)
+    twisting = -min(max(twist * softly, -twisting), twisting)
     if laws.rolling == CONSTANT_TORQUE:
-        # a resistance can stop the bodies within a step, but not turn them round
         speed = math.sqrt(dot(rate, rate))
-        stopping = speed / max(step * meeting.inverse_inertia, LEAST)
-        moment = times(-min(limit, stopping) / max(speed, LEAST), rate)
+        moment = times(-min(limit, speed * softly) / max(speed, LEAST), rate)
         roll = NOTHING
     else:
         secant = hertz_stiffness(row.contact_modulus, meeting.reduced_radius) * math.sqrt(overlap)
@@ -184,6 +201,7 @@ def resist_rolling(meeting, row, minimum_gap, force, roll, laws, step):
         inertia = 3.5 / max(meeting.inverse_inertia, LEAST)
         damping = 0.0 if yields else rolling_damping(laws.rolling_damping, inertia, stiffness)
         moment = times(-1.0, plus(times(stiffness, roll), times(damping, rate)))
+    moment = plus(moment, times(twisting, normal))
     return either(touching, moment, NOTHING), either(touching, roll, NOTHING)
 
 

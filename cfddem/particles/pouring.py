@@ -259,6 +259,7 @@ def pour(
     seed: int,
     periodic: bool = False,
     gravity: float = 9.81,
+    laws: Laws | None = None,
     patience: float = 20.0,
     progress: Progress | None = None,
 ) -> ParticleSolver:
@@ -272,6 +273,7 @@ def pour(
     seed       same seed, same bed
     periodic   repeat the column sideways instead of closing it by walls
     gravity    [m/s2]
+    laws       which laws hold between two bodies; without resistance to rolling, loose grains roll for long
     patience   give up after this many times the time of a fall from the top
     progress   called now and then with the time and the share of the kinetic energy that is left
     returns    the run at rest; its `bodies` are the bed
@@ -292,6 +294,7 @@ def pour(
         bodies(places, 0.5 * diameters, material.density),
         pair_table([material]),
         walls=sides[:1] if periodic else sides,
+        laws=laws,
         gravity=(0.0, 0.0, -gravity),
         box=(width, depth, None) if periodic else (None, None, None),
     )
