@@ -17,7 +17,7 @@ from cfddem.fluid.grid import Array, Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
 from cfddem.materials import pair_table
 from cfddem.particles.forces import CONTACTS, FRICTION_ONSETS, Laws
-from cfddem.particles.packing import lattice, mono, normal
+from cfddem.particles.packing import lattice, mono, normal, random_packing
 from cfddem.particles.pouring import pour_into
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies
@@ -114,6 +114,9 @@ def particles_of(case: Case, diameters: Array, table: np.ndarray, walls: list[Wa
             seed=bed.seed, material=kind, gravity=abs(case.laws.gravity[2]), laws=laws._replace(film=False),
         )  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
+    elif bed.start == "packed":
+        share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(size)
+        places, _ = random_packing(diameters, share, bed.seed, shape=size)
     elif bed.start == "at":
         places = np.array(bed.positions, float)
     else:

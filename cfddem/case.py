@@ -67,7 +67,9 @@ class Bed(Checked):
     spread: float = Field(0.0, ge=0, lt=0.5, description="standard deviation of the diameter over its mean [-]")
     count: int | None = Field(None, gt=0, description="number of particles")
     height: Positive | None = Field(None, description="of the poured bed, instead of a number [m]")
-    start: Literal["poured", "suspended", "at"] = Field("poured", description="at rest below, spread evenly, or placed")
+    start: Literal["poured", "suspended", "packed", "at"] = Field(
+        "poured", description="at rest below, spread evenly, packed at random all over, or placed"
+    )
     positions: tuple[Point, ...] = Field((), description='centres, for start = "at" [m]')
     velocity: Point = Field((0.0, 0.0, 0.0), description="of all particles at the start [m/s]")
     fixed: bool = Field(False, description="particles that nothing moves: a packed bed")

@@ -95,10 +95,12 @@ class Simulation:
 
     def _longest_particle_step(self) -> float:
         """Step of the particles: given, or what their clocks recommend [s]."""
+        if not (self.particles.bodies.inverse_mass > 0.0).any():
+            return math.inf
         read = self.particles.clocks(self.reference_speed)
         step = self.case.run.step or read.recommended
         check_step(step, read)
-        return step if math.isfinite(step) else 1e-3
+        return step
 
     @property
     def reference_speed(self) -> float:
@@ -106,10 +108,15 @@ class Simulation:
         run, bed = self.case.run, self.case.bed
         if run.reference_speed is not None:
             return run.reference_speed
-        inlet = bed.inlet_velocity
-        fastest = inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
         fall = math.sqrt(float(np.linalg.norm(self.gravity)) * bed.diameter)
-        return max(2.0 * fastest, fall, float(np.linalg.norm(bed.velocity)))
+        return max(2.0 * self._inlet_speed, fall, float(np.linalg.norm(bed.velocity)))
+
+    @property
+    def _inlet_speed(self) -> float:
+        """Fastest superficial velocity at the inlet [m/s]."""
+        inlet, jet = self.case.bed.inlet_velocity, self.case.bed.jet
+        steady = inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
+        return max(steady, 0.0 if jet is None else jet.velocity)
 
     def _choose_steps(self, until: float) -> tuple[float, int]:
         """Length of the next fluid step [s], and how many particle steps it holds."""
@@ -121,12 +128,13 @@ class Simulation:
         if self.fluid is not None:
             fluid = self.fluid.largest_step(COURANT)
             limits[fluid.clock] = fluid.step
+            limits["inlet Courant"] = COURANT * min(self.fluid.grid.spacing) / max(self._inlet_speed, 1e-300)
             speed = np.abs(self.particles.bodies.velocity).max(axis=0, initial=0.0) / np.array(self.fluid.grid.spacing)
             limits["particle Courant"] = COURANT / max(float(speed.max()), 1e-300)
         self.binding = min(limits, key=limits.__getitem__)
         largest = limits[self.binding]
         left = until - self.time
-        step = largest if math.isinf(left) else left / math.ceil(left / largest * (1.0 - 1e-12))
+        step = largest if math.isinf(left) else left / max(1, math.ceil(left / largest * (1.0 - 1e-12)))
         if not step > 1e-12 * self.time:
             raise RunFailed(
                 f"the fluid step has fallen to {step:.3g} s at t = {self.time:.6g} s ({self.binding}): the run has "

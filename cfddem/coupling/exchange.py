@@ -147,8 +147,9 @@ class Exchange:
         return self._memory[:, 3:]
 
     def inertia(self, bodies: Bodies) -> Array:
-        """Mass and added mass of every particle (N,) [kg]."""
-        return bodies.mass * (1.0 + self.added_mass * self.fluid.density / bodies.density)
+        """Mass and added mass of every particle (N,) [kg]; without end where nothing moves it."""
+        own = bodies.mass * (1.0 + self.added_mass * self.fluid.density / bodies.density)
+        return np.where(bodies.inverse_mass > 0.0, own, np.inf)
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next step depends on beside fluid and particles."""
@@ -197,8 +198,9 @@ class Exchange:
         if self._last_step == 0.0:
             return bodies.force.copy()
         before = self._memory[bodies.id]
-        gained = inertia[:, None] * (bodies.velocity - before[:, :3])
-        force: Array = (gained - before[:, 3:6]) / self._last_step
+        free = np.isfinite(inertia)
+        gained = np.where(free, inertia, 0.0)[:, None] * (bodies.velocity - before[:, :3])
+        force: Array = (gained - before[:, 3:]) / self._last_step
         return force
 
     def _pressure_force(self, bodies: Bodies, place: Placement, volume: Array) -> Array:

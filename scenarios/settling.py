@@ -1,0 +1,121 @@
+"""One sphere settles: terminal velocity wherever it falls, and how it gets there.
+
+A sphere in cells not much larger than itself stirs them, and would meet its own wind and its own voidage; both are
+taken out (:mod:`cfddem.coupling.own_wind`). What is left must be the drag law's own terminal velocity, at any
+Reynolds number, in cells of any size, at any place within them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from cfddem.case import Case
+from cfddem.gallery import gallery
+from cfddem.simulation import Simulation
+from closures.balance import terminal_velocity
+from closures.drag_single import schiller_naumann
+from closures.law import SHELF
+
+DIAMETER, WATER, VISCOSITY, DENSITY = 1e-3, 1000.0, 1e-3, 2500.0
+
+
+@dataclass(frozen=True)
+class Fall:
+    """How fast a sphere fell, over the drag law's own terminal velocity."""
+
+    reynolds: float
+    cell: float  # over the diameter
+    own_wind: bool
+    velocity: float  # against the mean of the fluid, over the terminal velocity
+
+
+def fall(
+    reynolds: float, cell: float, *, own_wind: bool = True, place: float = 0.5, box: float = 60.0, times: float = 12.0
+) -> Fall:
+    """Let a sphere fall through a periodic box from its terminal velocity, and see whether it keeps it.
+
+    reynolds  of the terminal velocity by Schiller and Naumann [-]
+    cell      edge over the diameter [-]
+    own_wind  take out what the sphere does to its own cells
+    place     within its cell, 0 to 1 along each axis
+    box       edge over the diameter; fewer images, and a longer way to one's own wake [-]
+    times     how long, over the time in which drag stops the sphere; less where it would reach its own wake
+    """
+    speed = reynolds * VISCOSITY / (WATER * DIAMETER)
+    drag = 3.0 * math.pi * VISCOSITY * DIAMETER * speed * schiller_naumann(reynolds, 1.0)
+    gravity = drag / ((DENSITY - WATER) * math.pi / 6.0 * DIAMETER**3)
+    edge = cell * DIAMETER
+    cells = max(8, round(box / cell))
+    relaxation = DENSITY * math.pi / 6.0 * DIAMETER**3 * speed / drag
+    end = min(times * relaxation, 0.5 * cells * edge / speed)
+    step = min(0.2 * relaxation, 0.2 * edge / speed)
+    start = (cells // 2 + place) * edge
+    case = Case(
+        fluid={"density": WATER, "viscosity": VISCOSITY},
+        # soft enough for the step: the sphere meets nothing
+        material={"sphere": {"density": DENSITY, "youngs_modulus": 1e-9, "poisson": 0.25}},
+        column={"width": cells * edge, "height": cells * edge, "cell": edge, "sides": "periodic", "ends": "periodic"},
+        bed={"diameter": DIAMETER, "positions": [(start, start, start)], "velocity": (0.0, 0.0, -speed)},
+        laws={
+            "gravity": (0.0, 0.0, -gravity),
+            "drag": "schiller_naumann",
+            "lubrication": "none",
+            "own_wind": own_wind,
+        },
+        run={"until": end, "step": min(step, 0.02 * DIAMETER / speed), "fluid_step": step, "reference_speed": speed},
+    )
+    simulation = Simulation(case)
+    assert simulation.fluid is not None
+    while simulation.time < end * (1.0 - 1e-12):
+        simulation.step(end)
+    wind = float(simulation.fluid.velocity[..., 2].mean())
+    velocity = (wind - float(simulation.particles.bodies.velocity[0, 2])) / speed
+    return Fall(reynolds, cell, own_wind, velocity)
+
+
+def release(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and speed of fall [m/s] of the sphere of a case, from rest."""
+    simulation = Simulation(case)
+    interval = case.run.history_every or 0.01 * case.run.until
+    times, speeds = [0.0], [0.0]
+    while simulation.time < case.run.until * (1.0 - 1e-12):
+        simulation.until(min(len(times) * interval, case.run.until))
+        times.append(simulation.time)
+        speeds.append(-float(simulation.particles.bodies.velocity[0, 2]))
+    return np.array(times), np.array(speeds)
+
+
+def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
+    """Speed of the same sphere by the ordinary differential equation of its drag law, alone in an endless fluid.
+
+    .. math:: (\\rho_p + C_m\\rho)V\\dot v = (\\rho_p - \\rho)Vg - 3\\pi\\eta d\\,F(Re)\\,v
+    """
+    assert case.fluid is not None and isinstance(case.laws.drag, str)
+    law, fluid, diameter = SHELF["drag"][case.laws.drag].function, case.fluid, case.bed.diameter
+    volume = math.pi / 6.0 * diameter**3
+    inertia = (case.solid.density + case.laws.added_mass * fluid.density) * volume
+    weight = (case.solid.density - fluid.density) * volume * abs(case.laws.gravity[2])
+
+    def acceleration(_: float, speed: np.ndarray) -> np.ndarray:
+        factor = law(fluid.density * diameter * abs(float(speed[0])) / fluid.viscosity, 1.0)
+        return (weight - 3.0 * math.pi * fluid.viscosity * diameter * factor * speed) / inertia
+
+    solved = solve_ivp(acceleration, (0.0, times[-1]), [0.0], t_eval=times, rtol=1e-9, atol=1e-12)
+    speeds: np.ndarray = solved.y[0]
+    return speeds
+
+
+def mordant() -> Case:
+    """The bead of the case file."""
+    return Case.from_toml(gallery()["settling"])
+
+
+def unbounded(case: Case, drag: str) -> float:
+    """Terminal velocity of the sphere of a case by a drag law, alone in an endless fluid [m/s]."""
+    assert case.fluid is not None
+    law, fluid, gravity = SHELF["drag"][drag].function, case.fluid, abs(case.laws.gravity[2])
+    return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
