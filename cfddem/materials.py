@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -40,6 +41,7 @@ class Material(Checked):
     friction_lubricated: float | None = Field(
         None, ge=0, description="mu where a film keeps the solids apart; the dry one if not given [-]"
     )
+    surface_energy: float = Field(0.0, ge=0, description="gamma, half of what parting like solids costs [J/m2]")
     roughness: float = Field(0.0, ge=0, description="sigma, height of asperities [m]")
     contact_modulus: float | None = Field(None, gt=0, description="E of the contact; the real one if not given [Pa]")
 
@@ -68,6 +70,7 @@ PAIR = np.dtype(
         ("friction", "f8"),  # mu, dry [-]
         ("friction_lubricated", "f8"),  # mu, where a film holds [-]
         ("rolling_friction", "f8"),  # mu_r [-]
+        ("work_of_adhesion", "f8"),  # w [J/m2]
         ("roughness_gap", "f8"),  # h_sigma [m]
     ],
     align=True,
@@ -77,7 +80,14 @@ PAIR = np.dtype(
 SMOOTHEST = 1e-10
 """No film is thinner than an atom: the least minimum gap of a pair, also of solids without roughness [m]."""
 
-_OVERRIDABLE = ("restitution", "friction", "friction_lubricated", "rolling_friction", "roughness_gap")
+_OVERRIDABLE = (
+    "restitution",
+    "friction",
+    "friction_lubricated",
+    "rolling_friction",
+    "work_of_adhesion",
+    "roughness_gap",
+)
 
 
 def pair_table(
@@ -86,7 +96,7 @@ def pair_table(
     """What each two materials do to each other.
 
     Unless `overrides` says otherwise, unlike materials take the lower restitution and frictions, the mean
-    roughness, and the reduced moduli.
+    roughness, the reduced moduli, and twice the geometric mean of the surface energies.
 
     materials  the solids of a run, walls among them
     overrides  {(i, j): {"friction": 0.3, ...}} for indices into `materials`
@@ -105,6 +115,7 @@ def pair_table(
             row["friction"] = min(first.friction, second.friction)
             row["friction_lubricated"] = min(_lubricated(first), _lubricated(second))
             row["rolling_friction"] = min(first.rolling_friction, second.rolling_friction)
+            row["work_of_adhesion"] = 2.0 * math.sqrt(first.surface_energy * second.surface_energy)
             row["roughness_gap"] = minimum_gap.asperities(first.roughness, second.roughness)
     for (i, j), values in (overrides or {}).items():
         for name, value in values.items():

@@ -13,7 +13,7 @@ import numpy as np
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import FREE, FRICTION_ONSETS, LINEAR, SPRING_DASHPOT, Laws
 from cfddem.particles.packing import lattice, random_packing
-from cfddem.particles.pouring import kinetic_energy, pour
+from cfddem.particles.pouring import AT_REST, kinetic_energy, pour
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.particles.walls import Cone, Cylinder, Plane
@@ -159,7 +159,7 @@ class Rest(NamedTuple):
 
     run: ParticleSolver
     poured: float  # energy it fell with [J]
-    settled: float  # time at which it was at rest [s]
+    settled: float  # time from which on it was at rest [s]
     energy: np.ndarray  # kinetic energy afterwards [J]
     weight: np.ndarray  # vertical force on the walls over the weight of the bed, afterwards [-]
 
@@ -187,14 +187,16 @@ def rest(
         progress=lambda time, share: fallen.append(share),
     )
     settled, weight = run.time, GRAVITY * float(run.bodies.mass.sum())
-    poured = kinetic_energy(run.bodies) / fallen[-1]
+    poured, resting = kinetic_energy(run.bodies) / fallen[-1], settled
     energy, carried = [], []
     step = 0.5 * run.clocks(0.1).recommended
-    for _ in range(samples):
+    while len(energy) < samples:
         run.advance(step, max(1, int(watch / samples / step)))
         energy.append(kinetic_energy(run.bodies))
         carried.append(-float(run.wall_force[:, 2].sum()) / weight)
-    return Rest(run, poured, settled, np.array(energy), np.array(carried))
+        if energy[-1] > AT_REST * poured and run.time < settled + 1.0:  # it swings back: at rest is from here on
+            resting, energy, carried = run.time, [], []
+    return Rest(run, poured, resting, np.array(energy), np.array(carried))
 
 
 def slope(

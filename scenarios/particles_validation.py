@@ -2,8 +2,8 @@
 
 One sphere: MFIX DEM01, DEM02 and DEM04 (Garg et al. 2012) against their exact solutions; Kharaz, Gorham & Salman
 (2001) against what they measured. A bed must come to rest and press on its floor with its weight; a slope must
-keep its angle under water; a hopper follows Beverloo et al. (1961); films never raise kinetic energy. Rolling
-friction is in none of them.
+keep its angle under water; a hopper follows Beverloo et al. (1961); films never raise kinetic energy. The
+beds that are poured have rolling friction; grains that nothing keeps from rolling roll for ever.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """Granular physics: one sphere on a floor, oblique impacts, beds at rest, slopes and hoppers.
 
 MFIX DEM01, DEM02, DEM04: Garg, Galvin, Li & Pannala (2012), Powder Technol. 220, 122, cases as in
-`scenarios/data/mfix_dem_verification_cases.csv`. There is no rolling friction in any of these.
+`scenarios/data/mfix_dem_verification_cases.csv`. Only the poured beds
+have rolling friction.
 """
 
 from __future__ import annotations

@@ -9,10 +9,12 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from cfddem.errors import InputError
 from cfddem.kernels import inline
 from cfddem.particles.surfaces import SURFACE, touched
 from cfddem.particles.vectors import across, at, cross, dot, either, minus, plus, times
 from closures.blend import contact_share
+from closures.cohesion import jkr_contact_radius, jkr_force, jkr_pull_off, jkr_stretch
 from closures.contact import (
     hertz_damping,
     hertz_force,
@@ -33,6 +35,7 @@ DRIFT, VERLET = 0, 1
 FILM, OVERLAP = 0, 1
 HERTZ, LINEAR = 0, 1
 TOTAL, RESCALED = 0, 1
+NO_COHESION, JKR = 0, 1
 FREE, CONSTANT_TORQUE, SPRING_DASHPOT = 0, 1, 2
 ROLLING = 3.5
 """How much easier the contact point of two solid spheres is moved along the surface than their centres apart."""
@@ -40,6 +43,7 @@ ROLLING = 3.5
 INTEGRATORS = {"drift": DRIFT, "verlet": VERLET}
 FRICTION_ONSETS = {"film": FILM, "overlap": OVERLAP}
 CONTACTS = {"hertz": HERTZ, "linear": LINEAR}
+COHESIONS = {"none": NO_COHESION, "jkr": JKR}
 SPRINGS = {"total": TOTAL, "rescaled": RESCALED}
 ROLLINGS = {"free": FREE, "constant_torque": CONSTANT_TORQUE, "spring_dashpot": SPRING_DASHPOT}
 
@@ -56,6 +60,7 @@ class Laws(NamedTuple):
     contact: int = HERTZ
     spring: int = TOTAL  # tangential force from the total displacement, or rescaled while loading
     rolling: int = FREE  # what resists rolling: nothing, a constant torque, or a spring that yields and a dashpot
+    cohesion: int = NO_COHESION  # what holds dry solids together, in place of the elastic force of Hertz
     cutoff_ratio: float = 1.0  # h_co / R*
     normal_stiffness: float = 0.0  # of the linear contact [N/m]
     tangential_stiffness: float = 0.0  # of the linear contact [N/m]
@@ -63,9 +68,16 @@ class Laws(NamedTuple):
 
     def without_the_absent(self) -> Laws:
         """The same laws with each choice that is not made as None, which a loop compiled for it leaves out."""
-        choices = ("film", "integrator", "friction_onset", "contact", "spring", "rolling")
+        choices = ("film", "integrator", "friction_onset", "contact", "spring", "rolling", "cohesion")
         absent: dict[str, Any] = {name: None for name in choices if not getattr(self, name)}
         return self._replace(**absent)
+
+    def check(self) -> None:
+        """Refuse choices that exclude each other."""
+        if self.cohesion and self.film:
+            raise InputError("cohesion", self.cohesion, "absent where there are films; adhesion is that of dry solids")
+        if self.cohesion and self.contact != HERTZ:
+            raise InputError("cohesion", self.cohesion, "with the contact of Hertz; linear springs do not adhere")
 
 
 class Meeting(NamedTuple):
@@ -103,6 +115,13 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
     hertz = laws.contact != LINEAR
     stiffness = hertz_stiffness(row.contact_modulus, meeting.reduced_radius)
     elastic = hertz_force(stiffness, overlap) if hertz else laws.normal_stiffness * overlap
+    held = 0.0
+    if laws.cohesion:
+        adhesion = (max(row.work_of_adhesion, LEAST), meeting.reduced_radius, row.contact_modulus)
+        contact_radius = jkr_contact_radius(-meeting.gap, adhesion[0], adhesion[1], adhesion[2])
+        elastic = jkr_force(contact_radius, adhesion[0], adhesion[1], adhesion[2])
+        held = jkr_pull_off(adhesion[0], adhesion[1])
+        overlap = max(contact_radius * contact_radius / meeting.reduced_radius, LEAST)  # of Hertz' contact as wide
     damping = (
         hertz_damping(row.damping_ratio, reduced_mass, stiffness, overlap)
         if hertz
@@ -141,7 +160,7 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
     friction = row.friction
     if laws.film:
         friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
-    limit = coulomb_limit(friction, normal_force)
+    limit = coulomb_limit(friction, normal_force + 2.0 * held)  # Thornton (1991): the pull presses, too
     size = math.sqrt(dot(pull, pull))
     sliding = size > limit
     pull = times(limit / max(size, LEAST) if sliding else 1.0, pull)
@@ -158,6 +177,13 @@ def contact(meeting, rows, which, minimum_gap, spring, laws, step):
         times(share * stretch, cross(normal, pull)),
         either(gripping, spring, NOTHING),
     )
+
+
+@inline
+def contact_reach(meeting, row, minimum_gap):
+    """Gap up to which an adhesive contact lasts: 0 until the solids touch, then how far they can be stretched."""
+    stretch = jkr_stretch(row.work_of_adhesion, meeting.reduced_radius, row.contact_modulus)
+    return stretch if meeting.gap < minimum_gap else 0.0
 
 
 @inline

@@ -210,9 +210,9 @@ def _copy_memory(edges, donor, k):
         edges.spring[3 * k + x] = edges.spring[3 * donor + x]
         if len(edges.roll) > 0:
             edges.roll[3 * k + x] = edges.roll[3 * donor + x]
+    edges.minimum_gap[k] = edges.minimum_gap[donor]
     if len(edges.resistance) > 0:
         edges.approach_speed[k] = edges.approach_speed[donor]
-        edges.minimum_gap[k] = edges.minimum_gap[donor]
         edges.accounted_gap[k] = edges.accounted_gap[donor]
         edges.resistance[k] = edges.resistance[donor]
     if len(edges.entry) > 0 and not np.isnan(edges.entry[5 * k]):  # an encounter goes on where the contact is now

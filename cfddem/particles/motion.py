@@ -12,7 +12,7 @@ import numpy as np
 from cfddem.kernels import CHUNKS, inline, prange, serial_and_threaded
 from cfddem.particles.encounters import observe
 from cfddem.particles.films import film_force, squeeze, wet
-from cfddem.particles.forces import NOTHING, VERLET, Meeting, contact, relative_velocity, resist_rolling
+from cfddem.particles.forces import NOTHING, VERLET, Meeting, contact, contact_reach, relative_velocity, resist_rolling
 from cfddem.particles.meshes import hand_over, meet_walls
 from cfddem.particles.pair_loops import (
     meet_pairs,
@@ -236,6 +236,8 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                 push, turn, memory = contact(
                     meeting, rows, which, edges.minimum_gap[k], at(edges.spring, k), laws, half
                 )
+                if laws.cohesion:
+                    edges.minimum_gap[k] = contact_reach(meeting, rows[which], edges.minimum_gap[k])
                 if rolling:
                     held = edges.minimum_gap[k]
                     torque, rolled = resist_rolling(meeting, rows[which], held, push, at(edges.roll, k), laws, half)

@@ -12,7 +12,7 @@ import numpy as np
 
 from cfddem.kernels import inline, prange, serial_and_threaded
 from cfddem.particles.films import moisten, squeeze_shortly
-from cfddem.particles.forces import Meeting, contact, resist_rolling
+from cfddem.particles.forces import Meeting, contact, contact_reach, resist_rolling
 from cfddem.particles.pairs import between
 from cfddem.particles.vectors import at, dot, minus, plus, put, times
 
@@ -82,6 +82,8 @@ def _meet_pair(
         resistance[k], approach_speed[k], minimum_gap[k], accounted_gap[k] = now
         separated = now[2]
     push, turn, memory = contact(meeting, rows, which, separated, at(spring, k), laws, step)
+    if laws.cohesion:
+        minimum_gap[k] = contact_reach(meeting, rows[which], separated)
     if laws.rolling:
         torque, rolled = resist_rolling(meeting, rows[which], separated, push, at(roll, k), laws, step)
         put(moment, k, torque)

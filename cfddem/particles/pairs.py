@@ -28,7 +28,9 @@ class Edges(NamedTuple):
     near: int  # edges of particles that may touch before the next list; those after it have films alone
     spring: np.ndarray  # (n, 3) tangential displacement of the contact [m]
     approach_speed: np.ndarray  # (n,) largest approach speed of this encounter [m/s]
-    minimum_gap: np.ndarray  # (n,) h_min of this encounter; 0 without a film [m]
+    minimum_gap: (
+        np.ndarray
+    )  # (n,) gap below which solids are in contact: h_min of a film, the reach of adhesion; else 0 [m]
     accounted_gap: np.ndarray  # (n,) gap up to which the film's impulse has been given [m]
     force: np.ndarray  # (n, 3) on the first body [N]
     couple: np.ndarray  # (n, 3) torque per radius, the same on both bodies [N]
@@ -176,9 +178,9 @@ def remember(old, new, old_row, new_row):
                     for axis in range(3):
                         new.roll[k, axis] = sign * old.roll[before, axis]
                         new.moment[k, axis] = sign * old.moment[before, axis]
+                new.minimum_gap[k] = old.minimum_gap[before]
                 if len(new.resistance) > 0:
                     new.approach_speed[k] = old.approach_speed[before]
-                    new.minimum_gap[k] = old.minimum_gap[before]
                     new.accounted_gap[k] = old.accounted_gap[before]
                     new.resistance[k] = old.resistance[before]
                 if len(new.entry) > 0:

@@ -66,6 +66,7 @@ class ParticleSolver:
         self.walls = assemble(walls)
         self._walled = True if walls else None
         self.laws = laws or Laws()
+        self.laws.check()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
         self.skin = 0.1 * float(bodies.radius.mean()) if skin is None else skin
