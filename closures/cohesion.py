@@ -119,7 +119,7 @@ def jkr_sticking_speed(
     1.0
     """
     lost = (work_of_adhesion**5 * reduced_radius**4 / reduced_modulus**2) ** (1.0 / 6.0)
-    return math.sqrt(14.18 / reduced_mass) * lost
+    return float(math.sqrt(14.18 / reduced_mass) * lost)
 
 
 @law("cohesion", "Hamaker, Physica 4 (1937) 1058; Israelachvili, Intermolecular and Surface Forces (2011) ch. 13")

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from cfddem import simulation
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
+from cfddem.particles import solver
 from cfddem.particles.forces import Laws
 from cfddem.particles.neighbours import wrap
 from cfddem.particles.packing import (
@@ -195,7 +195,7 @@ def test_memory_goes_with_the_pair_through_lists_and_sorting(film: bool, monkeyp
 
     It is odd in the two: where sorting turns a pair round, the spring must change its sign.
     """
-    monkeypatch.setattr(simulation, "THREADING_PAYS", 1)
+    monkeypatch.setattr(solver, "THREADING_PAYS", 1)
     centres, box = random_packing(mono(400, 1e-3), 0.55, seed=9)
     shuffled = centres[np.random.default_rng(1).permutation(len(centres))]
     spheres = bodies(shuffled, 0.5e-3, 2500.0, viscosity=1e-3 if film else 0.0)
