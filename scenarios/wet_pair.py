@@ -11,6 +11,7 @@ What you'll learn: which of the film laws between coated spheres matters, and wh
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -50,10 +51,12 @@ class WetPair:
     velocity: float  # normal speed of impact [m/s]
     turned: float  # by the line of centres [deg]
     history: dict[str, np.ndarray] = field(repr=False)  # time, gap, angle, approach speed, turning, spin
+    warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The result without its history, ready for JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "history"}
+        kept = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "history"}
+        return kept | {"warnings": list(self.warnings)}
 
 
 def collide_wet(
@@ -144,7 +147,20 @@ def collide_wet(
         velocity=speed,
         turned=math.degrees(float(state[motion.ANGLE])),
         history=_columns(rows, numbers),
+        warnings=_caveats(numbers),
     )
+
+
+def _caveats(numbers: Numbers) -> tuple[str, ...]:
+    """Where the model says less than it seems to."""
+    if numbers.minimum_gap < numbers.film:
+        return ()
+    caveat = (
+        f"at {numbers.speed:.3g} m/s the liquid is glass through the whole film of {numbers.film:.3g} m, which then "
+        "does not act; the fitted pressure does not hold at so high a Stokes number"
+    )
+    warnings.warn(caveat, stacklevel=3)
+    return (caveat,)
 
 
 def _run(numbers: Numbers, angle: float, duration: float, keep: bool) -> tuple[bool, float, np.ndarray, np.ndarray]:

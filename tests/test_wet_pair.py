@@ -76,8 +76,10 @@ def test_a_faster_liquid_glass_keeps_the_solids_farther_apart() -> None:
     """h_min grows as the root of the speed and ends at the film."""
     slow, fast = collide_wet(1.0).minimum_gap, collide_wet(4.0).minimum_gap
     assert fast / slow == pytest.approx(2.0)
-    stiff = collide_wet(6.0, bridge="deforming", cut="constant")
+    with pytest.warns(UserWarning, match="glass through the whole film"):
+        stiff = collide_wet(6.0, bridge="deforming", cut="constant")
     assert stiff.minimum_gap == 270e-6
+    assert len(stiff.warnings) == 1
 
 
 @pytest.mark.parametrize("kind", TRANSITION_PRESSURES, ids="-".join)
