@@ -78,6 +78,7 @@ def stage(
         laws=laws,
         free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
         skin=8.0 * setting.reduced_radius,
+        check_steps=False,  # a pair has clocks of its own
         record=True,
     )
 

@@ -66,13 +66,38 @@ def test_unstable_step_is_refused_with_the_one_that_works() -> None:
     check_step(float(works.group(1)), read)
 
 
+def test_run_refuses_an_unstable_step_and_names_one_that_works() -> None:
+    """Looked at when a step is first taken, and again after some lists; whoever wants to see it fail says so."""
+    run = pair(overlap=1e-3 * RADIUS)
+    limit = run.clocks().limit
+    with pytest.raises(UnstableStep, match="take"):
+        run.advance(1.01 * limit)
+    assert run.steps == 0
+    run.advance(run.recommended_step())
+    wild = pair(overlap=1e-3 * RADIUS)
+    wild._checking = False
+    wild.advance(1.01 * limit)
+
+
+def test_wall_of_another_material_sets_the_clock() -> None:
+    """A sphere pressed into a wall a hundred times stiffer has a stiffer contact than into its own material."""
+    hard = GLASS.model_copy(update={"youngs_modulus": 1e9})
+    limits = []
+    for material in (0, 1):
+        sphere = bodies([[0.0, 0.0, 0.99 * RADIUS]], RADIUS, GLASS.density)
+        run = ParticleSolver(sphere, pair_table([GLASS, hard]), walls=[Plane(material=material)])
+        limits.append(run.clocks().overlap)
+    moduli = pair_table([GLASS, hard])["contact_modulus"]
+    assert limits[1] / limits[0] == pytest.approx(math.sqrt(moduli[0, 0] / moduli[0, 1]), rel=1e-9)
+
+
 def energy_gain(share: float) -> float:
     """Energy of two elastic pressed spheres that swing, over the first, after many steps of `share` limits."""
     elastic = GLASS.model_copy(update={"restitution": 1.0, "friction": 0.0})
     chain = [[2.0 * RADIUS * 0.98 * n, 0.0, 0.0] for n in range(8)]
     fixed = [True, *[False] * 6, True]
     spheres = bodies(chain, RADIUS, GLASS.density, fixed=fixed)
-    run = ParticleSolver(spheres, pair_table([elastic]), skin=10.0 * RADIUS)
+    run = ParticleSolver(spheres, pair_table([elastic]), skin=10.0 * RADIUS, check_steps=False)
     run.bodies.velocity[1:7, 0] = 1e-3 * np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
     run.refresh()
     limit = run.clocks().overlap

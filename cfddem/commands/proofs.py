@@ -38,7 +38,7 @@ def validate(
 def bench(
     target: Annotated[str, Parameter(help="dem")] = "dem",
     *,
-    particles: Annotated[int, Parameter(help="10000, 100000 or 1000000")] = 10_000,
+    particles: Annotated[int, Parameter(help="1000, 10000, 100000 or 1000000")] = 10_000,
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,

@@ -12,6 +12,7 @@ from cfddem.kernels import kernel
 from cfddem.particles.forces import LINEAR, VERLET, Laws
 from cfddem.particles.pairs import Edges
 from cfddem.particles.state import Bodies
+from cfddem.particles.surfaces import Walls
 from closures import contact, lubrication, timescales
 from closures.contact import hertz_stiffness
 from closures.timescales import overlap_period
@@ -50,7 +51,13 @@ class Clocks:
 
 
 def clocks(
-    bodies: Bodies, edges: Edges, gap: np.ndarray, table: np.ndarray, laws: Laws, reference_speed: float
+    bodies: Bodies,
+    edges: Edges,
+    walls: Walls,
+    gap: np.ndarray,
+    table: np.ndarray,
+    laws: Laws,
+    reference_speed: float,
 ) -> Clocks:
     """Read the clocks of the particles as they are.
 
@@ -63,7 +70,7 @@ def clocks(
         if laws.contact == LINEAR:
             swing = math.sqrt(mass / max(laws.normal_stiffness, laws.tangential_stiffness))
             hertz, impact = min(hertz, math.pi * swing / STEPS_PER_HERTZ_TIME), min(impact, STABLE * swing)
-        elif speed > 0.0:
+        elif speed > 0.0 and row["contact_modulus"] > 0.0:
             stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), radius)
             deepest = contact.hertz_largest_overlap(mass, stiffness, speed)
             hertz = min(hertz, timescales.hertz_time(mass, stiffness, speed) / STEPS_PER_HERTZ_TIME)
@@ -71,7 +78,7 @@ def clocks(
         if laws.film and laws.integrator == VERLET:
             strength = lubrication.film_strength(float(bodies.viscosity.max()), radius)
             film = min(film, 2.0 * timescales.film_time(mass, strength, float(row["roughness_gap"])))
-    overlap = STABLE / math.sqrt(max(_largest_rate(bodies, edges, gap, table, laws), 1e-300))
+    overlap = STABLE / math.sqrt(max(_largest_rate(bodies, edges, walls, gap, table, laws), 1e-300))
     crossing = 0.1 * float(bodies.radius.min()) / speed if speed > 0.0 else math.inf
     return Clocks(hertz, impact, overlap, film, crossing)
 
@@ -94,7 +101,7 @@ def _lightest_pairs(bodies: Bodies, table: np.ndarray) -> list[tuple[float, floa
 
 
 @kernel
-def _largest_rate(bodies, edges, gap, table, laws):
+def _largest_rate(bodies, edges, walls, gap, table, laws):
     """Bound of the contacts' squared angular frequency: twice the stiffness on a particle over its mass."""
     stiffness = np.zeros(len(bodies.radius))
     for k in range(len(gap)):
@@ -106,7 +113,7 @@ def _largest_rate(bodies, edges, gap, table, laws):
         radius = bodies.radius[i]
         if pair:
             radius = radius * bodies.radius[j] / (radius + bodies.radius[j])
-        row = table[bodies.material[i], bodies.material[j] if pair else bodies.material[i]]
+        row = table[bodies.material[i], bodies.material[j] if pair else walls.material[j]]
         stiff = laws.normal_stiffness
         if laws.contact != LINEAR:
             stiff = overlap_period(1.0, hertz_stiffness(row.contact_modulus, radius), overlap) ** -2

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.errors import InputError
-from cfddem.kernels import inline, kernel, prange, threaded
+from cfddem.kernels import CHUNKS, inline, kernel, prange, threaded
 from cfddem.particles.near_walls import near_walls
 from cfddem.particles.pairs import HOME, Edges, edges, near_first, shifts
 from cfddem.particles.state import Bodies
@@ -21,6 +21,9 @@ from cfddem.particles.vectors import at, flat
 
 FEW = 64
 """Up to so many particles every pair is looked at."""
+
+USUAL_PAIRS = 8
+"""Room for this many listed pairs a particle is made before they are counted."""
 
 CLASS_RATIO = 2.0
 """Radii within this factor share a size class."""
@@ -63,16 +66,21 @@ def list_edges(
         if box[axis] < 2.0 * reach:
             raise InputError("box", float(box[axis]), f"at least {2.0 * reach:.3g} m, twice the reach of a pair")
     find = _among_few if bodies.count <= FEW else _among_many
-    first, second, image = find(bodies, cutoff_ratio, skin, box)
-    near = len(first)
+    pieces = find(bodies, cutoff_ratio, skin, box)
+    first, second, image = (np.concatenate([piece[column] for piece in pieces]) for column in range(3))
+    del pieces
+    pairs = near = len(first)
     if cutoff_ratio > 0.0:
         first, second, image, near = near_first(first, second, image, bodies, box, skin + roughness)
     particle, wall = near_walls(bodies, walls, cutoff_ratio, skin)
+    if len(wall):
+        first, second = np.concatenate([first, particle]), np.concatenate([second, wall])
+        image = np.concatenate([image, np.full(len(wall), HOME, np.uint8)])
     return edges(
-        np.concatenate([first, particle]),
-        np.concatenate([second, wall]),
-        np.concatenate([image, np.full(len(wall), HOME, np.uint8)]),
-        len(first),
+        first,
+        second,
+        image,
+        pairs,
         bodies.count,
         near=near,
         film=cutoff_ratio > 0.0,
@@ -81,9 +89,10 @@ def list_edges(
     )
 
 
-def _among_few(
-    bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+_Pieces = list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+def _among_few(bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
     """Pairs within reach, each looked at; nothing needs compiling."""
     i, j = np.triu_indices(bodies.count, 1)
     loose = bodies.inverse_mass[i] + bodies.inverse_mass[j] > 0.0
@@ -95,21 +104,24 @@ def _among_few(
     if not np.isfinite(box).any():
         within[:, :HOME] = within[:, HOME + 1 :] = False
     pair, image = np.nonzero(within)
-    return i[pair].astype(np.uint32), j[pair].astype(np.uint32), image.astype(np.uint8)
+    return [(i[pair].astype(np.uint32), j[pair].astype(np.uint32), image.astype(np.uint8))]
 
 
-def _among_many(
-    bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs within reach, looked for cell by cell: counted first, then written."""
+def _among_many(bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
+    """Pairs within reach, looked for cell by cell, in pieces one after the other.
+
+    Each piece has room for a usual number of pairs; where that is too little all is done again with enough.
+    """
     cells = bin_particles(bodies.position, bodies.radius, cutoff_ratio, skin, box)
-    count = np.zeros(bodies.count, np.int64)
-    nothing, images = np.zeros(0, np.uint32), np.zeros(0, np.uint8)
-    _search(flat(bodies), cells, cutoff_ratio, skin, box, count, nothing, nothing, images, False)
-    end = np.cumsum(count)
-    first, second, image = (np.empty(end[-1], kind) for kind in (np.uint32, np.uint32, np.uint8))
-    _search(flat(bodies), cells, cutoff_ratio, skin, box, end, first, second, image, True)
-    return first, second, image
+    room = USUAL_PAIRS * (bodies.count // CHUNKS + 1)
+    found = np.zeros(CHUNKS, np.int64)
+    while True:
+        first, second, image = (np.empty(CHUNKS * room, kind) for kind in (np.uint32, np.uint32, np.uint8))
+        _search(flat(bodies), cells, cutoff_ratio, skin, box, found, first, second, image)
+        if found.max() <= room:
+            begins = room * np.arange(CHUNKS)
+            return [(first[a:b], second[a:b], image[a:b]) for a, b in zip(begins, begins + found)]
+        room = int(found.max())
 
 
 def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float, skin: float, box: np.ndarray) -> Cells:
@@ -119,9 +131,12 @@ def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float,
     radius    (N,) [m]
     """
     smallest = float(radius.min())
-    size_class = np.floor(np.log(radius / smallest) / np.log(CLASS_RATIO) + 1e-9).astype(np.int64)
-    kinds, size_class = np.unique(size_class, return_inverse=True)
-    largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])
+    if float(radius.max()) < CLASS_RATIO * smallest:
+        size_class, largest = np.zeros(len(radius), np.int64), np.array([radius.max()])
+    else:
+        size_class = np.floor(np.log(radius / smallest) / np.log(CLASS_RATIO) + 1e-9).astype(np.int64)
+        kinds, size_class = np.unique(size_class, return_inverse=True)
+        largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])
     periodic = np.isfinite(box)
     low = np.where(periodic, 0.0, position.min(axis=0))
     span = np.where(periodic, box, np.maximum(position.max(axis=0) - low, smallest))
@@ -130,17 +145,16 @@ def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float,
     wanted = np.maximum(wanted, np.prod(span) ** (1.0 / 3.0) / most)
     number = np.clip(np.floor(span / wanted[:, None]).astype(np.int64), 1, 1 << 20)
     cells = np.prod(number, axis=1)
-    offset = np.concatenate([[0], np.cumsum(cells)])
-    cell = np.empty(len(radius), np.int64)
-    width = span / number
-    _place(position, size_class, low, width, number, offset, cell)
-    start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=offset[-1]))]).astype(np.int64)
-    return Cells(largest, low, width, number, offset[:-1], start, np.argsort(cell, kind="stable").astype(np.int32))
+    offset = np.cumsum(cells) - cells
+    start, member = np.zeros(int(cells.sum()) + 1, np.int64), np.empty(len(radius), np.int32)
+    _sort_into_cells(position, size_class, low, span / number, number, offset, start, member)
+    return Cells(largest, low, span / number, number, offset, start, member)
 
 
 @kernel
-def _place(position, size_class, low, width, number, offset, cell):
-    """Cell of each particle."""
+def _sort_into_cells(position, size_class, low, width, number, offset, start, member):
+    """Find the cell of each particle, and write the particles cell by cell, each cell in the order of rows."""
+    cell = np.empty(len(size_class), np.int64)
     for i in range(len(cell)):
         c = size_class[i]
         where = 0
@@ -148,45 +162,62 @@ def _place(position, size_class, low, width, number, offset, cell):
             step = int((position[i, axis] - low[axis]) / width[c, axis])
             where = where * number[c, axis] + min(max(step, 0), number[c, axis] - 1)
         cell[i] = offset[c] + where
+        start[cell[i] + 1] += 1
+    for place in range(1, len(start)):
+        start[place] += start[place - 1]
+    for i in range(len(cell)):
+        member[start[cell[i]]] = i
+        start[cell[i]] += 1
+    for place in range(len(start) - 1, 0, -1):
+        start[place] = start[place - 1]
+    start[0] = 0
 
 
 @threaded
-def _search(bodies, cells, cutoff_ratio, skin, box, end, first, second, image, fill):
-    """Count the later neighbours of each particle, or write them before `end` in ascending order."""
-    for i in prange(len(bodies.radius)):
-        radius, here = bodies.radius[i], at(bodies.position, i)
-        found = 0
-        base = end[i - 1] if fill and i > 0 else 0
-        for c in range(len(cells.largest)):
-            largest = cells.largest[c]
-            reach = radius + largest + cutoff_ratio * radius * largest / (radius + largest) + skin
-            x0, x1 = _range(here[0], reach, 0, c, cells, box)
-            y0, y1 = _range(here[1], reach, 1, c, cells, box)
-            z0, z1 = _range(here[2], reach, 2, c, cells, box)
-            for x in range(x0, x1 + 1):
-                ix, shift_x = _wrap(x, cells.number[c, 0])
-                for y in range(y0, y1 + 1):
-                    iy, shift_y = _wrap(y, cells.number[c, 1])
-                    for z in range(z0, z1 + 1):
-                        iz, shift_z = _wrap(z, cells.number[c, 2])
-                        cell = cells.offset[c] + (ix * cells.number[c, 1] + iy) * cells.number[c, 2] + iz
-                        for place in range(cells.start[cell], cells.start[cell + 1]):
-                            j = cells.member[place]
-                            if j <= i or bodies.inverse_mass[i] + bodies.inverse_mass[j] == 0.0:
-                                continue
-                            touch = radius + bodies.radius[j]
-                            near = touch + cutoff_ratio * radius * bodies.radius[j] / touch + skin
-                            there = at(bodies.position, j)
-                            dx = here[0] - there[0] - (shift_x * box[0] if shift_x != 0 else 0.0)
-                            dy = here[1] - there[1] - (shift_y * box[1] if shift_y != 0 else 0.0)
-                            dz = here[2] - there[2] - (shift_z * box[2] if shift_z != 0 else 0.0)
-                            if dx * dx + dy * dy + dz * dz < near * near:
-                                if fill:
-                                    code = HOME - 9 * shift_x - 3 * shift_y - shift_z
-                                    _insert(first, second, image, base, found, i, j, code)
-                                found += 1
-        if not fill:
-            end[i] = found
+def _search(bodies, cells, cutoff_ratio, skin, box, found, first, second, image):
+    """Write the later neighbours of each particle in ascending order, and count them also where there is no room."""
+    count, room = len(bodies.radius), len(first) // CHUNKS
+    for chunk in prange(CHUNKS):
+        base = chunk * room
+        end, total = base + room, base
+        for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            begin = total
+            radius, here = bodies.radius[i], at(bodies.position, i)
+            for c in range(len(cells.largest)):
+                largest = cells.largest[c]
+                reach = radius + largest + cutoff_ratio * radius * largest / (radius + largest) + skin
+                x0, x1 = _range(here[0], reach, 0, c, cells, box)
+                y0, y1 = _range(here[1], reach, 1, c, cells, box)
+                z0, z1 = _range(here[2], reach, 2, c, cells, box)
+                for x in range(x0, x1 + 1):
+                    ix, shift_x = _wrap(x, cells.number[c, 0])
+                    for y in range(y0, y1 + 1):
+                        iy, shift_y = _wrap(y, cells.number[c, 1])
+                        column = cells.offset[c] + (ix * cells.number[c, 1] + iy) * cells.number[c, 2]
+                        z = z0
+                        while z <= z1:  # cells that follow each other in a column hold particles that do so too
+                            iz, shift_z = _wrap(z, cells.number[c, 2])
+                            last = min(z1 - z + iz, cells.number[c, 2] - 1)
+                            z += last - iz + 1
+                            for place in range(cells.start[column + iz], cells.start[column + last + 1]):
+                                j = cells.member[place]
+                                if j <= i:
+                                    continue
+                                there = at(bodies.position, j)
+                                dx = here[0] - there[0] - (shift_x * box[0] if shift_x != 0 else 0.0)
+                                dy = here[1] - there[1] - (shift_y * box[1] if shift_y != 0 else 0.0)
+                                dz = here[2] - there[2] - (shift_z * box[2] if shift_z != 0 else 0.0)
+                                square = dx * dx + dy * dy + dz * dz
+                                if square >= reach * reach:
+                                    continue
+                                touch = radius + bodies.radius[j]
+                                near = touch + cutoff_ratio * radius * bodies.radius[j] / touch + skin
+                                if square < near * near and bodies.inverse_mass[i] + bodies.inverse_mass[j] > 0.0:
+                                    if total < end:
+                                        code = HOME - 9 * shift_x - 3 * shift_y - shift_z
+                                        _insert(first, second, image, begin, total - begin, i, j, code)
+                                    total += 1
+        found[chunk] = total - base
 
 
 @inline

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from cfddem.particles.clocks import Clocks, clocks
+from cfddem.errors import InputError
+from cfddem.particles.clocks import Clocks, check_step, clocks
 from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.forces import Laws
 from cfddem.particles.guard import guard
@@ -24,10 +27,16 @@ from cfddem.record.collisions import CollisionRecord
 THREADING_PAYS = 1000
 """From this many particles on, loops run on all threads; on one they still work on several pairs at once."""
 
-SHORT_LIST, LONG_LIST = 40, 200
-"""Steps that a neighbour list should last at least and at most."""
+LISTING_COSTS = (8.0, 2.0)
+"""Steps that a new list takes, over what a skin of one radius adds to a step; for few particles and for many."""
 
-_NO_ROWS = np.zeros(0, ENCOUNTER)
+NARROWEST, WIDEST = 0.01, 0.6
+"""Bounds of the skin that is found in the run, over the mean radius."""
+
+CHECK_EVERY = 20
+"""The time step is looked at again at every so many lists."""
+
+_NO_ROWS, _NO_VECTORS = np.zeros(0, ENCOUNTER), np.zeros((0, 3))
 
 
 class ParticleSolver:
@@ -44,6 +53,8 @@ class ParticleSolver:
     skin     allowance of the neighbour list; found and tuned in the run if not given [m]
     sort_every  re-sort many particles by place at every so many lists
     record   keep a record of encounters, in `collisions`
+    check_steps  refuse time steps above the stability limit
+    after    an earlier run over the same particles and walls, whose pairs are remembered
     """
 
     def __init__(
@@ -60,6 +71,8 @@ class ParticleSolver:
         skin: float | None = None,
         sort_every: int = 5,
         record: bool = False,
+        check_steps: bool = True,
+        after: ParticleSolver | None = None,
     ) -> None:
         self.bodies = bodies
         self.table = table
@@ -69,17 +82,23 @@ class ParticleSolver:
         self.laws.check()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
-        self.skin = 0.1 * float(bodies.radius.mean()) if skin is None else skin
+        few = bodies.count < THREADING_PAYS
+        self.skin = (0.1 if few else 0.02) * float(bodies.radius.mean()) if skin is None else skin
         self.domain = None if domain is None else np.array(domain, float)
         self.sort_every = sort_every
         self._lists, self._listed_at = -1, 0
+        self._checking, self._accepted = check_steps, 0.0
+        self._next_id = int(bodies.id.max(initial=-1)) + 1
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
         self.time, self.steps = 0.0, 0
         self.collisions = CollisionRecord() if record else None
         wrap(self.bodies.position, self.box)
         self._next_order()
-        self._take_list(self._listed())
+        fresh = self._listed()
+        if after is not None:
+            self._recall(after, fresh)
+        self._take_list(fresh)
         self.refresh()
 
     @property
@@ -105,7 +124,19 @@ class ParticleSolver:
 
         reference_speed  fastest approach to be expected [m/s]
         """
-        return clocks(self.bodies, self.edges, self.gap, self.table, self.laws, reference_speed)
+        return clocks(self.bodies, self.edges, self.walls, self.gap, self.table, self.laws, reference_speed)
+
+    def _limits(self) -> Clocks:
+        """The clocks by which a step is refused: where films may stop what comes near, only contacts that exist."""
+        read = self.clocks()
+        return replace(read, impact=math.inf, film=math.inf, crossing=math.inf) if self.laws.film else read
+
+    def recommended_step(self, reference_speed: float = 0.0) -> float:
+        """Time step to take: 2 % of the Hertz time, less where stability asks for it [s].
+
+        reference_speed  fastest approach to be expected [m/s]
+        """
+        return self.clocks(reference_speed).recommended
 
     def advance(self, step: float, steps: int = 1) -> None:
         """Move by a number of equal time steps.
@@ -113,9 +144,13 @@ class ParticleSolver:
         step   [s]
         steps  how many
 
-        Raises RunFailed, naming the particle, where one is no number any more, has left or was pressed through.
+        Raises UnstableStep where the step is above what contacts allow, and RunFailed, naming the particle,
+        where one is no number any more, has left or was pressed through.
         """
         while steps > 0:
+            if self._checking and step > self._accepted:
+                check_step(step, self._limits())
+                self._accepted = step
             done, farthest, noted = self._march(step, steps)
             steps -= done
             if self.collisions is not None:
@@ -150,6 +185,7 @@ class ParticleSolver:
         edges: dict[str, Any] = {name: each if np.ndim(each) else int(each) for name, each in state["edges"].items()}
         clock = state["clock"]
         self.time, self.steps, self.skin = float(clock["time"]), int(clock["steps"]), float(clock["skin"])
+        self._next_id = max(self._next_id, int(self.bodies.id.max()) + 1)
         self._lists, self._listed_at = int(clock["lists"]), int(clock["listed_at"])
         travel = self.walls.travel.copy()
         self._take_list(Edges(**edges))
@@ -193,13 +229,72 @@ class ParticleSolver:
     def _relist(self) -> None:
         """Find the pairs anew; what they remember and the forces at hand are carried over."""
         wrap(self.bodies.position, self.box)
-        old, order = self.edges, self._next_order()
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order), dtype=np.int32)
+        old, order = self.edges._replace(impulse=_NO_VECTORS), self._next_order()
+        del self.edges, self._views
         self._tune_skin()
         fresh = self._listed()
-        remember(old, fresh, order, place)
+        remember(old, fresh, order, _inverse(order))
+        del old
         self._take_list(fresh)
+        if self._lists % CHECK_EVERY == 0:
+            self._accepted = 0.0
+
+    def insert(self, fresh: Bodies) -> np.ndarray:
+        """Add particles, which must not overlap others; `bodies` is another object from then on.
+
+        fresh    :func:`cfddem.particles.state.bodies`; their ids are given anew
+        returns  the ids they got (n,)
+        """
+        count = self.bodies.count
+        ids = self._next_id + np.arange(fresh.count, dtype=np.int64)
+        self._next_id += fresh.count
+        joined = Bodies(*(np.concatenate(pair) for pair in zip(self.bodies, fresh._replace(id=ids))))
+        self._exchange(joined, np.append(np.arange(count), np.full(fresh.count, count)))
+        return ids
+
+    def remove(self, gone: np.ndarray) -> Bodies:
+        """Take particles out; `bodies` is another object from then on.
+
+        gone     (N,) bool, which rows of `bodies`
+        returns  the particles that were taken out
+        """
+        gone = np.asarray(gone, bool)
+        if gone.all():
+            raise InputError("gone", int(gone.sum()), f"fewer than all {self.bodies.count} particles")
+        taken = Bodies(*(array[gone] for array in self.bodies))
+        if gone.any():
+            self._exchange(Bodies(*(array[~gone] for array in self.bodies)), np.flatnonzero(~gone))
+        return taken
+
+    def _exchange(self, made: Bodies, order: np.ndarray) -> None:
+        """Go on with other particles; what pairs remember is kept where both are still there.
+
+        order  old row of each new one; the number of old rows for a newcomer, who remembers nothing
+        """
+        count = self.bodies.count
+        old = self.edges._replace(start=np.append(self.edges.start, self.edges.start[-1]))
+        place = np.full(count + 1, -1, np.int32)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        self.bodies = made
+        wrap(made.position, self.box)
+        fresh = self._listed()
+        remember(old, fresh, order.astype(np.int32), place)
+        self._take_list(fresh)
+        self._accepted, self._listed_at = 0.0, self.steps
+        springs = fresh.spring.copy()
+        self.refresh()
+        fresh.spring[:] = springs  # no time has passed in which contacts could slide
+
+    def _recall(self, earlier: ParticleSolver, fresh: Edges) -> None:
+        """Take over what the pairs of an earlier run remember."""
+        then, now = np.argsort(earlier.bodies.id), np.argsort(self.bodies.id)
+        if not np.array_equal(earlier.bodies.id[then], self.bodies.id[now]):
+            raise InputError("after", None, "a run over the same particles", "ids differ")
+        if len(earlier.edges.resistance) == 0 and self.laws.film:
+            raise InputError("after", None, "a run with films, as this one")
+        order = np.empty(len(now), np.int32)
+        order[now] = then
+        remember(earlier.edges, fresh, order, _inverse(order))
 
     def _next_order(self) -> np.ndarray:
         """Re-sort the particles now and then, so that near particles have near rows; returns the old rows."""
@@ -211,12 +306,23 @@ class ParticleSolver:
         return order
 
     def _tune_skin(self) -> None:
-        """Widen a skin that is used up too soon, narrow one that lists too many pairs for too long."""
+        """Choose the skin at which finding the pairs anew and looking at those that do not touch cost the same.
+
+        The time between two lists grows with the skin, and so does the number of pairs in them.
+        """
         age, self._listed_at = self.steps - self._listed_at, self.steps
-        if self._skin_is_given:
+        if self._skin_is_given or age == 0:
             return
         radius = float(self.bodies.radius.mean())
-        if age < SHORT_LIST:
-            self.skin = min(1.25 * self.skin, 0.6 * radius)
-        elif age > LONG_LIST:
-            self.skin = max(0.8 * self.skin, 0.04 * radius)
+        best = radius * math.sqrt(LISTING_COSTS[self.bodies.count >= THREADING_PAYS] * self.skin / (radius * age))
+        best = min(max(best, 0.5 * self.skin), 2.0 * self.skin)
+        largest = float(self.bodies.radius.max())
+        room = 0.5 * float(self.box.min()) - (2.0 + 0.5 * self._reach_ratio) * largest
+        self.skin = min(max(best, NARROWEST * radius), WIDEST * radius, max(self.skin, 0.99 * room))
+
+
+def _inverse(order: np.ndarray) -> np.ndarray:
+    """Where each row of an order went."""
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order), dtype=order.dtype)
+    return place

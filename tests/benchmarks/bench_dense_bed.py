@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 from typing import Any
 
 import pytest
@@ -12,7 +13,7 @@ from scenarios.dense_bed import STEP, bed
 
 @pytest.mark.slow
 @pytest.mark.parametrize("film", [False, True])
-@pytest.mark.parametrize(("count", "steps"), [(10_000, 500), (100_000, 50), (1_000_000, 5)])
+@pytest.mark.parametrize(("count", "steps"), [(1_000, 5000), (10_000, 500), (100_000, 50), (1_000_000, 5)])
 @pytest.mark.parametrize("threads", [1, 2])
 def bench_dense_bed(benchmark: Any, count: int, steps: int, threads: int, film: bool) -> None:
     """Cost of a step against the number of particles and of threads, list rebuilds included."""
@@ -20,4 +21,6 @@ def bench_dense_bed(benchmark: Any, count: int, steps: int, threads: int, film: 
     run = bed(count, film)
     run.advance(STEP, steps)
     benchmark.pedantic(run.advance, args=(STEP, steps), rounds=3)
+    run._relist()
+    benchmark.extra_info["peak memory of the process [MB]"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000
     benchmark.extra_info["million particle-steps per second"] = count * steps / benchmark.stats.stats.median / 1e6
