@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.case import Case, Column, Jet
 from cfddem.coupling.exchange import Exchange
 from cfddem.coupling.voidage import Spreading
-from cfddem.errors import InputError, nearest
+from cfddem.errors import InputError
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
@@ -23,10 +23,6 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies
 from cfddem.particles.state import bodies as make_bodies
 from cfddem.particles.walls import Cylinder, Plane, Wall
-from closures.law import SHELF, Law
-
-POURED_SOLID_FRACTION = 0.58
-"""Solid fraction of a poured bed, by which a bed's height is turned into a number of particles."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +76,9 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         smoothing=case.laws.smoothing * float(2.0 * spheres.radius.mean()),
     )
     fluid.set_voidage(1.0 - spreading.solid_fraction(spreading.place(spheres.position, spheres.radius)))
-    exchange = Exchange(fluid, spreading, drag_of(case), added_mass=case.laws.added_mass, own_wind=case.laws.own_wind)
+    exchange = Exchange(
+        fluid, spreading, case.laws.drag_law, added_mass=case.laws.added_mass, own_wind=case.laws.own_wind
+    )
     return Parts(solver, fluid, exchange)
 
 
@@ -89,12 +87,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
 
 def particle_diameters(case: Case) -> Array:
     """Diameter of every particle (N,) [m]."""
-    bed, column = case.bed, case.column
-    count = bed.count or len(bed.positions)
-    if bed.height is not None:
-        width, depth, _ = column.size
-        area = 0.25 * math.pi * width**2 if column.shape == "cylinder" else width * depth
-        count = int(POURED_SOLID_FRACTION * area * bed.height / (math.pi / 6.0 * bed.diameter**3))
+    bed, count = case.bed, case.particle_count
     if count < 1:
         raise InputError("bed.height", bed.height, "high enough for one particle")
     if bed.spread == 0.0:
@@ -266,23 +259,3 @@ def _hole(jet: Jet, column: Column) -> Callable[..., np.ndarray]:
     half_x, half_y = 0.5 * jet.width, 0.5 * (jet.depth or depth)
     low = (0.5 * width - half_x, 0.5 * depth - half_y, -height)
     return rectangle(low, (0.5 * width + half_x, 0.5 * depth + half_y, height))
-
-
-def drag_of(case: Case) -> Law | None:
-    """The drag law of the case."""
-    import closures.drag
-    import closures.drag_resolved
-    import closures.drag_single  # noqa: F401  puts the laws on the shelf
-
-    chosen = case.laws.drag
-    if chosen is None or chosen == "none":
-        return None
-    if callable(chosen):
-        return next((card for card in SHELF["drag"].values() if card.function is chosen), None) or _own(chosen)
-    if chosen not in SHELF["drag"]:
-        raise InputError("laws.drag", chosen, nearest(chosen, SHELF["drag"]))
-    return SHELF["drag"][chosen]
-
-
-def _own(function: Callable[[float, float], float]) -> Law:
-    raise InputError("laws.drag", getattr(function, "__name__", function), "a law; decorate it with @closures.law(...)")

@@ -6,18 +6,31 @@ walls, boundaries, particles, is built by :mod:`cfddem.assembly`.
 
 from __future__ import annotations
 
+import math
+import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
-from cfddem.errors import InputError
+from cfddem.errors import InputError, nearest
 from cfddem.materials import Checked, Fluid, Material
+from cfddem.mistakes import Key, described, key_lines, line_of, refused, shown
+from closures.law import Law
 
 Positive = Annotated[float, Field(gt=0)]
 Point = tuple[float, float, float]
+
+POURED_SOLID_FRACTION = 0.58
+"""Solid fraction of a poured bed, by which a bed's height is turned into a number of particles, and back."""
+
+LONGEST_FILE = 500_000
+"""A case is a page that a person reads; who places very many particles does so from Python [characters]."""
+
+DEEPEST_KEY = 20
+"""Most words in a key; the reader of TOML takes the square of it in time."""
 
 
 class Column(Checked):
@@ -40,13 +53,23 @@ class Column(Checked):
         """Edges of the box (x, y, z) [m]."""
         return self.width, self.width if self.depth is None else self.depth, self.height
 
+    @property
+    def floor_area(self) -> float:
+        """Area of the floor [m2]."""
+        width, depth, _ = self.size
+        return 0.25 * math.pi * width**2 if self.shape == "cylinder" else width * depth
+
     @model_validator(mode="after")
     def _round_columns_have_a_side(self) -> Column:
         if self.shape == "cylinder":
             if self.depth not in (None, self.width):
-                raise ValueError("depth: must be left out, or equal to width; the width of a cylinder is its diameter")
-            if self.sides == "periodic" or self.front is not None:
-                raise ValueError("sides: must be no_slip or free_slip; a cylinder has one side")
+                raise InputError(
+                    "depth", self.depth, "left out, or equal to width", "the width of a cylinder is its diameter"
+                )
+            if self.sides == "periodic":
+                raise InputError("sides", self.sides, "no_slip or free_slip", "the side of a cylinder is a wall")
+            if self.front is not None:
+                raise InputError("front", self.front, "left out", "a cylinder has one side")
         return self
 
 
@@ -83,14 +106,26 @@ class Bed(Checked):
     def _one_number_of_particles(self) -> Bed:
         given = [name for name in ("count", "height", "positions") if getattr(self, name)]
         if len(given) != 1:
-            raise ValueError(f"count: must be given, or height, or positions, and only one; here {given or 'none'}")
+            found = " and ".join(given) if given else "none of them"
+            raise InputError("count", self.count, "given, or height, or positions, and only one", f"here {found}")
         if self.positions and self.start == "poured":
             object.__setattr__(self, "start", "at")
         if not isinstance(self.inlet_velocity, float):
             times = [time for time, _ in self.inlet_velocity]
             if not times or sorted(set(times)) != times:
-                raise ValueError("inlet_velocity: must be a number or [time, velocity] pairs in the order of time")
+                raise InputError("inlet_velocity", None, "a number, or [time, velocity] pairs in the order of time")
         return self
+
+    @property
+    def floor_speed(self) -> float:
+        """Superficial velocity through the floor, the largest in time [m/s]."""
+        inlet = self.inlet_velocity
+        return inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
+
+    @property
+    def inlet_speed(self) -> float:
+        """Superficial velocity through the floor or its jet, whichever is faster [m/s]."""
+        return max(self.floor_speed, 0.0 if self.jet is None else self.jet.velocity)
 
 
 class CaseLaws(Checked):
@@ -109,6 +144,20 @@ class CaseLaws(Checked):
     own_wind: bool = Field(True, description="take out the wind that a lone particle makes itself")
     convection: Literal["limited", "central"] = Field("limited", description="scheme of the fluid")
     gravity: Point = Field((0.0, 0.0, -9.81), description="g [m/s2]")
+
+    @field_validator("drag")
+    @classmethod
+    def _drag_is_on_the_shelf(cls, value: Any) -> Any:
+        if isinstance(value, str) and value != "none":
+            _drag_named(value)
+        return value
+
+    @property
+    def drag_law(self) -> Law | None:
+        """The drag law, with its range and source; None where there is no drag."""
+        if self.drag is None or self.drag == "none":
+            return None
+        return _drag_named(self.drag) if isinstance(self.drag, str) else _drag_of_ones_own(self.drag)
 
 
 class CaseRun(Checked):
@@ -149,12 +198,8 @@ class Case(Checked):
 
     @model_validator(mode="after")
     def _names_are_known(self) -> Case:
-        known = list(self.material)
-        for field, name in (("bed.material", self.bed.material), ("column.material", self.column.material)):
-            if name is not None and name not in known:
-                raise ValueError(f"{field}: must be one of {', '.join(known)}; {name!r} is no [material]")
-        if self.bed.material is None and len(known) > 1:
-            raise ValueError(f"bed.material: must be given, one of {', '.join(known)}")
+        for mistake in _unknown_names(list(self.material), self.bed.material, self.column.material):
+            raise mistake
         return self
 
     @property
@@ -162,35 +207,50 @@ class Case(Checked):
         """Material of the particles."""
         return self.material[self.bed.material or next(iter(self.material))]
 
+    @property
+    def particle_count(self) -> int:
+        """Number of particles: given, or what a poured bed of the given height holds."""
+        bed = self.bed
+        if bed.height is None:
+            return bed.count or len(bed.positions)
+        return int(POURED_SOLID_FRACTION * self.column.floor_area * bed.height / (math.pi / 6.0 * bed.diameter**3))
+
+    @property
+    def reference_speed(self) -> float:
+        """Fastest collision to be expected [m/s]: given, or twice the inlet velocity, or a fall of a diameter."""
+        if self.run.reference_speed is not None:
+            return self.run.reference_speed
+        fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.diameter)
+        return max(2.0 * self.bed.inlet_speed, fall, math.hypot(*self.bed.velocity))
+
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
         """Read a case from a TOML file.
 
         overrides  {"bed.inlet_velocity": 0.06, ...}, in the place of what the file says
 
-        Raises InputError, naming file, key, value and limit.
+        Raises InputError, naming all mistakes with file, line, key, value and limit.
         """
-        path = Path(path)
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as failure:
-            reason = failure.strerror if isinstance(failure, OSError) else "not UTF-8 text"
-            raise InputError(f"case {path}", None, "a readable TOML file", f"{reason}") from None
-        return cls.from_text(text, str(path), overrides)
+        return cls.from_text(read_text(Path(path)), str(path), overrides)
 
     @classmethod
     def from_text(cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None) -> Case:
         """Read a case from the text of a TOML file; `name` is what errors call it."""
-        try:
-            values = tomllib.loads(text)
-        except (tomllib.TOMLDecodeError, RecursionError) as failure:
-            raise InputError(name, None, "valid TOML", str(failure)) from None
+        values = _parsed(text, name)
         for key, value in (overrides or {}).items():
             _put(values, key.split("."), value, key)
         try:
             return cls.model_validate(values)
         except ValidationError as refusal:
-            raise InputError(name, None, "a case", "; ".join(_complaints(refusal))) from None
+            lines, given = key_lines(text), {tuple(key.split(".")) for key in overrides or {}}
+
+            def place(key: Key) -> str:
+                if key in given:
+                    return "--set "
+                line = line_of(key, lines)
+                return f"{name}: " if line is None else f"{name}:{line}: "
+
+            raise refused(refusal, cls, values, _mistakes_in_names(refusal, values), place) from None
 
     def to_toml(self) -> str:
         """The case as TOML; `Case.from_text` gives the same case back."""
@@ -209,14 +269,95 @@ class Case(Checked):
         return Case(**values)
 
 
+def read_text(path: Path) -> str:
+    """The text of a case file."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(LONGEST_FILE + 1)
+        if len(content) > LONGEST_FILE:
+            raise InputError(
+                f"case {path}", None, f"at most {LONGEST_FILE // 1000} kB", "place very many particles from Python"
+            )
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
+    except OSError as failure:
+        raise InputError(f"case {path}", None, "a readable TOML file", failure.strerror or str(failure)) from None
+    except UnicodeDecodeError as failure:
+        remedy = f"byte {failure.start} is not UTF-8; save it as UTF-8"
+        raise InputError(f"case {path}", None, "UTF-8 text", remedy) from None
+
+
+_DEEP = re.compile(rf"(?:[\w\"'-]{{1,64}}+[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}")
+
+
+def _parsed(text: str, name: str) -> dict[str, Any]:
+    """The values of a TOML text."""
+    text = text.removeprefix("\ufeff")
+    if len(text) > LONGEST_FILE:
+        raise InputError(name, None, f"at most {LONGEST_FILE // 1000} kB", "place very many particles from Python")
+    deep = _DEEP.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(f"{name}:{line}", None, f"a case, whose keys have at most {DEEPEST_KEY} words")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(name, None, "a case, whose lists and tables lie a few levels deep") from None
+    except ValueError as failure:
+        reason, _, where = str(failure).partition(" (at ")
+        found = re.match(r"line (\d+), column (\d+)", where)
+        place = f"{name}:{found[1]}" if found else name
+        raise InputError(place, None, "valid TOML", f"{reason} in column {found[2]}" if found else reason) from None
+
+
 def _put(values: dict[str, Any], keys: list[str], value: Any, whole: str) -> None:
     """Set a value in nested tables."""
     for key in keys[:-1]:
         values = values.setdefault(key, {})
         if not isinstance(values, dict):
-            raise InputError(whole, value, f"inside a table; {key} is a value")
+            raise InputError(f"--set {whole}", shown(value), f"inside a table; {key} is a value")
     values[keys[-1]] = value
 
 
-def _complaints(refusal: ValidationError) -> list[str]:
-    return [".".join(str(part) for part in each["loc"]) + ": " + each["msg"] for each in refusal.errors()]
+def _unknown_names(known: list[str], bed: str | None, column: str | None) -> Iterator[InputError]:
+    """Names of materials that no [material] has."""
+    if bed is None and len(known) > 1:
+        yield InputError("bed.material", None, f"given, {nearest('', known)}")
+    for field, name in (("bed.material", bed), ("column.material", column)):
+        if name is not None and name not in known:
+            yield InputError(field, shown(name), nearest(name, known), "materials are tables [material.NAME]")
+
+
+def _mistakes_in_names(refusal: ValidationError, values: Mapping[str, Any]) -> list[InputError]:
+    """Unknown names, looked for in the bare values where other mistakes keep the case from being made."""
+    if any(each["loc"] == () for each in refusal.errors()):
+        return []
+    known, bed, column = (values.get(name) for name in ("material", "bed", "column"))
+    if not (isinstance(known, dict) and known and isinstance(bed, dict) and isinstance(column, dict)):
+        return []
+    names = [each if isinstance(each, str) else None for each in (bed.get("material"), column.get("material"))]
+    if "material" in bed and names[0] is None:
+        return []
+    return list(_unknown_names([described([each]) for each in known], *names))
+
+
+def _drag_named(name: str) -> Law:
+    """The drag law of a name: of the shelf, or of an installed package that offers laws."""
+    from closures import shelf
+
+    shelf.fill()
+    laws = shelf.SHELF["drag"]
+    if name not in laws:
+        shelf.fill_from_packages()
+    if name not in laws:
+        raise InputError("drag", shown(name), nearest(name, laws))
+    return laws[name]
+
+
+def _drag_of_ones_own(function: Callable[[float, float], float]) -> Law:
+    """The card of a drag law that is passed as a function."""
+    from closures.law import page
+
+    try:
+        return page(function)
+    except KeyError as failure:
+        raise InputError("laws.drag", None, "a law", str(failure.args[0])) from None

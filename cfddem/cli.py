@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from cyclopts import App, CycloptsError
@@ -18,7 +19,7 @@ app = App(
 )
 
 for command in (
-    *(cases.run, cases.resume),
+    *(cases.new, cases.check, cases.run, cases.resume),
     *(results.report, results.view, results.export),
     *(collisions.collide, collisions.wet_wall, collisions.three_spheres, collisions.wet_pair),
     *(proofs.validate, proofs.bench),
@@ -37,6 +38,8 @@ def main() -> None:
         for line in str(failure).splitlines():
             print(f"cfddem: {line}", file=sys.stderr)
         sys.exit(failure.exit_code)
+    except BrokenPipeError:  # whoever read the output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except KeyboardInterrupt:
         print("cfddem: stopped", file=sys.stderr)
         sys.exit(130)

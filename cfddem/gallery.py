@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from cfddem.case import Case
 from cfddem.errors import InputError, nearest
 
 
@@ -15,6 +16,33 @@ def gallery() -> dict[str, Path]:
     """Case files that come with the package, by name."""
     home = Path(str(files("scenarios")))
     return {path.stem.replace("_", "-"): path for path in sorted(home.glob("*.toml"))}
+
+
+def gallery_case(path: Path) -> Case:
+    """A case of the gallery."""
+    return Case.from_toml(path)
+
+
+def begin(name: str, output: Path | None = None) -> Path:
+    """Write a case of the gallery where the user can change it; an existing file is never overwritten.
+
+    name     of the gallery
+    output   file to write; in this folder if not given
+    returns  the file
+    """
+    known = gallery()
+    if name.replace("_", "-") not in known:
+        raise InputError("name", name, nearest(name, known), "the gallery has no case of another name")
+    source = known[name.replace("_", "-")]
+    output = output or Path(source.name)
+    try:
+        with output.open("x", encoding="utf-8") as file:
+            file.write(source.read_text(encoding="utf-8"))
+    except FileExistsError:
+        raise InputError("output", str(output), "a file that is not there yet", "give another name with -o") from None
+    except OSError as failure:
+        raise InputError("output", str(output), "a file that can be written", str(failure.strerror)) from None
+    return output
 
 
 def find_case(name: Path | None) -> Path:

@@ -10,11 +10,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cfddem.errors import InputError, nearest
+from cfddem.mistakes import refused
 from closures import contact, minimum_gap
 
 
 class Checked(BaseModel):
-    """A frozen description whose values are checked when it is made; a refusal is one readable line."""
+    """A frozen description whose values are checked when it is made; a refusal is a readable line a mistake."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -22,7 +23,9 @@ class Checked(BaseModel):
         try:
             super().__init__(**values)
         except ValidationError as refusal:
-            raise _readable(refusal, type(self)) from None
+            raise refused(refusal, type(self), values) from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # so that parts of it keep their own complaints
 
 
 class Material(Checked):
@@ -48,7 +51,9 @@ class Material(Checked):
     @model_validator(mode="after")
     def _softer_not_harder(self) -> Material:
         if self.contact_modulus is not None and self.contact_modulus > self.youngs_modulus:
-            raise ValueError("contact_modulus: must be at most youngs_modulus; it is there to soften contacts")
+            raise InputError(
+                "contact_modulus", self.contact_modulus, "at most youngs_modulus", "it is there to soften contacts"
+            )
         return self
 
 
@@ -135,24 +140,3 @@ def _contact_modulus(material: Material) -> float:
 
 def _lubricated(material: Material) -> float:
     return material.friction if material.friction_lubricated is None else material.friction_lubricated
-
-
-def _readable(refusal: ValidationError, model: type[BaseModel]) -> InputError:
-    """The first complaint of the checker as field, value, limit."""
-    complaint = refusal.errors()[0]
-    field = ".".join(str(part) for part in complaint["loc"]) or model.__name__.lower()
-    kind, context = complaint["type"], complaint.get("ctx", {})
-    limits = {
-        "greater_than": f"above {context.get('gt')}",
-        "greater_than_equal": f"at least {context.get('ge')}",
-        "less_than_equal": f"at most {context.get('le')}",
-        "finite_number": "a finite number",
-        "missing": "given",
-        "extra_forbidden": nearest(field, model.model_fields),
-    }
-    limit = limits.get(kind, complaint["msg"])
-    if kind == "value_error":
-        field, _, limit = str(context["error"]).partition(": must be ")
-    value = None if kind in ("missing", "value_error") else complaint["input"]
-    described = model.model_fields[field].description if field in model.model_fields else ""
-    return InputError(field, value, limit, f"{field} is {described}" if described else "")

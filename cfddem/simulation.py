@@ -10,15 +10,10 @@ import numpy as np
 
 from cfddem.assembly import assemble
 from cfddem.case import Case
+from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
 from cfddem.errors import RunFailed
 from cfddem.particles.clocks import check_step
 from cfddem.particles.state import Bodies
-
-MOST_SUBSTEPS = 50
-"""A fluid step lasts at most as long as a collision: fifty steps of 2 % of the Hertz time."""
-
-COURANT = 0.5
-"""Part of a cell that fluid or particles may cross in a fluid step."""
 
 CLOCKS_EVERY = 20
 """Fluid steps between two readings of the particles' clocks."""
@@ -97,26 +92,10 @@ class Simulation:
         """Step of the particles: given, or what their clocks recommend [s]."""
         if not (self.particles.bodies.inverse_mass > 0.0).any():
             return math.inf
-        read = self.particles.clocks(self.reference_speed)
+        read = self.particles.clocks(self.case.reference_speed)
         step = self.case.run.step or read.recommended
         check_step(step, read)
         return step
-
-    @property
-    def reference_speed(self) -> float:
-        """Fastest collision to be expected [m/s]: given, or twice the inlet velocity, or a fall of a diameter."""
-        run, bed = self.case.run, self.case.bed
-        if run.reference_speed is not None:
-            return run.reference_speed
-        fall = math.sqrt(float(np.linalg.norm(self.gravity)) * bed.diameter)
-        return max(2.0 * self._inlet_speed, fall, float(np.linalg.norm(bed.velocity)))
-
-    @property
-    def _inlet_speed(self) -> float:
-        """Fastest superficial velocity at the inlet [m/s]."""
-        inlet, jet = self.case.bed.inlet_velocity, self.case.bed.jet
-        steady = inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
-        return max(steady, 0.0 if jet is None else jet.velocity)
 
     def _choose_steps(self, until: float) -> tuple[float, int]:
         """Length of the next fluid step [s], and how many particle steps it holds."""
@@ -128,7 +107,7 @@ class Simulation:
         if self.fluid is not None:
             fluid = self.fluid.largest_step(COURANT)
             limits[fluid.clock] = fluid.step
-            limits["inlet Courant"] = COURANT * min(self.fluid.grid.spacing) / max(self._inlet_speed, 1e-300)
+            limits["inlet Courant"] = COURANT * min(self.fluid.grid.spacing) / max(self.case.bed.inlet_speed, 1e-300)
             speed = np.abs(self.particles.bodies.velocity).max(axis=0, initial=0.0) / np.array(self.fluid.grid.spacing)
             limits["particle Courant"] = COURANT / max(float(speed.max()), 1e-300)
         self.binding = min(limits, key=limits.__getitem__)

@@ -2,10 +2,63 @@
 
 from __future__ import annotations
 
+import json as _json
+import sys
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
+
+from cfddem.commands.printing import tell_of_compilation
+
+
+def new(
+    name: Annotated[str | None, Parameter(help="of the gallery; lists it if not given")] = None,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="file to write; NAME.toml here")] = None,
+    schema: Annotated[bool, Parameter(help="print the JSON schema of case files, for editors", negative="")] = False,
+) -> None:
+    """Begin a case: write a commented one of the gallery into this folder, to be changed.
+
+    Example: cfddem new liquid-bed
+    """
+    from cfddem.gallery import gallery, gallery_case
+
+    if schema:
+        from cfddem.case import Case
+
+        print(_json.dumps(Case.model_json_schema(), indent=2))
+        return
+    if name is None:
+        for known, path in gallery().items():
+            print(f"{known:<20}  {gallery_case(path).title}")
+        return
+    from cfddem.gallery import begin
+
+    written = begin(name, output)
+    print(f"written to {written}; change it, then: cfddem check {written} && cfddem run {written}")
+
+
+def check(
+    case: Annotated[Path | None, Parameter(help="TOML file, or a name of the gallery; the only one here")] = None,
+    *,
+    set: Annotated[list[str] | None, Parameter(help="key=value in place of the file's; repeat for more")] = None,
+    strict: Annotated[bool, Parameter(help="amber ends with exit code 1", negative="")] = False,
+    json: Annotated[bool, Parameter(help="print the card as JSON", negative="")] = False,
+) -> None:
+    """Say what a run will be before it runs: numbers, clocks, cost, and what speaks against it.
+
+    Ends with exit code 0 for green and amber, 2 for red.
+
+    Example: cfddem check liquid-bed --set bed.inlet_velocity=0.1
+    """
+    from cfddem.card import card
+    from cfddem.case import Case
+    from cfddem.gallery import find_case, overrides
+
+    made = card(Case.from_toml(find_case(case), overrides(set or [])))
+    print(_json.dumps(made.summary()) if json else "\n".join(made.lines()))
+    sys.exit({"green": 0, "amber": int(strict), "red": 2}[made.colour])
 
 
 def run(
@@ -15,24 +68,29 @@ def run(
     set: Annotated[list[str] | None, Parameter(help="key=value in place of the file's; repeat for more")] = None,
     threads: Annotated[int | None, Parameter(help="of the machine; all if not given")] = None,
 ) -> None:
-    """Run a case into a folder, and report what came out.
+    """Run a case into a folder, and report what came out. A case whose card is red is refused.
 
-    Example: cfddem run liquid-bed -o bed --set run.until=0.1
+    Example: cfddem run liquid-bed -o bed --set bed.count=200 --set run.until=0.02
     """
-    from cfddem.case import Case
+    from cfddem.card import refuse_red
+    from cfddem.case import Case, read_text
     from cfddem.gallery import find_case, overrides
+
+    path = find_case(case)
+    described = Case.from_toml(path, overrides(set or []))
+    for warning in refuse_red(described).verdict():
+        print(f"cfddem: {warning}", file=sys.stderr)
+    tell_of_compilation()
     from cfddem.kernels import use_threads
     from cfddem.progress import live_line
     from cfddem.report import lines
     from cfddem.report import report as summary
     from cfddem.run import Run
 
-    path = find_case(case)
-    described = Case.from_toml(path, overrides(set or []))
     folder = output or Path(f"{path.stem}-run")
     use_threads(threads)
     with live_line() as line:
-        text = described.to_toml() if set else path.read_text()
+        text = described.to_toml() if set else read_text(path)
         Run.begin(described, folder, text=text, report=line.update, progress=line.say).go()
     print("\n".join(lines(summary(folder))))
     print(f"\nwritten to {folder}; see it with: cfddem view {folder}")
@@ -46,8 +104,9 @@ def resume(
 ) -> None:
     """Go on with a run that was stopped or killed, to the same bits.
 
-    Example: cfddem resume bed --until 0.12
+    Example: cfddem resume bed --until 0.03
     """
+    tell_of_compilation()
     from cfddem.kernels import use_threads
     from cfddem.progress import live_line
     from cfddem.record.reading import newest_run

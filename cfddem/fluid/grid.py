@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.errors import InputError
+from cfddem.fluid.division import cell_counts
 from cfddem.kernels import prange, threaded
 
 Array = NDArray[np.float64]
@@ -83,24 +84,10 @@ class Grid:
         returns  Grid
         errors   InputError where the cells do not fit the box
         """
-        lengths = np.asarray(size, dtype=float)
-        widths = np.broadcast_to(np.asarray(cell, dtype=float), (3,))
-        if lengths.shape != (3,) or not (np.isfinite(lengths).all() and (lengths > 0).all()):
-            raise InputError("grid.size", tuple(lengths), "three positive lengths in m")
-        if not (np.isfinite(widths).all() and (widths > 0).all()):
-            raise InputError("grid.cell", tuple(widths), "positive, in m")
-        counts = np.maximum(np.rint(lengths / widths), 1.0)
-        for name, length, width, count in zip("xyz", lengths, widths, counts):
-            if abs(count * width - length) > 1e-6 * length:
-                raise InputError(
-                    "grid.cell",
-                    float(width),
-                    f"a whole fraction of the box, {length:g} m along {name}",
-                    f"{length / count:.6g} m fits {int(count)} times",
-                )
+        counts = cell_counts(size, cell)
         grid = cls(
-            tuple(int(n) for n in counts),  # type: ignore[arg-type]
-            tuple(float(length / n) for length, n in zip(lengths, counts)),  # type: ignore[arg-type]
+            counts,
+            tuple(float(length) / n for length, n in zip(size, counts)),  # type: ignore[arg-type]
             tuple(float(x) for x in origin),  # type: ignore[arg-type]
         )
         return grid if solid is None else grid.with_solid(solid)

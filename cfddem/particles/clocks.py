@@ -3,51 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from cfddem.errors import UnstableStep
 from cfddem.kernels import kernel
 from cfddem.particles.forces import LINEAR, VERLET, Laws
 from cfddem.particles.pairs import Edges
 from cfddem.particles.state import Bodies
+from cfddem.particles.steps import STABLE, Clocks, check_step, crossing_step, hertz_steps, linear_steps
 from cfddem.particles.surfaces import Walls
-from closures import contact, lubrication, timescales
+from closures import lubrication, timescales
 from closures.contact import hertz_stiffness
 from closures.timescales import overlap_period
 
-STEPS_PER_HERTZ_TIME = 50
-"""The default step is 2 % of the Hertz time of the fastest approach."""
-
-STABLE = 1.0
-"""A step may be at most this over the largest angular frequency; velocity Verlet breaks at 2."""
-
-
-@dataclass(frozen=True)
-class Clocks:
-    """Largest steps that each piece of physics allows, in seconds; infinite where it sets no limit."""
-
-    hertz: float  # 2 % of the Hertz time at the reference speed
-    impact: float  # stability of an impact at the reference speed
-    overlap: float  # stability of the contacts that exist
-    film: float  # stability of the film as an explicit force; the lubricated drift has no limit
-    crossing: float  # a particle may not cross a tenth of its radius in a step
-
-    @property
-    def recommended(self) -> float:
-        """The step to take: 2 % of the Hertz time, less where stability asks for it [s]."""
-        return min(self.hertz, 0.5 * self.limit)
-
-    @property
-    def limit(self) -> float:
-        """The step from which a run is refused [s]."""
-        return min(self.impact, self.overlap, self.film, self.crossing)
-
-    @property
-    def binding(self) -> str:
-        """The clock that sets the limit."""
-        return min(("impact", "overlap", "film", "crossing"), key=lambda name: float(getattr(self, name)))
+__all__ = ["Clocks", "check_step", "clocks"]
 
 
 def clocks(
@@ -68,25 +37,17 @@ def clocks(
     hertz, impact, film = math.inf, math.inf, math.inf
     for mass, radius, row in _lightest_pairs(bodies, table):
         if laws.contact == LINEAR:
-            swing = math.sqrt(mass / max(laws.normal_stiffness, laws.tangential_stiffness))
-            hertz, impact = min(hertz, math.pi * swing / STEPS_PER_HERTZ_TIME), min(impact, STABLE * swing)
+            steps = linear_steps(mass, laws.normal_stiffness, laws.tangential_stiffness)
         elif speed > 0.0 and row["contact_modulus"] > 0.0:
-            stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), radius)
-            deepest = contact.hertz_largest_overlap(mass, stiffness, speed)
-            hertz = min(hertz, timescales.hertz_time(mass, stiffness, speed) / STEPS_PER_HERTZ_TIME)
-            impact = min(impact, STABLE * timescales.overlap_period(mass, stiffness, deepest))
+            steps = hertz_steps(mass, radius, float(row["contact_modulus"]), speed)
+        else:
+            steps = math.inf, math.inf
+        hertz, impact = min(hertz, steps[0]), min(impact, steps[1])
         if laws.film and laws.integrator == VERLET:
             strength = lubrication.film_strength(float(bodies.viscosity.max()), radius)
             film = min(film, 2.0 * timescales.film_time(mass, strength, float(row["roughness_gap"])))
     overlap = STABLE / math.sqrt(max(_largest_rate(bodies, edges, walls, gap, table, laws), 1e-300))
-    crossing = 0.1 * float(bodies.radius.min()) / speed if speed > 0.0 else math.inf
-    return Clocks(hertz, impact, overlap, film, crossing)
-
-
-def check_step(step: float, read: Clocks) -> None:
-    """Refuse a step that the physics cannot follow, with the one that works."""
-    if step > read.limit:
-        raise UnstableStep(step, read.limit, f"{read.binding} clock", f"take {read.recommended:.2g} s")
+    return Clocks(hertz, impact, overlap, film, crossing_step(float(bodies.radius.min()), speed))
 
 
 def _lightest_pairs(bodies: Bodies, table: np.ndarray) -> list[tuple[float, float, np.ndarray]]:

@@ -1,0 +1,238 @@
+"""What the laws of beds say of a case before it runs: velocities, expansion, pressure drop, film, steps, cost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cfddem.case import POURED_SOLID_FRACTION, Case
+from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
+from cfddem.fluid.division import cell_counts
+from cfddem.materials import pair_table
+from cfddem.particles.steps import Clocks, crossing_step, hertz_steps, linear_steps
+from closures import balance, bed, contact, drag_single, minimum_gap, numbers
+from closures.drag import ergun
+
+LIQUID = 100.0
+"""Density from which on a fluid counts as a liquid, whose beds expand evenly [kg/m3]."""
+
+BYTES_PER_PARTICLE, BYTES_PER_CELL, BYTES_AT_LEAST = 3000.0, 1300.0, 0.45e9
+"""Memory of a dense run, by the size of its arrays and that of a process with its loops."""
+
+PARTICLE_STEPS_PER_SECOND, CELL_STEPS_PER_SECOND, EXCHANGES_PER_SECOND = 4e6, 3e5, 4e5
+"""Speed of one core: particle steps, cells of fluid steps, particles of fluid steps.
+
+Measured with 2 000 to 128 000 spheres in a liquid; particles alone are two to three times as fast where few touch.
+"""
+
+
+@dataclass(frozen=True)
+class Bed:
+    """The bed by the laws of beds; nan where a law does not apply."""
+
+    count: int
+    solids: float  # volume of the particles [m3]
+    weight: float  # buoyant, over the floor [Pa]
+    archimedes: float
+    inlet: float  # mean superficial velocity over the floor, the largest in time [m/s]
+    reynolds: float  # on the superficial velocity; on the terminal one where nothing flows in
+    onset: float  # u_mf by the drag law, at the voidage of a poured bed [m/s]
+    terminal: float  # u_t of a particle alone [m/s]
+    voidage: float  # of the bed in the flow
+    height: float  # of the bed in the flow [m]
+    pressure_drop: float  # [Pa]
+    drag_factor: float  # F at this voidage
+
+    @property
+    def poured_height(self) -> float:
+        """Height of the bed at rest [m]."""
+        return self.height * (1.0 - self.voidage) / POURED_SOLID_FRACTION
+
+
+def bed_of(case: Case) -> Bed:
+    """The bed of a case."""
+    diameter, floor = case.bed.diameter, case.column.floor_area
+    count = case.particle_count
+    solids = count * math.pi / 6.0 * diameter**3 * (1.0 + 3.0 * case.bed.spread**2)
+    packed, nan = 1.0 - POURED_SOLID_FRACTION, math.nan
+    poured = solids / (floor * POURED_SOLID_FRACTION)
+    gravity, solid, fluid = math.hypot(*case.laws.gravity), case.solid, case.fluid
+    if fluid is None:
+        weight = solids * solid.density * gravity / floor
+        return Bed(count, solids, weight, nan, 0.0, nan, nan, nan, packed, poured, nan, nan)
+    weight = solids * abs(solid.density - fluid.density) * gravity / floor
+    inlet = mean_inlet(case)
+    if fluid.viscosity == 0.0:
+        return Bed(count, solids, weight, nan, inlet, nan, nan, nan, packed, poured, nan, nan)
+    number = abs(numbers.archimedes(diameter, solid.density, fluid.density, fluid.viscosity, gravity))
+    scale = fluid.viscosity / (fluid.density * diameter)
+    law = case.laws.drag_law
+    drag = ergun if law is None else law.function
+    terminal = balance.reynolds_in_balance(number, 1.0, drag_single.brown_lawler) * scale
+    onset = balance.reynolds_in_balance(number, packed, drag) * scale
+    reynolds = (inlet or terminal) / scale
+    voidage = packed
+    if case.bed.start != "poured" and (case.bed.fixed or inlet == 0.0):
+        voidage = 1.0 - solids / (floor * case.column.height)
+    elif case.bed.fixed:
+        voidage = packed
+    elif inlet > 0.0 and number > 0.0:
+        voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
+    height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
+    drop = weight
+    if case.bed.fixed or inlet < onset:
+        drop = bed.ergun_gradient(inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)) * height
+    return Bed(
+        count, solids, weight, number, inlet, reynolds, onset, terminal, voidage, height, drop, drag(reynolds, voidage)
+    )
+
+
+def mean_inlet(case: Case) -> float:
+    """Superficial velocity over the whole floor, the jet included, the largest in time [m/s]."""
+    column, jet = case.column, case.bed.jet
+    if column.ends != "flow":
+        return 0.0
+    inlet = case.bed.floor_speed
+    if jet is None:
+        return inlet
+    width, depth, _ = column.size
+    hole = 0.25 * math.pi * jet.width**2 if jet.round else min(jet.width, width) * min(jet.depth or depth, depth)
+    share = min(1.0, hole / column.floor_area)
+    return (1.0 - share) * inlet + share * jet.velocity
+
+
+# ---------------------------------------------------------------- film and contact
+
+
+@dataclass(frozen=True)
+class Encounter:
+    """Two mean particles that meet at the reference speed."""
+
+    speed: float  # [m/s]
+    stokes: float
+    roughness_gap: float  # h_sigma [m]
+    film_gap: float  # h_eps, with the real modulus [m]
+    softened_film_gap: float  # h_eps if the film felt the modulus of the contact [m]
+    overlap: float  # deepest, dry [m]
+    real_overlap: float  # the same with the real modulus [m]
+    resting_overlap: float  # under the weight of the bed [m]
+    softening: float  # modulus of the contact over the real one
+
+    @property
+    def gap(self) -> float:
+        """The minimum gap: the larger of roughness and elastic film [m]."""
+        return max(self.roughness_gap, self.film_gap)
+
+    @property
+    def softened_gap(self) -> float:
+        """What the minimum gap would be if the film felt the modulus of the contact [m]."""
+        return max(self.roughness_gap, self.softened_film_gap)
+
+
+def encounter_of(case: Case, known: Bed) -> Encounter:
+    """How two particles of a case meet."""
+    row = _pair(case)
+    mass, radius = _reduced(case, 1.0)
+    speed = max(case.reference_speed, 1e-12)
+    real, soft = float(row["film_modulus"]), float(row["contact_modulus"])
+    stiffness, real_stiffness = contact.hertz_stiffness(soft, radius), contact.hertz_stiffness(real, radius)
+    load = known.weight * case.bed.diameter**2
+    viscosity = 0.0 if case.fluid is None else case.fluid.viscosity
+    wet = viscosity > 0.0 and case.laws.lubrication != "none"
+    return Encounter(
+        speed,
+        numbers.stokes(mass, speed, viscosity, radius) if viscosity > 0.0 else math.inf,
+        float(row["roughness_gap"]) if wet else 0.0,
+        minimum_gap.elastohydrodynamic(viscosity, speed, real, radius) if wet else 0.0,
+        minimum_gap.elastohydrodynamic(viscosity, speed, soft, radius) if wet else 0.0,
+        contact.hertz_largest_overlap(mass, stiffness, speed),
+        contact.hertz_largest_overlap(mass, real_stiffness, speed),
+        (load / stiffness) ** (2.0 / 3.0),
+        soft / real,
+    )
+
+
+def _pair(case: Case):  # type: ignore[no-untyped-def]
+    """Row of the table of material pairs of two particles."""
+    kind = list(case.material).index(case.bed.material or next(iter(case.material)))
+    return pair_table(list(case.material.values()))[kind, kind]
+
+
+def _reduced(case: Case, size: float) -> tuple[float, float]:
+    """Reduced mass [kg] and radius [m] of two particles of `size` times the mean diameter."""
+    diameter = size * case.bed.diameter
+    return 0.5 * math.pi / 6.0 * diameter**3 * case.solid.density, 0.25 * diameter
+
+
+# ---------------------------------------------------------------- steps and cost
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps of a run, and what it costs."""
+
+    clocks: Clocks  # of the particles
+    particle: float  # step of the particles [s]
+    limits: dict[str, float]  # of the fluid step, by clock [s]
+    cells: tuple[int, int, int] | None
+
+    @property
+    def binding(self) -> str:
+        """Clock that sets the fluid step."""
+        return min(self.limits, key=self.limits.__getitem__)
+
+    @property
+    def fluid(self) -> float:
+        """Step of the fluid, or of the particles between two looks at their clocks [s]."""
+        return self.limits[self.binding]
+
+
+def steps_of(case: Case, known: Bed) -> Steps:
+    """Steps of a case at its start."""
+    smallest = max(0.1, 1.0 - 3.0 * case.bed.spread)
+    mass, radius = _reduced(case, smallest)
+    speed, laws, run = max(case.reference_speed, 1e-12), case.laws, case.run
+    if laws.contact == "linear" and max(laws.normal_stiffness, laws.tangential_stiffness) > 0.0:
+        hertz, impact = linear_steps(mass, laws.normal_stiffness, laws.tangential_stiffness)
+    else:
+        hertz, impact = hertz_steps(mass, radius, float(_pair(case)["contact_modulus"]), speed)
+    read = Clocks(hertz, impact, math.inf, math.inf, crossing_step(2.0 * radius, speed))
+    particle = math.inf if case.bed.fixed else run.step or read.recommended
+    limits = {"collision": MOST_SUBSTEPS * particle}
+    if run.fluid_step is not None:
+        limits["given"] = run.fluid_step
+    if case.fluid is None:
+        return Steps(read, particle, limits, None)
+    cells = cell_counts(case.column.size, case.column.cell)
+    spacing = [length / count for length, count in zip(case.column.size, cells)]
+    fastest = max(known.inlet / known.voidage, case.bed.inlet_speed)
+    if fastest > 0.0:
+        limits["Courant"] = COURANT * min(spacing) / fastest
+    if not case.bed.fixed:
+        limits["particle Courant"] = COURANT * min(spacing) / speed
+    return Steps(read, particle, limits, cells)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Time on one core, memory, and room on the disk."""
+
+    seconds: float
+    memory: float  # [byte]
+    disk: float  # [byte]
+    snapshots: float
+
+
+def cost_of(case: Case, known: Bed, steps: Steps) -> Cost:
+    """What a run will cost, to within a factor of two or three."""
+    cells = math.prod(steps.cells or (0, 0, 0))
+    pushes, turns = case.run.until / min(steps.particle, steps.fluid), case.run.until / steps.fluid
+    seconds = pushes * known.count / PARTICLE_STEPS_PER_SECOND
+    seconds += turns * (cells / CELL_STEPS_PER_SECOND + known.count / EXCHANGES_PER_SECOND * bool(cells))
+    snapshots = 1.0 + case.run.until / (case.run.every or case.run.until / 50.0)
+    return Cost(
+        seconds,
+        BYTES_AT_LEAST + BYTES_PER_PARTICLE * known.count + BYTES_PER_CELL * cells,
+        snapshots * (120.0 * known.count + 40.0 * cells),
+        snapshots,
+    )

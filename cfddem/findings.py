@@ -1,0 +1,268 @@
+"""What speaks against a run before it begins: red where it cannot come out right, amber where it may not."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from cfddem.case import POURED_SOLID_FRACTION, Case
+from cfddem.expected import LIQUID, Bed, Cost, Encounter, Steps
+
+DENSEST = 0.64
+"""Solid fraction of a random close packing: no bed of equal spheres is denser."""
+
+SUSPENDED = math.pi / 6.0 / 1.02**3
+"""Solid fraction that a cubic lattice holds with a fiftieth of a diameter between neighbours."""
+
+NARROWEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
+"""Kernel, as a box of equal variance, over the diameter: below the first a sphere overfills its box."""
+
+DEEP, DEEPEST = 0.02, 0.1
+"""Overlap over the diameter: from the first on contacts are soft, from the second spheres pass into each other."""
+
+LONG = 86_400.0
+"""A run that takes longer than a day is worth a second thought [s]."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that speaks against a run."""
+
+    colour: Literal["amber", "red"]
+    key: str  # of the case
+    reason: str  # what, with number and limit
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.reason}; {self.remedy}"
+
+
+def findings(case: Case, bed: Bed, pair: Encounter, steps: Steps, cost: Cost) -> list[Finding]:
+    """All that speaks against a run, red first."""
+    found = [*_room(case, bed), *_particles(case), *_contacts(case, pair), *_steps(case, steps), *_cost(case, cost)]
+    if case.fluid is not None:
+        found += [*_kernel(case, steps), *_flow(case, bed), *_drag(case, bed)]
+    return sorted(found, key=lambda each: each.colour != "red")
+
+
+def _room(case: Case, bed: Bed) -> Iterator[Finding]:
+    """Do the particles fit into the column, and does the bed?"""
+    column, diameter = case.column, case.bed.diameter
+    narrowest = min(column.size)
+    if diameter > narrowest * (1.0 + 1e-9):
+        yield Finding(
+            "red", "bed.diameter", f"{diameter:.3g} m is more than the column's {narrowest:.3g} m", "widen the column"
+        )
+        return
+    fraction = bed.solids / (column.floor_area * column.height)
+    most = int(bed.count / fraction * (SUSPENDED if case.bed.start == "suspended" else POURED_SOLID_FRACTION))
+    fits = f"at most {most} of these particles fit; take fewer, or a higher column"
+    if case.bed.start == "suspended" and fraction > SUSPENDED:
+        yield Finding("red", "bed.count", f"solid fraction {fraction:.2f}, above {SUSPENDED:.2f} of a lattice", fits)
+    elif fraction > DENSEST:
+        yield Finding("red", "bed.count", f"voidage {1 - fraction:.2f}, below {1 - DENSEST:.2f} of a packing", fits)
+    elif case.bed.start == "poured" and bed.poured_height > column.height - 0.5 * diameter:
+        yield Finding(
+            "red", "bed.count", f"poured to {bed.poured_height:.3g} m, above the lid at {column.height:.3g} m", fits
+        )
+    elif bed.voidage < 1.0 and bed.height > 0.9 * column.height and case.bed.start == "poured":
+        colour: Literal["amber", "red"] = "red" if bed.height > 1.2 * column.height else "amber"
+        yield Finding(
+            colour, "column.height",
+            f"the bed expands to about {bed.height:.3g} m; the lid is at {column.height:.3g} m",
+            f"take {1.3 * bed.height:.2g} m, or a slower inlet",
+        )  # fmt: skip
+
+
+def _particles(case: Case) -> Iterator[Finding]:
+    """Do particles that are placed one by one lie in the column, and apart from each other?"""
+    places = np.array(case.bed.positions, float).reshape(-1, 3)
+    if not len(places):
+        return
+    size, radius = np.array(case.column.size), 0.5 * case.bed.diameter
+    outside = ~((places >= 0.0) & (places <= size)).all(axis=1)
+    if case.column.shape == "cylinder":
+        outside |= np.hypot(*(places[:, :2] - 0.5 * size[:2]).T) > 0.5 * size[0]
+    if outside.any():
+        row = int(np.argmax(outside))
+        yield Finding(
+            "red", f"bed.positions.{row}",
+            f"{[float(f'{x:.4g}') for x in places[row]]} lies outside of the column"
+            + (f", as do {int(outside.sum()) - 1} more" if outside.sum() > 1 else ""),
+            f"it reaches from 0 to {case.column.size} m",
+        )  # fmt: skip
+    deepest, rows = 0.0, (0, 0)
+    order = np.argsort(places[:, 2])
+    for k, row in enumerate(order):
+        above = order[k + 1 :]
+        above = above[: np.searchsorted(places[above, 2], places[row, 2] + 2.0 * radius)]
+        if len(above):
+            overlap = 2.0 * radius - np.linalg.norm(places[above] - places[row], axis=1)
+            if overlap.max() > deepest:
+                deepest, rows = float(overlap.max()), (int(row), int(above[np.argmax(overlap)]))
+    if deepest > DEEP * 2.0 * radius:
+        yield Finding(
+            "red", "bed.positions",
+            f"particles {min(rows)} and {max(rows)} overlap by {50.0 * deepest / radius:.3g} % of their diameter",
+            "move them apart",
+        )  # fmt: skip
+
+
+def _contacts(case: Case, pair: Encounter) -> Iterator[Finding]:
+    """Are contacts stiff enough?"""
+    diameter, laws = case.bed.diameter, case.laws
+    if laws.contact == "linear":
+        if laws.normal_stiffness == 0.0:
+            yield Finding("red", "laws.normal_stiffness", "0 N/m: nothing keeps particles apart", "give a stiffness")
+        return
+    if case.bed.fixed:
+        return
+    for what, overlap in (("impacts at the reference speed", pair.overlap), ("the bed's weight", pair.resting_overlap)):
+        part = overlap / diameter
+        if part > DEEP:
+            softer = case.solid.contact_modulus or case.solid.youngs_modulus
+            stiff = softer * (part / (0.5 * DEEP)) ** (2.5 if overlap == pair.overlap else 1.5)
+            yield Finding(
+                "red" if part > DEEPEST else "amber", "material.contact_modulus",
+                f"{what} press spheres {100.0 * part:.2g} % of a diameter into each other; {100.0 * DEEP:g} % is soft",
+                f"take {stiff:.1g} Pa",
+            )  # fmt: skip
+
+
+def _steps(case: Case, steps: Steps) -> Iterator[Finding]:
+    """Can the physics follow the steps?"""
+    given, read = case.run.step, steps.clocks
+    if given is not None and given > read.limit and not case.bed.fixed:
+        yield Finding(
+            "red", "run.step",
+            f"{given:.3g} s is above the stability limit {read.limit:.3g} s of the {read.binding} clock",
+            f"take {read.recommended:.2g} s, or leave it out",
+        )  # fmt: skip
+    elif given is not None and given > 1.5 * read.recommended:
+        yield Finding(
+            "amber", "run.step",
+            f"{given:.3g} s is stable, but long beside the {read.recommended:.2g} s of 2 % of a collision",
+            f"take {read.recommended:.2g} s, or leave it out",
+        )  # fmt: skip
+    if case.run.average_from is not None and case.run.average_from >= case.run.until:
+        yield Finding(
+            "amber", "run.average_from", f"{case.run.average_from:g} s is not before the end, {case.run.until:g} s",
+            "means will be of the last row alone; begin them earlier",
+        )  # fmt: skip
+
+
+def _cost(case: Case, cost: Cost) -> Iterator[Finding]:
+    """Does it fit into this machine, and into a day?"""
+    there = memory()
+    if cost.memory > 0.5 * there:
+        yield Finding(
+            "red" if cost.memory > there else "amber", "bed.count",
+            f"needs about {cost.memory / 1e9:.3g} GB of memory; this machine has {there / 1e9:.3g} GB",
+            "take fewer particles, or larger cells",
+        )  # fmt: skip
+    if cost.seconds > LONG:
+        yield Finding(
+            "amber", "run.until", f"takes about {cost.seconds / LONG:.2g} days on one core",
+            "soften material.contact_modulus, take fewer particles, or a shorter run",
+        )  # fmt: skip
+    if cost.disk > 50e9 or cost.snapshots > 100_000:
+        yield Finding(
+            "amber", "run.every", f"writes {cost.snapshots:.3g} snapshots of together about {cost.disk / 1e9:.2g} GB",
+            "write less often",
+        )  # fmt: skip
+
+
+def memory() -> float:
+    """Memory of this machine [byte]; infinite where it cannot be known."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):
+        return math.inf
+
+
+# ---------------------------------------------------------------- with a fluid
+
+
+def _kernel(case: Case, steps: Steps) -> Iterator[Finding]:
+    """Is what a particle fills large enough for it?"""
+    assert steps.cells is not None
+    spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
+    smallest, diameter = min(spacing, default=min(case.column.size)), case.bed.diameter
+    own = 0.0 if case.laws.mapping == "divided" else 1.0 / math.sqrt(6.0)
+    sphere = diameter / math.sqrt(20.0) if case.laws.mapping == "divided" else 0.0
+    deviation = max(case.laws.smoothing * diameter, own * smallest, math.hypot(sphere, smallest / math.sqrt(12.0)))
+    width = math.sqrt(12.0) * deviation / diameter
+    if width < NARROW_KERNEL:
+        yield Finding(
+            "red" if width < NARROWEST_KERNEL else "amber", "column.cell",
+            f"{smallest:.3g} m spreads a particle over {width:.2g} diameters; a bed needs {NARROW_KERNEL:g}",
+            f"take cells of {3.0 * diameter:.2g} m, or laws.smoothing = 1.5",
+        )  # fmt: skip
+    if case.laws.smoothing * diameter > 12.0 * smallest:
+        yield Finding(
+            "amber", "column.cell",
+            f"{smallest:.3g} m is far below the kernel of {case.laws.smoothing * diameter:.3g} m, which costs time",
+            f"take cells of {2.0 * diameter:.2g} m or more",
+        )  # fmt: skip
+
+
+def _flow(case: Case, bed: Bed) -> Iterator[Finding]:
+    """Does the flow fluidise the bed, and leave it in the column?"""
+    assert case.fluid is not None
+    inlet, ends = case.bed.inlet_velocity, case.column.ends
+    if case.fluid.viscosity == 0.0 and case.laws.drag_law is not None:
+        yield Finding(
+            "red", "fluid.viscosity", "0 Pa s: drag laws need a viscous fluid", 'set it, or laws.drag = "none"'
+        )
+    weight = case.laws.gravity[2] * (case.solid.density - case.fluid.density)
+    if case.bed.start == "poured" and case.laws.gravity[2] >= 0.0:
+        yield Finding("red", "laws.gravity", "does not point down, but the bed is poured", 'bed.start = "suspended"')
+    if ends != "flow" and (case.bed.inlet_speed > 0.0):
+        yield Finding(
+            "amber", "bed.inlet_velocity", f"is not used, as column.ends = {ends!r}", 'set column.ends = "flow"'
+        )
+    if ends == "periodic" and math.hypot(*case.laws.gravity) > 0.0:
+        yield Finding("amber", "column.ends", "periodic along gravity: all falls faster and faster", "set laws.gravity")
+    if case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or case.laws.gravity[2] == 0.0:
+        return
+    if weight > 0.0:
+        yield Finding(
+            "amber", "material.density", "particles float, and the flow lifts them to the lid", "turn gravity"
+        )
+    elif bed.inlet > bed.terminal:
+        yield Finding(
+            "red" if isinstance(inlet, float) else "amber", "bed.inlet_velocity",
+            f"{bed.inlet:.3g} m/s is above the terminal velocity {bed.terminal:.3g} m/s: the bed is carried to the lid",
+            f"the bed is fluid from {bed.onset:.2g} m/s on; or set bed.fixed = true",
+        )  # fmt: skip
+    elif bed.inlet < bed.onset and case.bed.start == "poured":
+        yield Finding(
+            "amber", "bed.inlet_velocity", f"{bed.inlet:.3g} m/s is below minimum fluidisation, {bed.onset:.3g} m/s",
+            "the bed will stay packed; fixed = true makes that much faster",
+        )  # fmt: skip
+
+
+def _drag(case: Case, bed: Bed) -> Iterator[Finding]:
+    """Is the drag law asked inside the range it was fitted to?"""
+    law = case.laws.drag_law
+    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+        return
+    voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
+    values = {"reynolds": bed.reynolds, "voidage": voidage}
+    for name, (low, high) in law.ranges.items():
+        value = values.get(name)
+        if value is not None and not low <= value <= high:
+            yield Finding(
+                "amber", "laws.drag", f"{law.name} was fitted for {name} {low:g} to {high:g}; here it is {value:.3g}",
+                "cfddem explain lists the laws and their ranges",
+            )  # fmt: skip
+
+
+def bubbles(case: Case, bed: Bed) -> bool:
+    """Whether the bed bubbles, so that the laws of even expansion do not hold."""
+    return case.fluid is not None and case.fluid.density < LIQUID and bed.inlet > bed.onset
