@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from test_command_line import cfddem
 
 from cfddem.errors import InputError
 from closures.restitution import davis_sitison
 from scenarios import three_spheres_engine as engine
+from scenarios import three_spheres_figures as figures
 from scenarios import three_spheres_validation as study
 from scenarios.three_spheres import centres, outcomes, simulate
 from scenarios.validation import Row
@@ -137,6 +140,16 @@ def test_a_map_equals_single_runs() -> None:
             assert table["outcome"][row, column] == run.outcome
             assert table["restitution12"][row, column] == run.restitution12
             assert table["restitution23"][row, column] == run.restitution23
+
+
+def test_a_map_shows_each_outcome_in_its_colour(tmp_path: Path) -> None:
+    table = {"outcome": np.array([["FS", "PA1"], ["FA", "PA3"]])}
+    mesh = figures.outcome_map(np.array([1.0, 2.0]), np.array([10.0, 20.0]), table).axes[0].collections[0]
+    shown = mesh.cmap(mesh.norm(mesh.get_array())).reshape(2, 2, 4)
+    for place, outcome in np.ndenumerate(table["outcome"]):
+        assert to_hex(shown[place]) == figures.COLOURS[outcome]
+    figures.draw_map(tmp_path / "map.png", {"stokes": 8.0, "friction": 0.1}, count=3)
+    assert (tmp_path / "map.png").stat().st_size > 10_000
 
 
 def test_two_spheres_head_on_follow_the_law_to_rounding_of_the_integrator() -> None:
