@@ -63,7 +63,7 @@ class Card:
 
     def lines(self) -> list[str]:
         """The card as text, at most 100 columns wide."""
-        out, group = [self.title], ""
+        out, group = [textwrap.shorten(self.title, WIDTH, placeholder=" ...")], ""
         for row in self.rows:
             if row.group != group:
                 group = row.group
@@ -77,7 +77,7 @@ class Card:
             return ["green: nothing speaks against it"]
         out = []
         for each in self.findings:
-            out += textwrap.wrap(f"{each.colour}: {each}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+            out += textwrap.wrap(f"{each.colour}: {each}", WIDTH, subsequent_indent="  ")
         return out
 
 
@@ -132,8 +132,8 @@ def _flow_rows(case: Case, bed: Bed) -> Iterator[Row]:
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"of the {'superficial inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes)
-    yield Row(group, "u_mf", bed.onset, "m/s", "minimum fluidisation by the drag law, at voidage 0.42")
-    yield Row(group, "u_t", bed.terminal, "m/s", "terminal velocity of one particle, Brown and Lawler")
+    yield Row(group, "u_mf", bed.onset, "m/s", "minimum fluidisation by the drag law")
+    yield Row(group, "u_t", bed.terminal, "m/s", "of one particle alone, Brown and Lawler")
     if bed.inlet and bed.onset and bed.terminal:
         yield Row(group, "u / u_mf", bed.inlet / bed.onset)
         yield Row(group, "u / u_t", bed.inlet / bed.terminal)
@@ -149,7 +149,7 @@ def _film_rows(case: Case, pair: Encounter) -> Iterator[Row]:
         yield Row(group, "minimum gap", pair.gap, "m", f"set by {regime}")
         yield Row(group, "minimum gap / roughness", pair.gap / pair.roughness_gap)
         if pair.softening < 1.0:
-            note = "if the film felt the softened modulus; it feels the real one"
+            note = "if the film felt the softened modulus, too"
             yield Row(group, "minimum gap, softened", pair.softened_gap, "m", note)
     yield Row(group, "contact modulus / real", pair.softening)
     yield Row(group, "overlap / diameter", pair.overlap / case.bed.diameter, "", "deepest, dry")
@@ -200,7 +200,7 @@ def _outlook(case: Case, bed: Bed, cost: Cost) -> Iterator[Row]:
     elif not math.isnan(bed.height):
         yield Row(group, "bed height", bed.height, "m", "poured")
     amount, unit = _duration(cost.seconds)
-    yield Row(group, "time on one core", amount, unit, "to within a factor of three, after loops are compiled")
+    yield Row(group, "time on one core", amount, unit, "to a factor of three, loops compiled")
     yield Row(group, "memory", cost.memory / 1e9, "GB")
     yield Row(group, "snapshots", cost.snapshots, "", f"{cost.disk / 1e6:.3g} MB")
 

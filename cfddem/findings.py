@@ -122,16 +122,19 @@ def _contacts(case: Case, pair: Encounter) -> Iterator[Finding]:
         return
     if case.bed.fixed:
         return
-    for what, overlap in (("impacts at the reference speed", pair.overlap), ("the bed's weight", pair.resting_overlap)):
-        part = overlap / diameter
-        if part > DEEP:
-            softer = case.solid.contact_modulus or case.solid.youngs_modulus
-            stiff = softer * (part / (0.5 * DEEP)) ** (2.5 if overlap == pair.overlap else 1.5)
-            yield Finding(
-                "red" if part > DEEPEST else "amber", "material.contact_modulus",
-                f"{what} press spheres {100.0 * part:.2g} % of a diameter into each other; {100.0 * DEEP:g} % is soft",
-                f"take {stiff:.1g} Pa",
-            )  # fmt: skip
+    both = {
+        "impacts at the reference speed press": (pair.overlap, 2.5),
+        "the bed's weight presses": (pair.resting_overlap, 1.5),
+    }
+    what, (overlap, power) = max(both.items(), key=lambda each: each[1])
+    part = overlap / diameter
+    if part > DEEP:
+        softer = case.solid.contact_modulus or case.solid.youngs_modulus
+        yield Finding(
+            "red" if part > DEEPEST else "amber", "material.contact_modulus",
+            f"{what} spheres {100.0 * part:.2g} % of a diameter into each other; more than {100.0 * DEEP:g} % is soft",
+            f"take {softer * (part / (0.5 * DEEP)) ** power:.1g} Pa",
+        )  # fmt: skip
 
 
 def _steps(case: Case, steps: Steps) -> Iterator[Finding]:

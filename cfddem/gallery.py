@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tomllib
 from collections.abc import Sequence
 from importlib.resources import files
@@ -10,6 +11,7 @@ from typing import Any
 
 from cfddem.case import Case
 from cfddem.errors import InputError, nearest
+from cfddem.mistakes import parts_of
 
 
 def gallery() -> dict[str, Path]:
@@ -68,8 +70,31 @@ def overrides(given: Sequence[str]) -> dict[str, Any]:
         key, equals, value = each.partition("=")
         if not equals or not key:
             raise InputError("--set", each, "key=value, such as bed.inlet_velocity=0.06")
-        try:
-            values[key] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            values[key] = value
+        values[full_key(key)] = read_value(value)
     return values
+
+
+def read_value(text: str) -> Any:
+    """A value as TOML reads it; what TOML cannot read is a text."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def full_key(key: str) -> str:
+    """A key with its table, where its last word alone says enough: seed is bed.seed.
+
+    >>> full_key("seed"), full_key("fluid.viscosity"), full_key("title")
+    ('bed.seed', 'fluid.viscosity', 'title')
+    """
+    if "." in key or key in Case.model_fields:
+        return key
+    homes = {name: parts[0].model_fields for name, field in Case.model_fields.items() if (parts := parts_of(field))}
+    homes.pop("material")  # by the name of the solid: material.NAME.density
+    found = [f"{name}.{key}" for name, words in homes.items() if key in words]
+    if len(found) > 1:
+        raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
+    if not found:
+        raise InputError("key", key, nearest(key, {*Case.model_fields, *itertools.chain(*homes.values())}))
+    return found[0]

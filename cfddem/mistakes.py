@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from cfddem.errors import InputError, nearest
 
@@ -88,7 +89,8 @@ def refused(
     found = [(key, _one(key, several, model)) for key, several in itertools.islice(said.items(), MOST)]
     errors = []
     for key, error in [*found, *(((), error) for error in more)]:
-        whole = (*key, *error.field[len(described(key)) :].strip(".").split(".")) if error.field else key
+        beyond = error.field.removeprefix(described(key)).strip(".")  # what the parts of a description say of theirs
+        whole = (*key, *beyond.split(".")) if beyond else key
         errors.append(InputError(place(whole) + error.field, error.value, error.limit, error.remedy))
     untold = max(0, len(said) - MOST)
     return errors[0] if len(errors) == 1 and not untold else Mistakes(errors, untold)
@@ -172,8 +174,13 @@ def _owner(model: type[BaseModel], key: Key) -> type[BaseModel]:
     """The part of a description that the last word of a key belongs to."""
     for part in key[:-1]:
         if part in model.model_fields:
-            model = next(_models(model.model_fields[str(part)].annotation), model)
+            model = next(iter(parts_of(model.model_fields[str(part)])), model)
     return model
+
+
+def parts_of(field: FieldInfo) -> list[type[BaseModel]]:
+    """Descriptions that stand in a field."""
+    return list(_models(field.annotation))
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
@@ -187,7 +194,7 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 def _home(word: str, owner: type[BaseModel], model: type[BaseModel]) -> str:
     """Where an unknown key belongs, if another part of the description knows it."""
     for name, field in model.model_fields.items():
-        for part in _models(field.annotation):
+        for part in parts_of(field):
             if part is not owner and word in part.model_fields:
                 return f"{word} belongs to {name}"
     return ""

@@ -1,0 +1,253 @@
+"""Case files: what is written is what is read, and whatever is written wrongly is said at once, by line."""
+
+from __future__ import annotations
+
+import copy
+import datetime
+import tempfile
+import time
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import tomli_w
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from cfddem.card import card
+from cfddem.case import DEEPEST_KEY, LONGEST_FILE, Case
+from cfddem.errors import InputError
+from cfddem.gallery import gallery, overrides
+from cfddem.mistakes import MOST, Mistakes
+
+GALLERY = gallery()
+TEXT = GALLERY["liquid-bed"].read_text()
+LONGEST_LINE = 600
+SECONDS = 2.0
+
+
+def refused(text: str, given: dict[str, Any] | None = None) -> InputError:
+    with pytest.raises(InputError) as refusal:
+        Case.from_text(text, "bed.toml", given)
+    return refusal.value
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_a_case_written_and_read_again_is_the_same(name: str) -> None:
+    case = Case.from_toml(GALLERY[name])
+    assert Case.from_text(case.to_toml()) == case
+    changed = case.with_(**{"run.until": 0.125, "bed.seed": 7})
+    assert (changed.run.until, changed.bed.seed) == (0.125, 7)
+    assert Case.from_text(changed.to_toml()) == changed
+
+
+def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
+    text = TEXT.replace("viscosity = 8.354e-4", 'viscosity = "thick"').replace("count = 2000", "cuont = 2000")
+    text = text.replace('drag = "di_felice"', 'drag = "di_felce"').replace("until = 3.0 ", "")
+    refusal = refused(text, {"column.width": -1})
+    assert isinstance(refusal, Mistakes)
+    told = str(refusal).splitlines()
+    assert len(told) == len(refusal.each) == 5
+    lines = {
+        name: 1 + next(k for k, line in enumerate(text.split("\n")) if name in line) for name in ("thick", "cuont")
+    }
+    assert f"bed.toml:{lines['thick']}: fluid.viscosity = 'thick': must be a number" in told[0]
+    assert "--set column.width = -1: must be above 0" in told[1]
+    assert f"bed.toml:{lines['cuont']}: bed.cuont = 2000: must be one of " in told[2]
+    assert "did you mean 'count'" in told[2]
+    assert "laws.drag = 'di_felce'" in told[3] and "did you mean 'di_felice'" in told[3]
+    assert "run.until: must be given" in told[4]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"bed.height": 0.01}, "count = 2000: must be given, or height, or positions, and only one"),
+        ({"bed.material": "alumna"}, "bed.material = 'alumna': must be one of alumina (did you mean 'alumina'?)"),
+        ({"column.material": "glass"}, "column.material = 'glass'"),
+        ({"column.shape": "cylinder", "column.depth": 0.1}, "column.depth = 0.1: must be left out, or equal to width"),
+        (
+            {"column.shape": "cylinder", "column.sides": "periodic"},
+            "column.sides = 'periodic': must be no_slip or",
+        ),
+        ({"column.sides": "freeslip"}, "did you mean 'free_slip'"),
+        ({"column.viscosity": 1e-3}, "viscosity belongs to fluid"),
+        ({"column.cell": [0.1, 0.2]}, "column.cell = [0.1, 0.2]: must be a number or a longer list"),
+        ({"bed.inlet_velocity": [[1.0, 0.1], [0.5, 0.2]]}, "bed.inlet_velocity: must be a number, or [time, velocity]"),
+        ({"bed.count": 10.5}, "bed.count = 10.5: must be a whole number"),
+        ({"bed.diameter": float("inf")}, "bed.diameter = inf: must be a finite number"),
+        (
+            {"material.alumina.contact_modulus": 1e12},
+            "contact_modulus = 1000000000000.0: must be at most young",
+        ),
+        ({"bed.diameter.mean": 1e-3}, "must be inside a table; diameter is a value"),
+        ({"laws.gravity": 9.81}, "laws.gravity = 9.81: must be a list"),
+        ({"run": 3.0}, "run = 3.0: must be a table"),
+    ],
+    ids=str,
+)
+def test_a_mistake_is_told_with_key_value_and_limit(given: dict[str, Any], said: str) -> None:
+    told = str(refused(TEXT, given))
+    assert said in told
+    assert "\n" not in told
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"\xff\xfe[\x00b\x00", "must be UTF-8 text; byte 0 is not UTF-8"),
+        (b"a = 1\nb = \n", ":2: must be valid TOML"),
+        (b"a = 1\na = 2\n", "must be valid TOML; Cannot overwrite a value"),
+        (b"x = '" + b"x" * LONGEST_FILE + b"'", "must be at most 500 kB"),
+        (b"x = " + b"[" * 100_000, "must be a case, whose lists and tables lie a few levels deep"),
+        (
+            b"\n" + b".".join([b"a"] * 20_000) + b" = 1",
+            f":2: must be a case, whose keys have at most {DEEPEST_KEY}",
+        ),
+        (b"x = " + b"9" * 5000, "must be valid TOML; Exceeds the limit"),
+        (b"", "must be given"),
+    ],
+    ids=range(8),
+)
+def test_what_is_no_case_file_is_told_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "bed.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refusal:
+        Case.from_toml(path)
+    assert said in str(refusal.value)
+    assert max(map(len, str(refusal.value).splitlines())) < LONGEST_LINE
+
+
+def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.toml", tmp_path):
+        with pytest.raises(InputError, match="a readable TOML file"):
+            Case.from_toml(path)
+
+
+def test_a_file_of_other_editors_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "bed.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
+    assert Case.from_toml(path) == Case.from_text(TEXT)
+
+
+def test_short_keys_are_found_in_their_table() -> None:
+    assert overrides(["seed=3", "viscosity=2e-3", "bed.count=5", "title=a bed"]) == {
+        "bed.seed": 3,
+        "fluid.viscosity": 2e-3,
+        "bed.count": 5,
+        "title": "a bed",
+    }
+    with pytest.raises(InputError, match=r"seeed.*did you mean 'seed'"):
+        overrides(["seeed=3"])
+    with pytest.raises(InputError, match=r"height.*column.height or bed.height"):
+        overrides(["height=3"])
+
+
+def test_the_schema_for_editors_knows_every_key() -> None:
+    schema = Case.model_json_schema()
+    for name, section in (("Bed", "bed"), ("Column", "column"), ("CaseLaws", "laws"), ("CaseRun", "run")):
+        assert set(tomllib.loads(TEXT)[section]) <= set(schema["$defs"][name]["properties"])
+        assert schema["$defs"][name]["additionalProperties"] is False
+
+
+# ---------------------------------------------------------------- files that nobody would write
+
+odd_values = st.one_of(
+    st.floats(),
+    st.sampled_from([0.0, -0.0, 1e-300, 1e300, -1e300, 5e-324, 1.7e308, float("nan"), float("inf")]),
+    st.integers(-(10**40), 10**40),
+    st.integers(2**62, 2**64),
+    st.booleans(),
+    st.text(max_size=30),
+    st.lists(st.one_of(st.floats(), st.text(max_size=3), st.lists(st.floats(), max_size=4)), max_size=5),
+    st.dictionaries(st.text(max_size=5), st.floats(), max_size=3),
+    st.just(datetime.date(2020, 1, 1)),
+    st.just("x" * 5000),
+    st.just([[0.02, 0.02, 0.1]] * 300),
+    st.sampled_from(
+        ["poured", "suspended", "at", "packed", "cylinder", "periodic", "closed", "flow", "linear", "none"]
+    ),
+)
+
+
+ENDINGS = [
+    *[""] * 6,
+    "x = " + "[" * 5000,
+    "x.y = {" * 500,
+    "a." * 3000 + "a = 1",
+    "#" * 300_000,
+    "x = 0x" + "f" * 9000,
+    "\n".join(f"k{k} = {k}" for k in range(20_000)),
+    "x = [" + "1.5, " * 80_000 + "]",
+    "x = '" + "ä" * 400_000,
+]
+
+
+@st.composite
+def mutated_files(draw: st.DrawFn) -> bytes:
+    """A case file with a few things wrong: values, keys, text, bytes."""
+    values = copy.deepcopy(tomllib.loads(TEXT))
+    tables = [values, *(each for each in values.values() if isinstance(each, dict)), values["material"]["alumina"]]
+    known = [name for part in Case.model_json_schema()["$defs"].values() for name in part["properties"]]
+    for _ in range(draw(st.integers(0, 4))):
+        table = draw(st.sampled_from(tables))
+        change = draw(st.sampled_from(["set", "set", "set", "delete", "add", "nest"]))
+        if change == "delete" and table:
+            table.pop(draw(st.sampled_from(sorted(table))))
+        elif change == "set" and table:
+            table[draw(st.sampled_from(sorted(table)))] = draw(odd_values)
+        elif change == "add":
+            table[draw(st.one_of(st.sampled_from(known), st.text(max_size=10)))] = draw(odd_values)
+        else:
+            for _ in range(draw(st.integers(1, 30))):
+                table = table.setdefault(draw(st.sampled_from(["bed", "fluid", "a"])), {})
+                if not isinstance(table, dict):
+                    break
+    text = tomli_w.dumps(values)
+    for _ in range(draw(st.integers(0, 2))):
+        where = draw(st.integers(0, len(text)))
+        text = text[:where] + draw(st.text(max_size=5)) + text[where + draw(st.integers(0, 5)) :]
+    text += draw(st.sampled_from(ENDINGS))
+    content = text.encode(draw(st.sampled_from(["utf-8", "utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-7"])), "replace")
+    if draw(st.booleans()):
+        where = draw(st.integers(0, len(content)))
+        content = content[:where] + draw(st.binary(max_size=4)) + content[where:]
+    return content
+
+
+def examine(content: bytes) -> None:
+    """A file is a case with a card, or it is refused in lines of the documented form; soon, and nothing is written."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bed.toml"
+        path.write_bytes(content)
+        begun = time.process_time()
+        try:
+            made = card(Case.from_toml(path))
+        except InputError as refusal:
+            lines = str(refusal).splitlines()
+            assert 1 <= len(lines) <= MOST + 3
+            for line in lines:
+                assert len(line) <= LONGEST_LINE
+                assert ": must be " in line or line.endswith("more mistakes")
+        else:
+            assert made.colour in ("green", "amber", "red")
+            assert max(map(len, made.lines())) <= 100
+        assert time.process_time() - begun < SECONDS
+        assert [each.name for each in Path(folder).iterdir()] == ["bed.toml"]
+
+
+UNHURRIED: dict[str, Any] = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True}
+
+
+@settings(max_examples=200, **UNHURRIED)
+@given(mutated_files())
+def test_a_mutated_file_is_a_case_or_a_few_lines_of_complaint(content: bytes) -> None:
+    examine(content)
+
+
+@pytest.mark.slow
+@settings(max_examples=5000, **UNHURRIED)
+@given(mutated_files())
+def test_five_thousand_mutated_files(content: bytes) -> None:
+    examine(content)
