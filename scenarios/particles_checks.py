@@ -200,7 +200,12 @@ def rest(
 
 
 def slope(
-    friction: float, film: bool, onset: str = "film", shape: tuple[int, int, int] = (10, 8, 10), seed: int = 3
+    friction: float,
+    film: bool,
+    onset: str = "film",
+    shape: tuple[int, int, int] = (10, 8, 10),
+    seed: int = 3,
+    rolling_friction: float = 0.0,
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Tilt a bed on a rough bottom slowly until it flows.
 
@@ -210,6 +215,7 @@ def slope(
     film     under water, films on
     onset    of friction: "film" or "overlap"
     shape    of the bed along, across and normal to the slope, in diameters
+    rolling_friction  mu_r of a rolling spring that yields and a dashpot; nothing resists rolling where it is 0 [-]
     returns  angle at which the mean speed reaches 0.2 sqrt(g d) [deg], and the history of angle [deg] and speed [m/s]
     """
     glass = Material(
@@ -219,6 +225,7 @@ def slope(
         poisson=0.25,
         restitution=0.5,
         friction=friction,
+        rolling_friction=rolling_friction,
         roughness=5e-6,
     )
     count = int(0.58 * math.prod(shape) * 6.0 / math.pi)
@@ -229,7 +236,11 @@ def slope(
     run = ParticleSolver(
         grains,
         pair_table([glass]),
-        laws=Laws(film=film, friction_onset=FRICTION_ONSETS[onset]),
+        laws=Laws(
+            film=film,
+            friction_onset=FRICTION_ONSETS[onset],
+            rolling=SPRING_DASHPOT if rolling_friction > 0.0 else FREE,
+        ),
         gravity=DOWN,
         box=(box[0], box[1], None),
     )

@@ -127,6 +127,8 @@ def slopes(curves: Curves) -> list[Row]:
             angles[name], tilt, speed = checks.slope(friction, film, onset)
             curves[f"slope/friction_{friction}_{name}"] = {"angle": (tilt, "deg"), "speed": (speed, "m/s")}
         rows.append(Row(f"slope, mu {friction}: under water against dry", angles["wet"], angles["dry"], 2.0, "deg"))
+        rolls, _, _ = checks.slope(friction, False, rolling_friction=0.3)
+        rows.append(Row(f"slope, mu {friction}: with rolling friction of 0.3", rolls, angles["dry"], unit="deg"))
         rows.append(
             Row(f"slope, mu {friction}: friction at overlap only", angles["wet_overlap"], angles["dry"], unit="deg")
         )
