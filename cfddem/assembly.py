@@ -118,6 +118,8 @@ def particles_of(case: Case, diameters: Array, table: np.ndarray, walls: list[Wa
         places, 0.5 * diameters, density, velocity=np.array(bed.velocity), material=kind, viscosity=viscosity,
         fixed=bed.fixed,
     )  # fmt: skip
+    if case.fluid is not None:
+        made.inverse_mass[:] /= 1.0 + case.laws.added_mass * case.fluid.density / density
     outside = ~((made.position >= 0.0) & (made.position <= np.array(size))).all(axis=1)
     if outside.any():
         row = int(np.argmax(outside))

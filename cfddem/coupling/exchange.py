@@ -52,6 +52,7 @@ class Offer(NamedTuple):
     resistance: Array  # b* (N,) [kg/s]
     target: Array  # v* (N, 3) [m/s]
     slip: Array  # u - v (N, 3) [m/s]
+    swept: Array | float  # force of the added mass that the fluid's acceleration gives (N, 3) [N]
 
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
@@ -84,12 +85,10 @@ class Exchange:
         self.outside = 0  # how often the drag law was asked outside of its range
         self._factors = _drag_loop(drag.function) if drag else None
         self._ranges = _ranges(drag)
-        self._memory = np.zeros((0, 6))  # by id: velocity and drag impulse of the last step
+        self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
         self._winds = np.zeros((0, MODES, 3))  # by id: own winds [m/s]
         self._trail: list[Array] = []  # positions by id at the two steps before
         self._last_step = 0.0
-        self.carried = np.zeros(3)  # momentum under way between the phases [N s]
-        self._return: Array | None = None  # force per volume that the fluid still has to get [N/m3]
 
     # ------------------------------------------------------------ around one fluid step
 
@@ -109,7 +108,8 @@ class Exchange:
         carried = np.column_stack([implicit, implicit[:, None] * target])
         drag = spreading.smooth(spreading.deposit(place, carried)) / self.fluid.grid.cell_volume
         momentum = np.moveaxis(drag[1:], 0, -1)
-        return Offer(step, place, 1.0 - solid, drag[0], momentum, self._return, implicit, target, slip)
+        swept, source = self._swept_along(bodies, place, slip, step)
+        return Offer(step, place, 1.0 - solid, drag[0], momentum, source, implicit, target, slip, swept)
 
     def answer(self, bodies: Bodies, offer: Offer, gravity: Array) -> None:
         """Leave in `bodies.applied` what the fluid, having made its step, does to every particle meanwhile.
@@ -128,9 +128,11 @@ class Exchange:
             drag
             + self._pressure_force(bodies, place, volume)
             + weight_left
+            + offer.swept
         )  # fmt: skip
         self._memory[rows, :3] = bodies.velocity
         self._memory[rows, 3:6] = offer.step * drag
+        self._memory[rows, 6:] = offer.slip + bodies.velocity
         if self.own_wind is not None:
             fluid, winds = self.fluid, self._winds[rows]
             self._winds[rows] = self.own_wind.advance(
@@ -144,12 +146,12 @@ class Exchange:
     @property
     def drag_impulse(self) -> Array:
         """Impulse of drag on every particle in the last fluid step, by id (n, 3) [N s]."""
-        return self._memory[:, 3:]
+        return self._memory[:, 3:6]
 
     def inertia(self, bodies: Bodies) -> Array:
         """Mass and added mass of every particle (N,) [kg]; without end where nothing moves it."""
-        own = bodies.mass * (1.0 + self.added_mass * self.fluid.density / bodies.density)
-        return np.where(bodies.inverse_mass > 0.0, own, np.inf)
+        with np.errstate(divide="ignore"):
+            return 1.0 / bodies.inverse_mass
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next step depends on beside fluid and particles."""
@@ -168,6 +170,29 @@ class Exchange:
         self._last_step, self.outside = float(state["last_step"]), int(state["outside"])
 
     # ------------------------------------------------------------ terms
+
+    def _swept_along(self, bodies: Bodies, place: Placement, slip: Array, step: float) -> tuple[Any, Array | None]:
+        r"""Force of the added mass, :math:`C\rho V(\dot u - \dot v)`; its second part is in the inertia already.
+
+        returns  its first part (N, 3) [N]; both parts, with the other sign, as the fluid gets them (nz, ny, nx, 3)
+
+        The acceleration is that of the step before: the fluid gets what the particles lost then.
+        """
+        if self.added_mass == 0.0 or self._last_step == 0.0:
+            return 0.0, None
+        before = self._memory[bodies.id]
+        added = (self.inertia(bodies) - bodies.mass)[:, None]
+        added = np.where(np.isfinite(added), added, 0.0)
+        swept = added * (slip + bodies.velocity - before[:, 6:]) / self._last_step
+        lost = self.under_way(bodies) / step - swept
+        source = self.spreading.smooth(self.spreading.deposit(place, lost)) / self.fluid.grid.cell_volume
+        return swept, np.ascontiguousarray(np.moveaxis(source, 0, -1))
+
+    def under_way(self, bodies: Bodies) -> Array:
+        """Momentum that added mass has taken from every particle and the fluid gets in the next step (N, 3) [N s]."""
+        added = np.where(bodies.inverse_mass > 0.0, self.inertia(bodies) - bodies.mass, 0.0)
+        moved: Array = added[:, None] * (bodies.velocity - self._memory[bodies.id, :3])
+        return moved
 
     def _what_they_meet(self, bodies: Bodies, place: Placement, solid: Array) -> tuple[Array, Array, Array]:
         """Slip u - v (N, 3) [m/s] and voidage (N,) around every particle, and the own wind in what it sees (N, 3)."""
@@ -200,7 +225,7 @@ class Exchange:
         before = self._memory[bodies.id]
         free = np.isfinite(inertia)
         gained = np.where(free, inertia, 0.0)[:, None] * (bodies.velocity - before[:, :3])
-        force: Array = (gained - before[:, 3:]) / self._last_step
+        force: Array = (gained - before[:, 3:6]) / self._last_step
         return force
 
     def _pressure_force(self, bodies: Bodies, place: Placement, volume: Array) -> Array:
@@ -221,7 +246,7 @@ class Exchange:
         """Rows for particles seen for the first time: as fast as they are now, with no drag yet."""
         most = int(bodies.id.max(initial=-1)) + 1
         if most > len(self._memory):
-            grown = np.zeros((most, 6))
+            grown = np.zeros((most, 9))
             grown[: len(self._memory)] = self._memory
             fresh = bodies.id >= len(self._memory)
             grown[bodies.id[fresh], :3] = bodies.velocity[fresh]
