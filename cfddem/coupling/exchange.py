@@ -53,6 +53,7 @@ class Offer(NamedTuple):
     target: Array  # v* (N, 3) [m/s]
     slip: Array  # u - v (N, 3) [m/s]
     swept: Array | float  # force of the added mass that the fluid's acceleration gives (N, 3) [N]
+    screening: Array  # rate at which the drag of the others stops the fluid around (N,) [1/s]
 
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
@@ -98,7 +99,7 @@ class Exchange:
         self._make_room(bodies)
         place = spreading.place(bodies.position, bodies.radius)
         solid = spreading.solid_fraction(place)
-        slip, voidage, wind = self._what_they_meet(bodies, place, solid)
+        slip, voidage, others, wind = self._what_they_meet(bodies, place, solid)
         resistance = self._resistance(bodies, slip, voidage)
         inertia = self.inertia(bodies)
         stiffness = step * resistance / inertia
@@ -109,7 +110,8 @@ class Exchange:
         drag = spreading.smooth(spreading.deposit(place, carried)) / self.fluid.grid.cell_volume
         momentum = np.moveaxis(drag[1:], 0, -1)
         swept, source = self._swept_along(bodies, place, slip, step)
-        return Offer(step, place, 1.0 - solid, drag[0], momentum, source, implicit, target, slip, swept)
+        screening = resistance * others / (self.fluid.density * voidage)
+        return Offer(step, place, 1.0 - solid, drag[0], momentum, source, implicit, target, slip, swept, screening)
 
     def answer(self, bodies: Bodies, offer: Offer, gravity: Array) -> None:
         """Leave in `bodies.applied` what the fluid, having made its step, does to every particle meanwhile.
@@ -136,7 +138,7 @@ class Exchange:
         if self.own_wind is not None:
             fluid, winds = self.fluid, self._winds[rows]
             self._winds[rows] = self.own_wind.advance(
-                place, winds, -drag, offer.slip, fluid.density, fluid.viscosity, offer.step
+                place, winds, -drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
             )
         self._trail = [self._trail[-1], _by_id(bodies.position, rows)]
         self._last_step = offer.step
@@ -194,17 +196,19 @@ class Exchange:
         moved: Array = added[:, None] * (bodies.velocity - self._memory[bodies.id, :3])
         return moved
 
-    def _what_they_meet(self, bodies: Bodies, place: Placement, solid: Array) -> tuple[Array, Array, Array]:
-        """Slip u - v (N, 3) [m/s] and voidage (N,) around every particle, and the own wind in what it sees (N, 3)."""
+    def _what_they_meet(self, bodies: Bodies, place: Placement, solid: Array) -> tuple[Array, Array, Array, Array]:
+        """Around every particle: slip u - v (N, 3) [m/s], voidage (N,), number of others per volume (N,) [1/m3], and
+        the own wind in what it sees (N, 3) [m/s]."""
         spreading = self.spreading
         seen = spreading.gather(place, spreading.smooth(np.moveaxis(self.fluid.velocity, -1, 0)))
         solids = spreading.gather(place, solid[None])[:, 0]
-        wind = np.zeros_like(seen)
+        wind, others = np.zeros_like(seen), np.zeros_like(solids)
         if self.own_wind is not None:
             own, share = self.own_wind.share(place, solids)
+            others = np.maximum(solids - own, 0.0) / ((4.0 / 3.0) * math.pi * place.radius**3)
             wind = share[:, None] * self._winds[bodies.id].sum(axis=1)
             solids = np.maximum(solids - share * own, 0.0)
-        return seen - wind - bodies.velocity, 1.0 - solids, wind
+        return seen - wind - bodies.velocity, 1.0 - solids, others, wind
 
     def _resistance(self, bodies: Bodies, slip: Array, voidage: Array) -> Array:
         """Drag over slip, b (N,) [kg/s]; of the fluid's model."""

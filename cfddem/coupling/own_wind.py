@@ -19,8 +19,9 @@ The kernel of a grid is no Gaussian, so its width is the one with which the wind
 is so a sum of few winds, each of which relaxes at its own rate, (nu/s^2)(y_k + 3/8 R^2/(R + 2.6)), with R = U s/nu; the
 second part is what the moving particle leaves behind.
 
-Where particles are many, drag laws are made for means that count every particle, this one too, and nothing is
-taken out: the disturbance counts with the share that the particle has in the solids that it sees.
+Where particles are many, the drag of the others holds the wind back (Brinkman), which adds beta/(eps rho) to each
+rate. And drag laws of dense beds are made for means that count every particle, this one too: of both disturbances
+only the share is taken out that the particle has in the solids that it sees.
 """
 
 from __future__ import annotations
@@ -77,17 +78,26 @@ class OwnWind:
         return own, np.clip(own / np.maximum(solid, 1e-300), 0.0, 1.0)
 
     def advance(
-        self, place: Placement, winds: Array, force: Array, slip: Array, density: float, viscosity: float, step: float
+        self,
+        place: Placement,
+        winds: Array,
+        force: Array,
+        slip: Array,
+        screening: Array,
+        density: float,
+        viscosity: float,
+        step: float,
     ) -> Array:
         """The own winds (N, MODES, 3) [m/s] after a step [s] in which the particles have pushed the fluid.
 
         force  on the fluid (N, 3) [N]
         slip   u - v, without the own wind (N, 3) [m/s]
+        screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         """
         if viscosity <= 0.0:
             return np.zeros_like(winds)
         new = np.empty_like(winds)
-        _build_up(winds, force, slip, self._at(place, self._flow), density, viscosity, step, *_MODES, new)
+        _build_up(winds, force, slip, screening, self._at(place, self._flow), density, viscosity, step, *_MODES, new)
         return new
 
     def _at(self, place: Placement, tables: Array) -> Array:
@@ -141,7 +151,7 @@ def _tables(spreading: Spreading) -> tuple[Array, Array]:
 
 
 @threaded
-def _build_up(winds, force, slip, flow, density, viscosity, step, rates, weights, new):
+def _build_up(winds, force, slip, screening, flow, density, viscosity, step, rates, weights, new):
     """Exact relaxation of every wind towards what a steady force would make of it."""
     for n in prange(len(winds)):
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
@@ -155,6 +165,7 @@ def _build_up(winds, force, slip, flow, density, viscosity, step, rates, weights
                 total += weights[k] * rates[k] / (rates[k] + blown)
             scale = creeping * oseen_share(reynolds) / total * force[n, d]
             for k in range(len(rates)):
-                steady = scale * weights[k] * rates[k] / (rates[k] + blown)
-                left = math.exp(-step * viscosity / (density * width * width) * (rates[k] + blown))
+                fading = viscosity / (density * width * width) * (rates[k] + blown)
+                steady = scale * weights[k] * rates[k] / (rates[k] + blown) * fading / (fading + screening[n])
+                left = math.exp(-step * (fading + screening[n]))
                 new[n, k, d] = steady + left * (winds[n, k, d] - steady)
