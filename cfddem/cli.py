@@ -8,29 +8,39 @@ import sys
 from cyclopts import App, CycloptsError
 
 from cfddem import __version__
-from cfddem.commands import cases, collisions, proofs, results
+from cfddem.commands import cases, collisions, knowledge, proofs, results
 from cfddem.errors import CfddemError
 
 app = App(
     name="cfddem",
     version=__version__,
-    help="Spheres in a fluid, with the thin film between them. All numbers are in SI units.",
+    help="""Spheres in a fluid, with the thin film between them. All numbers are in SI units.
+
+Exit codes: 0 all is well; 1 a limit does not hold (validate), amber with --strict (check), something is wrong
+(doctor); 2 wrong input, or a case whose card is red; 3 a run that failed or was stopped; 130 stopped from the keyboard.
+
+Example: cfddem new liquid-bed, then cfddem check, cfddem run, cfddem report, cfddem view
+""",
     help_flags=["--help", "-h"],
 )
 
 for command in (
-    *(cases.new, cases.check, cases.run, cases.resume),
+    *(cases.new, cases.check, cases.run, cases.resume, cases.sweep),
     *(results.report, results.view, results.export),
     *(collisions.collide, collisions.wet_wall, collisions.three_spheres, collisions.wet_pair),
     *(proofs.validate, proofs.bench),
+    *(knowledge.explain, knowledge.doctor),
 ):
     app.command(command)
+
+
+app.register_install_completion_command(help="Complete commands and options in this shell with the Tab key.")
 
 
 def main() -> None:
     """Run a command; a user's mistake ends in a line each and exit code 2, never in a traceback."""
     try:
-        app(exit_on_error=False, print_error=False)
+        app(sys.argv[1:], exit_on_error=False, print_error=False)
     except CycloptsError as mistake:
         print("cfddem: " + " ".join(str(mistake).split()), file=sys.stderr)
         sys.exit(2)

@@ -178,6 +178,12 @@ def _owner(model: type[BaseModel], key: Key) -> type[BaseModel]:
     return model
 
 
+def field_of(model: type[BaseModel], key: Sequence[str]) -> str | None:
+    """What a description says of one of its keys."""
+    owner = _owner(model, tuple(key))
+    return owner.model_fields[key[-1]].description if key[-1] in owner.model_fields else None
+
+
 def parts_of(field: FieldInfo) -> list[type[BaseModel]]:
     """Descriptions that stand in a field."""
     return list(_models(field.annotation))

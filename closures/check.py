@@ -65,7 +65,7 @@ def _arguments(card: Law) -> list[str]:
     return list(inspect.signature(card.function).parameters)
 
 
-def _samples(card: Law, name: str, count: int) -> list[float]:
+def samples(card: Law, name: str, count: int) -> list[float]:
     """Values of an argument over its range, evenly spaced in decades where the range spans more than two."""
     usual_low, usual_high = PLAUSIBLE.get(name.removesuffix("_i").removesuffix("_j"), (1e-3, 1.0))
     low, high = card.ranges.get(name, (usual_low, usual_high))
@@ -83,7 +83,7 @@ def _shown(stated: dict[str, float]) -> str:
 
 def _finite(card: Law) -> Iterator[str]:
     names = _arguments(card)
-    for values in itertools.product(*(_samples(card, name, 4) for name in names)):
+    for values in itertools.product(*(samples(card, name, 4) for name in names)):
         stated = dict(zip(names, values))
         try:
             value = card.function(**stated)
@@ -102,7 +102,7 @@ def _compiled_alike(card: Law) -> Iterator[str]:
 
     names = _arguments(card)
     compiled = njit(error_model="numpy")(card.function)
-    for values in zip(*(_samples(card, name, 5) for name in names)):
+    for values in zip(*(samples(card, name, 5) for name in names)):
         try:
             value = compiled(*values)
         except Exception as refusal:  # whatever stops the compiler, errors of its own or others, is the complaint
@@ -143,7 +143,7 @@ def _drag(card: Law) -> Iterator[str]:
         yield "is not a drag law: it must take reynolds and voidage"
         return
     sizes = dict.fromkeys(set(_arguments(card)) - {"reynolds", "voidage"}, 1.0)
-    numbers, voidages = _samples(card, "reynolds", 401), _samples(card, "voidage", 401)
+    numbers, voidages = samples(card, "reynolds", 401), samples(card, "voidage", 401)
 
     def factor(reynolds: float, voidage: float) -> float:
         return card.function(reynolds=reynolds, voidage=voidage, **sizes)
@@ -223,9 +223,9 @@ def _other_kind(
         names = _arguments(card)
         if not takes <= set(names):
             return
-        middle = {name: _samples(card, name, 3)[1] for name in names}
+        middle = {name: samples(card, name, 3)[1] for name in names}
         for name in names:
-            values = _samples(card, name, 101)
+            values = samples(card, name, 101)
 
             def curve(value: float, name: str = name) -> float:
                 return card.function(**{**middle, name: value})
@@ -254,7 +254,7 @@ def _lift(card: Law) -> Iterator[str]:
     names = _arguments(card)
     if "shear_reynolds" not in names:
         return
-    rest = {name: _samples(card, name, 3)[1] for name in names} | {"shear_reynolds": 0.0}
+    rest = {name: samples(card, name, 3)[1] for name in names} | {"shear_reynolds": 0.0}
     if card.function(**rest) != 0.0:
         yield f"is {card.function(**rest):.3g} without shear"
 

@@ -36,7 +36,7 @@ def new(
     from cfddem.gallery import begin
 
     written = begin(name, output)
-    print(f"written to {written}; change it, then: cfddem check {written} && cfddem run {written}")
+    print(f"written to {written}; change it, then cfddem check, then cfddem run")
 
 
 def check(
@@ -117,3 +117,49 @@ def resume(
     with live_line() as line:
         Run.resume(folder, until=until, report=line.update, progress=line.say).go()
     print(f"written to {folder}")
+
+
+def sweep(
+    case: Annotated[Path | None, Parameter(help="TOML file, or a name of the gallery; the only one here")] = None,
+    *,
+    over: Annotated[list[str], Parameter(help="key=1,2,3 or key=1..5; repeat for all combinations")],
+    set: Annotated[list[str] | None, Parameter(help="key=value for all runs; repeat for more")] = None,
+    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="runs at a time")] = 1,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; NAME-sweep")] = None,
+    json: Annotated[bool, Parameter(help="print the outcomes as JSON", negative="")] = False,
+) -> None:
+    """Run a case for many values: a folder each, a table and a figure. Once stopped, the same line goes on.
+
+    Ends with exit code 3 if a run did not finish; the others are kept.
+
+    Example: cfddem sweep liquid-bed --over seed=1..2 --set bed.count=50 --set run.until=0.01 -o seeds
+    """
+    from dataclasses import asdict
+
+    from cfddem.gallery import find_case, overrides
+    from cfddem.sweep import Outcome, failures, ranges
+    from cfddem.sweep import sweep as run_all
+
+    path = find_case(case)
+    values = ranges(over)
+    done = 0
+
+    def say(outcome: Outcome) -> None:
+        nonlocal done
+        done += 1
+        took = "was finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
+        print(f"{done:>4}  {outcome.name[:60]:<60}  {took}", file=sys.stderr if json else sys.stdout, flush=True)
+
+    folder = output or Path(f"{path.stem}-sweep")
+    if jobs == 1:
+        tell_of_compilation()
+    outcomes = run_all(path, values, folder, overrides=overrides(set or []), jobs=jobs, say=say)
+    bad = list(failures(outcomes))
+    if json:
+        print(_json.dumps([asdict(each) for each in outcomes]))
+    else:
+        print(f"table and figure in {folder}")
+    for line in bad:
+        print(f"cfddem: {line}", file=sys.stderr)
+    if bad:
+        sys.exit(3)

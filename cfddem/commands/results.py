@@ -39,7 +39,7 @@ def view(
 ) -> None:
     """Make a picture of a run, a film, or curves in time.
 
-    Example: cfddem view bed-run --movie bed.mp4
+    Example: cfddem view bed --movie bed.gif
     """
     from cfddem.record.reading import newest_run
     from cfddem.view import pictures, plots
@@ -65,7 +65,7 @@ def export(
 ) -> None:
     """Write a run in another format. ParaView, pyvista and h5py open run.vtkhdf as it is.
 
-    Example: cfddem export bed-run --to csv
+    Example: cfddem export bed --to csv
     """
     from cfddem.record.export import export as run
     from cfddem.record.reading import newest_run
