@@ -32,10 +32,11 @@ def case(**overrides: object) -> Case:
     return Case.from_toml(gallery()["packed-bed"], overrides)
 
 
-def flow_through(described: Case, velocity: float) -> Drop:
+def flow_through(described: Case, velocity: float, slab: tuple[float, float] = (0.25, 0.75)) -> Drop:
     """Let a fluid flow through the bed until its pressure drop stands still.
 
     velocity  superficial [m/s]
+    slab      between which shares of the height the drop is measured
     """
     fluid_of, diameter = described.fluid, described.bed.diameter
     assert fluid_of is not None
@@ -49,7 +50,7 @@ def flow_through(described: Case, velocity: float) -> Drop:
     fluid = simulation.fluid
     assert fluid is not None
     height = described.column.height
-    low, high = 0.25 * height, 0.75 * height
+    low, high = slab[0] * height, slab[1] * height
     before = np.inf
     for _ in range(MOST_STEPS):
         simulation.step()

@@ -19,6 +19,7 @@ from cfddem.simulation import Simulation
 from closures.balance import terminal_velocity
 from closures.drag_single import schiller_naumann
 from closures.law import SHELF
+from scenarios.validation import numbers
 
 DIAMETER, WATER, VISCOSITY, DENSITY = 1e-3, 1000.0, 1e-3, 2500.0
 
@@ -119,3 +120,43 @@ def unbounded(case: Case, drag: str) -> float:
     assert case.fluid is not None
     law, fluid, gravity = SHELF["drag"][drag].function, case.fluid, abs(case.laws.gravity[2])
     return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
+
+
+def ten_cate(density: float, viscosity: float) -> Case:
+    """The nylon sphere of ten Cate et al. (2002) in one of their oils, without the walls of their box."""
+    diameter = 0.015
+    edge = 4.0 * diameter
+    return Case(
+        title="A sphere settles in silicone oil",
+        fluid={"density": density, "viscosity": viscosity},
+        material={"nylon": {"density": 1120.0, "youngs_modulus": 1e3, "poisson": 0.4}},
+        column={"width": 25 * edge, "height": 25 * edge, "cell": edge, "sides": "periodic", "ends": "closed"},
+        bed={"diameter": diameter, "positions": [(12.5 * edge, 12.5 * edge, 20.5 * edge)]},
+        laws={"drag": "abraham", "lubrication": "none", "added_mass": 0.5},
+        run={"until": 2.0, "history_every": 0.02, "reference_speed": 0.1, "fluid_step": 0.005},
+    )
+
+
+def in_held_gas() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """MFIX DEM06, a grain in gas that it cannot stir: time [s], velocity and exact velocity [m/s]."""
+    listed = numbers("mfix_dem06_velocity_analytic")
+    times, exact = listed["t [s]"], listed["v_p [m/s]"]
+    diameter, edge = 1e-4, 2e-3
+    case = Case(
+        fluid={"density": 1.2, "viscosity": 1.8e-5},
+        material={"grain": {"density": 2000.0, "youngs_modulus": 1e3, "poisson": 0.3}},
+        column={"width": 8 * edge, "height": 8 * edge, "cell": edge, "sides": "periodic", "ends": "periodic"},
+        bed={"diameter": diameter, "positions": [(8.4e-3, 8.6e-3, 15e-3)]},
+        # a fluid that is held has no wind of the grain's own
+        laws={"drag": "schiller_naumann", "lubrication": "none", "own_wind": False},
+        run={"until": float(times[-1]), "fluid_step": 2e-4, "reference_speed": 0.06},
+    )
+    simulation = Simulation(case)
+    assert simulation.fluid is not None
+    velocity = [0.0]
+    for instant in times[1:]:
+        while simulation.time < instant * (1.0 - 1e-12):
+            simulation.fluid.set_velocity((0.0, 0.0, 0.4))
+            simulation.step(float(instant))
+        velocity.append(float(simulation.particles.bodies.velocity[0, 2]))
+    return times, np.array(velocity), exact

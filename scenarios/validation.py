@@ -27,6 +27,7 @@ from cfddem.errors import InputError
 TARGETS: dict[str, str] = {
     "binary-collision": "scenarios.binary_collision_validation",
     "particles": "scenarios.particles_validation",
+    "coupling": "scenarios.coupling_validation",
     "wet-tumbler": "scenarios.wet_tumbler_validation",
     "wet": "scenarios.wet_validation",
 }
