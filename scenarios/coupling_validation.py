@@ -60,7 +60,7 @@ def released(curves: Curves) -> list[Row]:
     """Spheres released in a liquid, beside the equation of motion of their drag law, and experiments."""
     rows = []
     bead, measured = settling.mordant(), numbers("mordant2000_glass_0p5mm")
-    cases = [("Mordant", bead, settling.unbounded(bead, "brown_lawler"), measured["U_terminal [m/s]"][0])]
+    cases = [("Mordant", bead, settling.unbounded(bead, "brown_lawler"), measured["U_terminal"][0])]
     spheres = reference("tencate2002_cases")
     for row in (0, 2):
         density, viscosity, endless, fastest = (
@@ -81,7 +81,7 @@ def released(curves: Curves) -> list[Row]:
         rows.append(Row(f"{name}: fastest over measured", float(speeds.max()) / experiment, 1.0, note=note))
         if name == "Mordant":
             late = times[np.argmax(speeds >= 0.95 * speeds[-1])]
-            rows.append(Row("Mordant: 95 % time over measured", late / measured["tau95 [s]"][0], 1.0, note=note))
+            rows.append(Row("Mordant: 95 % time over measured", late / measured["tau95"][0], 1.0, note=note))
     return rows
 
 
@@ -102,7 +102,7 @@ def packed(curves: Curves) -> list[Row]:
         rows.append(worst(f"packed bed, {drag}, Re 0.01 to 100: pressure drop over the formula", points, 0.01))
     listed = numbers("cfdem_ergun_test_dp")
     points = []
-    for velocity, expected in list(zip(listed["U_superficial [m/s]"], listed["dp_ergun [Pa]"]))[::3]:
+    for velocity, expected in list(zip(listed["U_superficial"], listed["dp_ergun"]))[::3]:
         drop = packed_bed.flow_through(packed_bed.case(), float(velocity), slab=(0.0, 1.0))
         points.append((velocity, drop.measured * 0.0156 / expected, 1.0))
     rows.append(worst("Ergun test of a coupled code: pressure drop", points, 0.02))

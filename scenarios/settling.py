@@ -140,7 +140,7 @@ def ten_cate(density: float, viscosity: float) -> Case:
 def in_held_gas() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """MFIX DEM06, a grain in gas that it cannot stir: time [s], velocity and exact velocity [m/s]."""
     listed = numbers("mfix_dem06_velocity_analytic")
-    times, exact = listed["t [s]"], listed["v_p [m/s]"]
+    times, exact = listed["t"], listed["v_p"]
     diameter, edge = 1e-4, 2e-3
     case = Case(
         fluid={"density": 1.2, "viscosity": 1.8e-5},
