@@ -9,6 +9,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Box": "cfddem.particles.walls",
+    "Case": "cfddem.case",
     "CfddemError": "cfddem.errors",
     "Cone": "cfddem.particles.walls",
     "Cylinder": "cfddem.particles.walls",
@@ -20,6 +21,7 @@ _HOME = {
     "Mesh": "cfddem.particles.walls",
     "ParticleSolver": "cfddem.particles.solver",
     "Plane": "cfddem.particles.walls",
+    "Simulation": "cfddem.simulation",
     "bodies": "cfddem.particles.state",
     "open_run": "cfddem.record.reading",
     "pair_table": "cfddem.materials",

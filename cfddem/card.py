@@ -13,7 +13,7 @@ from typing import Any
 
 from cfddem.case import Case
 from cfddem.errors import CfddemError, InputError
-from cfddem.expected import Bed, Cost, Encounter, Steps, bed_of, cost_of, encounter_of, steps_of
+from cfddem.expected import Bed, Cost, Encounter, Steps, bed_drag, bed_of, cost_of, encounter_of, steps_of
 from cfddem.findings import Finding, bubbles, findings
 from closures import timescales
 
@@ -51,6 +51,9 @@ class Card:
         """green, amber or red: that of the worst finding."""
         colours = {each.colour for each in self.findings}
         return "red" if "red" in colours else "amber" if colours else "green"
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
 
     def summary(self) -> dict[str, Any]:
         """Plain values: colour, findings, and the numbers by group and name."""
@@ -132,7 +135,7 @@ def _flow_rows(case: Case, bed: Bed) -> Iterator[Row]:
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"of the {'superficial inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes)
-    yield Row(group, "u_mf", bed.onset, "m/s", "minimum fluidisation by the drag law")
+    yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {bed_drag(case).__name__}")
     yield Row(group, "u_t", bed.terminal, "m/s", "of one particle alone, Brown and Lawler")
     if bed.inlet and bed.onset and bed.terminal:
         yield Row(group, "u / u_mf", bed.inlet / bed.onset)
@@ -184,7 +187,7 @@ def _step_rows(case: Case, bed: Bed, steps: Steps) -> Iterator[Row]:
 
 def _outlook(case: Case, bed: Bed, cost: Cost) -> Iterator[Row]:
     group = "to be expected"
-    if case.fluid is not None and not math.isnan(bed.archimedes):
+    if case.fluid is not None and not math.isnan(bed.archimedes) and (case.bed.start == "poured" or bed.inlet):
         note = (
             "at least: it bubbles"
             if bubbles(case, bed)
@@ -197,7 +200,7 @@ def _outlook(case: Case, bed: Bed, cost: Cost) -> Iterator[Row]:
         if bed.inlet:
             note = "Ergun" if case.bed.fixed or bed.inlet < bed.onset else "buoyant weight over the floor"
             yield Row(group, "pressure drop", bed.pressure_drop, "Pa", note)
-    elif not math.isnan(bed.height):
+    elif case.bed.start == "poured":
         yield Row(group, "bed height", bed.height, "m", "poured")
     amount, unit = _duration(cost.seconds)
     yield Row(group, "time on one core", amount, unit, "to a factor of three, loops compiled")

@@ -196,6 +196,13 @@ class Case(Checked):
     laws: CaseLaws = CaseLaws.model_validate({})
     run: CaseRun
 
+    @field_validator("title")
+    @classmethod
+    def _title_is_a_line(cls, value: str) -> str:
+        if not value.isprintable() or len(value) > 200:
+            raise InputError("title", value, "one line of at most 200 printable characters")
+        return value
+
     @model_validator(mode="after")
     def _names_are_known(self) -> Case:
         for mistake in _unknown_names(list(self.material), self.bed.material, self.column.material):

@@ -50,6 +50,9 @@ def main() -> None:
         sys.exit(failure.exit_code)
     except BrokenPipeError:  # whoever read the output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as failure:  # a disk that is full, a folder that cannot be written to
+        print(f"cfddem: {failure.filename or 'file'}: {failure.strerror or failure}", file=sys.stderr)
+        sys.exit(2)
     except KeyboardInterrupt:
         print("cfddem: stopped", file=sys.stderr)
         sys.exit(130)

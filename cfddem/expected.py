@@ -11,6 +11,7 @@ from cfddem.fluid.division import cell_counts
 from cfddem.materials import pair_table
 from cfddem.particles.steps import Clocks, crossing_step, hertz_steps, linear_steps
 from closures import balance, bed, contact, drag_single, minimum_gap, numbers
+from closures.balance import Drag
 from closures.drag import ergun
 
 LIQUID = 100.0
@@ -66,8 +67,7 @@ def bed_of(case: Case) -> Bed:
         return Bed(count, solids, weight, nan, inlet, nan, nan, nan, packed, poured, nan, nan)
     number = abs(numbers.archimedes(diameter, solid.density, fluid.density, fluid.viscosity, gravity))
     scale = fluid.viscosity / (fluid.density * diameter)
-    law = case.laws.drag_law
-    drag = ergun if law is None else law.function
+    drag = bed_drag(case)
     terminal = balance.reynolds_in_balance(number, 1.0, drag_single.brown_lawler) * scale
     onset = balance.reynolds_in_balance(number, packed, drag) * scale
     reynolds = (inlet or terminal) / scale
@@ -85,6 +85,12 @@ def bed_of(case: Case) -> Bed:
     return Bed(
         count, solids, weight, number, inlet, reynolds, onset, terminal, voidage, height, drop, drag(reynolds, voidage)
     )
+
+
+def bed_drag(case: Case) -> Drag:
+    """The drag law of the case, or Ergun's where it has none or one of spheres alone."""
+    law = case.laws.drag_law
+    return ergun if law is None or law.function(1.0, 0.42) == law.function(1.0, 1.0) else law.function
 
 
 def mean_inlet(case: Case) -> float:
@@ -221,6 +227,7 @@ class Cost:
     memory: float  # [byte]
     disk: float  # [byte]
     snapshots: float
+    of_cells: bool  # cells take more memory than particles
 
 
 def cost_of(case: Case, known: Bed, steps: Steps) -> Cost:
@@ -235,4 +242,5 @@ def cost_of(case: Case, known: Bed, steps: Steps) -> Cost:
         BYTES_AT_LEAST + BYTES_PER_PARTICLE * known.count + BYTES_PER_CELL * cells,
         snapshots * (120.0 * known.count + 40.0 * cells),
         snapshots,
+        BYTES_PER_CELL * cells > BYTES_PER_PARTICLE * known.count,
     )

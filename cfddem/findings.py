@@ -164,7 +164,7 @@ def _cost(case: Case, cost: Cost) -> Iterator[Finding]:
     there = memory()
     if cost.memory > 0.5 * there:
         yield Finding(
-            "red" if cost.memory > there else "amber", "bed.count",
+            "red" if cost.memory > there else "amber", "column.cell" if cost.of_cells else "bed.count",
             f"needs about {cost.memory / 1e9:.3g} GB of memory; this machine has {there / 1e9:.3g} GB",
             "take fewer particles, or larger cells",
         )  # fmt: skip

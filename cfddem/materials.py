@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from cfddem.errors import InputError, nearest
 from cfddem.mistakes import refused
@@ -18,6 +18,14 @@ class Checked(BaseModel):
     """A frozen description whose values are checked when it is made; a refusal is a readable line a mistake."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _truth_is_no_number(cls, value: Any, about: ValidationInfo) -> Any:
+        field = cls.model_fields[about.field_name or ""]
+        if isinstance(value, bool) and field.annotation is not bool:
+            raise InputError(about.field_name or "", value, "anything but true or false")
+        return value
 
     def __init__(self, **values: Any) -> None:
         try:

@@ -119,13 +119,13 @@ def sweep(
         runs[run_name(values)] = case, values
     if output.exists() and not output.is_dir():
         raise InputError("output", str(output), "a folder", "a file of that name is there")
+    output.mkdir(parents=True, exist_ok=True)
     outcomes: dict[str, Outcome] = {}
     work = (delayed(_one)(case, values, output / name, jobs > 1) for name, (case, values) in runs.items())
     for outcome in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
         outcomes[outcome.name] = outcome
         say(outcome)
     ordered = [outcomes[name] for name in runs]
-    output.mkdir(parents=True, exist_ok=True)
     write_table(ordered, output / "sweep.csv")
     figure(ordered, output / "sweep.png")
     return ordered

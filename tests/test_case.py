@@ -84,6 +84,8 @@ def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
         ({"bed.diameter.mean": 1e-3}, "must be inside a table; diameter is a value"),
         ({"laws.gravity": 9.81}, "laws.gravity = 9.81: must be a list"),
         ({"run": 3.0}, "run = 3.0: must be a table"),
+        ({"bed.seed": True}, "bed.seed = True: must be anything but true or false"),
+        ({"title": "two\nlines"}, "title = 'two\\nlines': must be one line"),
     ],
     ids=str,
 )
@@ -142,6 +144,33 @@ def test_short_keys_are_found_in_their_table() -> None:
         overrides(["seeed=3"])
     with pytest.raises(InputError, match=r"height.*column.height or bed.height"):
         overrides(["height=3"])
+
+
+def test_an_installed_package_may_offer_a_drag_law(monkeypatch: pytest.MonkeyPatch) -> None:
+    from types import SimpleNamespace
+
+    from closures import shelf
+    from closures.law import law
+
+    def load() -> None:
+        law("drag", "of a test", reynolds=(0.0, 1.0))(offered_drag)
+
+    def offered_drag(reynolds: float, voidage: float) -> float:
+        return voidage**-3.65
+
+    def broken() -> None:
+        raise ImportError("no such file")
+
+    points = [SimpleNamespace(name="good", load=load), SimpleNamespace(name="bad", load=broken)]
+    monkeypatch.setattr(shelf, "entry_points", lambda group: points if group == "cfddem.closures" else [])
+    shelf.fill_from_packages.cache_clear()
+    try:
+        case = Case.from_text(TEXT, "bed.toml", {"laws.drag": "offered_drag"})
+        assert case.laws.drag_law is not None and case.laws.drag_law.reference == "of a test"
+        assert shelf.fill_from_packages() == {"bad": "ImportError: no such file"}
+    finally:
+        shelf.SHELF["drag"].pop("offered_drag", None)
+        shelf.fill_from_packages.cache_clear()
 
 
 def test_the_schema_for_editors_knows_every_key() -> None:

@@ -70,7 +70,7 @@ def run(
 ) -> None:
     """Run a case into a folder, and report what came out. A case whose card is red is refused.
 
-    Example: cfddem run liquid-bed -o bed --set bed.count=200 --set run.until=0.02
+    Example: cfddem run liquid-bed -o bed --set start=suspended --set run.until=0.02
     """
     from cfddem.card import refuse_red
     from cfddem.case import Case, read_text
@@ -132,7 +132,7 @@ def sweep(
 
     Ends with exit code 3 if a run did not finish; the others are kept.
 
-    Example: cfddem sweep liquid-bed --over seed=1..2 --set bed.count=50 --set run.until=0.01 -o seeds
+    Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set run.until=0.01 -o seeds
     """
     from dataclasses import asdict
 
