@@ -55,6 +55,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         gravity=case.laws.gravity if case.fluid is None else (0.0, 0.0, 0.0),
         box=periodic_box(case),
         domain=_domain(case),
+        record=case.run.collisions,
     )
     if case.fluid is None:
         return Parts(solver, None, None)

@@ -172,6 +172,7 @@ class CaseRun(Checked):
     reference_speed: Positive | None = Field(
         None, description="fastest collision expected; estimated if not given [m/s]"
     )
+    collisions: bool = Field(False, description="record every encounter of two bodies, from first to last touch")
 
 
 class Case(Checked):

@@ -39,6 +39,14 @@ class RunFailed(CfddemError):
     exit_code = 3
 
 
+class RunStopped(CfddemError):
+    """A run that was asked to stop, and did so where it can go on; ends as a shell expects of a signal."""
+
+    def __init__(self, message: str, signal_number: int) -> None:
+        self.exit_code = 128 + signal_number
+        super().__init__(message)
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """The limit to state for an unknown word: the known ones, and the nearest first.
 

@@ -1,84 +1,153 @@
-"""What came out of a run: means with errors, beside what the laws of beds say."""
+"""What came out of a run: means with errors, beside what the laws of beds say, and what speaks against it."""
 
 from __future__ import annotations
 
+import json
 import math
+import textwrap
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cfddem.assembly import particle_diameters
+from cfddem.card import card
 from cfddem.case import Case
-from cfddem.record.reading import open_run
+from cfddem.errors import InputError
+from cfddem.expected import LIQUID
+from cfddem.record.reading import Run, open_run
 from cfddem.record.series import block_average, stationarity
 from closures import bed as laws_of_beds
+from closures.law import SHELF
 
-MEASURES = ("bed_height", "bed_voidage", "pressure_drop", "granular_temperature", "fastest", "contact_count")
+MEASURES = (
+    "bed_height", "bed_voidage", "bed_voidage_pressure", "pressure_drop", "granular_temperature", "fastest",
+    "contact_count",
+)  # fmt: skip
+
+FREE_SIDES = ("free_slip", "periodic")
+"""Sides that do not hold the flow back: the bed is then as wide as one likes."""
 
 
 def report(folder: Path) -> dict[str, Any]:
     """Means over the averaging window of a run, and the laws that hold for it.
 
     folder   of the run
-    returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit), `laws` (law, computed,
-             expected, ratio), `ledger`
+    returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
+             (law, computed, expected, ratio), `ledger`, `warnings`, `wall_time`, `card`, `provenance`
     """
     run = open_run(folder)
-    case = Case.from_text(run.case_text, str(folder / "case.toml"))
-    history = run.history
-    time = history["time"]
-    end = float(time[-1])
-    begin = 0.5 * end if case.run.average_from is None else min(case.run.average_from, end)
-    window = time >= begin
-    measures = {}
-    for name in MEASURES:
-        if name in history:
-            average = block_average(history[name][window])
-            steady = stationarity(history[name][window])
-            measures[name] = {
-                "mean": average.mean,
-                "error": average.error,
-                "unit": run.unit(name),
-                "drift": steady.drift,
-            }
-    ledger: dict[str, float] = {
-        name: float(np.nanmax(np.abs(history[name][1:]))) if len(time) > 1 else float("nan")
-        for name in ("exchange_imbalance", "volume_imbalance")
-        if name in history
-    }
-    ledger["particles_lost"] = float(history["particle_count"][0] - history["particle_count"][-1])
+    if not len(run.history.get("time", ())):
+        raise InputError("folder", str(folder), "a run with a history", "it ended before its first row")
+    case = case_of(run)
+    begin, end = window_of(run, case)
+    inside = run.history["time"] >= begin
+    measures = {name: _measured(run, name, inside) for name in MEASURES if name in run.history}
+    measures = {name: each for name, each in measures.items() if each["known"] > 0.5}
+    laws = _laws(case, measures)
     return {
-        "case": case.title or folder.name,
+        "case": case.title or folder.resolve().name,
         "folder": str(folder),
         "status": run.status,
         "message": run.message,
         "window": [begin, end],
         "measures": measures,
-        "laws": _laws(case, measures),
-        "ledger": ledger,
+        "laws": laws,
+        "ledger": _ledger(run),
+        "warnings": _warnings(run, case, measures, laws),
+        "wall_time": run.about.get("wall_time", {}),
+        "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": _last(run, "fluid_steps")},
+        "card": card(case).summary(),
+        "provenance": run.provenance,
     }
+
+
+def case_of(run: Run) -> Case:
+    """The case that a run was begun with."""
+    return Case.from_text(run.case_text, str(run.folder / "case.toml"))
+
+
+def window_of(run: Run, case: Case) -> tuple[float, float]:
+    """Begin and end of the means: as the case says, else the second half of what was run [s]."""
+    end = float(run.history["time"][-1])
+    return (0.5 * end if case.run.average_from is None else min(case.run.average_from, end)), end
+
+
+def _measured(run: Run, name: str, inside: np.ndarray) -> dict[str, Any]:
+    """Mean with its error, and whether the series is stationary in the window."""
+    column = run.history[name][inside]
+    values = column[np.isfinite(column)]
+    average, steady = block_average(values), stationarity(values)
+    return {
+        "known": len(values) / len(column),
+        "mean": average.mean,
+        "error": average.error,
+        "error_is_lower_bound": not average.enough,
+        "unit": run.unit(name),
+        "long_name": run.long_name(name),
+        "drift": steady.drift,
+        "drift_error": steady.error,
+        "stationary": None if math.isnan(steady.drift) else steady.stationary,
+    }
+
+
+def steadiness(measured: dict[str, Any]) -> str:
+    """Whether a measure is stationary, in words."""
+    if measured["stationary"] is None:
+        return "too short to say"
+    if measured["stationary"]:
+        return "stationary"
+    drift = measured["drift"]
+    return f"drifts, by {drift:+.2g}" if abs(drift) > 3.0 * measured["drift_error"] else "still settling"
+
+
+def _last(run: Run, name: str) -> int:
+    column = run.history.get(name, np.zeros(0))
+    return int(column[-1]) if len(column) else 0
+
+
+def _ledger(run: Run) -> dict[str, float]:
+    """What must not change, at its largest over the run."""
+    history = run.history
+    ledger = {
+        name: float(np.nanmax(np.abs(history[name][1:]))) if len(history[name]) > 1 else math.nan
+        for name in ("exchange_imbalance", "volume_imbalance")
+        if name in history
+    }
+    return ledger | {"particles_lost": float(history["particle_count"][0] - history["particle_count"][-1])}
+
+
+# ---------------------------------------------------------------- laws
 
 
 def _laws(case: Case, measures: dict[str, Any]) -> list[dict[str, Any]]:
     """Each law of beds that applies, with what the run gave for it."""
     if case.fluid is None or case.column.ends != "flow" or not isinstance(case.bed.inlet_velocity, float):
         return []
-    gravity = abs(case.laws.gravity[2])
-    rows = []
-    if not case.bed.fixed and case.bed.inlet_velocity > 0.0:
-        weight = buoyant_weight(case) / floor_area(case.column.size, case.column.shape)
-        rows.append(_compared("pressure drop over buoyant weight", measures["pressure_drop"]["mean"], weight, "Pa"))
-    liquid = case.fluid.density > 100.0
-    if liquid and gravity > 0.0 and not case.bed.fixed and case.bed.inlet_velocity > 0.0:
-        found = measures["bed_voidage"]["mean"]
+    if (
+        case.bed.inlet_velocity <= 0.0
+        or case.bed.jet is not None
+        or not {"bed_voidage", "pressure_drop"} <= {*measures}
+    ):
+        return []
+    drop = measures["pressure_drop"]["mean"]
+    if case.bed.fixed:
+        height, voidage = measures["bed_height"]["mean"], measures["bed_voidage"]["mean"]
+        inlet, fluid = case.bed.inlet_velocity, case.fluid
+        slope = laws_of_beds.ergun_gradient(inlet, case.bed.diameter, fluid.density, fluid.viscosity, voidage)
+        return [_compared("pressure drop by Ergun", drop, slope * height, "Pa", "ergun_gradient", voidage=voidage)]
+    weight = buoyant_weight(case) / case.column.floor_area
+    rows = [_compared("pressure drop by the buoyant weight", drop, weight, "Pa")]
+    if case.fluid.density > LIQUID and abs(case.laws.gravity[2]) > 0.0:
         for name, voidage in expansion_laws(case).items():
-            rows.append(_compared(f"voidage by {name}", found, voidage, "-"))
+            for way, told in (("bed_voidage", "height"), ("bed_voidage_pressure", "pressure")):
+                if way in measures:
+                    rows.append(_compared(f"voidage by {name}, from {told}", measures[way]["mean"], voidage, "-"))
     return rows
 
 
 def expansion_laws(case: Case) -> dict[str, float]:
-    """Voidage of a liquid bed by each published law of its expansion [-]."""
+    """Voidage of a liquid bed by each published law of its expansion [-]; with its walls where they hold the flow."""
     assert case.fluid is not None and isinstance(case.bed.inlet_velocity, float)
     density, viscosity, diameter = case.fluid.density, case.fluid.viscosity, case.bed.diameter
     archimedes = density * (case.solid.density - density) * abs(case.laws.gravity[2]) * diameter**3 / viscosity**2
@@ -86,14 +155,21 @@ def expansion_laws(case: Case) -> dict[str, float]:
         return {}
     reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
     terminal = reynolds * viscosity / (density * diameter)
-    exponents = {
-        "Richardson-Zaki": laws_of_beds.exponent_richardson_zaki(reynolds, 0.0),
-        "Garside": laws_of_beds.exponent_garside(reynolds),
-        "Khan-Richardson": laws_of_beds.exponent_khan_richardson(archimedes, 0.0),
+    wall = 0.0 if case.column.sides in FREE_SIDES else diameter / min(case.column.size[:2])
+    laws = {
+        "Richardson-Zaki": (
+            laws_of_beds.exponent_richardson_zaki(reynolds, wall),
+            laws_of_beds.wall_factor_richardson_zaki(wall),
+        ),
+        "Garside": (laws_of_beds.exponent_garside(reynolds), laws_of_beds.wall_factor_richardson_zaki(wall)),
+        "Khan-Richardson": (
+            laws_of_beds.exponent_khan_richardson(archimedes, wall),
+            laws_of_beds.wall_factor_khan_richardson(wall),
+        ),
     }
     return {
-        name: laws_of_beds.expanded_voidage(case.bed.inlet_velocity, terminal, exponent)
-        for name, exponent in exponents.items()
+        name: laws_of_beds.expanded_voidage(case.bed.inlet_velocity, factor * terminal, exponent)
+        for name, (exponent, factor) in laws.items()
     }
 
 
@@ -109,8 +185,47 @@ def floor_area(size: tuple[float, float, float], shape: str) -> float:
     return 0.25 * math.pi * size[0] ** 2 if shape == "cylinder" else size[0] * size[1]
 
 
-def _compared(law: str, computed: float, expected: float, unit: str) -> dict[str, Any]:
-    return {"law": law, "computed": computed, "expected": expected, "ratio": computed / expected, "unit": unit}
+def _compared(what: str, computed: float, expected: float, unit: str, law: str = "", **asked: float) -> dict[str, Any]:
+    """One law beside the run; and where it was asked outside of its own range."""
+    ranges = SHELF["bed"][law].ranges if law else {}
+    outside = [
+        f"{name} {asked[name]:.3g} is not within {low:g} to {high:g}"
+        for name, (low, high) in ranges.items()
+        if name in asked and not low <= asked[name] <= high
+    ]
+    return {
+        "law": what, "computed": computed, "expected": expected, "ratio": computed / expected, "unit": unit,
+        "outside_range": "; ".join(outside),
+    }  # fmt: skip
+
+
+# ---------------------------------------------------------------- what speaks against the run
+
+
+def _warnings(run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> list[str]:
+    """One line each: how the run ended, laws outside of their range, series that still move, the card's findings."""
+    found = []
+    if run.status in ("failed", "stopped"):
+        found.append(
+            f"the run was {run.status}: {run.message}" if run.status == "stopped" else f"failed: {run.message}"
+        )
+    elif run.status == "running":
+        found.append("the run is under way, or was killed")
+    if run.missing:
+        found.append(f"{len(run.missing)} snapshots are missing")
+    outside = _last(run, "outside_range")
+    if outside:
+        asked = _last(run, "fluid_steps") * float(run.history["particle_count"].mean())
+        share = f", {100.0 * outside / asked:.2g} % of all times it was asked" if asked else ""
+        found.append(f"the drag law {case.laws.drag} was asked outside of its range {outside} times{share}")
+    found += [f"{row['law']}: {row['outside_range']}" for row in laws if row["outside_range"]]
+    moving = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is False]
+    if moving:
+        found.append(f"not stationary in the window: {', '.join(moving)}; run longer, or set run.average_from later")
+    short = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is None]
+    if short:
+        found.append("the window holds too few rows for errors; run longer, or set run.history_every smaller")
+    return found
 
 
 def lines(result: dict[str, Any]) -> list[str]:
@@ -120,11 +235,33 @@ def lines(result: dict[str, Any]) -> list[str]:
     for name, each in result["measures"].items():
         error = "" if math.isnan(each["error"]) else f" +- {each['error']:.2g}"
         unit = "" if each["unit"] == "1" else each["unit"]
-        out.append(f"  {name.replace('_', ' '):<24} {each['mean']:.4g}{error} {unit}".rstrip())
+        value = f"{each['mean']:.4g}{error} {unit}".rstrip()
+        out.append(f"  {name.replace('_', ' '):<24} {value:<28} {steadiness(each)}")
     if result["laws"]:
         out += ["", f"  {'law':<40} {'run':>10} {'law':>10} {'ratio':>7}"]
         for row in result["laws"]:
             out.append(f"  {row['law']:<40} {row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}")
     out += ["", "  ledger, largest over the run"]
     out += [f"  {name.replace('_', ' '):<24} {value:.2g}" for name, value in result["ledger"].items()]
+    total = sum(result["wall_time"].values())
+    if total:
+        parts = sorted(result["wall_time"].items(), key=lambda each: -each[1])
+        out += ["", f"  wall time {total:.3g} s: " + ", ".join(f"{n} {100 * s / total:.0f} %" for n, s in parts[:6])]
+    if result["warnings"]:
+        out.append("")
+        for each in result["warnings"]:
+            out += textwrap.wrap(f"warning: {each}", 98, initial_indent="  ", subsequent_indent="    ")
     return out
+
+
+def as_json(result: Any) -> str:
+    """The report as JSON, with null for what has no value."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: plain(each) for name, each in value.items()}
+        if isinstance(value, list | tuple):
+            return [plain(each) for each in value]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    return json.dumps(plain(result), allow_nan=False)

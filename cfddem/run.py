@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import signal
+import threading
 import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from cfddem.assembly import grid_of
 from cfddem.case import Case
-from cfddem.errors import CfddemError, RunFailed
+from cfddem.errors import InputError, RunFailed, RunStopped, UnstableStep
+from cfddem.particles.guard import guard
 from cfddem.particles.pouring import kinetic_energy
 from cfddem.record import checkpoint
 from cfddem.record.ledger import exchange_imbalance, volume_imbalance
-from cfddem.record.measures import bed_height, cells_of, granular_temperature, pressure_drop
+from cfddem.record.measures import bed_height, cells_of, granular_temperature, pressure_drop, voidage_by_pressure
 from cfddem.record.output import RunFolder
 from cfddem.record.provenance import provenance
 from cfddem.simulation import Simulation
+from cfddem.stopwatch import Stopwatch
 
 FIELDS = {
+    "fluid_steps": ("1", "number of the fluid step"),
     "fastest": ("m/s", "speed of the fastest particle"),
     "exchange_imbalance": ("1", "momentum given by the fluid and not got by particles, over that given"),
     "volume_imbalance": ("1", "volume gained by a cell against its faces, over the largest flux"),
@@ -30,8 +35,17 @@ FIELDS = {
 }
 """What a run records beside the known quantities."""
 
-CHECKPOINT_SECONDS = 60.0
-"""A checkpoint is written with the next snapshot after so long, and at the end."""
+CHECKPOINT_SHARE = 0.02
+"""A checkpoint is written with every snapshot, unless checkpoints would take more than this share of the time."""
+
+BED = (0.2, 0.8)
+"""Part of the bed height in which the slope of the pressure is taken, away from floor and surface."""
+
+SAY_EVERY = 0.5
+"""Between two reports on the way to the next row of history [s]."""
+
+_SAME = 1.0 - 1e-12
+"""Two times closer than this are one."""
 
 Report = Callable[["Run"], None]
 
@@ -41,20 +55,21 @@ class Run:
 
     simulation  to be advanced
     folder      that is written
-    report      is called after every row of history
+    report      is called after every row of history, and now and then on the way to the next
     """
 
     def __init__(self, simulation: Simulation, folder: RunFolder, report: Report = lambda _: None) -> None:
         self.simulation, self.folder, self.report = simulation, folder, report
         plan = simulation.case.run
         self.end = plan.until
-        every = plan.every or plan.until / 50.0
-        self.rows_per_snapshot = max(1, round(every / (plan.history_every or every / 10.0)))
-        self.interval = every / self.rows_per_snapshot
+        self.every = plan.every or plan.until / 50.0
+        self.rows_per_snapshot = max(1, round(self.every / (plan.history_every or self.every / 10.0)))
+        self.interval = self.every / self.rows_per_snapshot
         self.row: dict[str, float] = {}
-        self.wall_begin, self.time_begin = clock.monotonic(), simulation.time
-        self._checkpoint_at = clock.monotonic()
-        self._stop = ""
+        self._begun: tuple[float, float] | None = None
+        self._checkpoint_at, self._checkpoint_cost = clock.monotonic(), 0.0
+        self._said_at = clock.monotonic()
+        self._stop = 0
 
     @classmethod
     def begin(
@@ -79,8 +94,7 @@ class Run:
         simulation = Simulation(case, progress)
         grid = None if simulation.fluid is None else simulation.fluid.grid
         run = cls(simulation, RunFolder.create(Path(folder), written, provenance(case.bed.seed), grid, FIELDS), report)
-        run._write_row()
-        run._write_snapshot()
+        run._write_beginning()
         return run
 
     @classmethod
@@ -92,66 +106,125 @@ class Run:
         report: Report = lambda _: None,
         progress: Callable[[str], None] = lambda _: None,
     ) -> Run:
-        """Go on from the newest whole checkpoint of a folder, to the same bits; what was written later is dropped."""
-        written = RunFolder.reopen(Path(folder))
-        state = checkpoint.newest(Path(folder))
-        overrides = state["overrides"] | ({} if until is None else {"run.until": until})
-        case = Case.from_text(written.case_text, str(Path(folder) / "case.toml"), overrides)
+        """Go on from the newest whole checkpoint of a folder, to the same bits; what was written later is dropped.
+
+        A run that was killed before its first checkpoint begins anew.
+        """
+        folder = Path(folder)
+        state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
+        if state is not None and until is not None:
+            _must_be_later(until, float(state["simulation"]["particles"]["clock"]["time"]))
+        written = RunFolder.reopen(folder)
+        overrides = ({} if state is None else state["overrides"]) | ({} if until is None else {"run.until": until})
+        case = Case.from_text(written.case_text, str(folder / "case.toml"), overrides)
+        if state is None:
+            written.drop_after(-1.0)
+            run = cls(Simulation(case, progress), written, report)
+            run._write_beginning()
+            return run
         simulation = Simulation.restored(case, state["simulation"])
+        simulation.wall = Stopwatch(written.about.get("wall_time"))
+        if simulation.particles.collisions is not None:
+            simulation.particles.collisions.put_back(state["collisions"])
         written.drop_after(simulation.time)
         return cls(simulation, written, report)
 
+    @property
+    def remaining(self) -> float:
+        """Wall time to the end at the pace so far [s]; NaN before the first step."""
+        if self._begun is None or self.simulation.time == self._begun[1]:
+            return math.nan
+        wall, time = self._begun
+        return (clock.monotonic() - wall) * (self.end - self.simulation.time) / (self.simulation.time - time)
+
     def go(self) -> None:
         """Run to the end; a failure leaves the last good snapshot and says so in the folder."""
-        count = round(self.simulation.time / self.interval)
+        rows = math.floor(self.simulation.time / self.interval / (_SAME * _SAME))
         try:
             with self._stopped_cleanly():
-                while not self._stop and self.simulation.time < self.end * (1.0 - 1e-12):
-                    count += 1
-                    target = min(count * self.interval, self.end)
-                    while not self._stop and self.simulation.time < target * (1.0 - 1e-12):
-                        self.simulation.step(target)
-                    if self._stop:
+                while not self._stop and self.simulation.time < self.end * _SAME:
+                    rows += 1
+                    target = min(rows * self.interval, self.end)
+                    self._advance(target)
+                    if self.simulation.time < target * _SAME:
                         break
                     self._write_row()
-                    if count % self.rows_per_snapshot == 0 or target == self.end:
+                    if rows % self.rows_per_snapshot == 0 or target == self.end:
                         self._write_snapshot()
-                    self.report(self)
-        except CfddemError as failure:
-            self.folder.finish("failed", str(failure))
+                    self._say()
+                self._write_checkpoint()
+                self._finish()
+        except RunStopped:
             raise
-        self._write_checkpoint()
-        self.folder.finish("stopped" if self._stop else "finished", self._stop)
-        if self._stop:
-            raise RunFailed(
-                f"stopped by {self._stop} at t = {self.simulation.time:.6g} s; cfddem resume {self.folder.folder}"
-            )
+        except BaseException as failure:
+            self.folder.finish("failed", str(failure) or type(failure).__name__)
+            raise
+
+    def _advance(self, target: float) -> None:
+        """Go on to a time [s], or until the run is asked to stop."""
+        while not self._stop and self.simulation.time < target * _SAME:
+            try:
+                self.simulation.step(target)
+            except (InputError, UnstableStep) as refusal:
+                self._blame(refusal)
+            if self._begun is None:  # the first step loads or compiles loops: it says nothing of the pace
+                self._begun = clock.monotonic(), self.simulation.time
+            if clock.monotonic() - self._said_at > SAY_EVERY:
+                self._say()
+
+    def _blame(self, refusal: Exception) -> NoReturn:
+        """Some part of a step would not go on: name the particle that is behind it, if one is."""
+        moved = self.simulation.particles
+        guard(moved.bodies, moved.edges, moved.gap, moved.domain, moved.time, math.nan, moved.walls.wall)
+        raise RunFailed(f"t = {moved.time:.6g} s: {refusal}") from refusal
+
+    def _say(self) -> None:
+        self.report(self)
+        self._said_at = clock.monotonic()
+
+    def _finish(self) -> None:
+        """Say in the folder how the run ended."""
+        if self.simulation.time >= self.end * _SAME:
+            self.folder.finish("finished")
+            return
+        name = signal.Signals(self._stop).name
+        self.folder.finish("stopped", name)
+        where = f"at t = {self.simulation.time:.6g} s"
+        raise RunStopped(f"stopped by {name} {where}; go on with: cfddem resume {self.folder.folder}", self._stop)
 
     @contextmanager
     def _stopped_cleanly(self) -> Iterator[None]:
-        """SIGINT and SIGTERM end the run after the step at hand."""
+        """SIGINT and SIGTERM end the run after the step at hand; a second one does at once."""
+        before: dict[int, Any] = {}
 
         def stop(number: int, _: Any) -> None:
-            self._stop = signal.Signals(number).name
+            self._stop = number
+            signal.signal(number, before[number])
 
-        try:
-            before = [(each, signal.signal(each, stop)) for each in (signal.SIGINT, signal.SIGTERM)]
-        except ValueError:  # not the main thread, where nobody can be asked to stop
-            before = []
+        if threading.current_thread() is threading.main_thread():  # elsewhere nobody can be asked to stop
+            before = {each: signal.signal(each, stop) for each in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield
         finally:
-            for each, handler in before:
+            for each, handler in before.items():
                 signal.signal(each, handler)
 
     # ------------------------------------------------------------ what is written
 
+    def _write_beginning(self) -> None:
+        """What a run writes before its first step: with the first snapshot its first checkpoint."""
+        self._write_row()
+        self._write_snapshot()
+
     def _write_row(self) -> None:
+        self.simulation.wall.start()
         self.row = measure(self.simulation)
         self.folder.append_history(self.row)
+        self.simulation.wall.lap("measures")
 
     def _write_snapshot(self) -> None:
         simulation, bodies = self.simulation, self.simulation.particles.bodies
+        simulation.wall.start()
         fluid = None
         if simulation.fluid is not None:
             fluid = {
@@ -160,14 +233,31 @@ class Run:
                 "pressure": simulation.fluid.pressure,
             }
         particles = {name: getattr(bodies, name) for name in ("id", "position", "velocity", "spin", "radius", "force")}
-        self.folder.write_snapshot(simulation.time, simulation.particles.steps, fluid, particles)
-        if clock.monotonic() - self._checkpoint_at > CHECKPOINT_SECONDS:
+        record = simulation.particles.collisions
+        encounters = None if record is None else record.take()
+        self.folder.write_snapshot(simulation.time, simulation.particles.steps, fluid, particles, encounters)
+        simulation.wall.lap("snapshots")
+        if clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE:
             self._write_checkpoint()
 
     def _write_checkpoint(self) -> None:
-        until = {"run.until": self.end}
-        self.folder.write_checkpoint({"overrides": until, "simulation": self.simulation.checkpoint()})
+        """The state to go on from; the intervals too, which would follow from the end otherwise."""
+        begin, simulation = clock.monotonic(), self.simulation
+        simulation.wall.start()
+        plan = {"run.until": self.end, "run.every": self.every, "run.history_every": self.interval}
+        state: dict[str, Any] = {"overrides": plan, "simulation": simulation.checkpoint()}
+        if simulation.particles.collisions is not None:
+            state["collisions"] = simulation.particles.collisions.table
+        self.folder.write_checkpoint(state)
+        simulation.wall.lap("checkpoints")
+        self.folder.note("wall_time", dict(simulation.wall.seconds))
         self._checkpoint_at = clock.monotonic()
+        self._checkpoint_cost = self._checkpoint_at - begin
+
+
+def _must_be_later(until: float, time: float) -> None:
+    if until < time:
+        raise InputError("until", until, f"at least {time:.6g} s, where the run stands", "a run goes forward only")
 
 
 def measure(simulation: Simulation) -> dict[str, float]:
@@ -179,6 +269,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
     cells = cells_of(bodies.position, grid.shape, grid.spacing)
     row = {
         "time": simulation.time,
+        "fluid_steps": float(simulation.steps),
         "bed_height": height,
         "granular_temperature": granular_temperature(bodies.velocity, cells).mean,
         "kinetic_energy": kinetic_energy(bodies),
@@ -189,9 +280,15 @@ def measure(simulation: Simulation) -> dict[str, float]:
     if fluid is None or simulation.exchange is None:
         return row
     floor = float(grid.open.mean()) * column.size[0] * column.size[1]
-    solids = float(((4.0 / 3.0) * np.pi * bodies.radius**3).sum())
+    volume = (4.0 / 3.0) * np.pi * bodies.radius**3
+    carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
+    weight = (np.average(bodies.density, weights=volume) - fluid.density) * carried
+    low, high = (share * height for share in BED)
     row |= {
-        "bed_voidage": 1.0 - 0.99 * solids / (floor * height),
+        "bed_voidage": 1.0 - 0.99 * volume.sum() / (floor * height),
+        "bed_voidage_pressure": voidage_by_pressure(
+            fluid.pressure, grid.spacing, float(weight), low, high, open_cells=grid.open
+        ),
         "pressure_drop": pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open),
         "exchange_imbalance": exchange_imbalance(fluid, simulation.exchange),
         "volume_imbalance": volume_imbalance(fluid),

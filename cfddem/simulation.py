@@ -14,6 +14,7 @@ from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
 from cfddem.errors import RunFailed
 from cfddem.particles.clocks import check_step
 from cfddem.particles.state import Bodies
+from cfddem.stopwatch import Stopwatch
 
 CLOCKS_EVERY = 20
 """Fluid steps between two readings of the particles' clocks."""
@@ -33,6 +34,7 @@ class Simulation:
         self.gravity = np.array(case.laws.gravity)
         self.steps = 0
         self.binding = ""
+        self.wall = Stopwatch()
         self._particle_step = self._longest_particle_step()
 
     @property
@@ -42,13 +44,20 @@ class Simulation:
 
     def step(self, until: float = math.inf) -> None:
         """Make one fluid step, with as many particle steps as it takes; `until` [s] is met exactly."""
+        wall = self.wall
+        wall.start()
         step, substeps = self._choose_steps(until)
+        wall.lap("clocks")
         particles, bodies = self.particles, self.particles.bodies
         if self.fluid is not None and self.exchange is not None:
             offer = self.exchange.offer(bodies, step)
+            wall.lap("offer")
             self.fluid.step(step, *offer.fields)
+            wall.lap("fluid")
             self.exchange.answer(bodies, offer, self.gravity)
+            wall.lap("answer")
         particles.advance(step / substeps, substeps)
+        wall.lap("particles")
         self.steps += 1
 
     def until(self, time: float) -> None:
@@ -83,7 +92,7 @@ class Simulation:
             simulation.fluid.restore(state["fluid"])
             simulation.exchange.restore(state["exchange"])
         simulation.steps, simulation._particle_step = int(state["steps"]), float(state["particle_step"])
-        simulation.binding = ""
+        simulation.binding, simulation.wall = "", Stopwatch()
         return simulation
 
     # ------------------------------------------------------------ time steps

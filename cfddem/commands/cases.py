@@ -67,6 +67,7 @@ def run(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; NAME-run")] = None,
     set: Annotated[list[str] | None, Parameter(help="key=value in place of the file's; repeat for more")] = None,
     threads: Annotated[int | None, Parameter(help="of the machine; all if not given")] = None,
+    log: Annotated[Path | None, Parameter(help="file that gets a line of progress for every row of history")] = None,
 ) -> None:
     """Run a case into a folder, and report what came out. A case whose card is red is refused.
 
@@ -89,7 +90,7 @@ def run(
 
     folder = output or Path(f"{path.stem}-run")
     use_threads(threads)
-    with live_line() as line:
+    with live_line(log) as line:
         text = described.to_toml() if set else read_text(path)
         Run.begin(described, folder, text=text, report=line.update, progress=line.say).go()
     print("\n".join(lines(summary(folder))))
@@ -101,6 +102,7 @@ def resume(
     *,
     until: Annotated[float | None, Parameter(help="new end [s]")] = None,
     threads: Annotated[int | None, Parameter(help="of the machine; all if not given")] = None,
+    log: Annotated[Path | None, Parameter(help="file that gets a line of progress for every row of history")] = None,
 ) -> None:
     """Go on with a run that was stopped or killed, to the same bits.
 
@@ -114,7 +116,7 @@ def resume(
 
     use_threads(threads)
     folder = folder or newest_run(Path())
-    with live_line() as line:
+    with live_line(log) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.say).go()
     print(f"written to {folder}")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as _json
 from pathlib import Path
 from typing import Annotated
 
@@ -12,18 +11,26 @@ from cyclopts import Parameter
 def report(
     folder: Annotated[Path | None, Parameter(help="of a run; the newest one here if not given")] = None,
     *,
-    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="page; NAME-report.html here")] = None,
+    json: Annotated[bool, Parameter(help="print the result as JSON instead; no page without -o", negative="")] = False,
 ) -> None:
-    """Means of a run with their errors, beside the laws of beds.
+    """Say what came out of a run, and write it on an HTML page with figures: means with errors, laws of beds, warnings.
 
     Example: cfddem report bed
     """
     from cfddem.record.reading import newest_run
-    from cfddem.report import lines
+    from cfddem.report import as_json, lines
     from cfddem.report import report as summary
 
-    result = summary(folder or newest_run(Path()))
-    print(_json.dumps(result, allow_nan=True) if json else "\n".join(lines(result)))
+    folder = folder or newest_run(Path())
+    result = summary(folder)
+    if json and output is None:
+        print(as_json(result))
+        return
+    from cfddem.view.page import page
+
+    written = page(folder, output, result)
+    print(as_json(result) if json else "\n".join([*lines(result), "", f"  with figures: {written}"]))
 
 
 def view(

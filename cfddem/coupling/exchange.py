@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -271,6 +272,7 @@ def _ranges(drag: Law | None) -> tuple[float, float, float, float]:
     return (*card.get("reynolds", (0.0, math.inf)), *card.get("voidage", (0.0, 1.0)))
 
 
+@cache
 def _drag_loop(law: Callable[..., float]) -> Any:
     """The loop that asks a law for every particle; small, and compiled for the law that a run has chosen."""
 

@@ -59,6 +59,11 @@ def write(folder: Path, state: Mapping[str, Any]) -> Path:
     return path
 
 
+def exists(folder: Path) -> bool:
+    """Whether a run has ever written a checkpoint, whole or damaged."""
+    return bool(_files(Path(folder) / "checkpoint"))
+
+
 def newest(folder: Path) -> dict[str, Any]:
     """The newest state of a run that is whole; a damaged one is named in a warning and passed over.
 

@@ -32,3 +32,12 @@ class CollisionRecord:
         """Keep the first rows that the loop has written."""
         if count:
             self._kept.append(self._rows[:count].copy())
+
+    def take(self) -> np.ndarray:
+        """All rows, which are forgotten here."""
+        table, self._kept = self.table, []
+        return table
+
+    def put_back(self, rows: np.ndarray) -> None:
+        """Rows that ended before those to come, as after a restart."""
+        self._kept = [np.array(rows, ENCOUNTER)]

@@ -155,6 +155,39 @@ def pressure_drop(
     return float(values[0] - values[1])
 
 
+def voidage_by_pressure(
+    pressure: Array,
+    spacing: Sequence[float],
+    weight: float,
+    low: float,
+    high: float,
+    origin: Sequence[float] = (0.0, 0.0, 0.0),
+    open_cells: Mask | None = None,
+) -> float:
+    r"""Mean voidage of a bed that the flow carries, from the slope of the pressure within it.
+
+    .. math:: -\frac{dp'}{dz} = (1-\varepsilon)(\rho_p-\rho)g
+
+    pressure    (nz, ny, nx), p' = p - rho g.x [Pa]
+    spacing     hx, hy, hz of a cell [m]
+    weight      (rho_p - rho) g, buoyant, of the volume of the particles [N/m3]
+    low, high   heights z between which a line is fitted to the means of layers [m]
+    origin      lowest corner of the box [m]
+    open_cells  cells that count; all if None
+    returns     eps [-]; NaN where fewer than three layers have their centres in between
+
+    >>> pressure = 1000.0 - 100.0 * np.array([0.5, 1.5, 2.5, 3.5]).reshape(4, 1, 1)
+    >>> round(voidage_by_pressure(pressure, (1.0, 1.0, 1.0), 250.0, 0.0, 4.0), 12)
+    0.6
+    """
+    layers = profile(pressure, "z", open_cells)
+    centre = origin[2] + (np.arange(len(layers)) + 0.5) * spacing[2]
+    inside = (centre >= low) & (centre <= high) & np.isfinite(layers)
+    if inside.sum() < 3 or weight == 0.0:
+        return float("nan")
+    return float(1.0 + np.polyfit(centre[inside], layers[inside], 1)[0] / weight)
+
+
 def particle_profile(values: Array, position: Array, radius: Array, edges: Array, along: str = "z") -> Array:
     """Mean over the particles whose centres lie in each slab, weighted by their volume.
 

@@ -208,6 +208,11 @@ class RunFolder:
         self.flush_history()
         checkpoint.write(self.folder, state)
 
+    def note(self, name: str, value: Any) -> None:
+        """Keep a plain value about the run itself in `run.json`, in place of an earlier one of that name."""
+        self.about[name] = value
+        self._write_about()
+
     def drop_after(self, time: float) -> None:
         """Forget snapshots and rows later than the state that a run goes on from [s].
 

@@ -19,6 +19,7 @@ import numpy as np
 from cfddem.errors import InputError, RunFailed, nearest
 from cfddem.record.folder import look, read_about, read_columns
 from cfddem.record.index import POINTS, Box, Snapshot, listed
+from cfddem.record.quantities import KNOWN, Quantity
 
 if TYPE_CHECKING:
     import pyvista
@@ -105,6 +106,11 @@ class Run:
     def particle_fields(self) -> list[str]:
         """Names of the fields of the particles."""
         return ["position" if name == POINTS else name for name in self._names["particles"]]
+
+    def long_name(self, name: str) -> str:
+        """What a field, or a column of the history, is."""
+        known = {**KNOWN, **{key: Quantity(*each) for key, each in self.about["fields"].items()}}
+        return known[name].long_name if name in known else name.replace("_", " ")
 
     def unit(self, name: str) -> str:
         """Unit of a field, or of a column of the history."""

@@ -1,0 +1,296 @@
+"""Coupled runs in their folders: stopped, killed and failed ones go on to the same bits, and say how they ended."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cfddem import cli, open_run
+from cfddem.case import Case
+from cfddem.errors import InputError, RunFailed, RunStopped
+from cfddem.kernels import use_threads
+from cfddem.record import checkpoint
+from cfddem.run import Run
+
+TINY = """
+title = "Glass beads that sink in water"
+[fluid]
+density = 1000.0
+viscosity = 2e-3
+[material.glass]
+density = 2500.0
+youngs_modulus = 60e9
+contact_modulus = 2e6
+poisson = 0.25
+restitution = 0.9
+friction = 0.3
+friction_lubricated = 0.1
+roughness = 1e-6
+[column]
+width = 0.012
+height = 0.018
+cell = 0.003
+[bed]
+diameter = 2e-3
+count = 160
+start = "suspended"
+inlet_velocity = 0.02
+[run]
+until = 0.024
+every = 0.004
+history_every = 0.001
+reference_speed = 0.1
+collisions = true
+"""
+"""Films are there from the start, contacts after a few milliseconds; a second of wall time."""
+
+
+def begin(folder: Path, text: str = TINY, report: Callable[[Run], None] = lambda _: None) -> Run:
+    return Run.begin(Case.from_text(text), folder, text=text, report=report)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run that nothing disturbs."""
+    folder = tmp_path_factory.mktemp("undisturbed") / "run"
+    begin(folder).go()
+    return folder
+
+
+def same_state(left: Path, right: Path) -> None:
+    """The last checkpoints hold the same bits: particles, pairs, walls, fluid, exchange and encounters."""
+
+    def compare(one: dict, other: dict, where: str) -> None:
+        assert one.keys() == other.keys(), where
+        for name, value in one.items():
+            if isinstance(value, dict):
+                compare(value, other[name], f"{where}.{name}")
+            elif isinstance(value, np.ndarray):
+                assert value.dtype == other[name].dtype and value.tobytes() == other[name].tobytes(), f"{where}.{name}"
+            else:
+                assert value == other[name], f"{where}.{name}"
+
+    compare(checkpoint.newest(left)["simulation"], checkpoint.newest(right)["simulation"], "state")
+
+
+def same_record(left: Path, right: Path) -> None:
+    """Snapshots, history and encounters are the same, value by value."""
+    one, other = open_run(left), open_run(right)
+    assert one.times.tolist() == other.times.tolist() and one.steps.tolist() == other.steps.tolist()
+    for place in range(len(one.times)):
+        for name in one.fluid_fields:
+            assert np.array_equal(one.fluid(name, place), other.fluid(name, place)), (place, name)
+        fields, others = one.particles(place), other.particles(place)
+        for name in fields:
+            assert np.array_equal(fields[name], others[name]), (place, name)
+    for columns, twins in ((one.history, other.history), (one.collisions, other.collisions)):
+        assert columns.keys() == twins.keys()
+        for name in columns:
+            assert np.array_equal(columns[name], twins[name], equal_nan=True), name
+
+
+def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
+    seen = open_run(undisturbed)
+    assert seen.status == "finished"
+    assert seen.times == pytest.approx(np.arange(7) * 0.004)
+    assert seen.history["time"] == pytest.approx(np.arange(25) * 0.001)
+    assert len(seen.collisions["first"]) > 10 and (np.diff(seen.collisions["end"]) >= 0.0).all()
+    assert seen.history["contact_count"][-1] > 10
+    parts = seen.about["wall_time"]
+    assert {"particles", "fluid", "offer", "answer", "measures", "snapshots", "first calls"} <= parts.keys()
+    assert min(parts.values()) > 0.0
+
+
+@pytest.mark.parametrize("rows", [6, 14])
+def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path: Path, undisturbed: Path, rows: int) -> None:
+    """In the middle between two snapshots, with films, contacts and open encounters alive."""
+
+    def stop(run: Run) -> None:
+        if len(run.folder._history["time"]) > rows:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    run = begin(tmp_path / "run", report=stop)
+    with pytest.raises(RunStopped, match=r"stopped by SIGTERM at t = 0\.0\d+ s; go on with: cfddem resume") as ended:
+        run.go()
+    assert ended.value.exit_code == 128 + signal.SIGTERM
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    assert open_run(tmp_path / "run").status == "stopped"
+    edges = run.simulation.particles.edges
+    assert (edges.resistance > 0.0).any() and np.isfinite(edges.entry).any()
+    assert rows < 10 or (edges.force != 0.0).any()
+    Run.resume(tmp_path / "run").go()
+    assert open_run(tmp_path / "run").status == "finished"
+    same_state(tmp_path / "run", undisturbed)
+    same_record(tmp_path / "run", undisturbed)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_a_stop_on_the_way_to_a_row_loses_none(tmp_path: Path, undisturbed: Path, share: float) -> None:
+    """Before and after the middle of an interval."""
+    run = begin(tmp_path / "run", TINY.replace("history_every = 0.001", "history_every = 0.004"))
+    step = run.simulation.step
+
+    def stepping(until: float) -> None:
+        step(until)
+        if run.simulation.time > (2.0 + share) * 0.004:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    run.simulation.step = stepping  # type: ignore[method-assign]
+    with pytest.raises(RunStopped, match="SIGINT"):
+        run.go()
+    assert 0.008 < run.simulation.time < 0.012
+    Run.resume(tmp_path / "run").go()
+    assert open_run(tmp_path / "run").history["time"] == pytest.approx(np.arange(7) * 0.004)
+
+
+def test_a_stop_in_the_step_that_reaches_the_row_keeps_the_row(tmp_path: Path) -> None:
+    run = begin(tmp_path / "run")
+    step = run.simulation.step
+
+    def stepping(until: float) -> None:
+        step(until)
+        if run.simulation.time == until and until > 0.0025:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    run.simulation.step = stepping  # type: ignore[method-assign]
+    with pytest.raises(RunStopped):
+        run.go()
+    assert open_run(tmp_path / "run").history["time"] == pytest.approx([0.0, 0.001, 0.002, 0.003])
+
+
+def test_a_longer_run_keeps_its_intervals(tmp_path: Path) -> None:
+    text = TINY.replace("until = 0.024", "until = 0.004").replace("every = 0.004", "every = 0.002")
+    begin(tmp_path / "run", text).go()
+    with pytest.raises(InputError, match=r"until = 0\.003: must be at least 0\.004 s"):
+        Run.resume(tmp_path / "run", until=0.003)
+    Run.resume(tmp_path / "run", until=0.007).go()
+    seen = open_run(tmp_path / "run")
+    assert seen.times == pytest.approx([0.0, 0.002, 0.004, 0.006, 0.007])
+    assert seen.history["time"] == pytest.approx(np.arange(8) * 0.001)
+
+
+def test_a_run_killed_before_its_first_checkpoint_begins_anew(tmp_path: Path, undisturbed: Path) -> None:
+    run = begin(tmp_path / "run")
+    run.folder._lock.close()
+    for each in (tmp_path / "run" / "checkpoint").iterdir():
+        each.unlink()
+    Run.resume(tmp_path / "run").go()
+    same_record(tmp_path / "run", undisturbed)
+
+
+def test_other_thread_counts_go_on_to_the_same_bits(tmp_path: Path) -> None:
+    """More than a thousand particles, whose loops are threaded: begun on one thread, gone on with on two."""
+    text = TINY.replace("width = 0.012", "width = 0.018").replace("height = 0.018", "height = 0.048")
+    text = text.replace("count = 160", "count = 1050").replace("until = 0.024", "until = 0.008")
+    before = use_threads(None)
+
+    def stop(run: Run) -> None:
+        if len(run.folder._history["time"]) == 5:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    begin(tmp_path / "whole", text).go()
+    with pytest.raises(RunStopped):
+        begin(tmp_path / "run", text, stop).go()
+    try:
+        use_threads(2)
+    except InputError:
+        pytest.skip("one thread only: NUMBA_NUM_THREADS or the machine allows no more")
+    try:
+        Run.resume(tmp_path / "run").go()
+    finally:
+        use_threads(before)
+    same_state(tmp_path / "run", tmp_path / "whole")
+    same_record(tmp_path / "run", tmp_path / "whole")
+
+
+# ---------------------------------------------------------------- failures
+
+
+def lost(run: Run) -> None:
+    run.simulation.particles.bodies.velocity[7] = (0.0, 0.0, -1e4)
+
+
+def no_number(run: Run) -> None:
+    run.simulation.particles.bodies.velocity[7, 1] = np.nan
+
+
+@pytest.mark.parametrize(("how", "said"), [(no_number, "is no number any more"), (lost, "particle 7 at")])
+def test_a_failure_leaves_the_last_good_snapshot(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    how: Callable[[Run], None],
+    said: str,
+) -> None:
+    """From the command line: one line, exit code 3, and what was written before is whole and can be gone on with."""
+    (tmp_path / "case.toml").write_text(TINY)
+    monkeypatch.chdir(tmp_path)
+    write = Run._write_row
+
+    def write_row(run: Run) -> None:
+        write(run)
+        if run.simulation.time > 0.0095:
+            how(run)
+
+    monkeypatch.setattr(Run, "_write_row", write_row)
+    monkeypatch.setattr(sys, "argv", ["cfddem", "run", "case.toml", "-o", "bed"])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == RunFailed.exit_code == 3
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.startswith("cfddem: ") and said in last
+    seen = open_run("bed")
+    assert (seen.status, len(seen.times)) == ("failed", 3) and said in seen.message
+    assert np.isfinite(seen.particles()["velocity"]).all() and np.isfinite(seen.fluid("pressure")).all()
+    assert len(seen.history["time"]) == 11
+    monkeypatch.setattr(Run, "_write_row", write)
+    Run.resume(Path("bed"), until=0.01).go()
+    assert open_run("bed").status == "finished"
+
+
+# ---------------------------------------------------------------- kills
+
+
+def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
+    """Kill a run at random instants, again and again, until it has ended; returns how often it was hit."""
+    words = [sys.executable, "-m", "cfddem.cli"]
+    (folder / "case.toml").write_text(TINY)
+    instants, hits = random.Random(seed), 0
+    while True:
+        begun = (folder / "run" / "run.json").exists()
+        command = [*words, "resume", "run"] if begun else [*words, "run", "case.toml", "-o", "run"]
+        mark = folder / "run" / "run.json"
+        before = mark.stat().st_mtime_ns if mark.exists() else 0
+        process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        if hits < kills:  # once it writes, not while it loads
+            while process.poll() is None and (not mark.exists() or mark.stat().st_mtime_ns == before):
+                time.sleep(0.002)
+            time.sleep(instants.uniform(0.0, 0.35))
+            process.kill()
+        _, said = process.communicate(timeout=300)
+        if process.returncode == -signal.SIGKILL:
+            hits += 1
+            seen = open_run(folder / "run")
+            assert not seen.missing and len(seen.history.get("time", ())) >= len(seen.times)
+            for place in range(len(seen.times)):
+                assert np.isfinite(seen.particles(place)["position"]).all()
+            continue
+        assert process.returncode == 0, said
+        return hits
+
+
+@pytest.mark.slow
+def test_ten_kills_of_a_real_run_leave_it_whole_and_its_end_the_same(tmp_path: Path, undisturbed: Path) -> None:
+    hits = kill_and_go_on(tmp_path, kills=10, seed=4)
+    assert hits >= 5
+    same_state(tmp_path / "run", undisturbed)
+    same_record(tmp_path / "run", undisturbed)
