@@ -17,7 +17,7 @@ app = App(
     help="""Spheres in a fluid, with the thin film between them. All numbers are in SI units.
 
 Exit codes: 0 all is well; 1 a limit does not hold (validate), amber with --strict (check), something is wrong
-(doctor); 2 wrong input, or a case whose card is red; 3 a run that failed; 130 stopped from the keyboard, 143 by SIGTERM.
+(doctor); 2 wrong input, or a case whose card is red; 3 a failed run; 130 stopped from the keyboard, 143 by SIGTERM.
 
 Example: cfddem new liquid-bed, then cfddem check, cfddem run, cfddem report, cfddem view
 """,
