@@ -48,12 +48,12 @@ class Line:
 
 
 def status_of(run: Run) -> str:
-    """Time, steps, bed height, fastest particle, contacts, the clock that binds, and the wall time that is left."""
+    """Time, wall time left, the clock that binds, steps, bed height, fastest particle, contacts: first what matters."""
     row, simulation = run.row, run.simulation
     return (
-        f"{simulation.time:.4g}/{run.end:g} s  {simulation.particles.steps} steps  "
-        f"bed {1e3 * row['bed_height']:.3g} mm  {row['fastest']:.2g} m/s  {row['contact_count']:.0f} contacts  "
-        f"clock: {simulation.binding or '-'}  {_duration(run.remaining)} left"
+        f"{simulation.time:.4g}/{run.end:g} s  {_duration(run.remaining)} left  clock: {simulation.binding or '-'}  "
+        f"{simulation.particles.steps} steps  bed {1e3 * row['bed_height']:.3g} mm  {row['fastest']:.2g} m/s  "
+        f"{row['contact_count']:.0f} contacts"
     )
 
 

@@ -65,7 +65,7 @@ class Run:
         self.every = plan.every or plan.until / 50.0
         self.rows_per_snapshot = max(1, round(self.every / (plan.history_every or self.every / 10.0)))
         self.interval = self.every / self.rows_per_snapshot
-        self.row: dict[str, float] = {}
+        self.row = folder.last_row
         self._begun: tuple[float, float] | None = None
         self._checkpoint_at, self._checkpoint_cost = clock.monotonic(), 0.0
         self._said_at = clock.monotonic()

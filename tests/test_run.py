@@ -3,55 +3,22 @@
 from __future__ import annotations
 
 import os
-import random
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from disturbed_runs import TINY, kill_and_go_on, long_enough, same_record, same_state
 
 from cfddem import cli, open_run
+from cfddem import run as running
 from cfddem.case import Case
 from cfddem.errors import InputError, RunFailed, RunStopped
 from cfddem.kernels import use_threads
-from cfddem.record import checkpoint
+from cfddem.progress import status_of
 from cfddem.run import Run
-
-TINY = """
-title = "Glass beads that sink in water"
-[fluid]
-density = 1000.0
-viscosity = 2e-3
-[material.glass]
-density = 2500.0
-youngs_modulus = 60e9
-contact_modulus = 2e6
-poisson = 0.25
-restitution = 0.9
-friction = 0.3
-friction_lubricated = 0.1
-roughness = 1e-6
-[column]
-width = 0.012
-height = 0.018
-cell = 0.003
-[bed]
-diameter = 2e-3
-count = 160
-start = "suspended"
-inlet_velocity = 0.02
-[run]
-until = 0.024
-every = 0.004
-history_every = 0.001
-reference_speed = 0.1
-collisions = true
-"""
-"""Films are there from the start, contacts after a few milliseconds; a second of wall time."""
 
 
 def begin(folder: Path, text: str = TINY, report: Callable[[Run], None] = lambda _: None) -> Run:
@@ -64,38 +31,6 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("undisturbed") / "run"
     begin(folder).go()
     return folder
-
-
-def same_state(left: Path, right: Path) -> None:
-    """The last checkpoints hold the same bits: particles, pairs, walls, fluid, exchange and encounters."""
-
-    def compare(one: dict, other: dict, where: str) -> None:
-        assert one.keys() == other.keys(), where
-        for name, value in one.items():
-            if isinstance(value, dict):
-                compare(value, other[name], f"{where}.{name}")
-            elif isinstance(value, np.ndarray):
-                assert value.dtype == other[name].dtype and value.tobytes() == other[name].tobytes(), f"{where}.{name}"
-            else:
-                assert value == other[name], f"{where}.{name}"
-
-    compare(checkpoint.newest(left)["simulation"], checkpoint.newest(right)["simulation"], "state")
-
-
-def same_record(left: Path, right: Path) -> None:
-    """Snapshots, history and encounters are the same, value by value."""
-    one, other = open_run(left), open_run(right)
-    assert one.times.tolist() == other.times.tolist() and one.steps.tolist() == other.steps.tolist()
-    for place in range(len(one.times)):
-        for name in one.fluid_fields:
-            assert np.array_equal(one.fluid(name, place), other.fluid(name, place)), (place, name)
-        fields, others = one.particles(place), other.particles(place)
-        for name in fields:
-            assert np.array_equal(fields[name], others[name]), (place, name)
-    for columns, twins in ((one.history, other.history), (one.collisions, other.collisions)):
-        assert columns.keys() == twins.keys()
-        for name in columns:
-            assert np.array_equal(columns[name], twins[name], equal_nan=True), name
 
 
 def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
@@ -111,8 +46,11 @@ def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
 
 
 @pytest.mark.parametrize("rows", [6, 14])
-def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path: Path, undisturbed: Path, rows: int) -> None:
+def test_a_stopped_run_goes_on_to_the_same_bits(
+    tmp_path: Path, undisturbed: Path, rows: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In the middle between two snapshots, with films, contacts and open encounters alive."""
+    monkeypatch.setattr(running, "SAY_EVERY", 0.0)
 
     def stop(run: Run) -> None:
         if len(run.folder._history["time"]) > rows:
@@ -127,8 +65,10 @@ def test_a_stopped_run_goes_on_to_the_same_bits(tmp_path: Path, undisturbed: Pat
     edges = run.simulation.particles.edges
     assert (edges.resistance > 0.0).any() and np.isfinite(edges.entry).any()
     assert rows < 10 or (edges.force != 0.0).any()
-    Run.resume(tmp_path / "run").go()
+    said: list[str] = []
+    Run.resume(tmp_path / "run", report=lambda run: said.append(status_of(run))).go()
     assert open_run(tmp_path / "run").status == "finished"
+    assert said[0].startswith("0.0") and "left" in said[0]
     same_state(tmp_path / "run", undisturbed)
     same_record(tmp_path / "run", undisturbed)
 
@@ -260,37 +200,10 @@ def test_a_failure_leaves_the_last_good_snapshot(
 # ---------------------------------------------------------------- kills
 
 
-def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
-    """Kill a run at random instants, again and again, until it has ended; returns how often it was hit."""
-    words = [sys.executable, "-m", "cfddem.cli"]
-    (folder / "case.toml").write_text(TINY)
-    instants, hits = random.Random(seed), 0
-    while True:
-        begun = (folder / "run" / "run.json").exists()
-        command = [*words, "resume", "run"] if begun else [*words, "run", "case.toml", "-o", "run"]
-        mark = folder / "run" / "run.json"
-        before = mark.stat().st_mtime_ns if mark.exists() else 0
-        process = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        if hits < kills:  # once it writes, not while it loads
-            while process.poll() is None and (not mark.exists() or mark.stat().st_mtime_ns == before):
-                time.sleep(0.002)
-            time.sleep(instants.uniform(0.0, 0.35))
-            process.kill()
-        _, said = process.communicate(timeout=300)
-        if process.returncode == -signal.SIGKILL:
-            hits += 1
-            seen = open_run(folder / "run")
-            assert not seen.missing and len(seen.history.get("time", ())) >= len(seen.times)
-            for place in range(len(seen.times)):
-                assert np.isfinite(seen.particles(place)["position"]).all()
-            continue
-        assert process.returncode == 0, said
-        return hits
-
-
 @pytest.mark.slow
-def test_ten_kills_of_a_real_run_leave_it_whole_and_its_end_the_same(tmp_path: Path, undisturbed: Path) -> None:
-    hits = kill_and_go_on(tmp_path, kills=10, seed=4)
-    assert hits >= 5
-    same_state(tmp_path / "run", undisturbed)
-    same_record(tmp_path / "run", undisturbed)
+def test_ten_kills_of_a_real_run_leave_it_whole_and_its_end_the_same(tmp_path: Path) -> None:
+    """`python tests/disturbed_runs.py 100` does a hundred."""
+    assert kill_and_go_on(tmp_path, kills=10, seed=4) >= 5
+    begin(tmp_path / "whole", long_enough(10)).go()
+    same_state(tmp_path / "run", tmp_path / "whole")
+    same_record(tmp_path / "run", tmp_path / "whole")

@@ -172,7 +172,7 @@ class ParticleSolver:
             "origin": self._origin,
             "clock": {
                 "time": self.time, "steps": self.steps, "skin": self.skin,
-                "lists": self._lists, "listed_at": self._listed_at,
+                "lists": self._lists, "listed_at": self._listed_at, "accepted": self._accepted,
             },
         }  # fmt: skip
 
@@ -187,6 +187,7 @@ class ParticleSolver:
         self.time, self.steps, self.skin = float(clock["time"]), int(clock["steps"]), float(clock["skin"])
         self._next_id = max(self._next_id, int(self.bodies.id.max()) + 1)
         self._lists, self._listed_at = int(clock["lists"]), int(clock["listed_at"])
+        self._accepted = float(clock.get("accepted", 0.0))
         travel = self.walls.travel.copy()
         self._take_list(Edges(**edges))
         self._origin[:] = state["origin"]

@@ -191,6 +191,11 @@ class RunFolder:
             self._history[name].append(value)
         self._history_is_new = True
 
+    @property
+    def last_row(self) -> dict[str, float]:
+        """The last row of the history; empty before the first."""
+        return {name: column[-1] for name, column in self._history.items() if column}
+
     def flush_history(self) -> None:
         """Write all rows so far."""
         if not self._history_is_new:

@@ -1,0 +1,151 @@
+"""A tiny coupled run, killed again and again at random instants, and what must be the same at its end.
+
+`python tests/disturbed_runs.py 100` kills it a hundred times; a quarter of an hour, most of it starting processes.
+"""
+
+from __future__ import annotations
+
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from cfddem import open_run
+from cfddem.case import Case
+from cfddem.record import checkpoint
+from cfddem.run import Run
+
+TINY = """
+title = "Glass beads that sink in water"
+[fluid]
+density = 1000.0
+viscosity = 2e-3
+[material.glass]
+density = 2500.0
+youngs_modulus = 60e9
+contact_modulus = 2e6
+poisson = 0.25
+restitution = 0.9
+friction = 0.3
+friction_lubricated = 0.1
+roughness = 1e-6
+[column]
+width = 0.012
+height = 0.018
+cell = 0.003
+[bed]
+diameter = 2e-3
+count = 160
+start = "suspended"
+inlet_velocity = 0.02
+[run]
+until = 0.024
+every = 0.004
+history_every = 0.001
+reference_speed = 0.1
+collisions = true
+"""
+"""Films are there from the start, contacts after a few milliseconds; a second of wall time."""
+
+
+def same_state(left: Path, right: Path) -> None:
+    """The last checkpoints hold the same bits: particles, pairs, walls, fluid, exchange and encounters."""
+
+    def compare(one: dict, other: dict, where: str) -> None:
+        assert one.keys() == other.keys(), where
+        for name, value in one.items():
+            if isinstance(value, dict):
+                compare(value, other[name], f"{where}.{name}")
+            elif isinstance(value, np.ndarray):
+                assert value.dtype == other[name].dtype and value.tobytes() == other[name].tobytes(), f"{where}.{name}"
+            else:
+                assert value == other[name], f"{where}.{name}"
+
+    compare(checkpoint.newest(left)["simulation"], checkpoint.newest(right)["simulation"], "state")
+
+
+def same_record(left: Path, right: Path) -> None:
+    """Snapshots, history and encounters are the same, value by value."""
+    one, other = open_run(left), open_run(right)
+    assert one.times.tolist() == other.times.tolist() and one.steps.tolist() == other.steps.tolist()
+    for place in range(len(one.times)):
+        for name in one.fluid_fields:
+            assert np.array_equal(one.fluid(name, place), other.fluid(name, place)), (place, name)
+        fields, others = one.particles(place), other.particles(place)
+        for name in fields:
+            assert np.array_equal(fields[name], others[name]), (place, name)
+    for columns, twins in ((one.history, other.history), (one.collisions, other.collisions)):
+        assert columns.keys() == twins.keys()
+        for name in columns:
+            assert np.array_equal(columns[name], twins[name], equal_nan=True), name
+
+
+def long_enough(kills: int) -> str:
+    """The case, made so long that it can be killed so often and still gets on."""
+    return TINY.replace("until = 0.024", f"until = {0.012 * kills:g}").replace("every = 0.004", "every = 0.002", 1)
+
+
+def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
+    """Kill a run at random instants, every other time while it loads, and let it go on; at last to its end.
+
+    Every folder that a kill leaves opens, and lacks nothing up to its last snapshot.
+
+    returns  how often it was hit before its end
+    """
+    run, instants, hits = folder / "run", random.Random(seed), 0
+    (folder / "case.toml").write_text(long_enough(kills))
+    for number in range(kills):
+        process = _started(folder)
+        if number % 2:
+            time.sleep(instants.uniform(0.0, 3.0))
+        else:
+            before = _snapshots(run)
+            while process.poll() is None and _snapshots(run) <= before:
+                time.sleep(0.002)
+            time.sleep(instants.uniform(0.0, 0.25))
+        process.kill()
+        _, said = process.communicate(timeout=300)
+        if process.returncode != -signal.SIGKILL:
+            assert process.returncode == 0, said
+            return hits
+        hits += 1
+        if (run / "run.json").exists():
+            seen = open_run(run)
+            assert not seen.missing
+            assert len(seen.history.get("time", ())) >= len(seen.times)
+            for place in range(len(seen.times)):
+                assert np.isfinite(seen.particles(place)["position"]).all()
+    process = _started(folder)
+    _, said = process.communicate(timeout=600)
+    assert process.returncode == 0, said
+    return hits
+
+
+def _started(folder: Path) -> subprocess.Popen[str]:
+    """The run, begun or gone on with, in a process of its own."""
+    begun = (folder / "run" / "run.json").exists()
+    words = ["resume", "run"] if begun else ["run", "case.toml", "-o", "run"]
+    command = [sys.executable, "-m", "cfddem.cli", *words]
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+
+
+def _snapshots(run: Path) -> int:
+    """Number of the last snapshot that is there; a resumed run first drops what is later than its checkpoint."""
+    return max((int(each.stem) for each in (run / "data").glob("[0-9]*.h5")), default=-1)
+
+
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    with tempfile.TemporaryDirectory() as place:
+        disturbed, whole = Path(place) / "disturbed", Path(place) / "whole"
+        disturbed.mkdir()
+        hit = kill_and_go_on(disturbed, count, seed=count)
+        Run.begin(Case.from_text(long_enough(count)), whole).go()
+        same_state(disturbed / "run", whole)
+        same_record(disturbed / "run", whole)
+        print(f"killed {hit} times; its end is the same to the last bit")
