@@ -14,11 +14,8 @@ from typing import Any
 from cfddem.case import Case
 from cfddem.errors import CfddemError, InputError
 from cfddem.expected import Bed, Cost, Encounter, Steps, bed_drag, bed_of, cost_of, encounter_of, steps_of
-from cfddem.findings import Finding, bubbles, findings
+from cfddem.findings import WIDTH, Finding, bubbles, findings
 from closures import timescales
-
-WIDTH = 100
-"""Columns of a terminal."""
 
 
 class RedCard(CfddemError):
@@ -78,10 +75,7 @@ class Card:
         """The colour, and what speaks against the run, at most 100 columns wide."""
         if not self.findings:
             return ["green: nothing speaks against it"]
-        out = []
-        for each in self.findings:
-            out += textwrap.wrap(f"{each.colour}: {each}", WIDTH, subsequent_indent="  ")
-        return out
+        return [line for each in self.findings for line in each.lines()]
 
 
 def card(case: Case) -> Card:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -25,6 +26,9 @@ NARROWEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 DEEP, DEEPEST = 0.02, 0.1
 """Overlap over the diameter: from the first on contacts are soft, from the second spheres pass into each other."""
 
+WIDTH = 100
+"""Columns of a terminal."""
+
 LONG = 86_400.0
 """A run that takes longer than a day is worth a second thought [s]."""
 
@@ -37,6 +41,10 @@ class Finding:
     key: str  # of the case
     reason: str  # what, with number and limit
     remedy: str
+
+    def lines(self, opening: str = "") -> list[str]:
+        """The finding as text, at most 100 columns wide."""
+        return textwrap.wrap(f"{opening}{self.colour}: {self}", WIDTH, subsequent_indent="  ")
 
     def __str__(self) -> str:
         return f"{self.key}: {self.reason}; {self.remedy}"

@@ -18,7 +18,7 @@ from typing import Any
 
 from cfddem.card import card
 from cfddem.case import Case
-from cfddem.errors import CfddemError, InputError
+from cfddem.errors import CfddemError, InputError, RunStopped
 from cfddem.gallery import full_key, read_value
 
 MOST = 10_000
@@ -34,7 +34,7 @@ class Outcome:
 
     folder: str
     values: dict[str, Any]  # what was changed, by key
-    status: str  # finished, failed, stopped, or refused before it began
+    status: str  # finished, failed, stopped, refused before it began, or waiting
     message: str = ""
     measures: dict[str, tuple[float, float, str]] = field(default_factory=dict)  # mean, error, unit
     seconds: float = 0.0
@@ -125,7 +125,12 @@ def sweep(
     for outcome in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
         outcomes[outcome.name] = outcome
         say(outcome)
-    ordered = [outcomes[name] for name in runs]
+        if outcome.status == "stopped":  # whoever stops a run means all of them
+            break
+    ordered = [
+        outcomes.get(name, Outcome(str(output / name), values, "waiting", "not begun; the same line goes on"))
+        for name, (_, values) in runs.items()
+    ]
     write_table(ordered, output / "sweep.csv")
     figure(ordered, output / "sweep.png")
     return ordered
@@ -157,7 +162,7 @@ def _one(case: Case, values: dict[str, Any], folder: Path, alone: bool) -> Outco
                 Run.resume(folder).go()
         outcome = Outcome(str(folder), values, open_run(folder).status)
     except CfddemError as failure:
-        status = "stopped" if str(failure).startswith("stopped by") else "failed"
+        status = "stopped" if isinstance(failure, RunStopped) else "failed"
         outcome = Outcome(str(folder), values, status, str(failure).replace("\n", "; "))
     except Exception as failure:  # one run must never take the others with it
         outcome = Outcome(str(folder), values, "failed", f"{type(failure).__name__}: {failure}")

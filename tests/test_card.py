@@ -9,13 +9,13 @@ import sys
 from typing import Any
 
 import pytest
+from example_case import TEXT
 
 from cfddem.card import Card, RedCard, card, refuse_red
 from cfddem.case import Case
 from cfddem.gallery import gallery
 from closures import bed, numbers
 
-TEXT = gallery()["liquid-bed"].read_text()
 GALLERY = {name: Case.from_toml(path) for name, path in gallery().items()}
 
 
@@ -158,7 +158,7 @@ begun = time.process_time()
 from cfddem.card import card
 from cfddem.case import Case
 from cfddem.gallery import gallery
-made = card(Case.from_toml(gallery()["liquid-bed"]))
+made = card(Case.from_toml(gallery()["packed-bed"]))
 print(json.dumps([made.colour, time.process_time() - begun, "numba" in sys.modules, "vtkmodules" in sys.modules]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)

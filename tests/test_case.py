@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import tomli_w
+from example_case import TEXT
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -22,7 +23,6 @@ from cfddem.gallery import gallery, overrides
 from cfddem.mistakes import MOST, Mistakes
 
 GALLERY = gallery()
-TEXT = GALLERY["liquid-bed"].read_text()
 LONGEST_LINE = 600
 SECONDS = 2.0
 

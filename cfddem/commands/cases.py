@@ -79,8 +79,8 @@ def run(
 
     path = find_case(case)
     described = Case.from_toml(path, overrides(set or []))
-    for warning in refuse_red(described).verdict():
-        print(f"cfddem: {warning}", file=sys.stderr)
+    for finding in refuse_red(described).findings:
+        print("\n".join(finding.lines("cfddem: ")), file=sys.stderr)
     tell_of_compilation()
     from cfddem.kernels import use_threads
     from cfddem.progress import live_line
@@ -134,7 +134,7 @@ def sweep(
 
     Ends with exit code 3 if a run did not finish; the others are kept.
 
-    Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set run.until=0.01 -o seeds
+    Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
     """
     from dataclasses import asdict
 
