@@ -78,7 +78,13 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
     )
     fluid.set_voidage(1.0 - spreading.solid_fraction(spreading.place(spheres.position, spheres.radius)))
     exchange = Exchange(
-        fluid, spreading, case.laws.drag_law, added_mass=case.laws.added_mass, own_wind=case.laws.own_wind
+        fluid,
+        spreading,
+        case.laws.drag_law,
+        added_mass=case.laws.added_mass,
+        own_wind=case.laws.own_wind,
+        lift=case.laws.lift,
+        viscous_stress=case.laws.viscous_stress,
     )
     return Parts(solver, fluid, exchange)
 

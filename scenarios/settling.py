@@ -148,7 +148,13 @@ def in_held_gas() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         column={"width": 8 * edge, "height": 8 * edge, "cell": edge, "sides": "periodic", "ends": "periodic"},
         bed={"diameter": diameter, "positions": [(8.4e-3, 8.6e-3, 15e-3)]},
         # a fluid that is held has no wind of the grain's own
-        laws={"drag": "schiller_naumann", "lubrication": "none", "own_wind": False},
+        # the listed velocities tend to the balance of the law at standard gravity, 9.80665 m/s2
+        laws={
+            "drag": "schiller_naumann",
+            "lubrication": "none",
+            "own_wind": False,
+            "gravity": (0.0, 0.0, -9.80665),
+        },
         run={"until": float(times[-1]), "fluid_step": 2e-4, "reference_speed": 0.06},
     )
     simulation = Simulation(case)

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from cfddem.case import Case
+from cfddem.coupling.lift import lift_force
 from cfddem.coupling.voidage import MAPPINGS, Spreading
 from cfddem.errors import InputError
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.simulation import Simulation
 from closures.drag import wen_yu
+from closures.lift import magnus
 
 SPACING = (0.010, 0.012, 0.009)
 
@@ -122,8 +124,9 @@ def momentum(simulation: Simulation) -> np.ndarray:
 
 @pytest.mark.parametrize(("model", "viscosity", "added_mass"), [("A", 1e-3, 0.0), ("B", 1.0, 0.0), ("A", 1.0, 0.5)])
 def test_momentum_of_fluid_and_particles_is_kept(model: str, viscosity: float, added_mass: float) -> None:
-    """In a periodic box, for weak drag and for drag that stops a grain within a step, with added mass and without."""
-    case = suspension(**{"laws.model": model, "fluid.viscosity": viscosity, "laws.added_mass": added_mass})
+    """In a periodic box, for weak drag and drag that stops a grain in a step; with lift, stress, added mass or not."""
+    more = {"laws.added_mass": added_mass, "laws.lift": added_mass > 0.0, "laws.viscous_stress": added_mass > 0.0}
+    case = suspension(**{"laws.model": model, "fluid.viscosity": viscosity} | more)
     simulation = stirred(case)
     bodies = simulation.particles.bodies
     scale = float((bodies.mass * np.linalg.norm(bodies.velocity, axis=1)).sum())
@@ -214,3 +217,14 @@ def test_a_particle_that_crosses_a_cell_in_a_step_is_refused() -> None:
     there = spreading.place(np.array([[0.025, 0.01, 0.01]]), np.array([1e-3]))
     with pytest.raises(InputError, match="fluid step"):
         spreading.solid_flux(here, there, 1e-3)
+
+
+def test_lift_points_to_where_it_must() -> None:
+    """A sphere that lags behind a shear flow goes to its fast side; one that spins backwards against it is lifted."""
+    slip, still = np.array([[0.1, 0.0, 0.0]]), np.zeros((1, 3))
+    # u_x grows with y: the curl points to -z
+    shear = lift_force(slip, np.array([[0.0, 0.0, -10.0]]), np.array([[0.0, 0.0, -5.0]]), np.array([1e-3]), 1e3, 1e-1)
+    assert shear[0, 1] > 0.0 and abs(shear[0, 0]) + abs(shear[0, 2]) < 1e-12 * shear[0, 1]
+    spun = lift_force(slip, still, np.array([[0.0, 0.0, 30.0]]), np.array([1e-3]), 1e3, 1e-1)
+    expected = math.pi / 8.0 * 1e3 * (2e-3) ** 3 * 30.0 * 0.1 * magnus(1e3 * 2e-3 * 0.1 / 1e-1)
+    assert spun[0] == pytest.approx([0.0, -expected, 0.0])

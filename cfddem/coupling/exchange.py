@@ -29,6 +29,7 @@ import numpy as np
 from numba import njit
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import MODES, OwnWind
 from cfddem.coupling.voidage import Placement, Spreading
 from cfddem.fluid.grid import Array
@@ -53,7 +54,7 @@ class Offer(NamedTuple):
     resistance: Array  # b* (N,) [kg/s]
     target: Array  # v* (N, 3) [m/s]
     slip: Array  # u - v (N, 3) [m/s]
-    swept: Array | float  # force of the added mass that the fluid's acceleration gives (N, 3) [N]
+    explicit: Array  # forces known before the fluid's step: lift, viscous stress, added mass (N, 3) [N]
     screening: Array  # rate at which the drag of the others stops the fluid around (N,) [1/s]
 
     @property
@@ -69,6 +70,8 @@ class Exchange:
     spreading   how particles spread over cells
     drag        card of a drag law; None for none
     added_mass  coefficient C of the added mass C rho V; 0 for none
+    lift        of shear (Saffman-Mei) and of spin (Magnus)
+    viscous_stress  V div(tau), in model A
     own_wind    take the velocity and the voidage that a lone particle itself makes out of what it meets
     """
 
@@ -80,9 +83,12 @@ class Exchange:
         *,
         added_mass: float = 0.0,
         own_wind: bool = True,
+        lift: bool = False,
+        viscous_stress: bool = False,
     ) -> None:
         self.fluid, self.spreading, self.drag = fluid, spreading, drag
-        self.added_mass = float(added_mass)
+        self.added_mass, self.lift = float(added_mass), lift
+        self.viscous_stress = viscous_stress and fluid.model == "A"
         self.own_wind = OwnWind(spreading) if own_wind else None
         self.outside = 0  # how often the drag law was asked outside of its range
         self._factors = _drag_loop(drag.function) if drag else None
@@ -110,9 +116,13 @@ class Exchange:
         carried = np.column_stack([implicit, implicit[:, None] * target])
         drag = spreading.smooth(spreading.deposit(place, carried)) / self.fluid.grid.cell_volume
         momentum = np.moveaxis(drag[1:], 0, -1)
-        swept, source = self._swept_along(bodies, place, slip, step)
+        aside = self._aside(bodies, place, slip)
+        swept, lost = self._swept_along(bodies, slip, step)
+        source = self._returned(place, lost - aside)
         screening = resistance * others / (self.fluid.density * voidage)
-        return Offer(step, place, 1.0 - solid, drag[0], momentum, source, implicit, target, slip, swept, screening)
+        return Offer(
+            step, place, 1.0 - solid, drag[0], momentum, source, implicit, target, slip, aside + swept, screening
+        )
 
     def answer(self, bodies: Bodies, offer: Offer, gravity: Array) -> None:
         """Leave in `bodies.applied` what the fluid, having made its step, does to every particle meanwhile.
@@ -131,7 +141,7 @@ class Exchange:
             drag
             + self._pressure_force(bodies, place, volume)
             + weight_left
-            + offer.swept
+            + offer.explicit
         )  # fmt: skip
         self._memory[rows, :3] = bodies.velocity
         self._memory[rows, 3:6] = offer.step * drag
@@ -174,22 +184,39 @@ class Exchange:
 
     # ------------------------------------------------------------ terms
 
-    def _swept_along(self, bodies: Bodies, place: Placement, slip: Array, step: float) -> tuple[Any, Array | None]:
+    def _aside(self, bodies: Bodies, place: Placement, slip: Array) -> Array:
+        """Lift and viscous stress on every particle (N, 3) [N]."""
+        fluid, spreading = self.fluid, self.spreading
+        force = np.zeros_like(slip)
+        if self.viscous_stress:
+            volume = (4.0 / 3.0) * math.pi * bodies.radius**3
+            force += volume[:, None] * spreading.gather(place, spreading.smooth(fluid.cell_viscous_force()))
+        if self.lift and fluid.viscosity > 0.0:
+            curl = vorticity(np.moveaxis(fluid.velocity, -1, 0), fluid.grid.spacing)
+            seen = spreading.gather(place, spreading.smooth(curl))
+            force += lift_force(slip, seen, bodies.spin, bodies.radius, fluid.density, fluid.viscosity)
+        return force
+
+    def _swept_along(self, bodies: Bodies, slip: Array, step: float) -> tuple[Array, Array]:
         r"""Force of the added mass, :math:`C\rho V(\dot u - \dot v)`; its second part is in the inertia already.
 
-        returns  its first part (N, 3) [N]; both parts, with the other sign, as the fluid gets them (nz, ny, nx, 3)
+        returns  its first part (N, 3) [N]; what the fluid gets for both, as a force over the coming step (N, 3) [N]
 
         The acceleration is that of the step before: the fluid gets what the particles lost then.
         """
         if self.added_mass == 0.0 or self._last_step == 0.0:
-            return 0.0, None
+            return np.zeros_like(slip), np.zeros_like(slip)
         before = self._memory[bodies.id]
-        added = (self.inertia(bodies) - bodies.mass)[:, None]
-        added = np.where(np.isfinite(added), added, 0.0)
+        added = np.where(bodies.inverse_mass > 0.0, self.inertia(bodies) - bodies.mass, 0.0)[:, None]
         swept = added * (slip + bodies.velocity - before[:, 6:]) / self._last_step
-        lost = self.under_way(bodies) / step - swept
-        source = self.spreading.smooth(self.spreading.deposit(place, lost)) / self.fluid.grid.cell_volume
-        return swept, np.ascontiguousarray(np.moveaxis(source, 0, -1))
+        return swept, self.under_way(bodies) / step - swept
+
+    def _returned(self, place: Placement, force: Array) -> Array | None:
+        """Force on the fluid, spread over cells (nz, ny, nx, 3) [N/m3]; None where there is none."""
+        if not (self.added_mass or self.lift or self.viscous_stress):
+            return None
+        source = self.spreading.smooth(self.spreading.deposit(place, force)) / self.fluid.grid.cell_volume
+        return np.ascontiguousarray(np.moveaxis(source, 0, -1))
 
     def under_way(self, bodies: Bodies) -> Array:
         """Momentum that added mass has taken from every particle and the fluid gets in the next step (N, 3) [N s]."""

@@ -138,27 +138,41 @@ class FluidState:
 
     def cell_pressure_gradient(self) -> Array:
         """grad p' of every cell, mean of its two faces as the momentum balance sees them (3, nz, ny, nx) [Pa/m]."""
-        gradient = np.zeros((3, *self.grid.shape))
         self.boundaries.fill_pressure(self._pressure)
+        gradient = np.empty_like(self._velocity)
         for d in range(3):
-            faces = (self._pressure - np.roll(self._pressure, 1, axis=2 - d)) * self._inverse[d]
-            faces = (faces - self.boundaries.driving[d]) * self._solved[d]
-            other = np.roll(faces, -1, axis=2 - d)
-            faces, other = self.grid.inner(faces), self.grid.inner(other)
-            low, high = self.grid.inner(self._solved[d]), self.grid.inner(np.roll(self._solved[d], -1, axis=2 - d))
-            # next to a face that is held the other face stands for both
-            gradient[d] = (faces + other) / np.maximum(low + high, 1.0)
-        return gradient
+            gradient[d] = (self._pressure - np.roll(self._pressure, 1, axis=2 - d)) * self._inverse[d]
+            gradient[d] -= self.boundaries.driving[d]
+        return self._in_cells(gradient)
+
+    def cell_viscous_force(self) -> Array:
+        """div tau of every cell, mean of its two faces (3, nz, ny, nx) [N/m3]."""
+        return self._in_cells(self._viscous_force())
+
+    def _in_cells(self, faces: Array) -> Array:
+        """Mean of the two faces of every cell; next to a face that is held the other stands for both."""
+        cells = np.empty((3, *self.grid.shape))
+        inner = self.grid.inner
+        for d in range(3):
+            balanced = faces[d] * self._solved[d]
+            low, high = inner(balanced), inner(np.roll(balanced, -1, axis=2 - d))
+            number = inner(self._solved[d]) + inner(np.roll(self._solved[d], -1, axis=2 - d))
+            cells[d] = (low + high) / np.maximum(number, 1.0)
+        return cells
 
     def viscous_force_at(self, points: Array) -> Array:
         """div tau, the stress of the fluid between the particles (not times eps), at points (N, 3): (N, 3) [N/m3]."""
+        return self._at(self._continued(self._viscous_force()), AT_FACES, points)
+
+    def _viscous_force(self) -> Array:
+        """div tau on the faces (3, ...) [N/m3]."""
         self._thicken(self._velocity, np.ones_like(self._mean_voidage))
         force = np.empty_like(self._velocity)
         transport(
             self._velocity, self._mean_voidage, self._thickness, self._buried, 0.0, self._inverse, 0.0,
             self._flux, self._expansion, force,
         )  # fmt: skip
-        return self._at(self._continued(force), AT_FACES, points)
+        return force
 
     def cell_value_at(self, field: Array, points: Array) -> Array:
         """A cell field (nz, ny, nx) at points (N, 3) [m], tri-linear between centres: (N,)."""
