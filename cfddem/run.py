@@ -19,8 +19,14 @@ from cfddem.errors import InputError, RunFailed, RunStopped, UnstableStep
 from cfddem.particles.guard import guard
 from cfddem.particles.pouring import kinetic_energy
 from cfddem.record import checkpoint
-from cfddem.record.ledger import exchange_imbalance, volume_imbalance
-from cfddem.record.measures import bed_height, cells_of, granular_temperature, pressure_drop, voidage_by_pressure
+from cfddem.record.ledger import entrance_rise, exchange_imbalance, volume_imbalance
+from cfddem.record.measures import (
+    bed_height,
+    cells_of,
+    granular_temperature,
+    pressure_drop,
+    voidage_by_pressure,
+)
 from cfddem.record.output import RunFolder
 from cfddem.record.provenance import provenance
 from cfddem.simulation import Simulation
@@ -289,7 +295,8 @@ def measure(simulation: Simulation) -> dict[str, float]:
         "bed_voidage_pressure": voidage_by_pressure(
             fluid.pressure, grid.spacing, float(weight), low, high, open_cells=grid.open
         ),
-        "pressure_drop": pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open),
+        "pressure_drop": pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open)
+        + entrance_rise(fluid),
         "exchange_imbalance": exchange_imbalance(fluid, simulation.exchange),
         "volume_imbalance": volume_imbalance(fluid),
         "outside_range": float(simulation.exchange.outside),
