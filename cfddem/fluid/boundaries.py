@@ -19,7 +19,7 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.fluid.conditions import SIDES, Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic
-from cfddem.fluid.grid import HIGH, LOW, Array, Grid
+from cfddem.fluid.grid import HIGH, LOW, Array, Grid, layers
 
 
 @dataclass
@@ -46,9 +46,7 @@ class Side:
 
     def layer(self, array: Any, index: int) -> Any:
         """View of one layer of cells parallel to the side."""
-        place: list[Any] = [slice(None)] * 3
-        place[2 - self.axis] = index
-        return array[tuple(place)]
+        return array[layers(self.axis, index)]
 
 
 class Boundaries:
@@ -241,9 +239,8 @@ class Boundaries:
 
     def _wrap_axis(self, array: Array, axis: int) -> None:
         n = self.grid.cells[axis]
-        view = np.moveaxis(array, array.ndim - 1 - axis, 0)
         for ghost in (0, 1, n + LOW, n + LOW + 1, n + LOW + 2):
-            view[ghost] = view[LOW + (ghost - LOW) % n]
+            array[layers(axis, ghost)] = array[layers(axis, LOW + (ghost - LOW) % n)]
 
     def fill_cells(self, array: Array) -> None:
         """Ghosts of a cell field (..., nz, ny, nx): periodic, or the value of the nearest cell."""
@@ -252,9 +249,8 @@ class Boundaries:
                 self._wrap_axis(array, axis)
                 continue
             n = self.grid.cells[axis]
-            view = np.moveaxis(array, array.ndim - 1 - axis, 0)
-            view[:LOW] = view[LOW]
-            view[n + LOW :] = view[n + LOW - 1]
+            array[layers(axis, slice(LOW))] = array[layers(axis, slice(LOW, LOW + 1))]
+            array[layers(axis, slice(n + LOW, None))] = array[layers(axis, slice(n + LOW - 1, n + LOW))]
 
     def fill_pressure(self, pressure: Array, correction: bool = False) -> None:
         """First ghost layer of a pressure: given on outlets (zero for a correction), no gradient at walls."""
@@ -275,9 +271,9 @@ class Boundaries:
                 continue
             n = self.grid.cells[axis]
             for component in range(3):
-                view = np.moveaxis(vector[component], 2 - axis, 0)
-                last = n + LOW if component == axis else n + LOW - 1
-                view[:LOW], view[last + 1 :] = view[LOW], view[last]
+                field, last = vector[component], n + LOW if component == axis else n + LOW - 1
+                field[layers(axis, slice(LOW))] = field[layers(axis, slice(LOW, LOW + 1))]
+                field[layers(axis, slice(last + 1, None))] = field[layers(axis, slice(last, last + 1))]
 
     def fill_velocity(self, velocity: Array) -> None:
         """Boundary faces and ghosts of a velocity (3, ...)."""
@@ -296,16 +292,21 @@ class Boundaries:
         beyond = (n + LOW, n + LOW + 1, n + LOW + 2) if side.high else (LOW - 1, LOW - 2)
         normal = velocity[axis]
         layer = side.layer
-        at_face = np.where(side.outlet, layer(normal, face), side.wall[axis])
+        at_face, mirror, opens = side.wall[axis], side.mirror, side.outlet.any()
+        leaves: Any = True
+        if opens:
+            at_face = np.where(side.outlet, layer(normal, face), at_face)
+            # Fluid that flows back through an outlet comes from rest: it brings no momentum.
+            leaves = np.where(side.outlet, at_face * side.inward <= 0.0, True)
+            mirror = mirror * leaves
         layer(normal, face)[:] = at_face
-        # Fluid that flows back through an outlet comes from rest: it brings no momentum.
-        leaves = np.where(side.outlet, at_face * side.inward <= 0.0, True)
-        mirror = side.mirror * leaves
         for component in range(3):
             values = velocity[component]
             if component == axis:
                 neighbour = layer(values, face - 1 if side.high else face + 1)
-                outside = np.where(side.outlet, at_face * leaves, 2.0 * at_face - neighbour)
+                outside = 2.0 * at_face - neighbour
+                if opens:
+                    outside = np.where(side.outlet, at_face * leaves, outside)
                 for ghost in (face + 1, face + 2) if side.high else (face - 1, face - 2):
                     if 0 <= ghost < values.shape[2 - axis]:
                         layer(values, ghost)[:] = outside

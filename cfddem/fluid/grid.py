@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,11 @@ UNIT = ((0, 0, 1), (0, 1, 0), (1, 0, 0))
 AT_FACES = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]])
 AT_CENTRES = np.full((1, 3), 0.5)
 """Where in its cell a component is stored, in cell widths along x, y, z."""
+
+
+def layers(axis: int, which: int | slice) -> tuple[Any, ...]:
+    """Index of layers of cells normal to x, y or z (axis 0, 1, 2) in the last three axes of an array."""
+    return (Ellipsis, which, *(slice(None),) * axis)
 
 
 @dataclass(frozen=True, eq=False)

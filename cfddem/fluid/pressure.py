@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.errors import RunFailed
-from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.kernels import kernel, prange, threaded, use_threads
 
 STRONG = 0.3
@@ -189,21 +189,19 @@ class Level:
         np.add(self.ax, self.ay, out=self.diagonal)
         self.diagonal += self.az
         self.diagonal += self.anchor
-        for axis, a in ((2, self.ax), (1, self.ay), (0, self.az)):
-            total, high = np.moveaxis(self.diagonal, axis, 0), np.moveaxis(a, axis, 0)
-            total[:-1] += high[1:]
-            total[-1] += high[0]
+        for d, a in enumerate((self.ax, self.ay, self.az)):
+            self.diagonal[layers(d, slice(-1))] += a[layers(d, slice(1, None))]
+            self.diagonal[layers(d, -1)] += a[layers(d, 0)]
         self.inverse.fill(0.0)
         np.divide(1.0, self.diagonal, out=self.inverse, where=self.diagonal > 0.0)
 
 
 def _pairs(values: Array, axis: int) -> Array:
     """Sums of neighbours two by two along an axis; an odd last one stands alone."""
-    moved = np.moveaxis(values, axis, 0)
-    total = moved[0::2].copy()
-    odd = moved[1::2]
-    total[: len(odd)] += odd
-    return np.moveaxis(total, 0, axis)
+    total: Array = values[layers(2 - axis, slice(0, None, 2))].copy()
+    odd = values[layers(2 - axis, slice(1, None, 2))]
+    total[layers(2 - axis, slice(odd.shape[axis]))] += odd
+    return total
 
 
 class PressureEquation:
