@@ -28,6 +28,7 @@ TARGETS: dict[str, str] = {
     "binary-collision": "scenarios.binary_collision_validation",
     "particles": "scenarios.particles_validation",
     "coupling": "scenarios.coupling_validation",
+    "beds": "scenarios.beds_validation",
     "wet-tumbler": "scenarios.wet_tumbler_validation",
     "wet": "scenarios.wet_validation",
 }

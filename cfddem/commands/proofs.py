@@ -36,25 +36,25 @@ def validate(
 
 
 def bench(
-    target: Annotated[str, Parameter(help="dem")] = "dem",
+    target: Annotated[str, Parameter(help="dem, or bed")] = "dem",
     *,
     particles: Annotated[int, Parameter(help="1000, 10000, 100000 or 1000000")] = 10_000,
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
-    """Measure this machine on standard work, beside LAMMPS where it is installed.
+    """Measure this machine on standard work: spheres alone (dem), or a gas bed (bed) of 24 750, beside other codes.
 
     Example: cfddem bench dem --particles 10000
     """
     tell_of_compilation()
-    from scenarios import dense_bed
+    from scenarios import dense_bed, gas_bed
 
-    if target != "dem":
-        raise InputError("target", target, nearest(target, ["dem"]))
-    result = dense_bed.bench(particles, threads, film)
+    if target not in ("dem", "bed"):
+        raise InputError("target", target, nearest(target, ["dem", "bed"]))
+    result = dense_bed.bench(particles, threads, film) if target == "dem" else gas_bed.bench(threads)
     if json:
         print(_json.dumps(result))
     else:
-        for name, text in dense_bed.rows(result):
+        for name, text in (dense_bed if target == "dem" else gas_bed).rows(result):
             print(f"{name:<20}  {text}")

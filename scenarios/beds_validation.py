@@ -1,0 +1,132 @@
+"""Beds beside what was measured on them, or what published laws say: sedimentation, fluidisation, bubbling gas beds.
+
+Runs are kept as folders. One that was stopped goes on where it was; one that is there is not run again.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.case import Case
+from cfddem.gallery import gallery
+from cfddem.record.measures import pressure_drop
+from cfddem.record.reading import Run as Written
+from cfddem.record.reading import open_run
+from cfddem.record.series import block_average, even, spectrum
+from cfddem.report import buoyant_weight
+from cfddem.run import Run
+from closures.bed import exponent_richardson_zaki
+from scenarios.defluidisation import onsets
+from scenarios.gas_bed import mueller, van_wachem
+from scenarios.sedimentation import SOLID_FRACTIONS, SYRUP, Settling, between_walls, exponent, in_periodic_box, vessel
+from scenarios.validation import Row, Tell
+
+MUELLER_HEIGHT, PROBE = 0.05, 0.045
+"""Height seen of Mueller's bed, and height of the pressure probe in van Wachem's [m]."""
+
+
+def study(folder: Path, tell: Tell) -> list[Row]:
+    """Run the beds, and return the table."""
+    return [*sedimentation(tell), *defluidised(folder, tell), *bubbling(folder, tell), *flat(folder, tell)]
+
+
+def sedimentation(tell: Tell) -> list[Row]:
+    """Exponents in water and in syrup, in a periodic box and between walls."""
+    rows = []
+    case = vessel()
+    assert case.fluid is not None
+    for place, viscosity in (("water", case.fluid.viscosity), ("syrup", SYRUP), ("water, between walls", None)):
+        found: list[Settling] = []
+        for share in SOLID_FRACTIONS:
+            tell(f"sedimentation in {place} at a solid fraction of {share:g}")
+            found.append(between_walls(share) if viscosity is None else in_periodic_box(share, viscosity=viscosity))
+        reynolds = case.fluid.density * found[0].terminal * case.bed.diameter / (viscosity or case.fluid.viscosity)
+        law = exponent_richardson_zaki(reynolds, 0.0)
+        own, start = exponent(found)
+        points = [{"at": each.solid_fraction, "value": each.velocity, "reference": each.terminal} for each in found]
+        rows += [
+            Row(f"settling in {place}: exponent", own, law, 0.1 * law, points=points),
+            Row(f"settling in {place}: velocity at no solids over that alone", start / found[0].terminal, 1.0),
+        ]
+    return rows
+
+
+def defluidised(folder: Path, tell: Tell) -> list[Row]:
+    """Minimum fluidisation on a slow ramp."""
+    case = Case.from_toml(gallery()["defluidisation"])
+    assert not isinstance(case.bed.inlet_velocity, float)
+    slow = tuple((5.0 * time, speed) for time, speed in case.bed.inlet_velocity)
+    history = finished(case, folder, "defluidisation", tell, {"bed.inlet_velocity": slow, "run.until": 6.5}).history
+    up, down = onsets(case.with_(**{"bed.inlet_velocity": slow}), history)
+    return [
+        Row("fluidised: minimum velocity over balance, up", up.velocity / up.balance, 1.0, 0.05),
+        Row("defluidised: minimum velocity over balance, down", down.velocity / down.balance, 1.0, 0.05),
+        Row("voidage of the bed less after than before", down.voidage - up.voidage),
+    ]
+
+
+def bubbling(folder: Path, tell: Tell) -> list[Row]:
+    """Mueller's bed."""
+    case = mueller()
+    run = finished(case, folder, "mueller", tell, {"run.until": 10.1})
+    window = run.history["time"] > 1.1
+    height = block_average(run.history["bed_height"][window])
+    note = f"standard error {height.error:.2g}"
+    return [
+        Row("Mueller: height", height.mean, MUELLER_HEIGHT, 0.15 * MUELLER_HEIGHT, "m", note),
+        _weight("Mueller", case, run.history["pressure_drop"][window]),
+    ]
+
+
+def flat(folder: Path, tell: Tell) -> list[Row]:
+    """Van Wachem's bed."""
+    case = van_wachem()
+    run = finished(case, folder, "van_wachem", tell, {"run.until": 12.0, "run.average_from": 2.0})
+    window = run.history["time"] > 2.0
+    height = block_average(run.history["bed_height"][window])
+    interval, heights = even(run.history["time"][window], run.history["bed_height"][window])
+    times, probed = probe(run, 2.0)
+    between, pressures = even(times, probed)
+    return [
+        Row("van Wachem: mean height", height.mean, 0.125, 0.0125, "m", f"standard error {height.error:.2g}"),
+        Row("van Wachem: deviation of height over that measured, log2", math.log2(heights.std() / 0.014), 0.0),
+        Row("van Wachem: frequency of height", spectrum(heights, interval).main, 2.65, 0.53, "Hz"),
+        Row("van Wachem: deviation of pressure over that measured, log2", math.log2(pressures.std() / 82.0), 0.0, 1.0),
+        Row("van Wachem: frequency of pressure", spectrum(pressures, between).main, 2.25, 0.45, "Hz"),
+        _weight("van Wachem", case, run.history["pressure_drop"][window]),
+    ]
+
+
+def probe(run: Written, begin: float, height: float = PROBE) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and pressure at a height over that at the top [Pa], from the snapshots of a run."""
+    assert run.grid is not None
+    top = run.grid.spacing[2] * run.grid.cells[2]
+    places = np.flatnonzero(run.times > begin)
+    drops = [pressure_drop(run.fluid("pressure", int(place)), run.grid.spacing, height, top) for place in places]
+    return run.times[places], np.array(drops)
+
+
+def finished(case: Case, folder: Path, name: str, tell: Tell, changes: dict[str, Any]) -> Written:
+    """The run of a changed case in its folder: made, gone on with, or there already."""
+    home = folder / name
+
+    def live(run: Run) -> None:
+        tell(f"{name}: {run.simulation.time:.3g} of {run.end:g} s")
+
+    if not (home / "run.json").exists():
+        Run.begin(case.with_(**changes), home, report=live, progress=tell).go()
+    elif open_run(home).status != "finished":
+        Run.resume(home, report=live, progress=tell).go()
+    return open_run(home)
+
+
+def _weight(name: str, case: Case, drops: np.ndarray) -> Row:
+    drop = block_average(drops)
+    weight = buoyant_weight(case) / case.column.floor_area
+    return Row(
+        f"{name}: pressure drop over weight", drop.mean / weight, 1.0, 0.03, note=f"error {drop.error / weight:.2g}"
+    )
