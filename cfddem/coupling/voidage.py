@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from cfddem.coupling import spreading_loops as loops
 from cfddem.errors import InputError, nearest
 from cfddem.fluid.grid import Array, Grid
-from cfddem.kernels import inline, kernel, prange, threaded
 
 MAPPINGS = ("linear", "centroid", "divided")
 """A cloud as large as a cell; all in the cell of the centre; the sphere cut into equal pieces, each in its cell."""
@@ -91,7 +91,9 @@ class Spreading:
         """Sum over particles of weight times value: values (N, m) give fields (m, nz, ny, nx)."""
         fields = np.zeros((math.prod(self.grid.cells), values.shape[1]))
         spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
-        _deposit(place.position, place.radius, place.order, place.start, np.ascontiguousarray(values), *spread, fields)
+        loops.deposit(
+            place.position, place.radius, place.order, place.start, np.ascontiguousarray(values), *spread, fields
+        )
         return np.ascontiguousarray(fields.T).reshape(-1, *self.grid.shape)
 
     def gather(self, place: Placement, fields: Array) -> Array:
@@ -99,7 +101,7 @@ class Spreading:
         cells = np.ascontiguousarray(fields.reshape(len(fields), -1).T)
         values = np.empty((len(place.position), len(fields)))
         spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
-        _gather(place.position, place.radius, cells, *spread, values)
+        loops.gather(place.position, place.radius, cells, *spread, values)
         return values
 
     def smooth(self, fields: Array) -> Array:
@@ -107,7 +109,7 @@ class Spreading:
         now = np.array(fields, float)
         other = np.empty_like(now)
         for _ in range(self.sweeps):
-            _sweep(now, other, self.strength, *self._gates)
+            loops.sweep(now, other, self.strength, *self._gates)
             now, other = other, now
         return now
 
@@ -147,7 +149,7 @@ class Spreading:
             raise InputError("solid_flux", None, "asked for on a grid without solid cells")
         flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
         volume = (4.0 / 3.0) * math.pi * new.radius**3
-        _flux(
+        loops.carry_all(
             old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
             self._periodic, *flux,
         )  # fmt: skip
@@ -156,7 +158,7 @@ class Spreading:
         for _ in range(self.sweeps):
             passed += change
             other = np.empty_like(change)
-            _sweep(change, other, self.strength, *self._gates)
+            loops.sweep(change, other, self.strength, *self._gates)
             change = other
         for axis in range(3):
             self._add_diffused(flux[axis], passed[0], axis)
@@ -204,153 +206,3 @@ def _gates(grid: Grid, periodic: np.ndarray) -> tuple[Array, Array, Array]:
             np.moveaxis(gate, at, 0)[0] = 0.0
         gates.append(gate)
     return gates[0], gates[1], gates[2]
-
-
-# ---------------------------------------------------------------- loops
-
-
-@inline
-def cell_and_share(coordinate, linear):
-    """Cell in which a cloud begins, and the share of it in the next; coordinate in cells from the low wall."""
-    start = math.floor(coordinate - 0.5 * linear)
-    return start, linear * (coordinate - 0.5 * linear - start)
-
-
-@threaded
-def _deposit(position, radius, order, start, values, offsets, linear, origin, inverse, home, fields):
-    """Slabs of even number together, then odd ones, then a last one that would touch the first round a period."""
-    slabs = len(start) - 1
-    even = slabs - slabs % 2
-    for phase in range(3):
-        first, last = (phase, even) if phase < 2 else (even, slabs)
-        for half in prange((last - first + 1) // 2):
-            slab = first + 2 * half
-            for place in range(start[slab], start[slab + 1]):
-                _spread(order[place], position, radius, values, offsets, linear, origin, inverse, home, fields)
-
-
-@kernel
-def _spread(n, position, radius, values, offsets, linear, origin, inverse, home, fields):
-    """Add what one particle carries to its cells."""
-    pz, py, px = home.shape
-    share = 1.0 / len(offsets)
-    for s in range(len(offsets)):
-        i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
-        j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
-        k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
-        for corner in range(8):
-            di, dj, dk = corner & 1, (corner >> 1) & 1, corner >> 2
-            weight = share * (a if di else 1.0 - a) * (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
-            if weight != 0.0:
-                pk, pj, pi = min(max(k + dk + 1, 0), pz - 1), min(max(j + dj + 1, 0), py - 1), i + di + 1
-                cell = home[pk, pj, min(max(pi, 0), px - 1)]
-                for m in range(values.shape[1]):
-                    fields[cell, m] += weight * values[n, m]
-
-
-@threaded
-def _gather(position, radius, cells, offsets, linear, origin, inverse, home, values):
-    """Every particle takes from its cells, with the weights of `_spread`."""
-    pz, py, px = home.shape
-    share = 1.0 / len(offsets)
-    for n in prange(len(position)):
-        for m in range(values.shape[1]):
-            values[n, m] = 0.0
-        for s in range(len(offsets)):
-            i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
-            j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
-            k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
-            for corner in range(8):
-                di, dj, dk = corner & 1, (corner >> 1) & 1, corner >> 2
-                weight = share * (a if di else 1.0 - a) * (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
-                if weight != 0.0:
-                    pk, pj, pi = min(max(k + dk + 1, 0), pz - 1), min(max(j + dj + 1, 0), py - 1), i + di + 1
-                    cell = home[pk, pj, min(max(pi, 0), px - 1)]
-                    for m in range(values.shape[1]):
-                        values[n, m] += weight * cells[cell, m]
-
-
-@threaded
-def _sweep(fields, out, strength, gate_x, gate_y, gate_z):
-    """One sweep of diffusion: what leaves a cell through an open face enters its neighbour."""
-    fold = fields.shape[0] * fields.shape[1]
-    nz, ny, nx = fields.shape[1:]
-    for plane in prange(fold):
-        m, k = plane // nz, plane % nz
-        below, above = k - 1 if k > 0 else nz - 1, k + 1 if k < nz - 1 else 0
-        for j in range(ny):
-            front, back = j - 1 if j > 0 else ny - 1, j + 1 if j < ny - 1 else 0
-            for i in range(nx):
-                left, right = i - 1 if i > 0 else nx - 1, i + 1 if i < nx - 1 else 0
-                here = fields[m, k, j, i]
-                out[m, k, j, i] = here + (
-                    strength[0] * gate_x[k, j, i] * (fields[m, k, j, left] - here)
-                    + strength[0] * gate_x[k, j, right] * (fields[m, k, j, right] - here)
-                    + strength[1] * gate_y[k, j, i] * (fields[m, k, front, i] - here)
-                    + strength[1] * gate_y[k, back, i] * (fields[m, k, back, i] - here)
-                    + strength[2] * gate_z[k, j, i] * (fields[m, below, j, i] - here)
-                    + strength[2] * gate_z[above, j, i] * (fields[m, above, j, i] - here)
-                )
-
-
-@kernel
-def _window(coordinate, linear, first, cells, periodic, weights):
-    """Weights of a cloud in a window of cells that begins at `first`; behind a wall they fall into the last cell."""
-    weights[:] = 0.0
-    start, share = cell_and_share(coordinate, linear)
-    for step in range(2):
-        cell = start + step
-        if not periodic:
-            cell = min(max(cell, 0), cells - 1)
-        weights[cell - first] += share if step else 1.0 - share
-
-
-@kernel
-def _flux(position, moved, radius, volume, offsets, linear, origin, inverse, periodic, flux_x, flux_y, flux_z):
-    """Volume [m3] that every particle carries through every face on its straight way.
-
-    Esirkepov's split: along each axis the change of the one-dimensional weights, times the mean of the weights of
-    the two other axes at both ends, so that the three fluxes together give exactly the change of the product.
-    """
-    nz, ny, nx = flux_x.shape[0], flux_x.shape[1], flux_y.shape[2]
-    old_x, new_x, old_y = np.zeros(6), np.zeros(6), np.zeros(6)
-    new_y, old_z, new_z = np.zeros(6), np.zeros(6), np.zeros(6)
-    for n in range(len(position)):
-        for s in range(len(offsets)):
-            x = (position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0]
-            y = (position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1]
-            z = (position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2]
-            i, j, k = math.floor(x) - 2, math.floor(y) - 2, math.floor(z) - 2
-            _window(x, linear, i, nx, periodic[0], old_x)
-            _window(x + moved[n, 0] * inverse[0], linear, i, nx, periodic[0], new_x)
-            _window(y, linear, j, ny, periodic[1], old_y)
-            _window(y + moved[n, 1] * inverse[1], linear, j, ny, periodic[1], new_y)
-            _window(z, linear, k, nz, periodic[2], old_z)
-            _window(z + moved[n, 2] * inverse[2], linear, k, nz, periodic[2], new_z)
-            part = volume[n] / len(offsets)
-            _carry(part, i, j, k, nx, ny, nz, old_x, new_x, old_y, new_y, old_z, new_z, 0, flux_x)
-            _carry(part, j, i, k, ny, nx, nz, old_y, new_y, old_x, new_x, old_z, new_z, 1, flux_y)
-            _carry(part, k, i, j, nz, nx, ny, old_z, new_z, old_x, new_x, old_y, new_y, 2, flux_z)
-
-
-@kernel
-def _carry(part, first, first_b, first_c, cells, cells_b, cells_c, old, new, old_b, new_b, old_c, new_c, axis, flux):
-    """Add the volume that one piece carries through the faces normal to one axis."""
-    for c in range(6):
-        for b in range(6):
-            across = (old_b[b] * old_c[c] + new_b[b] * new_c[c]) / 3.0
-            across += (old_b[b] * new_c[c] + new_b[b] * old_c[c]) / 6.0
-            if across == 0.0:
-                continue
-            passed = 0.0
-            for a in range(5):
-                passed -= part * (new[a] - old[a]) * across
-                if passed == 0.0:
-                    continue
-                face, other, third = (first + a + 1) % cells, (first_b + b) % cells_b, (first_c + c) % cells_c
-                if axis == 0:
-                    flux[third, other, face] += passed
-                elif axis == 1:
-                    flux[third, face, other] += passed
-                else:
-                    flux[face, third, other] += passed
