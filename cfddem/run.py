@@ -30,7 +30,6 @@ from cfddem.record.measures import (
 from cfddem.record.output import RunFolder
 from cfddem.record.provenance import provenance
 from cfddem.simulation import Simulation
-from cfddem.stopwatch import Stopwatch
 
 FIELDS = {
     "fluid_steps": ("1", "number of the fluid step"),
@@ -129,7 +128,7 @@ class Run:
             run._write_beginning()
             return run
         simulation = Simulation.restored(case, state["simulation"])
-        simulation.wall = Stopwatch(written.about.get("wall_time"))
+        simulation.wall.seconds.update(written.about.get("wall_time", {}))
         if simulation.particles.collisions is not None:
             simulation.particles.collisions.put_back(state["collisions"])
         written.drop_after(simulation.time)

@@ -14,7 +14,6 @@ from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
 from cfddem.errors import RunFailed
 from cfddem.particles.clocks import check_step
 from cfddem.particles.state import Bodies
-from cfddem.stopwatch import Stopwatch
 
 CLOCKS_EVERY = 20
 """Fluid steps between two readings of the particles' clocks."""
@@ -34,7 +33,7 @@ class Simulation:
         self.gravity = np.array(case.laws.gravity)
         self.steps = 0
         self.binding = ""
-        self.wall = Stopwatch()
+        self.wall = self.particles.wall
         self._particle_step = self._longest_particle_step()
 
     @property
@@ -47,17 +46,16 @@ class Simulation:
         wall = self.wall
         wall.start()
         step, substeps = self._choose_steps(until)
-        wall.lap("clocks")
+        wall.lap("time steps")
         particles, bodies = self.particles, self.particles.bodies
         if self.fluid is not None and self.exchange is not None:
             offer = self.exchange.offer(bodies, step)
-            wall.lap("offer")
+            wall.lap("voidage and drag")
             self.fluid.step(step, *offer.fields)
             wall.lap("fluid")
             self.exchange.answer(bodies, offer, self.gravity)
-            wall.lap("answer")
+            wall.lap("forces of the fluid")
         particles.advance(step / substeps, substeps)
-        wall.lap("particles")
         self.steps += 1
 
     def until(self, time: float) -> None:
@@ -92,7 +90,7 @@ class Simulation:
             simulation.fluid.restore(state["fluid"])
             simulation.exchange.restore(state["exchange"])
         simulation.steps, simulation._particle_step = int(state["steps"]), float(state["particle_step"])
-        simulation.binding, simulation.wall = "", Stopwatch()
+        simulation.binding, simulation.wall = "", simulation.particles.wall
         return simulation
 
     # ------------------------------------------------------------ time steps

@@ -23,6 +23,7 @@ from cfddem.particles.state import Bodies
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls import Wall
 from cfddem.record.collisions import CollisionRecord
+from cfddem.stopwatch import Stopwatch
 
 THREADING_PAYS = 1000
 """From this many particles on, loops run on all threads; on one they still work on several pairs at once."""
@@ -93,6 +94,7 @@ class ParticleSolver:
         check_walls(walls, self.box, len(table))
         self.time, self.steps = 0.0, 0
         self.collisions = CollisionRecord() if record else None
+        self.wall = Stopwatch()
         wrap(self.bodies.position, self.box)
         self._next_order()
         fresh = self._listed()
@@ -147,11 +149,13 @@ class ParticleSolver:
         Raises UnstableStep where the step is above what contacts allow, and RunFailed, naming the particle,
         where one is no number any more, has left or was pressed through.
         """
+        self.wall.start()
         while steps > 0:
             if self._checking and step > self._accepted:
                 check_step(step, self._limits())
                 self._accepted = step
             done, farthest, noted = self._march(step, steps)
+            self.wall.lap("pairs and motion")
             steps -= done
             if self.collisions is not None:
                 self.collisions.keep(noted)
@@ -162,6 +166,7 @@ class ParticleSolver:
                 guard(self.bodies, self.edges, self.gap, self.domain, self.time, step, self.walls.wall)
             if moved_far:
                 self._relist()
+            self.wall.lap("neighbour lists")
 
     def checkpoint(self) -> dict[str, Any]:
         """Everything the next step depends on, age and order of the list included."""
