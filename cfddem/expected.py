@@ -17,6 +17,9 @@ from closures.drag import ergun
 LIQUID = 100.0
 """Density from which on a fluid counts as a liquid, whose beds expand evenly [kg/m3]."""
 
+VISCOUS = 0.8
+"""Part of the viscous time of a cell that the fluid takes as a step."""
+
 BYTES_PER_PARTICLE, BYTES_PER_CELL, BYTES_AT_LEAST = 3000.0, 1300.0, 0.45e9
 """Memory of a dense run, by the size of its arrays and that of a process with its loops."""
 
@@ -76,7 +79,7 @@ def bed_of(case: Case) -> Bed:
         voidage = 1.0 - solids / (floor * case.column.height)
     elif case.bed.fixed:
         voidage = packed
-    elif inlet > 0.0 and number > 0.0:
+    elif inlet > 0.0 and number > 0.0 and fluid.density >= LIQUID:  # a gas bed bubbles instead
         voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
     height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
     drop = weight
@@ -214,6 +217,9 @@ def steps_of(case: Case, known: Bed) -> Steps:
     fastest = max(known.inlet / known.voidage, case.bed.inlet_speed)
     if fastest > 0.0:
         limits["Courant"] = COURANT * min(spacing) / fastest
+    rates = [width**-2 for width, count in zip(spacing, cells) if count > 1]
+    if rates and case.fluid.viscosity > 0.0:
+        limits["viscous"] = VISCOUS * case.fluid.density / (2.0 * case.fluid.viscosity * sum(rates))
     if not case.bed.fixed:
         limits["particle Courant"] = COURANT * min(spacing) / speed
     return Steps(read, particle, limits, cells)

@@ -246,7 +246,8 @@ def lines(result: dict[str, Any]) -> list[str]:
     total = sum(result["wall_time"].values())
     if total:
         parts = sorted(result["wall_time"].items(), key=lambda each: -each[1])
-        out += ["", f"  wall time {total:.3g} s: " + ", ".join(f"{n} {100 * s / total:.0f} %" for n, s in parts[:6])]
+        shares = ", ".join(f"{name} {100 * seconds / total:.0f} %" for name, seconds in parts[:6])
+        out += ["", *textwrap.wrap(f"  wall time {total:.3g} s: {shares}", 98, subsequent_indent="    ")]
     if result["warnings"]:
         out.append("")
         for each in result["warnings"]:

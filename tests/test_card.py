@@ -54,6 +54,14 @@ def test_the_onset_of_fluidisation_is_that_of_ergun_for_his_drag() -> None:
     assert number(shown, "u_mf") == pytest.approx(reynolds * 8.354e-4 / (997.0 * 3.087e-3), rel=1e-9)
 
 
+def test_a_gas_bed_that_bubbles_is_at_least_as_high_as_poured() -> None:
+    """Gas beds do not expand evenly: the balance of a suspension would promise too much."""
+    shown = made(fluid__density=1.2, fluid__viscosity=1.8e-5, bed__inlet_velocity=3.0, run__reference_speed=0.1)
+    assert number(shown, "u_mf") < 3.0 < number(shown, "u_t")
+    assert number(shown, "bed voidage") == pytest.approx(0.42)
+    assert "bubbles" in next(row.note for row in shown.rows if row.name == "bed height")
+
+
 def test_softening_shows_in_the_contact_and_not_in_the_film() -> None:
     smooth = {"material__alumina__roughness": 1e-9, "run__reference_speed": 0.3}
     soft, hard = made(**smooth), made(**smooth, material__alumina__contact_modulus=3e11)
@@ -149,6 +157,20 @@ def test_the_step_of_the_card_is_the_step_of_the_run() -> None:
     case = Case.from_text(TEXT, "bed.toml", given)
     simulation = Simulation(case)
     assert number(card(case), "step of the particles") == pytest.approx(simulation._particle_step, rel=1e-12)
+    fluid, _ = simulation._choose_steps(math.inf)
+    assert number(card(case), "step of the fluid") == pytest.approx(fluid, rel=1e-12)
+
+
+def test_the_viscous_clock_of_the_card_is_that_of_the_fluid() -> None:
+    from cfddem.simulation import Simulation
+
+    given = {"bed.count": 30, "bed.start": "suspended", "fluid.viscosity": 50.0, "column.height": 0.04}
+    case = Case.from_text(TEXT, "bed.toml", given)
+    simulation = Simulation(case)
+    fluid, _ = simulation._choose_steps(math.inf)
+    assert simulation.binding == "viscous"
+    # the run weighs each cell by the voidage of its neighbours, which thirty spheres change by a few per cent
+    assert 0.95 < fluid / number(card(case), "viscous clock") <= 1.0
 
 
 def test_a_card_is_there_at_once_and_compiles_nothing() -> None:
