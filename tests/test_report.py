@@ -51,35 +51,38 @@ average_from = 1.0
 """
 WEIGHT = 2000 * math.pi / 6.0 * 8e-9 * 1500.0 * 9.81 / 0.02**2
 """Buoyant, over the floor [Pa]."""
+OF_THE_FLUID = (
+    "bed_voidage", "bed_voidage_pressure", "pressure_drop", "exchange_imbalance", "volume_imbalance", "outside_range",
+)  # fmt: skip
 
 
 def made_up(folder: Path, text: str = BED, rows: int = 401, trend: float = 0.0) -> Path:
     """A run whose pressure drop carries the weight and whose voidage is 0.6, with noise of known strength."""
     case = Case.from_text(text)
     grid = grid_of(case.column)
-    run = RunFolder.create(folder, text, provenance(1), grid, FIELDS)
+    wet = case.fluid is not None
+    run = RunFolder.create(folder, text, provenance(1), grid if wet else None, FIELDS)
     noise = np.random.default_rng(2).normal(size=(3, rows))
     for k, time in enumerate(np.linspace(0.0, 2.0, rows)):
-        run.append_history(
-            {
-                "time": time,
-                "fluid_steps": 10.0 * k,
-                "bed_height": 0.04 + 1e-4 * noise[0, k] + trend * time,
-                "bed_voidage": 0.6 + 1e-3 * noise[1, k],
-                "bed_voidage_pressure": math.nan,
-                "pressure_drop": WEIGHT * (1.0 + 0.01 * noise[2, k]),
-                "granular_temperature": 1e-4,
-                "fastest": 0.1,
-                "contact_count": 7.0,
-                "particle_count": 2000.0,
-                "exchange_imbalance": math.nan if k == 0 else 1e-15,
-                "volume_imbalance": 1e-9,
-                "outside_range": 20.0 * k,
-            }
-        )
+        row = {
+            "time": time,
+            "fluid_steps": 10.0 * k,
+            "bed_height": 0.04 + 1e-4 * noise[0, k] + trend * time,
+            "bed_voidage": 0.6 + 1e-3 * noise[1, k],
+            "bed_voidage_pressure": math.nan,
+            "pressure_drop": WEIGHT * (1.0 + 0.01 * noise[2, k]),
+            "granular_temperature": 1e-4,
+            "fastest": 0.1,
+            "contact_count": 7.0,
+            "particle_count": 2000.0,
+            "exchange_imbalance": math.nan if k == 0 else 1e-15,
+            "volume_imbalance": 1e-9,
+            "outside_range": 20.0 * k,
+        }
+        run.append_history({name: value for name, value in row.items() if wet or name not in OF_THE_FLUID})
         if k % 100 == 0:
-            voidage = np.full(grid.shape, 0.6)
-            run.write_snapshot(time, 100 * k, {"voidage": voidage}, {"position": np.zeros((3, 3)), "id": np.arange(3)})
+            fluid = {"voidage": np.full(grid.shape, 0.6)} if wet else None
+            run.write_snapshot(time, 100 * k, fluid, {"position": np.zeros((3, 3)), "id": np.arange(3)})
     run.note("wall_time", {"fluid": 3.0, "particles": 5.0})
     run.finish("finished")
     return folder
@@ -116,6 +119,14 @@ def test_a_packed_bed_is_held_against_ergun(tmp_path: Path) -> None:
     slope = laws_of_beds.ergun_gradient(0.05, 2e-3, 1000.0, 1e-3, 0.6)
     assert [row["law"] for row in fixed] == ["pressure drop by Ergun"]
     assert fixed[0]["expected"] == pytest.approx(slope * 0.04, rel=0.01)
+
+
+def test_dry_particles_have_a_report_too(tmp_path: Path) -> None:
+    dry = BED[: BED.index("[fluid]")] + BED[BED.index("[material") :].replace("inlet_velocity = 0.05\n", "")
+    result = report(made_up(tmp_path / "run", dry))
+    assert result["laws"] == [] and "pressure_drop" not in result["measures"]
+    assert result["ledger"] == {"particles_lost": 0.0}
+    assert "has no voidage on a grid" in page(tmp_path / "run", tmp_path / "dry.html").read_text()
 
 
 def test_what_speaks_against_the_run_is_counted(tmp_path: Path) -> None:
