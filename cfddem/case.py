@@ -7,14 +7,13 @@ walls, boundaries, particles, is built by :mod:`cfddem.assembly`.
 from __future__ import annotations
 
 import math
-import re
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from cfddem.case_text import parsed, put, read_text
 from cfddem.errors import InputError, nearest
 from cfddem.materials import Checked, Fluid, Material
 from cfddem.mistakes import Key, described, key_lines, line_of, refused, shown
@@ -25,12 +24,6 @@ Point = tuple[float, float, float]
 
 POURED_SOLID_FRACTION = 0.58
 """Solid fraction of a poured bed, by which a bed's height is turned into a number of particles, and back."""
-
-LONGEST_FILE = 500_000
-"""A case is a page that a person reads; who places very many particles does so from Python [characters]."""
-
-DEEPEST_KEY = 20
-"""Most words in a key; the reader of TOML takes the square of it in time."""
 
 
 class Column(Checked):
@@ -246,9 +239,9 @@ class Case(Checked):
     @classmethod
     def from_text(cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None) -> Case:
         """Read a case from the text of a TOML file; `name` is what errors call it."""
-        values = _parsed(text, name)
+        values = parsed(text, name)
         for key, value in (overrides or {}).items():
-            _put(values, key.split("."), value, key)
+            put(values, key.split("."), value, key)
         try:
             return cls.model_validate(values)
         except ValidationError as refusal:
@@ -275,57 +268,8 @@ class Case(Checked):
         """A changed copy: `case.with_(**{"bed.inlet_velocity": 0.06})`, or whole sections by name."""
         values = self.model_dump()
         for key, value in changes.items():
-            _put(values, key.split("."), value, key)
+            put(values, key.split("."), value, key)
         return Case(**values)
-
-
-def read_text(path: Path) -> str:
-    """The text of a case file."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(LONGEST_FILE + 1)
-        if len(content) > LONGEST_FILE:
-            raise InputError(
-                f"case {path}", None, f"at most {LONGEST_FILE // 1000} kB", "place very many particles from Python"
-            )
-        return content.decode("utf-8-sig").replace("\r\n", "\n")
-    except OSError as failure:
-        raise InputError(f"case {path}", None, "a readable TOML file", failure.strerror or str(failure)) from None
-    except UnicodeDecodeError as failure:
-        remedy = f"byte {failure.start} is not UTF-8; save it as UTF-8"
-        raise InputError(f"case {path}", None, "UTF-8 text", remedy) from None
-
-
-_DEEP = re.compile(rf"(?:[\w\"'-]{{1,64}}+[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}")
-
-
-def _parsed(text: str, name: str) -> dict[str, Any]:
-    """The values of a TOML text."""
-    text = text.removeprefix("\ufeff")
-    if len(text) > LONGEST_FILE:
-        raise InputError(name, None, f"at most {LONGEST_FILE // 1000} kB", "place very many particles from Python")
-    deep = _DEEP.search(text)
-    if deep is not None:
-        line = text.count("\n", 0, deep.start()) + 1
-        raise InputError(f"{name}:{line}", None, f"a case, whose keys have at most {DEEPEST_KEY} words")
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise InputError(name, None, "a case, whose lists and tables lie a few levels deep") from None
-    except ValueError as failure:
-        reason, _, where = str(failure).partition(" (at ")
-        found = re.match(r"line (\d+), column (\d+)", where)
-        place = f"{name}:{found[1]}" if found else name
-        raise InputError(place, None, "valid TOML", f"{reason} in column {found[2]}" if found else reason) from None
-
-
-def _put(values: dict[str, Any], keys: list[str], value: Any, whole: str) -> None:
-    """Set a value in nested tables."""
-    for key in keys[:-1]:
-        values = values.setdefault(key, {})
-        if not isinstance(values, dict):
-            raise InputError(f"--set {whole}", shown(value), f"inside a table; {key} is a value")
-    values[keys[-1]] = value
 
 
 def _unknown_names(known: list[str], bed: str | None, column: str | None) -> Iterator[InputError]:

@@ -17,7 +17,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cfddem.card import card
-from cfddem.case import DEEPEST_KEY, LONGEST_FILE, Case
+from cfddem.case import Case
+from cfddem.case_text import DEEPEST_KEY, LONGEST_FILE
 from cfddem.errors import InputError
 from cfddem.gallery import gallery, overrides
 from cfddem.mistakes import MOST, Mistakes

@@ -74,7 +74,8 @@ def run(
     Example: cfddem run liquid-bed -o bed --set start=suspended --set run.until=0.02
     """
     from cfddem.card import refuse_red
-    from cfddem.case import Case, read_text
+    from cfddem.case import Case
+    from cfddem.case_text import read_text
     from cfddem.gallery import find_case, overrides
 
     path = find_case(case)
