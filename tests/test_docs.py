@@ -23,6 +23,10 @@ BLOCK = re.compile(r"^(?:<!-- (?P<mark>[^\n]*?) -->\n)?```(?P<kind>python|sh)\n(
 """A block that can be run. The mark before it says `not run`, `slow`, `exits N`, or `needs LIBRARY`."""
 
 
+LONG = ("scenarios/three_spheres.md", "scenarios/wet_tumbler.md")
+"""Pages that take longer than a plain test may."""
+
+
 class Block(NamedTuple):
     """A piece of a page that a reader may copy."""
 
@@ -77,7 +81,7 @@ def ends_with(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
 def pages_with(mark: str | None) -> list[Any]:
     """The pages that hold something to run; with a mark, those where a block carries it."""
     return [
-        pytest.param(page, id=name)
+        pytest.param(page, id=name, marks=[pytest.mark.slow] if name in LONG else [])
         for page, name in zip(PAGES, NAMES)
         if any(mark is None or block.mark == mark for block in blocks(page))
     ]
