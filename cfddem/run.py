@@ -161,6 +161,9 @@ class Run:
                 self._finish()
         except RunStopped:
             raise
+        except KeyboardInterrupt:
+            self.folder.finish("stopped", "in the middle of a step")
+            raise
         except BaseException as failure:
             self.folder.finish("failed", str(failure) or type(failure).__name__)
             raise

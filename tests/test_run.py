@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from cfddem.case import Case
 from cfddem.errors import InputError, RunFailed, RunStopped
 from cfddem.kernels import use_threads
 from cfddem.progress import status_of
+from cfddem.record.output import RunFolder
 from cfddem.run import Run
 
 
@@ -196,6 +198,20 @@ def test_a_failure_leaves_the_last_good_snapshot(
     monkeypatch.setattr(Run, "_write_row", write)
     Run.resume(Path("bed"), until=0.01).go()
     assert open_run("bed").status == "finished"
+
+
+def test_an_interrupt_in_the_middle_of_a_step_is_a_stop(tmp_path: Path) -> None:
+    """As a second Ctrl-C gives it; the run goes on from the checkpoint before."""
+
+    def step(_: float) -> None:
+        raise KeyboardInterrupt
+
+    halted = SimpleNamespace(case=Case.from_text(TINY), time=0.0, step=step)
+    folder = RunFolder.create(tmp_path / "run", TINY, {})
+    with pytest.raises(KeyboardInterrupt):
+        Run(halted, folder).go()  # type: ignore[arg-type]
+    seen = open_run(tmp_path / "run")
+    assert (seen.status, seen.message) == ("stopped", "in the middle of a step")
 
 
 # ---------------------------------------------------------------- kills
