@@ -16,6 +16,29 @@ def cell_and_share(coordinate, linear):
     return start, linear * (coordinate - 0.5 * linear - start)
 
 
+@inline
+def cells_and_weights(n, s, position, radius, offsets, linear, origin, inverse, home):
+    """The eight cells over which piece s of particle n is spread, and its weight in each."""
+    pz, py, px = home.shape
+    i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
+    j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
+    k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
+    i0, i1 = min(max(i + 1, 0), px - 1), min(max(i + 2, 0), px - 1)
+    j0, j1 = min(max(j + 1, 0), py - 1), min(max(j + 2, 0), py - 1)
+    k0, k1 = min(max(k + 1, 0), pz - 1), min(max(k + 2, 0), pz - 1)
+    cells = (
+        home[k0, j0, i0], home[k0, j0, i1], home[k0, j1, i0], home[k0, j1, i1],
+        home[k1, j0, i0], home[k1, j0, i1], home[k1, j1, i0], home[k1, j1, i1],
+    )  # fmt: skip
+    below, above = (1.0 - c) / len(offsets), c / len(offsets)
+    q00, q01, q10, q11 = (1.0 - b) * (1.0 - a), (1.0 - b) * a, b * (1.0 - a), b * a
+    weights = (
+        q00 * below, q01 * below, q10 * below, q11 * below,
+        q00 * above, q01 * above, q10 * above, q11 * above,
+    )  # fmt: skip
+    return cells, weights
+
+
 @threaded
 def deposit(position, radius, order, start, values, offsets, linear, origin, inverse, home, fields):
     """Slabs of even number together, then odd ones, then a last one that would touch the first round a period."""
@@ -32,42 +55,32 @@ def deposit(position, radius, order, start, values, offsets, linear, origin, inv
 @kernel
 def _spread(n, position, radius, values, offsets, linear, origin, inverse, home, fields):
     """Add what one particle carries to its cells."""
-    pz, py, px = home.shape
-    share = 1.0 / len(offsets)
     for s in range(len(offsets)):
-        i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
-        j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
-        k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
-        for corner in range(8):
-            di, dj, dk = corner & 1, (corner >> 1) & 1, corner >> 2
-            weight = share * (a if di else 1.0 - a) * (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
-            if weight != 0.0:
-                pk, pj, pi = min(max(k + dk + 1, 0), pz - 1), min(max(j + dj + 1, 0), py - 1), i + di + 1
-                cell = home[pk, pj, min(max(pi, 0), px - 1)]
-                for m in range(values.shape[1]):
-                    fields[cell, m] += weight * values[n, m]
+        c, w = cells_and_weights(n, s, position, radius, offsets, linear, origin, inverse, home)
+        for m in range(values.shape[1]):
+            value = values[n, m]
+            fields[c[0], m] += w[0] * value
+            fields[c[1], m] += w[1] * value
+            fields[c[2], m] += w[2] * value
+            fields[c[3], m] += w[3] * value
+            fields[c[4], m] += w[4] * value
+            fields[c[5], m] += w[5] * value
+            fields[c[6], m] += w[6] * value
+            fields[c[7], m] += w[7] * value
 
 
 @threaded
 def gather(position, radius, cells, offsets, linear, origin, inverse, home, values):
     """Every particle takes from its cells, with the weights of `_spread`."""
-    pz, py, px = home.shape
-    share = 1.0 / len(offsets)
     for n in prange(len(position)):
         for m in range(values.shape[1]):
             values[n, m] = 0.0
         for s in range(len(offsets)):
-            i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
-            j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
-            k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
-            for corner in range(8):
-                di, dj, dk = corner & 1, (corner >> 1) & 1, corner >> 2
-                weight = share * (a if di else 1.0 - a) * (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
-                if weight != 0.0:
-                    pk, pj, pi = min(max(k + dk + 1, 0), pz - 1), min(max(j + dj + 1, 0), py - 1), i + di + 1
-                    cell = home[pk, pj, min(max(pi, 0), px - 1)]
-                    for m in range(values.shape[1]):
-                        values[n, m] += weight * cells[cell, m]
+            c, w = cells_and_weights(n, s, position, radius, offsets, linear, origin, inverse, home)
+            for m in range(values.shape[1]):
+                low = (w[0] * cells[c[0], m] + w[1] * cells[c[1], m]) + (w[2] * cells[c[2], m] + w[3] * cells[c[3], m])
+                high = (w[4] * cells[c[4], m] + w[5] * cells[c[5], m]) + (w[6] * cells[c[6], m] + w[7] * cells[c[7], m])
+                values[n, m] += low + high
 
 
 @threaded

@@ -80,9 +80,9 @@ class Spreading:
 
     def place(self, position: Array, radius: Array) -> Placement:
         """Where particles stand among the cells."""
-        layers = np.floor((position[:, 2] - self._origin[2]) * self._inverse[2]).astype(np.int64)
+        layers = np.floor((position[:, 2] - self._origin[2]) * self._inverse[2])
         slabs = max(self.grid.cells[2] // SLAB, 1)
-        slab = np.clip(layers // SLAB, 0, slabs - 1)
+        slab = np.clip(layers // SLAB, 0, slabs - 1).astype(np.uint16)  # short numbers are sorted fastest
         order = np.argsort(slab, kind="stable")
         start = np.concatenate(([0], np.cumsum(np.bincount(slab, minlength=slabs))))
         return Placement(position.copy(), radius, order, start)
