@@ -35,7 +35,7 @@ class Fall:
 
 
 def fall(
-    reynolds: float, cell: float, *, own_wind: bool = True, place: float = 0.5, box: float = 60.0, times: float = 12.0
+    reynolds: float, cell: float, *, own_wind: bool = True, place: float = 0.5, box: float = 60.0, times: float = 60.0
 ) -> Fall:
     """Let a sphere fall through a periodic box from its terminal velocity, and see whether it keeps it.
 

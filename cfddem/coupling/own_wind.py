@@ -7,17 +7,11 @@ and the equations of the grid are. Per force, at a place f within its cell (0 to
 .. math:: M_d(f) = \sum_{\Delta} G_d(\Delta) \prod_e A_e(\Delta_e),\qquad
           A(0) = (1-f)^2 + f^2,\ A(\pm1) = f(1-f)
 
-where G is the flow of the grid's own Stokes equations, smoothing included, between cells that lie Delta apart. A
-moving particle leaves its wind behind (Oseen): M falls by :func:`closures.disturbance.oseen_share`. The wind takes
-time to build up, as momentum diffuses out of the kernel of width s, and less where the particle moves on:
-
-.. math:: u_s(t) = M F\left[1 - (1 + \nu t/s^2)^{-1/2}\right],\qquad
-          (1+x)^{-1/2} = \int_0^\infty \frac{e^{-y(1+x)}}{\sqrt{\pi y}}\,dy \approx \sum_k w_k e^{-y_k x}
-
-The kernel of a grid is no Gaussian, so its width is the one with which the wind begins as the grid's own does:
-:math:`s^2 = M\eta/(2 a_0)`, where F a_0/rho is the acceleration that the force gives to the kernel at first. The wind
-is so a sum of few winds, each of which relaxes at its own rate, (nu/s^2)(y_k + 3/8 R^2/(R + 2.6)), with R = U s/nu; the
-second part is what the moving particle leaves behind.
+where G is the flow of the grid's own Stokes equations, smoothing included, between cells that lie Delta apart. It is
+a sum over waves, each of which builds up at its own rate, nu times its eigenvalue L; waves of like L are taken
+together, which makes few winds. A moving particle leaves its wind behind: with s the width of the kernel,
+:math:`s^2 = M\eta/(2a_0)` where F a_0/rho is the first acceleration, and R = U s/nu, every rate grows by
+(nu/s^2) 3/8 R^2/(R + 2.6), and the steady sum is Oseen's, :func:`closures.disturbance.oseen_share`.
 
 Where particles are many, the drag of the others holds the wind back (Brinkman), which adds beta/(eps rho) to each
 rate. And drag laws of dense beds are made for means that count every particle, this one too: of both disturbances
@@ -44,19 +38,9 @@ _PERIODIC_STOKES = 2.837297
 
 
 LEFT_BEHIND, LEFT_AT = 0.375, 2.6
-"""Rate at which a moving particle leaves its wind: the winds' steady sum then is Oseen's share within 3 %."""
+"""Rate at which a moving particle leaves its wind: the winds' steady sum then is near Oseen's share by itself."""
 
-
-def _modes() -> tuple[Array, Array]:
-    """Rates y_k and weights w_k: the trapezoidal rule in log y, scaled to add up to one."""
-    logarithm = np.linspace(-9.8, 1.5, 9)
-    rates = np.exp(logarithm)
-    weights = np.exp(-rates) * np.sqrt(rates)
-    return rates, weights / weights.sum()
-
-
-_MODES = _modes()
-MODES = len(_MODES[0])
+MODES = 8
 """Number of winds of a particle."""
 
 
@@ -69,7 +53,7 @@ class OwnWind:
     def __init__(self, spreading: Spreading) -> None:
         self._origin, self._inverse = np.array(spreading.grid.origin), 1.0 / np.array(spreading.grid.spacing)
         self._linear = spreading.mapping == "linear"
-        self._flow, self._density = _tables(spreading)
+        self._flow, self._rates, self._density = _tables(spreading)
 
     def share(self, place: Placement, solid: Array) -> tuple[Array, Array]:
         """Own solid fraction that a particle sees (N,), and its share in all that it sees, 0 to 1 (N,)."""
@@ -97,7 +81,9 @@ class OwnWind:
         if viscosity <= 0.0:
             return np.zeros_like(winds)
         new = np.empty_like(winds)
-        _build_up(winds, force, slip, screening, self._at(place, self._flow), density, viscosity, step, *_MODES, new)
+        _build_up(
+            winds, force, slip, screening, self._at(place, self._flow), self._rates, density, viscosity, step, new
+        )
         return new
 
     def _at(self, place: Placement, tables: Array) -> Array:
@@ -113,11 +99,12 @@ class OwnWind:
         return values
 
 
-def _tables(spreading: Spreading) -> tuple[Array, Array]:
-    """What a force does to cells so many cells apart, and the own volume there (2, 2, 2) [1/m3].
+def _tables(spreading: Spreading) -> tuple[Array, Array, Array]:
+    """What a force does to cells so many cells apart, the rates of its winds, and the own volume there.
 
-    Of a force along x, y, z: steady velocity times viscosity [1/m], then first acceleration times density [1/m3]; as
-    one table (6, 2, 2, 2).
+    Of a force along x, y, z: steady velocity of every wind times viscosity [1/m], then first acceleration times
+    density [1/m3], as tables (3 MODES + 3, 2, 2, 2); rates over the viscosity nu (3, MODES) [1/m2]; volume (2, 2, 2)
+    [1/m3].
 
     Fourier sums over a lattice large enough to be endless but for the mean flow of its images, which is known.
     """
@@ -139,33 +126,45 @@ def _tables(spreading: Spreading) -> tuple[Array, Array]:
         values = np.fft.ifftn(symbol).real[:2, :2, :2]
         return values / volume
 
-    mobility, acceleration = [], []
+    # waves of like eigenvalue make one wind
+    finite = np.where(np.isfinite(laplacian), laplacian, 1.0)
+    smallest, largest = float(np.min(laplacian)), float(finite.max())
+    wind = np.clip((MODES * np.log(finite / smallest) / np.log(largest / smallest)).astype(int), 0, MODES - 1)
+    images = _PERIODIC_STOKES / (6.0 * math.pi * float(np.cbrt(np.prod(counts * spacing))))
+    flow, rates, acceleration = [], np.zeros((3, MODES)), []
     for d in range(3):
         # half of a cell's force acts on each of its faces, and a cell sees the mean of its faces
         seen = kernel**2 * np.cos(0.5 * waves[d]) ** 2
-        images = _PERIODIC_STOKES / (6.0 * math.pi * float(np.cbrt(np.prod(counts * spacing))))
         along = seen * (1.0 - steps[d] ** 2 / laplacian)
-        mobility.append(near(along / laplacian) + images)
+        along[0, 0, 0] = 0.0
+        for k in range(MODES):
+            part = np.where(wind == k, along, 0.0)
+            steady = float((part / laplacian).sum())
+            rates[d, k] = float(part.sum()) / steady if steady > 0.0 else smallest
+            flow.append(near(part / laplacian) + (images if k == 0 else 0.0))
         acceleration.append(near(along))
-    return np.array(mobility + acceleration), near(kernel)
+    return np.array(flow + acceleration), rates, near(kernel)
 
 
 @threaded
-def _build_up(winds, force, slip, screening, flow, density, viscosity, step, rates, weights, new):
+def _build_up(winds, force, slip, screening, flow, rates, density, viscosity, step, new):
     """Exact relaxation of every wind towards what a steady force would make of it."""
+    modes, diffusivity = rates.shape[1], viscosity / density
     for n in prange(len(winds)):
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
         for d in range(3):
-            creeping = flow[n, d] / viscosity
-            width = math.sqrt(0.5 * flow[n, d] / flow[n, 3 + d])
-            reynolds = density * speed * width / viscosity
-            blown = LEFT_BEHIND * reynolds * reynolds / (reynolds + LEFT_AT)
-            total = 0.0
-            for k in range(len(rates)):
-                total += weights[k] * rates[k] / (rates[k] + blown)
-            scale = creeping * oseen_share(reynolds) / total * force[n, d]
-            for k in range(len(rates)):
-                fading = viscosity / (density * width * width) * (rates[k] + blown)
-                steady = scale * weights[k] * rates[k] / (rates[k] + blown) * fading / (fading + screening[n])
+            creeping, moving = 0.0, 0.0
+            for k in range(modes):
+                creeping += flow[n, modes * d + k]
+            square = 0.5 * creeping / flow[n, 3 * modes + d]
+            reynolds = speed * math.sqrt(square) / diffusivity
+            blown = LEFT_BEHIND * reynolds * reynolds / (reynolds + LEFT_AT) / square
+            for k in range(modes):
+                moving += flow[n, modes * d + k] * rates[d, k] / (rates[d, k] + blown)
+            scale = oseen_share(reynolds) * creeping / moving * force[n, d] / viscosity
+            for k in range(modes):
+                steady = scale * flow[n, modes * d + k] * rates[d, k] / (rates[d, k] + blown)
+                fading = diffusivity * (rates[d, k] + blown)
                 left = math.exp(-step * (fading + screening[n]))
+                steady *= fading / (fading + screening[n])
                 new[n, k, d] = steady + left * (winds[n, k, d] - steady)
