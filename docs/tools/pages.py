@@ -108,11 +108,8 @@ def commands() -> str:
 
     text = app.generate_docs(output_format="markdown")
     text = re.sub(r"^#+ ", lambda mark: mark[0] if len(mark[0]) > 2 else "## ", text, flags=re.MULTILINE)
-    codes = (
-        "0 all went well, 1 a limit does not hold or a card is amber under `--strict`, 2 a mistake in what was asked"
-    )
-    codes += " or a red card, 3 a run that could not go on, 130 stopped from the keyboard."
-    return f"# Commands\n\nExit codes: {codes}\n\n{text.removeprefix('## cfddem')}"
+    text = re.sub(r"## Table of Contents\n.*?(?=\*\*Commands)", "", text, flags=re.DOTALL)
+    return f"# Commands\n\n{text.removeprefix('## cfddem')}"
 
 
 def shelf() -> str:
