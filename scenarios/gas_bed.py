@@ -1,7 +1,7 @@
 """Gas beds that bubble, from measured ones; and the standard gas bed, on which the speed of a coupled run is measured.
 
-The standard bed has the box, grains and gas of Goldschmidt et al., Powder Technol. 142 (2004) 98: 24 750 spheres at
-rest, over which gas begins to flow. Its two time steps are given, so that different codes do the same work.
+The standard bed has the box, grains and gas of Goldschmidt et al. (2004): 24 750 spheres at rest, into which gas
+begins to flow. Its two time steps are given, so that different codes do the same work.
 """
 
 from __future__ import annotations
