@@ -23,8 +23,8 @@ BLOCK = re.compile(r"^(?:<!-- (?P<mark>[^\n]*?) -->\n)?```(?P<kind>python|sh)\n(
 """A block that can be run. The mark before it says `not run`, `slow`, `exits N`, or `needs LIBRARY`."""
 
 
-LONG = ("scenarios/three_spheres.md", "scenarios/wet_tumbler.md")
-"""Pages that take longer than a plain test may."""
+QUICK = ("binary_collision", "wet_pair", "wet_wall")
+"""Pages of the gallery that take seconds; the others run whole beds, or maps."""
 
 
 class Block(NamedTuple):
@@ -78,10 +78,15 @@ def ends_with(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
+def is_long(page: Path) -> bool:
+    """Whether a page takes longer than a plain test may."""
+    return page.parent.name == "scenarios" and page.stem not in QUICK
+
+
 def pages_with(mark: str | None) -> list[Any]:
     """The pages that hold something to run; with a mark, those where a block carries it."""
     return [
-        pytest.param(page, id=name, marks=[pytest.mark.slow] if name in LONG else [])
+        pytest.param(page, id=name, marks=[pytest.mark.slow] if is_long(page) else [])
         for page, name in zip(PAGES, NAMES)
         if any(mark is None or block.mark == mark for block in blocks(page))
     ]
