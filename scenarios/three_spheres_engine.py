@@ -127,7 +127,8 @@ def _spheres(
     velocity = np.zeros((3, 3))
     velocity[0, 0] = SPEED / math.cos(angle[0])
     three = bodies(places, radius, density, velocity=velocity)
-    run = ParticleSolver(three, pair_table([solid]), laws=Laws(film=False))
+    # steps follow the films, which are laid over the engine; apart, spheres take longer ones than a contact could
+    run = ParticleSolver(three, pair_table([solid]), laws=Laws(film=False), check_steps=False)
     return run, 0.5 * mass * SPEED / (film_strength(1.0, 0.25 * DIAMETER) * stokes)
 
 
