@@ -106,7 +106,8 @@ class Pair:
                 viscosity=self.viscosity,
             )
             planes = []
-        return ParticleSolver(made, self.rows, walls=planes, laws=laws, **{"skin": max(self.radii), **options})
+        chosen = {"skin": max(self.radii), "check_steps": False} | options  # an impact has a clock of its own
+        return ParticleSolver(made, self.rows, walls=planes, laws=laws, **chosen)  # type: ignore[arg-type]
 
 
 def relative_velocity(run: ParticleSolver) -> np.ndarray:

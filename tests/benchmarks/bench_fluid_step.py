@@ -1,7 +1,7 @@
 """Time of one full fluid step, beside the memory speed of the machine measured in the same run.
 
     python tests/benchmarks/bench_fluid_step.py [--threads N] [--profile]
-    python -m pytest tests/benchmarks/bench_fluid_step.py
+    python -m pytest -n 0 tests/benchmarks/bench_fluid_step.py
 
 The work: a bed of voidage about 0.45 that moves a little each step fills the lower half of a box, gas enters below at
 0.3 m/s and leaves above, drag 2 000 kg/m3/s, model A, pressure tolerance 1e-9 of the largest face flux in every
