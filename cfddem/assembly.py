@@ -18,7 +18,7 @@ from cfddem.fluid.solver import FluidSolver
 from cfddem.materials import pair_table
 from cfddem.particles.forces import CONTACTS, FRICTION_ONSETS, Laws
 from cfddem.particles.packing import lattice, mono, normal, random_packing
-from cfddem.particles.pouring import pour_into
+from cfddem.particles.pouring import AT_REST, NEARLY_AT_REST, pour_into
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies
 from cfddem.particles.state import bodies as make_bodies
@@ -112,6 +112,7 @@ def particles_of(case: Case, diameters: Array, table: np.ndarray, walls: list[Wa
         spheres = pour_into(
             table, diameters, density, walls, *_room(case, float(diameters.max())), box=periodic_box(case),
             seed=bed.seed, material=kind, gravity=abs(case.laws.gravity[2]), laws=laws._replace(film=False),
+            at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
         )  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start == "packed":

@@ -31,8 +31,11 @@ _STIFFER = 8.0
 _BREATHS = (5, 7, 11, 13)
 """Steps between two looks at who swings back; unequal, lest a swing keep time with them."""
 
-_UNBALANCED, _FEW = 0.05, 1e-3
-"""In a bed at rest, no more than a few particles feel more than this share of their weight."""
+NEARLY_AT_REST = 1e-4
+"""Share of the energy that may be left where a fluid will stir the bed at once; a few grains may still roll."""
+
+_UNBALANCED, _FEW, _SOME = 0.05, 1e-3, 2e-2
+"""In a bed at rest, no more than a few particles feel more than this share of their weight; nearly at rest, some."""
 
 
 class Bed(NamedTuple):
@@ -58,6 +61,7 @@ def pour_into(
     material: np.ndarray | int = 0,
     gravity: float = 9.81,
     laws: Laws | None = None,
+    at_rest: float = AT_REST,
     progress: Progress | None = None,
 ) -> Bodies:
     """Particles at rest between walls, as :func:`poured_bed` pours them."""
@@ -73,6 +77,7 @@ def pour_into(
         material=material,
         gravity=gravity,
         laws=laws,
+        at_rest=at_rest,
         progress=progress,
     ).bodies
 
@@ -90,6 +95,7 @@ def poured_bed(
     material: np.ndarray | int = 0,
     gravity: float = 9.81,
     laws: Laws | None = None,
+    at_rest: float = AT_REST,
     patience: float = 50.0,
     progress: Progress | None = None,
 ) -> Bed:
@@ -111,6 +117,7 @@ def poured_bed(
     material      (N,) or one for all, row of the pair table
     gravity       along -z [m/s2]
     laws          of the later run
+    at_rest       share of the energy of the fall that may be left
     patience      give up after this many times the time of a fall from the top
     progress      called now and then with the time and the share of the kinetic energy that is left
 
@@ -135,7 +142,7 @@ def poured_bed(
         check_steps=False,  # steps follow the clocks here
     )
     bath = _Bath(run, float(np.sum(spheres.mass * gravity * (places[:, 2] - corner[2]))), gravity, height)
-    bath.patience, bath.progress = patience, progress
+    bath.patience, bath.progress, bath.at_rest = patience, progress, at_rest
     bath.fall()
     bath.calm()
     while soft < 1.0:
@@ -145,7 +152,7 @@ def poured_bed(
         bath.calm()
     run.table[:] = table
     run.refresh()
-    while (left := bath.release()) > AT_REST:
+    while (left := bath.release()) > at_rest:
         bath.calm()
     grains = _in_order(run.bodies)
     return Bed(grains, deepest(run), left, bath.time, run)
@@ -155,6 +162,7 @@ class _Bath:
     """A bed on its way to rest."""
 
     patience = 50.0
+    at_rest = AT_REST
     progress: Progress | None = None
 
     def __init__(self, run: ParticleSolver, brought: float, gravity: float, height: float) -> None:
@@ -168,7 +176,7 @@ class _Bath:
         self.time += steps * step
         if self.time > self.patience * self.fall_time:
             raise RunFailed(
-                f"the bed still holds {self.left:.2g} of its energy after {self.time:.3g} s (limit {AT_REST:g}); "
+                f"the bed still holds {self.left:.2g} of its energy after {self.time:.3g} s (limit {self.at_rest:g}); "
                 "raise patience, or use a material with more friction or less restitution"
             )
 
@@ -201,7 +209,8 @@ class _Bath:
                 made.velocity[back] = 0.0
                 made.spin[back] = 0.0
             self.tell()
-            if self.left < 0.3 * AT_REST and (unbalanced(self.run) > _UNBALANCED).mean() <= _FEW:
+            few = _FEW if self.at_rest <= AT_REST else _SOME
+            if self.left < 0.3 * self.at_rest and (unbalanced(self.run) > _UNBALANCED).mean() <= few:
                 return
 
     def release(self) -> float:
