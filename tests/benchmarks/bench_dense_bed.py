@@ -1,4 +1,4 @@
-"""Speed of the particle engine on the standard dense bed; run with `pytest -n 0 tests/benchmarks/bench_dense_bed.py`."""
+"""Speed of the particle engine on the standard dense bed: `pytest -n 0 tests/benchmarks/bench_dense_bed.py`."""
 
 from __future__ import annotations
 
