@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from cfddem.case import POURED_SOLID_FRACTION, Case
 from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
-from cfddem.fluid.division import cell_counts
+from cfddem.fluid.division import VISCOUS, cell_counts
 from cfddem.materials import pair_table
 from cfddem.particles.steps import Clocks, crossing_step, hertz_steps, linear_steps
 from closures import balance, bed, contact, drag_single, minimum_gap, numbers
@@ -16,9 +16,6 @@ from closures.drag import ergun
 
 LIQUID = 100.0
 """Density from which on a fluid counts as a liquid, whose beds expand evenly [kg/m3]."""
-
-VISCOUS = 0.8
-"""Part of the viscous time of a cell that the fluid takes as a step."""
 
 BYTES_PER_PARTICLE, BYTES_PER_CELL, BYTES_AT_LEAST = 3000.0, 1300.0, 0.45e9
 """Memory of a dense run, by the size of its arrays and that of a process with its loops."""

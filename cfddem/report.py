@@ -18,6 +18,7 @@ from cfddem.expected import LIQUID
 from cfddem.record.reading import Run, open_run
 from cfddem.record.series import block_average, stationarity
 from closures import bed as laws_of_beds
+from closures import numbers
 from closures.law import SHELF
 
 MEASURES = (
@@ -147,10 +148,19 @@ def _laws(case: Case, measures: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def expansion_laws(case: Case) -> dict[str, float]:
-    """Voidage of a liquid bed by each published law of its expansion [-]; with its walls where they hold the flow."""
-    assert case.fluid is not None and isinstance(case.bed.inlet_velocity, float)
+    """Voidage of a liquid bed by each published law of its expansion [-]."""
+    assert isinstance(case.bed.inlet_velocity, float)
+    return {
+        name: laws_of_beds.expanded_voidage(case.bed.inlet_velocity, limit, exponent)
+        for name, (exponent, limit) in expansion_exponents(case).items()
+    }
+
+
+def expansion_exponents(case: Case) -> dict[str, tuple[float, float]]:
+    """Exponent n [-] and velocity at voidage 1 [m/s] of each published law; with walls where they hold the flow."""
+    assert case.fluid is not None
     density, viscosity, diameter = case.fluid.density, case.fluid.viscosity, case.bed.diameter
-    archimedes = density * (case.solid.density - density) * abs(case.laws.gravity[2]) * diameter**3 / viscosity**2
+    archimedes = numbers.archimedes(diameter, case.solid.density, density, viscosity, abs(case.laws.gravity[2]))
     if archimedes <= 0.0:
         return {}
     reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
@@ -167,10 +177,7 @@ def expansion_laws(case: Case) -> dict[str, float]:
             laws_of_beds.wall_factor_khan_richardson(wall),
         ),
     }
-    return {
-        name: laws_of_beds.expanded_voidage(case.bed.inlet_velocity, factor * terminal, exponent)
-        for name, (exponent, factor) in laws.items()
-    }
+    return {name: (exponent, factor * terminal) for name, (exponent, factor) in laws.items()}
 
 
 def buoyant_weight(case: Case) -> float:
@@ -178,11 +185,6 @@ def buoyant_weight(case: Case) -> float:
     assert case.fluid is not None
     volume = float((math.pi / 6.0 * particle_diameters(case) ** 3).sum())
     return volume * (case.solid.density - case.fluid.density) * abs(case.laws.gravity[2])
-
-
-def floor_area(size: tuple[float, float, float], shape: str) -> float:
-    """Area of the column's floor [m2]."""
-    return 0.25 * math.pi * size[0] ** 2 if shape == "cylinder" else size[0] * size[1]
 
 
 def _compared(what: str, computed: float, expected: float, unit: str, law: str = "", **asked: float) -> dict[str, Any]:

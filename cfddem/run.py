@@ -17,12 +17,13 @@ from cfddem.assembly import grid_of
 from cfddem.case import Case
 from cfddem.errors import InputError, RunFailed, RunStopped, UnstableStep
 from cfddem.particles.guard import guard
-from cfddem.particles.pouring import kinetic_energy
+from cfddem.particles.state import kinetic_energy
 from cfddem.record import checkpoint
-from cfddem.record.ledger import entrance_rise, exchange_imbalance, volume_imbalance
+from cfddem.record.ledger import exchange_imbalance, volume_imbalance
 from cfddem.record.measures import (
     bed_height,
     cells_of,
+    entrance_rise,
     granular_temperature,
     pressure_drop,
     voidage_by_pressure,
@@ -288,7 +289,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
     if fluid is None or simulation.exchange is None:
         return row
     floor = float(grid.open.mean()) * column.size[0] * column.size[1]
-    volume = (4.0 / 3.0) * np.pi * bodies.radius**3
+    volume = bodies.volume
     carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
     weight = (np.average(bodies.density, weights=volume) - fluid.density) * carried
     low, high = (share * height for share in BED)
@@ -298,7 +299,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
             fluid.pressure, grid.spacing, float(weight), low, high, open_cells=grid.open
         ),
         "pressure_drop": pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open)
-        + entrance_rise(fluid),
+        + entrance_rise(fluid.volume_flux(2)[0], fluid.mean_voidage[0], fluid.density, grid.open[0]),
         "exchange_imbalance": exchange_imbalance(fluid, simulation.exchange),
         "volume_imbalance": volume_imbalance(fluid),
         "outside_range": float(simulation.exchange.outside),

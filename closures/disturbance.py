@@ -7,25 +7,6 @@ import math
 from closures.law import law
 
 
-@law("disturbance", "Maxey & Patel, Int. J. Multiphase Flow 27 (2001) 1603, doi:10.1016/S0301-9322(01)00014-3")
-def creeping_mobility(viscosity: float, width: float) -> float:
-    r"""Velocity per force, seen through a Gaussian kernel, where the force is spread over the same kernel.
-
-    .. math:: M = \frac{1}{6\pi^{3/2}\eta s}
-
-    viscosity  eta [Pa s]
-    width      s, standard deviation of the kernel [m]
-    returns    M [m/(N s)]
-
-    Range: creeping flow without end. A sphere of radius a has 1/(6 pi eta a): the kernel is one of radius
-    s sqrt(pi).
-
-    >>> round(6 * math.pi * creeping_mobility(1.0, 1 / math.sqrt(math.pi)), 12)
-    1.0
-    """
-    return float(1.0 / (6.0 * math.pi**1.5 * viscosity * width))
-
-
 @law("disturbance", "Oseen's equation with a Gaussian force, integrated over wave numbers")
 def oseen_share(reynolds: float) -> float:
     r"""What is left of the creeping mobility where the force moves through the fluid.
@@ -56,3 +37,21 @@ def oseen_share(reynolds: float) -> float:
         growth = (scaled - 1.0 + 2.0 * reynolds / math.sqrt(math.pi)) / (2.0 * square)
         second = growth / square + 2.0 / (3.0 * math.sqrt(math.pi) * reynolds) - 0.5 / square
     return 3.0 / math.sqrt(math.pi) * (math.sqrt(math.pi) / 3.0 - 0.5 * math.pi * reynolds * second)
+
+
+@law("disturbance", "fitted to the Oseen share of a Gaussian kernel, R = 0.03 ... 100")
+def left_behind(reynolds: float) -> float:
+    r"""Rate at which a moving particle leaves its own wind, over nu/s^2.
+
+    .. math:: b = \frac{3}{8}\,\frac{R^2}{R + 2.6},\qquad R = \rho U s/\eta
+
+    reynolds  R, on the width of the kernel [-]
+    returns   b [-]
+
+    Range: any. With winds that build up at the rates y_k of a creeping kernel and fade at y_k + b, the steady sum is
+    near the Oseen share; what is left is scaled away. Far above R = 1, b is 3/8 R.
+
+    >>> round(left_behind(1.0), 4)
+    0.1042
+    """
+    return 0.375 * reynolds * reynolds / (reynolds + 2.6)

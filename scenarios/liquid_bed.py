@@ -12,7 +12,7 @@ import numpy as np
 
 from cfddem.case import Case
 from cfddem.gallery import gallery
-from cfddem.report import buoyant_weight, expansion_laws, floor_area
+from cfddem.report import buoyant_weight, expansion_exponents, expansion_laws
 from cfddem.run import measure
 from cfddem.simulation import Simulation
 
@@ -49,20 +49,14 @@ def fluidise(velocity: float, **overrides: object) -> Bed:
     for instant in STARTING + np.linspace(0.0, AVERAGED, 101)[1:]:
         simulation.until(float(instant))
         rows.append(measure(simulation))
-    weight = buoyant_weight(described) / floor_area(described.column.size, described.column.shape)
+    weight = buoyant_weight(described) / described.column.floor_area
     laws = expansion_laws(described)
-    from closures import bed as laws_of_beds
-
-    assert described.fluid is not None
-    density, viscosity, diameter = described.fluid.density, described.fluid.viscosity, described.bed.diameter
-    archimedes = density * (described.solid.density - density) * 9.81 * diameter**3 / viscosity**2
-    reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
     return Bed(
         velocity=velocity,
         drop_over_weight=float(np.mean([row["pressure_drop"] for row in rows])) / weight,
         voidage=float(np.mean([row["bed_voidage"] for row in rows])),
         expected=float(np.mean(list(laws.values()))),
-        exponent=laws_of_beds.exponent_richardson_zaki(reynolds, 0.0),
+        exponent=expansion_exponents(described)["Richardson-Zaki"][0],
         height=float(np.mean([row["bed_height"] for row in rows])),
     )
 

@@ -13,9 +13,9 @@ import numpy as np
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import FREE, FRICTION_ONSETS, LINEAR, SPRING_DASHPOT, Laws
 from cfddem.particles.packing import lattice, random_packing
-from cfddem.particles.pouring import AT_REST, kinetic_energy, pour
+from cfddem.particles.pouring import AT_REST, pour
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
+from cfddem.particles.state import bodies, kinetic_energy
 from cfddem.particles.walls import Cone, Cylinder, Plane
 from closures import contact
 

@@ -134,12 +134,11 @@ class Exchange:
         fields = np.moveaxis(np.concatenate([weight, weight * seen], axis=-1), -1, 0)
         at = spreading.gather(place, spreading.smooth(fields))
         drag = offer.resistance[:, None] * (at[:, 3:] - at[:, :3] * offer.target)
-        volume = (4.0 / 3.0) * math.pi * bodies.radius**3
-        weight_left = (bodies.mass - self.fluid.density * volume)[:, None] * gravity
+        weight_left = (bodies.mass - self.fluid.density * place.volume)[:, None] * gravity
 
         force = (
             drag
-            + self._pressure_force(bodies, place, volume)
+            + self._pressure_force(bodies, place)
             + weight_left
             + offer.explicit
         )  # fmt: skip
@@ -167,11 +166,11 @@ class Exchange:
             return 1.0 / bodies.inverse_mass
 
     def checkpoint(self) -> dict[str, Any]:
-        """What the next step depends on beside fluid and particles."""
+        """Copies of what the next step depends on beside fluid and particles."""
         return {
-            "memory": self._memory,
-            "winds": self._winds,
-            "trail": {str(n): each for n, each in enumerate(self._trail)},
+            "memory": self._memory.copy(),
+            "winds": self._winds.copy(),
+            "trail": {str(n): each.copy() for n, each in enumerate(self._trail)},
             "last_step": self._last_step,
             "outside": self.outside,
         }
@@ -189,8 +188,7 @@ class Exchange:
         fluid, spreading = self.fluid, self.spreading
         force = np.zeros_like(slip)
         if self.viscous_stress:
-            volume = (4.0 / 3.0) * math.pi * bodies.radius**3
-            force += volume[:, None] * spreading.gather(place, spreading.smooth(fluid.cell_viscous_force()))
+            force += place.volume[:, None] * spreading.gather(place, spreading.smooth(fluid.cell_viscous_force()))
         if self.lift and fluid.viscosity > 0.0:
             curl = vorticity(np.moveaxis(fluid.velocity, -1, 0), fluid.grid.spacing)
             seen = spreading.gather(place, spreading.smooth(curl))
@@ -207,8 +205,7 @@ class Exchange:
         if self.added_mass == 0.0 or self._last_step == 0.0:
             return np.zeros_like(slip), np.zeros_like(slip)
         before = self._memory[bodies.id]
-        added = np.where(bodies.inverse_mass > 0.0, self.inertia(bodies) - bodies.mass, 0.0)[:, None]
-        swept = added * (slip + bodies.velocity - before[:, 6:]) / self._last_step
+        swept = self._added(bodies) * (slip + bodies.velocity - before[:, 6:]) / self._last_step
         return swept, self.under_way(bodies) / step - swept
 
     def _returned(self, place: Placement, force: Array) -> Array | None:
@@ -220,9 +217,12 @@ class Exchange:
 
     def under_way(self, bodies: Bodies) -> Array:
         """Momentum that added mass has taken from every particle and the fluid gets in the next step (N, 3) [N s]."""
-        added = np.where(bodies.inverse_mass > 0.0, self.inertia(bodies) - bodies.mass, 0.0)
-        moved: Array = added[:, None] * (bodies.velocity - self._memory[bodies.id, :3])
+        moved: Array = self._added(bodies) * (bodies.velocity - self._memory[bodies.id, :3])
         return moved
+
+    def _added(self, bodies: Bodies) -> Array:
+        """Added mass of every particle (N, 1) [kg]; none where nothing moves it."""
+        return np.where(bodies.inverse_mass > 0.0, self.inertia(bodies) - bodies.mass, 0.0)[:, None]
 
     def _what_they_meet(self, bodies: Bodies, place: Placement, solid: Array) -> tuple[Array, Array, Array, Array]:
         """Around every particle: slip u - v (N, 3) [m/s], voidage (N,), number of others per volume (N,) [1/m3], and
@@ -233,7 +233,7 @@ class Exchange:
         wind, others = np.zeros_like(seen), np.zeros_like(solids)
         if self.own_wind is not None:
             own, share = self.own_wind.share(place, solids)
-            others = np.maximum(solids - own, 0.0) / ((4.0 / 3.0) * math.pi * place.radius**3)
+            others = np.maximum(solids - own, 0.0) / place.volume
             wind = share[:, None] * self._winds[bodies.id].sum(axis=1)
             solids = np.maximum(solids - share * own, 0.0)
         return seen - wind - bodies.velocity, 1.0 - solids, others, wind
@@ -260,7 +260,7 @@ class Exchange:
         force: Array = (gained - before[:, 3:6]) / self._last_step
         return force
 
-    def _pressure_force(self, bodies: Bodies, place: Placement, volume: Array) -> Array:
+    def _pressure_force(self, bodies: Bodies, place: Placement) -> Array:
         r"""Force of the fluid's mean pressure, :math:`-V\nabla p'` of model A (N, 3) [N].
 
         The fluid has felt the voidage of the last three placements, 1/4, 1/2 and 1/4 of them; so do the particles.
@@ -271,8 +271,8 @@ class Exchange:
         force = np.zeros((bodies.count, 3))
         for share, trail in zip((0.25, 0.5), self._trail):
             at = self.spreading.place(trail[bodies.id], bodies.radius)
-            force -= share * volume[:, None] * self.spreading.gather(at, gradient)
-        return force - 0.25 * volume[:, None] * self.spreading.gather(place, gradient)
+            force -= share * place.volume[:, None] * self.spreading.gather(at, gradient)
+        return force - 0.25 * place.volume[:, None] * self.spreading.gather(place, gradient)
 
     def _make_room(self, bodies: Bodies) -> None:
         """Rows for particles seen for the first time: as fast as they are now, with no drag yet."""

@@ -10,8 +10,8 @@ and the equations of the grid are. Per force, at a place f within its cell (0 to
 where G is the flow of the grid's own Stokes equations, smoothing included, between cells that lie Delta apart. It is
 a sum over waves, each of which builds up at its own rate, nu times its eigenvalue L; waves of like L are taken
 together, which makes few winds. A moving particle leaves its wind behind: with s the width of the kernel,
-:math:`s^2 = M\eta/(2a_0)` where F a_0/rho is the first acceleration, and R = U s/nu, every rate grows by
-(nu/s^2) 3/8 R^2/(R + 2.6), and the steady sum is Oseen's, :func:`closures.disturbance.oseen_share`.
+:math:`s^2 = M\eta/(2a_0)` where F a_0/rho is the first acceleration, every rate grows by nu/s^2 times
+:func:`closures.disturbance.left_behind`, and the steady sum is Oseen's, :func:`closures.disturbance.oseen_share`.
 
 Where particles are many, the drag of the others holds the wind back (Brinkman), which adds beta/(eps rho) to each
 rate. And drag laws of dense beds are made for means that count every particle, this one too: of both disturbances
@@ -28,17 +28,13 @@ import numpy as np
 from cfddem.coupling.voidage import Placement, Spreading
 from cfddem.fluid.grid import Array
 from cfddem.kernels import prange, threaded
-from closures.disturbance import oseen_share
+from closures.disturbance import left_behind, oseen_share
 
 CELLS = 48
 """Cells along the shortest edge of the lattice on which a kernel's flow is tabulated."""
 
 _PERIODIC_STOKES = 2.837297
 """Hasimoto: in a cubic array of pitch L a force moves slower by this over 6 pi eta L."""
-
-
-LEFT_BEHIND, LEFT_AT = 0.375, 2.6
-"""Rate at which a moving particle leaves its wind: the winds' steady sum then is near Oseen's share by itself."""
 
 MODES = 8
 """Number of winds of a particle."""
@@ -57,8 +53,7 @@ class OwnWind:
 
     def share(self, place: Placement, solid: Array) -> tuple[Array, Array]:
         """Own solid fraction that a particle sees (N,), and its share in all that it sees, 0 to 1 (N,)."""
-        volume = (4.0 / 3.0) * math.pi * place.radius**3
-        own = volume * self._at(place, self._density[None])[:, 0]
+        own = place.volume * self._at(place, self._density[None])[:, 0]
         return own, np.clip(own / np.maximum(solid, 1e-300), 0.0, 1.0)
 
     def advance(
@@ -158,7 +153,7 @@ def _build_up(winds, force, slip, screening, flow, rates, density, viscosity, st
                 creeping += flow[n, modes * d + k]
             square = 0.5 * creeping / flow[n, 3 * modes + d]
             reynolds = speed * math.sqrt(square) / diffusivity
-            blown = LEFT_BEHIND * reynolds * reynolds / (reynolds + LEFT_AT) / square
+            blown = left_behind(reynolds) / square
             for k in range(modes):
                 moving += flow[n, modes * d + k] * rates[d, k] / (rates[d, k] + blown)
             scale = oseen_share(reynolds) * creeping / moving * force[n, d] / viscosity

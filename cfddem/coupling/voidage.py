@@ -41,6 +41,12 @@ class Placement(NamedTuple):
     order: np.ndarray  # rows sorted by slab
     start: np.ndarray  # (slabs + 1,) where the rows of a slab begin in `order`
 
+    @property
+    def volume(self) -> Array:
+        """Volume of each particle (N,) [m3]."""
+        volume: Array = (4.0 / 3.0) * math.pi * self.radius**3
+        return volume
+
 
 class Spreading:
     """Spreads what particles carry over the cells of a grid, and gathers what cells hold for particles.
@@ -115,8 +121,7 @@ class Spreading:
 
     def solid_fraction(self, place: Placement) -> Array:
         """Volume of particles over volume of cell (nz, ny, nx) [-]."""
-        volume = (4.0 / 3.0) * math.pi * place.radius**3
-        solid: Array = self.smooth(self.deposit(place, volume[:, None]))[0] / self.grid.cell_volume
+        solid: Array = self.smooth(self.deposit(place, place.volume[:, None]))[0] / self.grid.cell_volume
         return solid
 
     # ------------------------------------------------------------ flux
@@ -148,7 +153,7 @@ class Spreading:
         if grid.solid is not None:
             raise InputError("solid_flux", None, "asked for on a grid without solid cells")
         flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
-        volume = (4.0 / 3.0) * math.pi * new.radius**3
+        volume = new.volume
         loops.carry_all(
             old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
             self._periodic, *flux,

@@ -1,4 +1,4 @@
-"""How many cells fill a box; nothing is compiled here."""
+"""How cells divide a box, and what part of their viscous time a step may take; nothing is compiled here."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from cfddem.errors import InputError
+
+VISCOUS = 0.8
+"""Part of the viscous time of a cell that the fluid takes as a step."""
 
 
 def cell_counts(size: Sequence[float], cell: float | Sequence[float]) -> tuple[int, int, int]:

@@ -35,6 +35,7 @@ from cfddem.fluid.checks import (
     refuse_trapped_inflow,
 )
 from cfddem.fluid.conditions import Condition
+from cfddem.fluid.division import VISCOUS
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.momentum import predict, transport
 from cfddem.fluid.pressure import PressureEquation
@@ -255,7 +256,7 @@ class FluidSolver(FluidState):
         advection, diffusion, _ = self._clocks(self._velocity, self._mean_voidage)
         limits = {
             "Courant": courant / advection if advection > 0.0 else np.inf,
-            "viscous": 0.8 / diffusion if diffusion > 0.0 else np.inf,
+            "viscous": VISCOUS / diffusion if diffusion > 0.0 else np.inf,
         }
         clock = min(limits, key=limits.__getitem__)
         return StepLimit(limits[clock], clock if np.isfinite(limits[clock]) else "none")

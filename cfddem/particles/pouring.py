@@ -14,7 +14,7 @@ from cfddem.materials import Material, pair_table
 from cfddem.particles.filling import loose_places
 from cfddem.particles.forces import Laws
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import Bodies, bodies
+from cfddem.particles.state import Bodies, bodies, kinetic_energy
 from cfddem.particles.walls import Plane, Wall
 from closures import contact
 
@@ -329,11 +329,3 @@ def pour(
         f"the bed still holds {left:.2g} of its energy after {run.time:.3g} s (limit {AT_REST:g}); "
         "raise patience, or use a material with more friction or less restitution"
     )
-
-
-def kinetic_energy(spheres: Bodies) -> float:
-    """Kinetic energy of all particles, spin included [J]."""
-    mass = spheres.mass
-    linear = np.sum(mass[:, None] * spheres.velocity**2)
-    turning = np.sum(0.4 * mass[:, None] * spheres.radius[:, None] ** 2 * spheres.spin**2)
-    return 0.5 * float(linear + turning)

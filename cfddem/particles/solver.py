@@ -169,12 +169,12 @@ class ParticleSolver:
             self.wall.lap("neighbour lists")
 
     def checkpoint(self) -> dict[str, Any]:
-        """Everything the next step depends on, age and order of the list included."""
+        """Copies of everything the next step depends on, age and order of the list included."""
         return {
-            "bodies": self.bodies._asdict(),
-            "edges": self.edges._asdict(),
-            "walls": self.walls._asdict(),
-            "origin": self._origin,
+            "bodies": _copied(self.bodies),
+            "edges": _copied(self.edges),
+            "walls": _copied(self.walls),
+            "origin": self._origin.copy(),
             "clock": {
                 "time": self.time, "steps": self.steps, "skin": self.skin,
                 "lists": self._lists, "listed_at": self._listed_at, "accepted": self._accepted,
@@ -187,7 +187,9 @@ class ParticleSolver:
             own[:] = kept
         walls = dict(zip(self.walls._fields, self.walls)) | state["walls"]
         self.walls = type(self.walls)(**{name: np.array(each) for name, each in walls.items()})
-        edges: dict[str, Any] = {name: each if np.ndim(each) else int(each) for name, each in state["edges"].items()}
+        edges: dict[str, Any] = {
+            name: np.array(each) if np.ndim(each) else int(each) for name, each in state["edges"].items()
+        }
         clock = state["clock"]
         self.time, self.steps, self.skin = float(clock["time"]), int(clock["steps"]), float(clock["skin"])
         self._next_id = max(self._next_id, int(self.bodies.id.max()) + 1)
@@ -325,6 +327,11 @@ class ParticleSolver:
         largest = float(self.bodies.radius.max())
         room = 0.5 * float(self.box.min()) - (2.0 + 0.5 * self._reach_ratio) * largest
         self.skin = min(max(best, NARROWEST * radius), WIDEST * radius, max(self.skin, 0.99 * room))
+
+
+def _copied(arrays: Any) -> dict[str, Any]:
+    """The fields of a tuple of arrays and numbers by name, arrays as copies."""
+    return {name: each.copy() if isinstance(each, np.ndarray) else each for name, each in arrays._asdict().items()}
 
 
 def _inverse(order: np.ndarray) -> np.ndarray:

@@ -38,6 +38,12 @@ class Bodies(NamedTuple):
             array[:] = array[order]
 
     @property
+    def volume(self) -> np.ndarray:
+        """Volume of each particle (N,) [m3]."""
+        volume: np.ndarray = (4.0 / 3.0) * np.pi * self.radius**3
+        return volume
+
+    @property
     def mass(self) -> np.ndarray:
         """Mass of each particle (N,) [kg]."""
         return self.density * (4.0 / 3.0) * np.pi * self.radius**3
@@ -96,3 +102,11 @@ def bodies(
         torque=vectors(0.0),
         film_rate=scalars(0.0),
     )
+
+
+def kinetic_energy(spheres: Bodies) -> float:
+    """Kinetic energy of all particles, spin included [J]."""
+    mass = spheres.mass
+    linear = np.sum(mass[:, None] * spheres.velocity**2)
+    turning = np.sum(0.4 * mass[:, None] * spheres.radius[:, None] ** 2 * spheres.spin**2)
+    return 0.5 * float(linear + turning)

@@ -27,16 +27,3 @@ def volume_imbalance(fluid: FluidSolver) -> float:
     """Largest volume that a cell has gained against its faces in a step, over the largest flux through a face [-]."""
     flux = max(float(np.abs(fluid.volume_flux(d)).max()) * fluid.grid.face_area(d) for d in range(3))
     return float(np.abs(fluid.continuity_residual()).max() / max(flux, 1e-300))
-
-
-def entrance_rise(fluid: FluidSolver) -> float:
-    r"""Pressure that the fluid loses at the floor because the particles above it leave it less room [Pa].
-
-    .. math:: \left\langle\rho U^2(1/\varepsilon - 1)\right\rangle
-
-    Below the floor the fluid has all the room; it enters the bed at U/eps. Pressure drop from below the floor, where
-    it is measured, is that over the bed and this: together they carry the weight of the bed.
-    """
-    flux = fluid.volume_flux(2)[0]
-    inside = fluid.mean_voidage[0]
-    return float(np.mean(fluid.density * flux**2 * (1.0 / inside - 1.0)))

@@ -188,6 +188,27 @@ def voidage_by_pressure(
     return float(1.0 + np.polyfit(centre[inside], layers[inside], 1)[0] / weight)
 
 
+def entrance_rise(flux: Array, voidage: Array, density: float, open_cells: Mask | None = None) -> float:
+    r"""Pressure that the fluid loses at the floor because the particles above it leave it less room.
+
+    .. math:: \left\langle\rho U^2(1/\varepsilon - 1)\right\rangle
+
+    flux        U, superficial, through the floor (ny, nx) [m/s]
+    voidage     eps of the lowest layer (ny, nx) [-]
+    density     rho, of the fluid [kg/m3]
+    open_cells  (ny, nx) cells that count; all if None
+    returns     [Pa]
+
+    Below the floor the fluid has all the room; it enters the bed at U/eps. The pressure drop from below the floor,
+    where it is measured, is that over the bed and this: together they carry the weight of the bed.
+
+    >>> round(entrance_rise(np.full((1, 1), 0.1), np.full((1, 1), 0.5), 1000.0), 9)
+    10.0
+    """
+    loss = density * flux**2 * (1.0 / voidage - 1.0)
+    return float(loss[... if open_cells is None else open_cells].mean())
+
+
 def particle_profile(values: Array, position: Array, radius: Array, edges: Array, along: str = "z") -> Array:
     """Mean over the particles whose centres lie in each slab, weighted by their volume.
 
