@@ -8,21 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfddem.case import Case, Column, Jet
+from cfddem.bed import Jet
+from cfddem.case import Case, Column
 from cfddem.coupling.exchange import Exchange
 from cfddem.coupling.voidage import Spreading
-from cfddem.errors import InputError
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
-from cfddem.fluid.grid import Array, Grid, outside_cylinder
+from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
 from cfddem.materials import pair_table
 from cfddem.particles.forces import CONTACTS, FRICTION_ONSETS, Laws
-from cfddem.particles.packing import lattice, mono, normal, random_packing
-from cfddem.particles.pouring import AT_REST, NEARLY_AT_REST, pour_into
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies
-from cfddem.particles.state import bodies as make_bodies
 from cfddem.particles.walls import Cylinder, Plane, Wall
+from cfddem.placement import particles_of, periodic_box, periodic_directions
 
 
 @dataclass(frozen=True)
@@ -43,10 +41,9 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
     table, walls, laws = materials_of(case), walls_of(case), laws_of(case)
     spheres = bodies
     if spheres is None:
-        diameters = particle_diameters(case)
         if case.bed.start == "poured":
-            progress(f"pouring {len(diameters)} particles")
-        spheres = particles_of(case, diameters, table, walls, laws)
+            progress(f"pouring {case.particle_count} particles")
+        spheres = particles_of(case, table, walls, laws)
     solver = ParticleSolver(
         spheres,
         table,
@@ -74,7 +71,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         grid,
         periodic_directions(case),
         mapping=case.laws.mapping,
-        smoothing=case.laws.smoothing * float(2.0 * spheres.radius.mean()),
+        smoothing=case.laws.smoothing * case.bed.largest,
     )
     fluid.set_voidage(1.0 - spreading.solid_fraction(spreading.place(spheres.position, spheres.radius)))
     exchange = Exchange(
@@ -89,80 +86,6 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
     return Parts(solver, fluid, exchange)
 
 
-# ---------------------------------------------------------------- particles
-
-
-def particle_diameters(case: Case) -> Array:
-    """Diameter of every particle (N,) [m]."""
-    bed, count = case.bed, case.particle_count
-    if count < 1:
-        raise InputError("bed.height", bed.height, "high enough for one particle")
-    if bed.spread == 0.0:
-        return mono(count, bed.diameter)
-    return normal(count, bed.diameter, bed.spread * bed.diameter, bed.seed)
-
-
-def particles_of(case: Case, diameters: Array, table: np.ndarray, walls: list[Wall], laws: Laws) -> Bodies:
-    """The particles at the start."""
-    bed, size = case.bed, case.column.size
-    kind = list(case.material).index(bed.material or next(iter(case.material)))
-    viscosity = case.fluid.viscosity if case.fluid else 0.0
-    density = case.solid.density
-    if bed.start == "poured":
-        spheres = pour_into(
-            table, diameters, density, walls, *_room(case, float(diameters.max())), box=periodic_box(case),
-            seed=bed.seed, material=kind, gravity=abs(case.laws.gravity[2]), laws=laws._replace(film=False),
-            at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
-        )  # fmt: skip
-        places, diameters = spheres.position, 2.0 * spheres.radius
-    elif bed.start == "packed":
-        share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(size)
-        places, _ = random_packing(diameters, share, bed.seed, shape=size)
-    elif bed.start == "at":
-        places = np.array(bed.positions, float)
-    else:
-        places = _suspended(len(diameters), float(diameters.max()), size, bed.seed)
-    made = make_bodies(
-        places, 0.5 * diameters, density, velocity=np.array(bed.velocity), material=kind, viscosity=viscosity,
-        fixed=bed.fixed,
-    )  # fmt: skip
-    if case.fluid is not None:
-        made.inverse_mass[:] /= 1.0 + case.laws.added_mass * case.fluid.density / density
-    outside = ~((made.position >= 0.0) & (made.position <= np.array(size))).all(axis=1)
-    if outside.any():
-        row = int(np.argmax(outside))
-        raise InputError(
-            f"position of particle {row}", made.position[row].tolist(), f"inside the column, 0 to {size} m"
-        )
-    return made
-
-
-def _suspended(count: int, largest: float, size: tuple[float, float, float], seed: int) -> Array:
-    """Particles spread evenly over the column: a shaken lattice of as many places, thinned at random."""
-    volume = size[0] * size[1] * size[2]
-    pitch = (volume / count) ** (1.0 / 3.0)
-    for _ in range(200):
-        if pitch < 1.02 * largest:
-            break
-        places = lattice(largest, ((0.0, 0.0, 0.0), size), spacing=pitch / largest, seed=seed)
-        if len(places) >= count:
-            chosen = np.random.default_rng(seed).permutation(len(places))[:count]
-            return np.ascontiguousarray(places[np.sort(chosen)])
-        pitch *= 0.99
-    fraction = count * math.pi / 6.0 * largest**3 / volume
-    raise InputError("bed.count", count, f"below what a lattice holds; the solid fraction would be {fraction:.2f}")
-
-
-def _room(case: Case, largest: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Corner and size of the room that particles are poured into."""
-    width, depth, height = case.column.size
-    if case.column.shape == "box":
-        return (0.0, 0.0, 0.0), (width, depth, height)
-    side = width / math.sqrt(2.0)
-    corner = 0.5 * (width - side)
-    return (corner, corner, 0.0), (side, side, height)
-
-
 def materials_of(case: Case) -> np.ndarray:
     """Pair table of the case's materials, in the order of the case."""
     return pair_table(list(case.material.values()))
@@ -171,8 +94,8 @@ def materials_of(case: Case) -> np.ndarray:
 def walls_of(case: Case) -> list[Wall]:
     """What keeps the particles in: floor and lid where the ends are not periodic, sides where they are walls."""
     width, depth, height = case.column.size
-    names = list(case.material)
-    solid = names.index(case.column.material or case.bed.material or names[0])
+    names, first = list(case.material), next(iter(case.species.values()))
+    solid = names.index(case.column.material or first.material or names[0])
     walls: list[Wall] = []
     if case.column.ends != "periodic":
         walls.append(Plane(material=solid))
@@ -198,18 +121,6 @@ def laws_of(case: Case) -> Laws:
         normal_stiffness=case.laws.normal_stiffness,
         tangential_stiffness=case.laws.tangential_stiffness,
     )
-
-
-def periodic_directions(case: Case) -> tuple[bool, bool, bool]:
-    """Which of x, y, z repeat."""
-    column = case.column
-    return column.sides == "periodic", (column.front or column.sides) == "periodic", column.ends == "periodic"
-
-
-def periodic_box(case: Case) -> tuple[float | None, float | None, float | None]:
-    """Lengths of the periodic directions, None along the others [m]."""
-    x, y, z = (length if repeats else None for length, repeats in zip(case.column.size, periodic_directions(case)))
-    return x, y, z
 
 
 def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

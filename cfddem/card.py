@@ -13,8 +13,9 @@ from typing import Any
 
 from cfddem.case import Case
 from cfddem.errors import CfddemError, InputError
-from cfddem.expected import Bed, Cost, Encounter, Steps, bed_drag, bed_of, cost_of, encounter_of, steps_of
+from cfddem.expected import Bed, Cost, Encounter, Steps, bed_of, cost_of, encounter_of, steps_of
 from cfddem.findings import WIDTH, Finding, bubbles, findings
+from cfddem.mixture import bed_drag, sinking
 from closures import timescales
 
 
@@ -105,7 +106,13 @@ def card(case: Case) -> Card:
     except (ArithmeticError, ValueError):
         reason = "numbers so large or small that no law can be evaluated"
         return Card(title, (), (Finding("red", "case", reason, "all values are in SI units: m, kg, s, Pa"),))
-    rows = [*_flow_rows(case, bed), *_film_rows(case, pair), *_step_rows(case, bed, steps), *_outlook(case, bed, cost)]
+    rows = [
+        *_flow_rows(case, bed),
+        *_species_rows(case, bed),
+        *_film_rows(case, pair),
+        *_step_rows(case, bed, steps),
+        *_outlook(case, bed, cost),
+    ]
     return Card(title, tuple(rows), tuple(found))
 
 
@@ -123,23 +130,41 @@ def _flow_rows(case: Case, bed: Bed) -> Iterator[Row]:
     if case.fluid is None:
         return
     cells = case.column.cell if isinstance(case.column.cell, float) else min(case.column.cell)
-    yield Row(group, "cell / diameter", cells / case.bed.diameter)
-    yield Row(group, "density ratio", case.solid.density / case.fluid.density, "", "solid over fluid")
+    yield Row(group, "cell / diameter", cells / case.bed.largest, "", "of the largest species" * bool(case.bed.species))
+    yield Row(group, "density ratio", case.solid_density / case.fluid.density, "", "solid over fluid")
     if math.isnan(bed.archimedes):
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"of the {'superficial inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes)
+    slowest = "particle of the slowest species" if case.bed.species else "particle"
     yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {bed_drag(case).__name__}")
-    yield Row(group, "u_t", bed.terminal, "m/s", "of one particle alone, Brown and Lawler")
+    yield Row(group, "u_t", bed.terminal, "m/s", f"of one {slowest} alone, Brown and Lawler")
     if bed.inlet and bed.onset and bed.terminal:
         yield Row(group, "u / u_mf", bed.inlet / bed.onset)
         yield Row(group, "u / u_t", bed.inlet / bed.terminal)
 
 
+def _species_rows(case: Case, bed: Bed) -> Iterator[Row]:
+    """What each species of a mixture is, and whether it sinks."""
+    if not case.bed.species:
+        return
+    group, whole = "species", sum(case.volumes.values())
+    flows = bed.inlet > bed.onset
+    forces = sinking(case, bed.inlet, bed.voidage) if flows else {}
+    for name, each in case.species.items():
+        yield Row(group, f"{name}: particles", case.counts[name])
+        yield Row(group, f"{name}: share of the volume", case.volumes[name] / whole)
+        yield Row(group, f"{name}: diameter over mean", each.sauter / case.bed.diameter, "", "over the Sauter mean")
+        if name in forces:
+            note = "in the even mixture it " + ("sinks" if forces[name] > 0.0 else "rises")
+            yield Row(group, f"{name}: force over weight", forces[name], "", note)
+
+
 def _film_rows(case: Case, pair: Encounter) -> Iterator[Row]:
     if case.bed.fixed:
         return
-    group = f"collisions at {pair.speed:.3g} m/s"
+    among, diameter = f" of {pair.species}" * bool(case.bed.species), case.species[pair.species].diameter
+    group = f"collisions{among} at {pair.speed:.3g} m/s"
     if pair.gap > 0.0:
         yield Row(group, "St", pair.stokes, "", "inertia of a pair against its film")
         regime = "elasticity of the solids" if pair.film_gap > pair.roughness_gap else "roughness"
@@ -149,10 +174,10 @@ def _film_rows(case: Case, pair: Encounter) -> Iterator[Row]:
             note = "if the film felt the softened modulus, too"
             yield Row(group, "minimum gap, softened", pair.softened_gap, "m", note)
     yield Row(group, "contact modulus / real", pair.softening)
-    yield Row(group, "overlap / diameter", pair.overlap / case.bed.diameter, "", "deepest, dry")
+    yield Row(group, "overlap / diameter", pair.overlap / diameter, "", "deepest, dry")
     if pair.softening < 1.0:
-        yield Row(group, "overlap / diameter, real", pair.real_overlap / case.bed.diameter, "", "with the real modulus")
-    resting = pair.resting_overlap / case.bed.diameter
+        yield Row(group, "overlap / diameter, real", pair.real_overlap / diameter, "", "with the real modulus")
+    resting = pair.resting_overlap / diameter
     yield Row(group, "overlap / diameter, at rest", resting, "", "under the bed's weight")
 
 
@@ -172,7 +197,7 @@ def _step_rows(case: Case, bed: Bed, steps: Steps) -> Iterator[Row]:
     if not case.bed.fixed:
         yield Row(group, "particle steps in a fluid step", max(1.0, math.ceil(steps.fluid / steps.particle - 1e-9)))
     if not math.isnan(bed.drag_factor) and 0.0 < bed.voidage < 1.0:
-        fluid, density = case.fluid, case.solid.density
+        fluid, density = case.fluid, case.solid_density
         relaxation = timescales.drag_time(case.bed.diameter, density, fluid.viscosity, bed.voidage, bed.drag_factor)
         load = (1.0 - bed.voidage) * density / (bed.voidage * fluid.density)
         stiffness = load * steps.fluid / relaxation

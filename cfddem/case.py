@@ -8,22 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import wraps
+from inspect import signature
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
+from cfddem.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
 from cfddem.case_text import parsed, put, read_text
 from cfddem.errors import InputError, nearest
 from cfddem.materials import Checked, Fluid, Material
 from cfddem.mistakes import Key, described, key_lines, line_of, refused, shown
 from closures.law import Law
-
-Positive = Annotated[float, Field(gt=0)]
-Point = tuple[float, float, float]
-
-POURED_SOLID_FRACTION = 0.58
-"""Solid fraction of a poured bed, by which a bed's height is turned into a number of particles, and back."""
 
 
 class Column(Checked):
@@ -66,65 +63,10 @@ class Column(Checked):
         return self
 
 
-class Jet(Checked):
-    """A faster inlet through a part of the floor."""
-
-    velocity: float = Field(ge=0, description="superficial, upward [m/s]")
-    width: Positive = Field(description="along x; diameter of a round one [m]")
-    depth: Positive | None = Field(None, description="along y; the whole depth if not given [m]")
-    round: bool = Field(False, description="a round hole")
-
-
-class Bed(Checked):
-    """The particles, how they start, and the flow that meets them."""
-
-    material: str | None = Field(None, description="name of a [material]; the only one if not given")
-    diameter: Positive = Field(description="d; the mean where sizes differ [m]")
-    spread: float = Field(0.0, ge=0, lt=0.5, description="standard deviation of the diameter over its mean [-]")
-    count: int | None = Field(None, gt=0, description="number of particles")
-    height: Positive | None = Field(None, description="of the poured bed, instead of a number [m]")
-    start: Literal["poured", "suspended", "packed", "at"] = Field(
-        "poured", description="at rest below, spread evenly, packed at random all over, or placed"
-    )
-    positions: tuple[Point, ...] = Field((), description='centres, for start = "at" [m]')
-    velocity: Point = Field((0.0, 0.0, 0.0), description="of all particles at the start [m/s]")
-    fixed: bool = Field(False, description="particles that nothing moves: a packed bed")
-    seed: int = Field(1, ge=0, description="same seed, same bed")
-    inlet_velocity: float | tuple[tuple[float, float], ...] = Field(
-        0.0, description="superficial, upward; a number, or a list of [time, velocity] [m/s]"
-    )
-    jet: Jet | None = Field(None, description="a faster inlet through a part of the floor")
-
-    @model_validator(mode="after")
-    def _one_number_of_particles(self) -> Bed:
-        given = [name for name in ("count", "height", "positions") if getattr(self, name)]
-        if len(given) != 1:
-            found = " and ".join(given) if given else "none of them"
-            raise InputError("count", self.count, "given, or height, or positions, and only one", f"here {found}")
-        if self.positions and self.start == "poured":
-            object.__setattr__(self, "start", "at")
-        if not isinstance(self.inlet_velocity, float):
-            times = [time for time, _ in self.inlet_velocity]
-            if not times or sorted(set(times)) != times:
-                raise InputError("inlet_velocity", None, "a number, or [time, velocity] pairs in the order of time")
-        return self
-
-    @property
-    def floor_speed(self) -> float:
-        """Superficial velocity through the floor, the largest in time [m/s]."""
-        inlet = self.inlet_velocity
-        return inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
-
-    @property
-    def inlet_speed(self) -> float:
-        """Superficial velocity through the floor or its jet, whichever is faster [m/s]."""
-        return max(self.floor_speed, 0.0 if self.jet is None else self.jet.velocity)
-
-
 class CaseLaws(Checked):
     """Which laws hold."""
 
-    drag: str | Callable[[float, float], float] | None = Field("di_felice", description="name of a drag law, or a law")
+    drag: str | Callable[..., float] | None = Field("di_felice", description="name of a drag law, or a law")
     model: Literal["A", "B"] = Field("A", description="who carries the pressure gradient")
     lubrication: Literal["nijssen", "none"] = Field("nijssen", description="the film between two close spheres")
     contact: Literal["hertz", "linear"] = Field("hertz", description="normal contact")
@@ -153,6 +95,22 @@ class CaseLaws(Checked):
         if self.drag is None or self.drag == "none":
             return None
         return _drag_named(self.drag) if isinstance(self.drag, str) else _drag_of_ones_own(self.drag)
+
+    def drag_function(self, diameter_ratio: float = 1.0) -> Callable[[float, float], float] | None:
+        """The drag law of a sphere by Reynolds number and voidage, among others of a Sauter mean; None without drag.
+
+        diameter_ratio  diameter over that mean, for laws that ask for it [-]
+        """
+        law = self.drag_law
+        if law is None or "diameter_ratio" not in signature(law.function).parameters:
+            return None if law is None else law.function
+        function = law.function
+
+        @wraps(function)
+        def of_this_size(reynolds: float, voidage: float) -> float:
+            return function(reynolds, voidage, diameter_ratio)
+
+        return of_this_size
 
 
 class CaseRun(Checked):
@@ -201,29 +159,64 @@ class Case(Checked):
 
     @model_validator(mode="after")
     def _names_are_known(self) -> Case:
-        for mistake in _unknown_names(list(self.material), self.bed.material, self.column.material):
+        named = {f"bed.species.{name}": each.material for name, each in self.bed.species.items()}
+        for mistake in _unknown_names(list(self.material), named or {"bed": self.bed.material}, self.column.material):
             raise mistake
         return self
 
     @property
+    def species(self) -> dict[str, Species]:
+        """What the particles are, by name: the species of a mixture, or the bed, by the name of its material."""
+        only = next(iter(self.material))
+        return dict(self.bed.species) or {self.bed.material or only: self.bed}
+
+    def material_of(self, species: Species) -> Material:
+        """Material of the particles of a species."""
+        return self.material[species.material or next(iter(self.material))]
+
+    @property
     def solid(self) -> Material:
-        """Material of the particles."""
-        return self.material[self.bed.material or next(iter(self.material))]
+        """Material of the particles, where all are of one.
+
+        Raises InputError for a mixture.
+        """
+        if self.bed.species:
+            raise InputError("bed.species", None, "left out: this needs a bed of one material")
+        return self.material_of(self.bed)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of particles of each species: given, or what a poured bed of the given height holds."""
+        bed = self.bed
+        if bed.height is None:
+            return {name: each.count or len(bed.positions) for name, each in self.species.items()}
+        solids = POURED_SOLID_FRACTION * self.column.floor_area * bed.height
+        shares = bed.volumes(solids) or dict.fromkeys(self.species, solids)
+        return {name: int(shares[name] / each.mean_volume) for name, each in self.species.items()}
+
+    @property
+    def volumes(self) -> dict[str, float]:
+        """Volume of the particles of each species [m3]."""
+        return {name: count * self.species[name].mean_volume for name, count in self.counts.items()}
+
+    @property
+    def solid_density(self) -> float:
+        """Mean density of the particles, by their volume [kg/m3]."""
+        volumes, species = self.volumes, self.species
+        mass = sum(volume * self.material_of(species[name]).density for name, volume in volumes.items())
+        return mass / sum(volumes.values())
 
     @property
     def particle_count(self) -> int:
-        """Number of particles: given, or what a poured bed of the given height holds."""
-        bed = self.bed
-        if bed.height is None:
-            return bed.count or len(bed.positions)
-        return int(POURED_SOLID_FRACTION * self.column.floor_area * bed.height / (math.pi / 6.0 * bed.diameter**3))
+        """Number of all particles."""
+        return sum(self.counts.values())
 
     @property
     def reference_speed(self) -> float:
         """Fastest collision to be expected [m/s]: given, or twice the inlet velocity, or a fall of a diameter."""
         if self.run.reference_speed is not None:
             return self.run.reference_speed
-        fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.diameter)
+        fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.largest)
         return max(2.0 * self.bed.inlet_speed, fall, math.hypot(*self.bed.velocity))
 
     @classmethod
@@ -272,13 +265,15 @@ class Case(Checked):
         return Case(**values)
 
 
-def _unknown_names(known: list[str], bed: str | None, column: str | None) -> Iterator[InputError]:
-    """Names of materials that no [material] has."""
-    if bed is None and len(known) > 1:
-        yield InputError("bed.material", None, f"given, {nearest('', known)}")
-    for field, name in (("bed.material", bed), ("column.material", column)):
+def _unknown_names(known: list[str], beds: Mapping[str, str | None], column: str | None) -> Iterator[InputError]:
+    """Names of materials that no [material] has; `beds` says by key who names which."""
+    for key, name in beds.items():
+        if name is None and len(known) > 1:
+            yield InputError(f"{key}.material", None, f"given, {nearest('', known)}")
+    for key, name in {**beds, "column": column}.items():
         if name is not None and name not in known:
-            yield InputError(field, shown(name), nearest(name, known), "materials are tables [material.NAME]")
+            remedy = "materials are tables [material.NAME]"
+            yield InputError(f"{key}.material", shown(name), nearest(name, known), remedy)
 
 
 def _mistakes_in_names(refusal: ValidationError, values: Mapping[str, Any]) -> list[InputError]:
@@ -288,10 +283,15 @@ def _mistakes_in_names(refusal: ValidationError, values: Mapping[str, Any]) -> l
     known, bed, column = (values.get(name) for name in ("material", "bed", "column"))
     if not (isinstance(known, dict) and known and isinstance(bed, dict) and isinstance(column, dict)):
         return []
-    names = [each if isinstance(each, str) else None for each in (bed.get("material"), column.get("material"))]
-    if "material" in bed and names[0] is None:
+    species = bed.get("species") or {"": bed}
+    if not isinstance(species, dict):
         return []
-    return list(_unknown_names([described([each]) for each in known], *names))
+    tables = {f"bed.species.{name}" if name else "bed": each for name, each in species.items()}
+    named = {key: each.get("material") for key, each in tables.items() if isinstance(each, dict)}
+    told = {described([key]): name for key, name in named.items() if isinstance(name, str | None)}
+    other = column.get("material")
+    names = [described([each]) for each in known]
+    return list(_unknown_names(names, told, other if isinstance(other, str) else None))
 
 
 def _drag_named(name: str) -> Law:
@@ -307,7 +307,7 @@ def _drag_named(name: str) -> Law:
     return laws[name]
 
 
-def _drag_of_ones_own(function: Callable[[float, float], float]) -> Law:
+def _drag_of_ones_own(function: Callable[..., float]) -> Law:
     """The card of a drag law that is passed as a function."""
     from closures.law import page
 

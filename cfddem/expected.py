@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from cfddem.case import POURED_SOLID_FRACTION, Case
+from cfddem.bed import POURED_SOLID_FRACTION, Species
+from cfddem.case import Case
 from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
 from cfddem.fluid.division import VISCOUS, cell_counts
 from cfddem.materials import pair_table
+from cfddem.mixture import bed_drag
 from cfddem.particles.steps import Clocks, crossing_step, hertz_steps, linear_steps
 from closures import balance, bed, contact, drag_single, minimum_gap, numbers
-from closures.balance import Drag
-from closures.drag import ergun
 
 LIQUID = 100.0
 """Density from which on a fluid counts as a liquid, whose beds expand evenly [kg/m3]."""
@@ -38,7 +38,7 @@ class Bed:
     inlet: float  # mean superficial velocity over the floor, the largest in time [m/s]
     reynolds: float  # on the superficial velocity; on the terminal one where nothing flows in
     onset: float  # u_mf by the drag law, at the voidage of a poured bed [m/s]
-    terminal: float  # u_t of a particle alone [m/s]
+    terminal: float  # u_t of a particle alone, of the slowest species [m/s]
     voidage: float  # of the bed in the flow
     height: float  # of the bed in the flow [m]
     pressure_drop: float  # [Pa]
@@ -53,22 +53,27 @@ class Bed:
 def bed_of(case: Case) -> Bed:
     """The bed of a case."""
     diameter, floor = case.bed.diameter, case.column.floor_area
-    count = case.particle_count
-    solids = count * math.pi / 6.0 * diameter**3 * (1.0 + 3.0 * case.bed.spread**2)
+    count, solids, density = case.particle_count, sum(case.volumes.values()), case.solid_density
     packed, nan = 1.0 - POURED_SOLID_FRACTION, math.nan
     poured = solids / (floor * POURED_SOLID_FRACTION)
-    gravity, solid, fluid = math.hypot(*case.laws.gravity), case.solid, case.fluid
+    gravity, fluid = math.hypot(*case.laws.gravity), case.fluid
     if fluid is None:
-        weight = solids * solid.density * gravity / floor
+        weight = solids * density * gravity / floor
         return Bed(count, solids, weight, nan, 0.0, nan, nan, nan, packed, poured, nan, nan)
-    weight = solids * abs(solid.density - fluid.density) * gravity / floor
+    weight = solids * abs(density - fluid.density) * gravity / floor
     inlet = mean_inlet(case)
     if fluid.viscosity == 0.0:
         return Bed(count, solids, weight, nan, inlet, nan, nan, nan, packed, poured, nan, nan)
-    number = abs(numbers.archimedes(diameter, solid.density, fluid.density, fluid.viscosity, gravity))
+    number = abs(numbers.archimedes(diameter, density, fluid.density, fluid.viscosity, gravity))
     scale = fluid.viscosity / (fluid.density * diameter)
     drag = bed_drag(case)
-    terminal = balance.reynolds_in_balance(number, 1.0, drag_single.brown_lawler) * scale
+    terminal = min(
+        balance.terminal_velocity(
+            each.diameter, case.material_of(each).density, fluid.density, fluid.viscosity, drag_single.brown_lawler,
+            gravity,
+        )
+        for each in case.species.values()
+    )  # fmt: skip
     onset = balance.reynolds_in_balance(number, packed, drag) * scale
     reynolds = (inlet or terminal) / scale
     voidage = packed
@@ -85,12 +90,6 @@ def bed_of(case: Case) -> Bed:
     return Bed(
         count, solids, weight, number, inlet, reynolds, onset, terminal, voidage, height, drop, drag(reynolds, voidage)
     )
-
-
-def bed_drag(case: Case) -> Drag:
-    """The drag law of the case, or Ergun's where it has none or one of spheres alone."""
-    law = case.laws.drag_law
-    return ergun if law is None or law.function(1.0, 0.42) == law.function(1.0, 1.0) else law.function
 
 
 def mean_inlet(case: Case) -> float:
@@ -112,8 +111,9 @@ def mean_inlet(case: Case) -> float:
 
 @dataclass(frozen=True)
 class Encounter:
-    """Two mean particles that meet at the reference speed."""
+    """Two mean particles of a species that meet at the reference speed."""
 
+    species: str
     speed: float  # [m/s]
     stokes: float
     roughness_gap: float  # h_sigma [m]
@@ -136,16 +136,23 @@ class Encounter:
 
 
 def encounter_of(case: Case, known: Bed) -> Encounter:
-    """How two particles of a case meet."""
-    row = _pair(case)
-    mass, radius = _reduced(case, 1.0)
+    """How two particles of a case meet; in a mixture those of the species that press deepest into each other."""
+    met = (_encounter(case, known, name, each) for name, each in case.species.items())
+    return max(met, key=lambda each: each.overlap / case.species[each.species].diameter)
+
+
+def _encounter(case: Case, known: Bed, name: str, species: Species) -> Encounter:
+    """How two particles of a species meet."""
+    row = _pair(case, species)
+    mass, radius = _reduced(case, species, species.diameter)
     speed = max(case.reference_speed, 1e-12)
     real, soft = float(row["film_modulus"]), float(row["contact_modulus"])
     stiffness, real_stiffness = contact.hertz_stiffness(soft, radius), contact.hertz_stiffness(real, radius)
-    load = known.weight * case.bed.diameter**2
+    load = known.weight * species.diameter**2
     viscosity = 0.0 if case.fluid is None else case.fluid.viscosity
     wet = viscosity > 0.0 and case.laws.lubrication != "none"
     return Encounter(
+        name,
         speed,
         numbers.stokes(mass, speed, viscosity, radius) if viscosity > 0.0 else math.inf,
         float(row["roughness_gap"]) if wet else 0.0,
@@ -158,16 +165,14 @@ def encounter_of(case: Case, known: Bed) -> Encounter:
     )
 
 
-def _pair(case: Case):  # type: ignore[no-untyped-def]
-    """Row of the table of material pairs of two particles."""
-    kind = list(case.material).index(case.bed.material or next(iter(case.material)))
-    return pair_table(list(case.material.values()))[kind, kind]
+def _pair(case: Case, species: Species):  # type: ignore[no-untyped-def]
+    """Row of the table of material pairs of two particles of a species."""
+    return pair_table([case.material_of(species)])[0, 0]
 
 
-def _reduced(case: Case, size: float) -> tuple[float, float]:
-    """Reduced mass [kg] and radius [m] of two particles of `size` times the mean diameter."""
-    diameter = size * case.bed.diameter
-    return 0.5 * math.pi / 6.0 * diameter**3 * case.solid.density, 0.25 * diameter
+def _reduced(case: Case, species: Species, diameter: float) -> tuple[float, float]:
+    """Reduced mass [kg] and radius [m] of two particles of a species and a diameter [m]."""
+    return 0.5 * math.pi / 6.0 * diameter**3 * case.material_of(species).density, 0.25 * diameter
 
 
 # ---------------------------------------------------------------- steps and cost
@@ -195,14 +200,9 @@ class Steps:
 
 def steps_of(case: Case, known: Bed) -> Steps:
     """Steps of a case at its start."""
-    smallest = max(0.1, 1.0 - 3.0 * case.bed.spread)
-    mass, radius = _reduced(case, smallest)
-    speed, laws, run = max(case.reference_speed, 1e-12), case.laws, case.run
-    if laws.contact == "linear" and max(laws.normal_stiffness, laws.tangential_stiffness) > 0.0:
-        hertz, impact = linear_steps(mass, laws.normal_stiffness, laws.tangential_stiffness)
-    else:
-        hertz, impact = hertz_steps(mass, radius, float(_pair(case)["contact_modulus"]), speed)
-    read = Clocks(hertz, impact, math.inf, math.inf, crossing_step(2.0 * radius, speed))
+    run, speed = case.run, max(case.reference_speed, 1e-12)
+    every = [_clocks(case, each, speed) for each in case.species.values()]
+    read = min(every, key=lambda each: each.recommended)
     particle = math.inf if case.bed.fixed else run.step or read.recommended
     limits = {"collision": MOST_SUBSTEPS * particle}
     if run.fluid_step is not None:
@@ -220,6 +220,18 @@ def steps_of(case: Case, known: Bed) -> Steps:
     if not case.bed.fixed:
         limits["particle Courant"] = COURANT * min(spacing) / speed
     return Steps(read, particle, limits, cells)
+
+
+def _clocks(case: Case, species: Species, speed: float) -> Clocks:
+    """Clocks of the smallest particles of a species."""
+    mass, radius = _reduced(case, species, species.smallest)
+    laws = case.laws
+    if laws.contact == "linear" and max(laws.normal_stiffness, laws.tangential_stiffness) > 0.0:
+        hertz, impact = linear_steps(mass, laws.normal_stiffness, laws.tangential_stiffness)
+    else:
+        modulus = float(_pair(case, species)["contact_modulus"])
+        hertz, impact = hertz_steps(mass, radius, modulus, speed)
+    return Clocks(hertz, impact, math.inf, math.inf, crossing_step(2.0 * radius, speed))
 
 
 @dataclass(frozen=True)

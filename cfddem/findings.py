@@ -11,7 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from cfddem.case import POURED_SOLID_FRACTION, Case
+from cfddem.bed import POURED_SOLID_FRACTION
+from cfddem.case import Case
 from cfddem.expected import LIQUID, Bed, Cost, Encounter, Steps
 
 DENSEST = 0.64
@@ -25,6 +26,9 @@ NARROWEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 
 DEEP, DEEPEST = 0.02, 0.1
 """Overlap over the diameter: from the first on contacts are soft, from the second spheres pass into each other."""
+
+UNEQUAL = 1.2
+"""Species whose diameters differ by this and more want a drag law that knows of sizes."""
 
 WIDTH = 100
 """Columns of a terminal."""
@@ -60,23 +64,27 @@ def findings(case: Case, bed: Bed, pair: Encounter, steps: Steps, cost: Cost) ->
 
 def _room(case: Case, bed: Bed) -> Iterator[Finding]:
     """Do the particles fit into the column, and does the bed?"""
-    column, diameter = case.column, case.bed.diameter
+    column, diameter = case.column, case.bed.largest
     narrowest = min(column.size)
     if diameter > narrowest * (1.0 + 1e-9):
         yield Finding(
-            "red", "bed.diameter", f"{diameter:.3g} m is more than the column's {narrowest:.3g} m", "widen the column"
+            "red",
+            _key(case, "diameter"),
+            f"{diameter:.3g} m is more than the column's {narrowest:.3g} m",
+            "widen the column",
         )
         return
     fraction = bed.solids / (column.floor_area * column.height)
     most = int(bed.count / fraction * (SUSPENDED if case.bed.start == "suspended" else POURED_SOLID_FRACTION))
+    count = _key(case, "count")
     fits = f"at most {most} of these particles fit; take fewer, or a higher column"
     if case.bed.start == "suspended" and fraction > SUSPENDED:
         yield Finding("red", "bed.count", f"solid fraction {fraction:.2f}, above {SUSPENDED:.2f} of a lattice", fits)
     elif fraction > DENSEST:
-        yield Finding("red", "bed.count", f"voidage {1 - fraction:.2f}, below {1 - DENSEST:.2f} of a packing", fits)
+        yield Finding("red", count, f"voidage {1 - fraction:.2f}, below {1 - DENSEST:.2f} of a packing", fits)
     elif case.bed.start == "poured" and bed.poured_height > column.height - 0.5 * diameter:
         yield Finding(
-            "red", "bed.count", f"poured to {bed.poured_height:.3g} m, above the lid at {column.height:.3g} m", fits
+            "red", count, f"poured to {bed.poured_height:.3g} m, above the lid at {column.height:.3g} m", fits
         )
     elif bed.voidage < 1.0 and bed.height > 0.9 * column.height and case.bed.start == "poured":
         colour: Literal["amber", "red"] = "red" if bed.height > 1.2 * column.height else "amber"
@@ -85,6 +93,11 @@ def _room(case: Case, bed: Bed) -> Iterator[Finding]:
             f"the bed expands to about {bed.height:.3g} m; the lid is at {column.height:.3g} m",
             f"take {1.3 * bed.height:.2g} m, or a slower inlet",
         )  # fmt: skip
+
+
+def _key(case: Case, word: str) -> str:
+    """Where a word about the particles stands in a case."""
+    return f"bed.species.NAME.{word}" if case.bed.species else f"bed.{word}"
 
 
 def _particles(case: Case) -> Iterator[Finding]:
@@ -123,7 +136,7 @@ def _particles(case: Case) -> Iterator[Finding]:
 
 def _contacts(case: Case, pair: Encounter) -> Iterator[Finding]:
     """Are contacts stiff enough?"""
-    diameter, laws = case.bed.diameter, case.laws
+    laws, species = case.laws, case.species[pair.species]
     if laws.contact == "linear":
         if laws.normal_stiffness == 0.0:
             yield Finding("red", "laws.normal_stiffness", "0 N/m: nothing keeps particles apart", "give a stiffness")
@@ -135,9 +148,9 @@ def _contacts(case: Case, pair: Encounter) -> Iterator[Finding]:
         "the bed's weight presses": (pair.resting_overlap, 1.5),
     }
     what, (overlap, power) = max(both.items(), key=lambda each: each[1])
-    part = overlap / diameter
+    part, solid = overlap / species.diameter, case.material_of(species)
     if part > DEEP:
-        softer = case.solid.contact_modulus or case.solid.youngs_modulus
+        softer = solid.contact_modulus or solid.youngs_modulus
         yield Finding(
             "red" if part > DEEPEST else "amber", "material.contact_modulus",
             f"{what} spheres {100.0 * part:.2g} % of a diameter into each other; more than {100.0 * DEEP:g} % is soft",
@@ -203,7 +216,7 @@ def _kernel(case: Case, steps: Steps) -> Iterator[Finding]:
     """Is what a particle fills large enough for it?"""
     assert steps.cells is not None
     spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
-    smallest, diameter = min(spacing, default=min(case.column.size)), case.bed.diameter
+    smallest, diameter = min(spacing, default=min(case.column.size)), case.bed.largest
     own = 0.0 if case.laws.mapping == "divided" else 1.0 / math.sqrt(6.0)
     sphere = diameter / math.sqrt(20.0) if case.laws.mapping == "divided" else 0.0
     deviation = max(case.laws.smoothing * diameter, own * smallest, math.hypot(sphere, smallest / math.sqrt(12.0)))
@@ -230,7 +243,7 @@ def _flow(case: Case, bed: Bed) -> Iterator[Finding]:
         yield Finding(
             "red", "fluid.viscosity", "0 Pa s: drag laws need a viscous fluid", 'set it, or laws.drag = "none"'
         )
-    weight = case.laws.gravity[2] * (case.solid.density - case.fluid.density)
+    weight = case.laws.gravity[2] * (case.solid_density - case.fluid.density)
     if case.bed.start == "poured" and case.laws.gravity[2] >= 0.0:
         yield Finding("red", "laws.gravity", "does not point down, but the bed is poured", 'bed.start = "suspended"')
     if ends != "flow" and (case.bed.inlet_speed > 0.0):
@@ -264,14 +277,21 @@ def _drag(case: Case, bed: Bed) -> Iterator[Finding]:
     if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
         return
     voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
-    values = {"reynolds": bed.reynolds, "voidage": voidage}
-    for name, (low, high) in law.ranges.items():
-        value = values.get(name)
-        if value is not None and not low <= value <= high:
+    ratios = [each.sauter / case.bed.diameter for each in case.species.values()]
+    values = [("reynolds", bed.reynolds), ("voidage", voidage), *(("diameter_ratio", each) for each in ratios)]
+    for name, value in values:
+        low, high = law.ranges.get(name, (-math.inf, math.inf))
+        if not low <= value <= high:
             yield Finding(
                 "amber", "laws.drag", f"{law.name} was fitted for {name} {low:g} to {high:g}; here it is {value:.3g}",
                 "cfddem explain lists the laws and their ranges",
             )  # fmt: skip
+    if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
+        yield Finding(
+            "amber", "laws.drag",
+            f"{law.name} is for equal spheres; here species differ by {max(ratios) / min(ratios):.3g} in diameter",
+            "beetstra_polydisperse knows of sizes, on which it hangs who sinks",
+        )  # fmt: skip
 
 
 def bubbles(case: Case, bed: Bed) -> bool:

@@ -146,6 +146,7 @@ _LIMITS = {
     **dict.fromkeys(("int_type", "int_parsing", "int_from_float", "int_parsing_size"), "a whole number"),
     **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
     "string_type": "a text",
+    "string_pattern_mismatch": "made of letters, digits, _ and -",
     **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a table"),
     "callable_type": "",
     "none_required": "",

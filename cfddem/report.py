@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.assembly import particle_diameters
 from cfddem.card import card
 from cfddem.case import Case
 from cfddem.errors import InputError
 from cfddem.expected import LIQUID
+from cfddem.placement import grains_of
+from cfddem.record.quantities import MEAN_HEIGHT
 from cfddem.record.reading import Run, open_run
 from cfddem.record.series import block_average, stationarity
 from closures import bed as laws_of_beds
@@ -43,7 +44,8 @@ def report(folder: Path) -> dict[str, Any]:
     case = case_of(run)
     begin, end = window_of(run, case)
     inside = run.history["time"] >= begin
-    measures = {name: _measured(run, name, inside) for name in MEASURES if name in run.history}
+    heights = [name for name in run.history if name.startswith(MEAN_HEIGHT)]
+    measures = {name: _measured(run, name, inside) for name in (*MEASURES, *heights) if name in run.history}
     measures = {name: each for name, each in measures.items() if each["known"] > 0.5}
     laws = _laws(case, measures)
     return {
@@ -139,7 +141,7 @@ def _laws(case: Case, measures: dict[str, Any]) -> list[dict[str, Any]]:
         return [_compared("pressure drop by Ergun", drop, slope * height, "Pa", "ergun_gradient", voidage=voidage)]
     weight = buoyant_weight(case) / case.column.floor_area
     rows = [_compared("pressure drop by the buoyant weight", drop, weight, "Pa")]
-    if case.fluid.density > LIQUID and abs(case.laws.gravity[2]) > 0.0:
+    if case.fluid.density > LIQUID and abs(case.laws.gravity[2]) > 0.0 and not case.bed.species:
         for name, voidage in expansion_laws(case).items():
             for way, told in (("bed_voidage", "height"), ("bed_voidage_pressure", "pressure")):
                 if way in measures:
@@ -160,7 +162,7 @@ def expansion_exponents(case: Case) -> dict[str, tuple[float, float]]:
     """Exponent n [-] and velocity at voidage 1 [m/s] of each published law; with walls where they hold the flow."""
     assert case.fluid is not None
     density, viscosity, diameter = case.fluid.density, case.fluid.viscosity, case.bed.diameter
-    archimedes = numbers.archimedes(diameter, case.solid.density, density, viscosity, abs(case.laws.gravity[2]))
+    archimedes = numbers.archimedes(diameter, case.solid_density, density, viscosity, abs(case.laws.gravity[2]))
     if archimedes <= 0.0:
         return {}
     reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
@@ -183,8 +185,9 @@ def expansion_exponents(case: Case) -> dict[str, tuple[float, float]]:
 def buoyant_weight(case: Case) -> float:
     """Weight of the particles less that of the fluid they displace [N]."""
     assert case.fluid is not None
-    volume = float((math.pi / 6.0 * particle_diameters(case) ** 3).sum())
-    return volume * (case.solid.density - case.fluid.density) * abs(case.laws.gravity[2])
+    grains = grains_of(case)
+    excess = float((math.pi / 6.0 * grains.diameter**3 * (grains.density - case.fluid.density)).sum())
+    return excess * abs(case.laws.gravity[2])
 
 
 def _compared(what: str, computed: float, expected: float, unit: str, law: str = "", **asked: float) -> dict[str, Any]:

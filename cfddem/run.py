@@ -17,7 +17,8 @@ from cfddem.assembly import grid_of
 from cfddem.case import Case
 from cfddem.errors import InputError, RunFailed, RunStopped, UnstableStep
 from cfddem.particles.guard import guard
-from cfddem.particles.state import kinetic_energy
+from cfddem.particles.state import Bodies, kinetic_energy
+from cfddem.placement import species_of
 from cfddem.record import checkpoint
 from cfddem.record.ledger import exchange_imbalance, volume_imbalance
 from cfddem.record.measures import (
@@ -30,6 +31,7 @@ from cfddem.record.measures import (
 )
 from cfddem.record.output import RunFolder
 from cfddem.record.provenance import provenance
+from cfddem.record.quantities import MEAN_HEIGHT
 from cfddem.simulation import Simulation
 
 FIELDS = {
@@ -99,7 +101,10 @@ class Run:
         refuse_taken(Path(folder), written)
         simulation = Simulation(case, progress)
         grid = None if simulation.fluid is None else simulation.fluid.grid
-        run = cls(simulation, RunFolder.create(Path(folder), written, provenance(case.bed.seed), grid, FIELDS), report)
+        fields = FIELDS | {
+            f"{MEAN_HEIGHT}{name}": ("m", f"mean height of the centres of {name}") for name in case.bed.species
+        }
+        run = cls(simulation, RunFolder.create(Path(folder), written, provenance(case.bed.seed), grid, fields), report)
         run._write_beginning()
         return run
 
@@ -242,6 +247,8 @@ class Run:
                 "pressure": simulation.fluid.pressure,
             }
         particles = {name: getattr(bodies, name) for name in ("id", "position", "velocity", "spin", "radius", "force")}
+        if simulation.case.bed.species:
+            particles["species"] = species_of(simulation.case)[bodies.id]
         record = simulation.particles.collisions
         encounters = None if record is None else record.take()
         self.folder.write_snapshot(simulation.time, simulation.particles.steps, fluid, particles, encounters)
@@ -286,6 +293,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
         "particle_count": float(bodies.count),
         "contact_count": float((simulation.particles.edges.force != 0.0).any(axis=1).sum()),
     }
+    row |= _mean_heights(simulation.case, bodies)
     if fluid is None or simulation.exchange is None:
         return row
     floor = float(grid.open.mean()) * column.size[0] * column.size[1]
@@ -305,3 +313,12 @@ def measure(simulation: Simulation) -> dict[str, float]:
         "outside_range": float(simulation.exchange.outside),
     }
     return row
+
+
+def _mean_heights(case: Case, bodies: Bodies) -> dict[str, float]:
+    """Mean height of each species of a mixture by the volume of its particles [m]."""
+    if not case.bed.species:
+        return {}
+    species, volume = species_of(case)[bodies.id], bodies.volume
+    carried = np.bincount(species, volume * bodies.position[:, 2]) / np.bincount(species, volume)
+    return {f"{MEAN_HEIGHT}{name}": float(height) for name, height in zip(case.bed.species, carried)}

@@ -159,12 +159,13 @@ def test_pages_in_the_navigation_are_there() -> None:
 
 
 def test_every_key_of_a_case_is_in_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfddem.case import Bed, CaseLaws, CaseRun, Column
+    from cfddem.bed import Bed, Part
+    from cfddem.case import CaseLaws, CaseRun, Column
 
     monkeypatch.syspath_prepend(str(DOCS / "tools"))
     pytest.importorskip("griffe")
     page = tool("pages").case_keys()
-    for part in (Column, Bed, CaseLaws, CaseRun):
+    for part in (Column, Bed, Part, CaseLaws, CaseRun):
         assert all(f"| `{key}` |" in page for key in part.model_fields)
 
 

@@ -26,6 +26,7 @@ def loose_places(
     corner: tuple[float, float, float],
     size: tuple[float, float, float],
     seed: int,
+    layer: np.ndarray | None = None,
 ) -> np.ndarray:
     """Centres of spheres that touch neither each other nor a wall (N, 3) [m].
 
@@ -35,6 +36,7 @@ def loose_places(
     diameters     (N,) [m]
     corner, size  lowest corner and edges of the box in which the spheres start, open upward [m]
     seed          same seed, same places
+    layer         (N,) spheres of a lower number lie below those of a higher; all are mixed if not given
 
     Raises InputError where the walls leave too little room.
     """
@@ -46,29 +48,49 @@ def loose_places(
             raise InputError(f"size[{axis}]", size[axis], f"at least {pitch:.3g} m, a little more than a sphere")
     edge = np.clip((pitch / (SPACING * diameters) * (1.0 + 1e-9)).astype(int), 1, MOST_PER_EDGE)
     blocks = {int(k): _block(int(k), pitch) for k in np.unique(edge)[::-1]}
-    wanted = sum(math.ceil((edge == k).sum() / len(block)) for k, block in blocks.items())
+    layers = [np.arange(len(diameters))] if layer is None else [np.flatnonzero(layer == k) for k in np.unique(layer)]
+    wanted = [sum(math.ceil((edge[those] == k).sum() / len(block)) for k, block in blocks.items()) for those in layers]
+    places = np.empty((len(diameters), 3))
     while True:
-        sites = _sites(walls, corner, size, pitch, wanted)
-        places = np.empty((len(diameters), 3))
-        order, begin, missing = generator.permutation(len(sites)), 0, 0
-        for k, block in blocks.items():
-            members = generator.permutation(np.flatnonzero(edge == k))
-            free = 0.5 * (pitch / k - float(diameters[members].max()))
-            taken = np.zeros((0, 3))
-            while len(taken) < len(members) and begin < len(order):
-                more = order[begin : begin + math.ceil((len(members) - len(taken)) / len(block))]
-                begin += len(more)
-                fresh = (sites[more][:, None, :] + block[None]).reshape(-1, 3)
-                if k > 1:  # a site is clear of walls as far as half the pitch, its corners perhaps not
-                    fresh = fresh[_clear(fresh, 0.5 * pitch / k, walls)]
-                taken = np.concatenate([taken, fresh])
-            missing += max(0, len(members) - len(taken)) // len(block) + (len(taken) < len(members))
-            if len(taken) >= len(members):
-                shake = free / math.sqrt(3.0) * (1.0 - 1e-9)
-                places[members] = taken[: len(members)] + generator.uniform(-shake, shake, (len(members), 3))
-        if missing == 0:
+        sites, missing = _sites(walls, corner, size, pitch, sum(wanted)), []
+        for those, share in zip(layers, np.split(sites, np.cumsum(wanted)[:-1])):
+            missing.append(_fill(share, those, edge, diameters, blocks, pitch, walls, generator, places))
+        if not any(missing):
             return places
-        wanted = len(sites) + missing
+        wanted = [number + more for number, more in zip(wanted, missing)]
+
+
+def _fill(
+    sites: np.ndarray,
+    those: np.ndarray,
+    edge: np.ndarray,
+    diameters: np.ndarray,
+    blocks: dict[int, np.ndarray],
+    pitch: float,
+    walls: Sequence[Wall],
+    generator: np.random.Generator,
+    places: np.ndarray,
+) -> int:
+    """Put some of the spheres at random on sites; returns how many sites were missing."""
+    order, begin, missing = generator.permutation(len(sites)), 0, 0
+    for k, block in blocks.items():
+        members = generator.permutation(those[edge[those] == k])
+        if not len(members):
+            continue
+        free = 0.5 * (pitch / k - float(diameters[members].max()))
+        taken = np.zeros((0, 3))
+        while len(taken) < len(members) and begin < len(order):
+            more = order[begin : begin + math.ceil((len(members) - len(taken)) / len(block))]
+            begin += len(more)
+            fresh = (sites[more][:, None, :] + block[None]).reshape(-1, 3)
+            if k > 1:  # a site is clear of walls as far as half the pitch, its corners perhaps not
+                fresh = fresh[_clear(fresh, 0.5 * pitch / k, walls)]
+            taken = np.concatenate([taken, fresh])
+        missing += max(0, len(members) - len(taken)) // len(block) + (len(taken) < len(members))
+        if len(taken) >= len(members):
+            shake = free / math.sqrt(3.0) * (1.0 - 1e-9)
+            places[members] = taken[: len(members)] + generator.uniform(-shake, shake, (len(members), 3))
+    return missing
 
 
 def _block(number: int, pitch: float) -> np.ndarray:

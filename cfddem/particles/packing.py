@@ -15,6 +15,7 @@ from cfddem.particles.vectors import flat
 OVERLAP_LIMIT = 1e-4
 """Largest overlap that a packing may have, over the smaller of the two radii."""
 
+Seed = int | tuple[int, ...]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
@@ -34,7 +35,7 @@ def mono(count: int, diameter: float) -> np.ndarray:
     return np.full(count, float(diameter))
 
 
-def normal(count: int, mean: float, deviation: float, seed: int) -> np.ndarray:
+def normal(count: int, mean: float, deviation: float, seed: Seed) -> np.ndarray:
     """Normally distributed diameters, cut off at three deviations and at a tenth of the mean (count,) [m].
 
     mean, deviation  [m]
@@ -49,7 +50,7 @@ def normal(count: int, mean: float, deviation: float, seed: int) -> np.ndarray:
     return drawn
 
 
-def log_normal(count: int, median: float, spread: float, seed: int) -> np.ndarray:
+def log_normal(count: int, median: float, spread: float, seed: Seed) -> np.ndarray:
     """Log-normally distributed diameters, cut off at three standard deviations (count,) [m].
 
     median  [m]
@@ -60,7 +61,7 @@ def log_normal(count: int, median: float, spread: float, seed: int) -> np.ndarra
     return median * np.exp(spread * np.clip(steps, -3.0, 3.0))
 
 
-def from_table(count: int, diameters: np.ndarray, number_fractions: np.ndarray, seed: int) -> np.ndarray:
+def from_table(count: int, diameters: np.ndarray, number_fractions: np.ndarray, seed: Seed) -> np.ndarray:
     """Diameters drawn from a table of classes (count,) [m].
 
     diameters         of each class [m]

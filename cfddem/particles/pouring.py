@@ -59,6 +59,7 @@ def pour_into(
     box: tuple[float | None, float | None, float | None] = (None, None, None),
     seed: int,
     material: np.ndarray | int = 0,
+    layer: np.ndarray | None = None,
     gravity: float = 9.81,
     laws: Laws | None = None,
     at_rest: float = AT_REST,
@@ -75,6 +76,7 @@ def pour_into(
         box=box,
         seed=seed,
         material=material,
+        layer=layer,
         gravity=gravity,
         laws=laws,
         at_rest=at_rest,
@@ -93,6 +95,7 @@ def poured_bed(
     box: tuple[float | None, float | None, float | None] = (None, None, None),
     seed: int,
     material: np.ndarray | int = 0,
+    layer: np.ndarray | None = None,
     gravity: float = 9.81,
     laws: Laws | None = None,
     at_rest: float = AT_REST,
@@ -115,6 +118,7 @@ def poured_bed(
     box           length of the periodic box, which begins at 0; None along open axes [m]
     seed          same seed, same bed
     material      (N,) or one for all, row of the pair table
+    layer         (N,) those of a lower number are poured first; mixed if not given
     gravity       along -z [m/s2]
     laws          of the later run
     at_rest       share of the energy of the fall that may be left
@@ -125,7 +129,7 @@ def poured_bed(
     """
     diameters = np.asarray(diameters, float)
     still = [replace(wall, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for wall in walls]
-    places = loose_places(diameters, still, corner, size, seed)
+    places = loose_places(diameters, still, corner, size, seed, layer)
     spheres = bodies(places, 0.5 * diameters, density, material=material)
     laws = laws or Laws()
     # without viscosity films carry nothing, but they hold grains apart at their minimum gap

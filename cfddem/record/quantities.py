@@ -25,6 +25,7 @@ KNOWN = {
     "radius": Quantity("m", "radius"),
     "density": Quantity("kg/m3", "density"),
     "material": Quantity("1", "row of the table of materials"),
+    "species": Quantity("1", "number of the species, in the order of the case"),
     "force": Quantity("N", "sum of all forces"),
     "torque": Quantity("N m", "sum of all torques"),
     "drag": Quantity("N", "drag force"),
@@ -51,6 +52,9 @@ KNOWN = {
     "restitution": Quantity("1", "normal speed after over before"),
     "restitution_tangential": Quantity("1", "tangential speed after over before"),
 }
+
+MEAN_HEIGHT = "mean_height_"
+"""Begin of the columns that say, for each species of a mixture, how high its particles are."""
 
 
 def quantity(name: str, fields: Mapping[str, Quantity], where: str) -> Quantity:

@@ -82,14 +82,23 @@ def case_keys() -> str:
             continue
         table = f"[{name}.NAME]" if name == "material" else f"[{name}]"
         about = field.description or (parts[0].__doc__ or "").split("\n")[0]
-        lines += [f"## `{table}`", "", _plain(about), "", "| key | meaning | default |", "|:--|:--|:--|"]
+        lines += [*_table_of_keys(table, about, parts[0])]
         for key, each in parts[0].model_fields.items():
-            default = "**needed**" if each.is_required() else f"`{_default(each.get_default())}`"
-            if not each.is_required() and each.get_default() is None:
-                default = "-"
-            lines.append(f"| `{key}` | {_plain(each.description or '')}{_choices(each.annotation)} | {default} |")
-        lines.append("")
+            for part in parts_of(each) if str(each.annotation).startswith("dict") else []:
+                lines += [*_table_of_keys(f"[{name}.{key}.NAME]", each.description or "", part)]
     return "\n".join(lines)
+
+
+def _table_of_keys(table: str, about: str, part: Any) -> Iterator[str]:
+    """The keys of one table of a case file."""
+    yield from (f"## `{table}`", "", _plain(about), "", "| key | meaning | default |", "|:--|:--|:--|")
+    for key, each in part.model_fields.items():
+        default = "**needed**" if each.is_required() else f"`{_default(each.get_default())}`"
+        refused = any(getattr(rule, "gt", None) == each.get_default() for rule in each.metadata)
+        if not each.is_required() and (each.get_default() is None or refused):
+            default = "-"
+        yield f"| `{key}` | {_plain(each.description or '')}{_choices(each.annotation)} | {default} |"
+    yield ""
 
 
 def _choices(annotation: Any) -> str:
