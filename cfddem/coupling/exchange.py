@@ -29,6 +29,7 @@ import numpy as np
 from numba import njit
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.coupling import exchange_loops as loops
 from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import MODES, OwnWind
 from cfddem.coupling.voidage import Placement, Spreading
@@ -63,6 +64,16 @@ class Offer(NamedTuple):
         return self.voidage, self.drag_coefficient, self.drag_momentum, self.source
 
 
+class Met(NamedTuple):
+    """What every particle meets, without what it makes of it itself."""
+
+    slip: Array  # u - v (N, 3) [m/s]
+    wind: Array  # of its own, in what it sees (N, 3) [m/s]
+    voidage: Array  # (N,)
+    reynolds: Array  # of the slip (N,)
+    others: Array  # number of others per volume (N,) [1/m3]
+
+
 class Exchange:
     """Drag, pressure force and buoyancy between a fluid and its particles.
 
@@ -94,7 +105,7 @@ class Exchange:
         self._factors = _drag_loop(drag.function) if drag else None
         self._ranges = _ranges(drag)
         self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
-        self._winds = np.zeros((0, MODES, 3))  # by id: own winds [m/s]
+        self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # by id: own winds [m/s]
         self._trail: list[Array] = []  # positions by id at the two steps before
         self._last_step = 0.0
 
@@ -102,26 +113,32 @@ class Exchange:
 
     def offer(self, bodies: Bodies, step: float) -> Offer:
         """What the particles bring into the coming fluid step of a length [s]: volume, drag and momentum."""
-        spreading = self.spreading
+        spreading, fluid = self.spreading, self.fluid
         self._make_room(bodies)
         place = spreading.place(bodies.position, bodies.radius)
         solid = spreading.solid_fraction(place)
-        slip, voidage, others, wind = self._what_they_meet(bodies, place, solid)
-        resistance = self._resistance(bodies, slip, voidage)
-        inertia = self.inertia(bodies)
-        stiffness = step * resistance / inertia
-        theta = (1.0 + stiffness) / (2.0 + stiffness)
-        implicit = resistance / (1.0 + theta * stiffness)
-        target = bodies.velocity + wind + (theta * step / inertia)[:, None] * self._other_force(bodies, inertia)
-        carried = np.column_stack([implicit, implicit[:, None] * target])
-        drag = spreading.smooth(spreading.deposit(place, carried)) / self.fluid.grid.cell_volume
-        momentum = np.moveaxis(drag[1:], 0, -1)
-        aside = self._aside(bodies, place, slip)
-        swept, lost = self._swept_along(bodies, slip, step)
-        source = self._returned(place, lost - aside)
-        screening = resistance * others / (self.fluid.density * voidage)
+        met = self._meet(bodies, place, solid)
+        drag = self._resistance(bodies, met)
+        implicit, target, carried = np.empty(bodies.count), np.empty((bodies.count, 3)), np.empty((bodies.count, 4))
+        loops.promise(
+            drag, 1.0 / self.inertia(bodies), self._other_force(bodies), bodies.velocity, met.wind, step,
+            implicit, target, carried,
+        )  # fmt: skip
+        fields = spreading.smooth(spreading.deposit(place, carried)) / fluid.grid.cell_volume
+        aside = self._aside(bodies, place, met.slip)
+        swept, lost = self._swept_along(bodies, met.slip, step)
         return Offer(
-            step, place, 1.0 - solid, drag[0], momentum, source, implicit, target, slip, aside + swept, screening
+            step=step,
+            place=place,
+            voidage=1.0 - solid,
+            drag_coefficient=fields[0],
+            drag_momentum=np.moveaxis(fields[1:], 0, -1),
+            source=self._returned(place, lost - aside),
+            resistance=implicit,
+            target=target,
+            slip=met.slip,
+            explicit=aside + swept,
+            screening=drag * met.others / (fluid.density * met.voidage),
         )
 
     def answer(self, bodies: Bodies, offer: Offer, gravity: Array) -> None:
@@ -129,31 +146,22 @@ class Exchange:
 
         gravity  (3,) [m/s2]; weight and buoyancy are among the forces applied
         """
-        rows, place, spreading = bodies.id, offer.place, self.spreading
-        weight, seen, _ = self.fluid.drag_exchange()
-        fields = np.moveaxis(np.concatenate([weight, weight * seen], axis=-1), -1, 0)
-        at = spreading.gather(place, spreading.smooth(fields))
-        drag = offer.resistance[:, None] * (at[:, 3:] - at[:, :3] * offer.target)
-        weight_left = (bodies.mass - self.fluid.density * place.volume)[:, None] * gravity
-
-        force = (
-            drag
-            + self._pressure_force(bodies, place)
-            + weight_left
-            + offer.explicit
+        rows, place, fluid, spreading = bodies.id, offer.place, self.fluid, self.spreading
+        weight, velocity, _ = fluid.drag_exchange()
+        fields = np.moveaxis(np.concatenate([weight, weight * velocity], axis=-1), -1, 0)
+        seen = spreading.gather(place, spreading.smooth(fields))
+        pressure, drag = self._pressure_force(bodies, place), np.empty((bodies.count, 3))
+        loops.settle(
+            rows, seen, offer.resistance, offer.target, pressure, offer.explicit, place.volume, bodies.mass,
+            fluid.density, gravity, bodies.velocity, offer.slip, offer.step,
+            self._memory, drag, bodies.applied, bodies.force,
         )  # fmt: skip
-        self._memory[rows, :3] = bodies.velocity
-        self._memory[rows, 3:6] = offer.step * drag
-        self._memory[rows, 6:] = offer.slip + bodies.velocity
         if self.own_wind is not None:
-            fluid, winds = self.fluid, self._winds[rows]
-            self._winds[rows] = self.own_wind.advance(
-                place, winds, -drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
+            self.own_wind.advance(
+                place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
             )
         self._trail = [self._trail[-1], _by_id(bodies.position, rows)]
         self._last_step = offer.step
-        bodies.force[:] += force - bodies.applied  # the sum of forces at hand changes by as much
-        bodies.applied[:] = force
 
     @property
     def drag_impulse(self) -> Array:
@@ -224,40 +232,35 @@ class Exchange:
         """Added mass of every particle (N, 1) [kg]; none where nothing moves it."""
         return np.where(bodies.inverse_mass > 0.0, self.inertia(bodies) - bodies.mass, 0.0)[:, None]
 
-    def _what_they_meet(self, bodies: Bodies, place: Placement, solid: Array) -> tuple[Array, Array, Array, Array]:
-        """Around every particle: slip u - v (N, 3) [m/s], voidage (N,), number of others per volume (N,) [1/m3], and
-        the own wind in what it sees (N, 3) [m/s]."""
-        spreading = self.spreading
-        seen = spreading.gather(place, spreading.smooth(np.moveaxis(self.fluid.velocity, -1, 0)))
-        solids = spreading.gather(place, solid[None])[:, 0]
-        wind, others = np.zeros_like(seen), np.zeros_like(solids)
-        if self.own_wind is not None:
-            own, share = self.own_wind.share(place, solids)
-            others = np.maximum(solids - own, 0.0) / place.volume
-            wind = share[:, None] * self._winds[bodies.id].sum(axis=1)
-            solids = np.maximum(solids - share * own, 0.0)
-        return seen - wind - bodies.velocity, 1.0 - solids, others, wind
+    def _meet(self, bodies: Bodies, place: Placement, solid: Array) -> Met:
+        """What every particle meets, less what it makes of it itself."""
+        spreading, fluid = self.spreading, self.fluid
+        velocity = spreading.smooth(np.moveaxis(fluid.velocity, -1, 0))
+        seen = spreading.gather(place, np.concatenate([velocity, solid[None]]))
+        own = np.zeros(bodies.count) if self.own_wind is None else self.own_wind.solid(place)
+        scalars, vectors = np.empty((3, bodies.count)), np.empty((2, bodies.count, 3))
+        met = Met(*vectors, *scalars)
+        loops.meet(
+            seen, place.volume, bodies.radius, bodies.velocity, bodies.id, self._winds, own, fluid.density,
+            fluid.viscosity, *met,
+        )  # fmt: skip
+        return met
 
-    def _resistance(self, bodies: Bodies, slip: Array, voidage: Array) -> Array:
+    def _resistance(self, bodies: Bodies, met: Met) -> Array:
         """Drag over slip, b (N,) [kg/s]; of the fluid's model."""
-        fluid, diameter = self.fluid, 2.0 * bodies.radius
-        speed = np.sqrt(np.einsum("nd,nd->n", slip, slip))
-        reynolds = fluid.density * diameter * voidage * speed / max(fluid.viscosity, 1e-300)
+        factor = np.zeros(bodies.count)
         if self._factors is None:
-            return np.zeros(bodies.count)
-        factor = np.empty(bodies.count)
-        self.outside += self._factors(reynolds, voidage, *self._ranges, factor)
-        resistance: Array = 3.0 * math.pi * fluid.viscosity * diameter * voidage * factor
-        return resistance / voidage if fluid.model == "B" else resistance
+            return factor
+        self.outside += self._factors(met.reynolds, met.voidage, *self._ranges, factor)
+        resistance: Array = 6.0 * math.pi * self.fluid.viscosity * bodies.radius * met.voidage * factor
+        return resistance / met.voidage if self.fluid.model == "B" else resistance
 
-    def _other_force(self, bodies: Bodies, inertia: Array) -> Array:
+    def _other_force(self, bodies: Bodies) -> Array:
         """Mean of all forces but drag over the step before (N, 3) [N]; at the start, those at hand."""
         if self._last_step == 0.0:
-            return bodies.force.copy()
-        before = self._memory[bodies.id]
-        free = np.isfinite(inertia)
-        gained = np.where(free, inertia, 0.0)[:, None] * (bodies.velocity - before[:, :3])
-        force: Array = (gained - before[:, 3:6]) / self._last_step
+            return bodies.force
+        force = np.empty((bodies.count, 3))
+        loops.other_force(bodies.id, self._memory, bodies.velocity, self.inertia(bodies), self._last_step, force)
         return force
 
     def _pressure_force(self, bodies: Bodies, place: Placement) -> Array:
@@ -267,12 +270,14 @@ class Exchange:
         """
         if self.fluid.model == "B":
             return np.zeros((bodies.count, 3))
-        gradient = self.spreading.smooth(self.fluid.cell_pressure_gradient())
-        force = np.zeros((bodies.count, 3))
-        for share, trail in zip((0.25, 0.5), self._trail):
-            at = self.spreading.place(trail[bodies.id], bodies.radius)
-            force -= share * place.volume[:, None] * self.spreading.gather(at, gradient)
-        return force - 0.25 * place.volume[:, None] * self.spreading.gather(place, gradient)
+        spreading = self.spreading
+        gradient = spreading.smooth(self.fluid.cell_pressure_gradient())
+        force = np.empty((bodies.count, 3))
+        loops.press(
+            place.volume, *(spreading.gather_at(trail[bodies.id], bodies.radius, gradient) for trail in self._trail),
+            spreading.gather(place, gradient), force,
+        )  # fmt: skip
+        return force
 
     def _make_room(self, bodies: Bodies) -> None:
         """Rows for particles seen for the first time: as fast as they are now, with no drag yet."""
@@ -283,7 +288,7 @@ class Exchange:
             fresh = bodies.id >= len(self._memory)
             grown[bodies.id[fresh], :3] = bodies.velocity[fresh]
             self._memory = grown
-            self._winds = np.concatenate([self._winds, np.zeros((most - len(self._winds), MODES, 3))])
+            self._winds = np.concatenate([self._winds, np.zeros((most - len(self._winds), *self._winds.shape[1:]))])
             here = _by_id(bodies.position, bodies.id)
             self._trail = [np.concatenate([trail, here[len(trail) :]]) for trail in self._trail or [here[:0]] * 2]
 

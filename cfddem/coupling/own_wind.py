@@ -20,14 +20,13 @@ only the share is taken out that the particle has in the solids that it sees.
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
 
 from cfddem.coupling.voidage import Placement, Spreading
 from cfddem.fluid.grid import Array
-from cfddem.kernels import prange, threaded
+from cfddem.kernels import inline, prange, threaded
 from closures.disturbance import left_behind, oseen_share
 
 CELLS = 48
@@ -47,51 +46,43 @@ class OwnWind:
     """
 
     def __init__(self, spreading: Spreading) -> None:
-        self._origin, self._inverse = np.array(spreading.grid.origin), 1.0 / np.array(spreading.grid.spacing)
-        self._linear = spreading.mapping == "linear"
+        grid = spreading.grid
+        self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(spreading.mapping == "linear")
         self._flow, self._rates, self._density = _tables(spreading)
 
-    def share(self, place: Placement, solid: Array) -> tuple[Array, Array]:
-        """Own solid fraction that a particle sees (N,), and its share in all that it sees, 0 to 1 (N,)."""
-        own = place.volume * self._at(place, self._density[None])[:, 0]
-        return own, np.clip(own / np.maximum(solid, 1e-300), 0.0, 1.0)
+    def solid(self, place: Placement) -> Array:
+        """The part of the solid fraction that each particle sees which is its own (N,)."""
+        own = np.empty(len(place.volume))
+        _own_solid(place.position, place.volume, self._density, *self._cell, own)
+        return own
 
     def advance(
         self,
         place: Placement,
+        rows: np.ndarray,
         winds: Array,
-        force: Array,
+        drag: Array,
         slip: Array,
         screening: Array,
         density: float,
         viscosity: float,
         step: float,
-    ) -> Array:
-        """The own winds (N, MODES, 3) [m/s] after a step [s] in which the particles have pushed the fluid.
+    ) -> None:
+        """Let the own winds grow and fade over a step [s] in which the particles have pushed the fluid.
 
-        force  on the fluid (N, 3) [N]
-        slip   u - v, without the own wind (N, 3) [m/s]
+        rows       by which a particle's winds are known
+        winds      (n, MODES, 3) [m/s], changed in place
+        drag       on the particles; the fluid felt its opposite (N, 3) [N]
+        slip       u - v, without the own wind (N, 3) [m/s]
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         """
         if viscosity <= 0.0:
-            return np.zeros_like(winds)
-        new = np.empty_like(winds)
+            winds[rows] = 0.0
+            return
         _build_up(
-            winds, force, slip, screening, self._at(place, self._flow), self._rates, density, viscosity, step, new
-        )
-        return new
-
-    def _at(self, place: Placement, tables: Array) -> Array:
-        """Tables (m, 2, 2, 2) at the place of every particle within its cell (N, m)."""
-        cells = (place.position - self._origin) * self._inverse - 0.5
-        shift = np.where(self._linear, cells - np.floor(cells), 0.0)
-        apart = 2.0 * shift * (1.0 - shift)  # both neighbours, to which symmetry gives the same
-        own = 1.0 - apart
-        values = np.zeros((len(cells), len(tables)))
-        for k, j, i in itertools.product((0, 1), repeat=3):
-            weight = (apart if i else own)[:, 0] * (apart if j else own)[:, 1] * (apart if k else own)[:, 2]
-            values += weight[:, None] * tables[:, k, j, i]
-        return values
+            place.position, *self._cell, rows, drag, slip, screening, self._flow, self._rates, density, viscosity,
+            step, winds,
+        )  # fmt: skip
 
 
 def _tables(spreading: Spreading) -> tuple[Array, Array, Array]:
@@ -141,25 +132,56 @@ def _tables(spreading: Spreading) -> tuple[Array, Array, Array]:
     return np.array(flow + acceleration), rates, near(kernel)
 
 
+@inline
+def _shares(n, position, origin, inverse, linear):
+    """Along x, y, z, how much of what a particle does to its cells it sees in the cell next to the one it did it to."""
+    x = (position[n, 0] - origin[0]) * inverse[0] - 0.5
+    y = (position[n, 1] - origin[1]) * inverse[1] - 0.5
+    z = (position[n, 2] - origin[2]) * inverse[2] - 0.5
+    a, b, c = linear * (x - math.floor(x)), linear * (y - math.floor(y)), linear * (z - math.floor(z))
+    return 2.0 * a * (1.0 - a), 2.0 * b * (1.0 - b), 2.0 * c * (1.0 - c)
+
+
+@inline
+def _seen(table, shares):
+    """A table (2, 2, 2), of what is done in a cell and seen so many cells apart, at those shares."""
+    a, b, c = shares
+    near = (1.0 - b) * ((1.0 - a) * table[0, 0, 0] + a * table[0, 0, 1])
+    near += b * ((1.0 - a) * table[0, 1, 0] + a * table[0, 1, 1])
+    far = (1.0 - b) * ((1.0 - a) * table[1, 0, 0] + a * table[1, 0, 1])
+    far += b * ((1.0 - a) * table[1, 1, 0] + a * table[1, 1, 1])
+    return (1.0 - c) * near + c * far
+
+
 @threaded
-def _build_up(winds, force, slip, screening, flow, rates, density, viscosity, step, new):
+def _own_solid(position, volume, table, origin, inverse, linear, own):
+    for n in prange(len(volume)):
+        own[n] = volume[n] * _seen(table, _shares(n, position, origin, inverse, linear))
+
+
+@threaded
+def _build_up(
+    position, origin, inverse, linear, rows, drag, slip, screening, flow, rates, density, viscosity, step, winds
+):
     """Exact relaxation of every wind towards what a steady force would make of it."""
     modes, diffusivity = rates.shape[1], viscosity / density
-    for n in prange(len(winds)):
+    for n in prange(len(rows)):
+        shares = _shares(n, position, origin, inverse, linear)
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
         for d in range(3):
-            creeping, moving = 0.0, 0.0
+            creeping = 0.0
             for k in range(modes):
-                creeping += flow[n, modes * d + k]
-            square = 0.5 * creeping / flow[n, 3 * modes + d]
+                creeping += _seen(flow[modes * d + k], shares)
+            square = 0.5 * creeping / _seen(flow[3 * modes + d], shares)
             reynolds = speed * math.sqrt(square) / diffusivity
             blown = left_behind(reynolds) / square
+            moving = 0.0
             for k in range(modes):
-                moving += flow[n, modes * d + k] * rates[d, k] / (rates[d, k] + blown)
-            scale = oseen_share(reynolds) * creeping / moving * force[n, d] / viscosity
+                moving += _seen(flow[modes * d + k], shares) * rates[d, k] / (rates[d, k] + blown)
+            scale = -oseen_share(reynolds) * creeping / moving * drag[n, d] / viscosity
             for k in range(modes):
-                steady = scale * flow[n, modes * d + k] * rates[d, k] / (rates[d, k] + blown)
+                steady = scale * _seen(flow[modes * d + k], shares) * rates[d, k] / (rates[d, k] + blown)
                 fading = diffusivity * (rates[d, k] + blown)
                 left = math.exp(-step * (fading + screening[n]))
                 steady *= fading / (fading + screening[n])
-                new[n, k, d] = steady + left * (winds[n, k, d] - steady)
+                winds[rows[n], k, d] = steady + left * (winds[rows[n], k, d] - steady)

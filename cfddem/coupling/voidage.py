@@ -38,14 +38,9 @@ class Placement(NamedTuple):
 
     position: Array  # (N, 3) [m]
     radius: Array  # (N,) [m]
+    volume: Array  # (N,) [m3]
     order: np.ndarray  # rows sorted by slab
     start: np.ndarray  # (slabs + 1,) where the rows of a slab begin in `order`
-
-    @property
-    def volume(self) -> Array:
-        """Volume of each particle (N,) [m3]."""
-        volume: Array = (4.0 / 3.0) * math.pi * self.radius**3
-        return volume
 
 
 class Spreading:
@@ -91,7 +86,7 @@ class Spreading:
         slab = np.clip(layers // SLAB, 0, slabs - 1).astype(np.uint16)  # short numbers are sorted fastest
         order = np.argsort(slab, kind="stable")
         start = np.concatenate(([0], np.cumsum(np.bincount(slab, minlength=slabs))))
-        return Placement(position.copy(), radius, order, start)
+        return Placement(position.copy(), radius, (4.0 / 3.0) * math.pi * radius**3, order, start)
 
     def deposit(self, place: Placement, values: Array) -> Array:
         """Sum over particles of weight times value: values (N, m) give fields (m, nz, ny, nx)."""
@@ -104,10 +99,14 @@ class Spreading:
 
     def gather(self, place: Placement, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle: (N, m). The adjoint of `deposit`."""
+        return self.gather_at(place.position, place.radius, fields)
+
+    def gather_at(self, position: Array, radius: Array, fields: Array) -> Array:
+        """The same at other places (N, 3) [m] of particles."""
         cells = np.ascontiguousarray(fields.reshape(len(fields), -1).T)
-        values = np.empty((len(place.position), len(fields)))
+        values = np.empty((len(position), len(fields)))
         spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
-        loops.gather(place.position, place.radius, cells, *spread, values)
+        loops.gather(position, radius, cells, *spread, values)
         return values
 
     def smooth(self, fields: Array) -> Array:
