@@ -23,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
+from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,7 +103,8 @@ class Exchange:
         self.viscous_stress = viscous_stress and fluid.model == "A"
         self.own_wind = OwnWind(spreading) if own_wind else None
         self.outside = 0  # how often the drag law was asked outside of its range
-        self._factors = _drag_loop(drag.function) if drag else None
+        self._unequal = drag is not None and "diameter_ratio" in signature(drag.function).parameters
+        self._factors = _drag_loop(drag.function, self._unequal) if drag else None
         self._ranges = _ranges(drag)
         self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
         self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # by id: own winds [m/s]
@@ -118,7 +120,7 @@ class Exchange:
         place = spreading.place(bodies.position, bodies.radius)
         solid = spreading.solid_fraction(place)
         met = self._meet(bodies, place, solid)
-        drag = self._resistance(bodies, met)
+        drag = self._resistance(bodies, met, self._diameter_ratio(bodies, place, solid))
         implicit, target, carried = np.empty(bodies.count), np.empty((bodies.count, 3)), np.empty((bodies.count, 4))
         loops.promise(
             drag, 1.0 / self.inertia(bodies), self._other_force(bodies), bodies.velocity, met.wind, step,
@@ -246,12 +248,26 @@ class Exchange:
         )  # fmt: skip
         return met
 
-    def _resistance(self, bodies: Bodies, met: Met) -> Array:
+    def _diameter_ratio(self, bodies: Bodies, place: Placement, solid: Array) -> Array:
+        """Diameter of every particle over the Sauter mean around it (N,) [-]; 1 where the law does not ask.
+
+        The Sauter mean is the volume of the particles around over the sum of theirs divided by the diameter.
+        """
+        if not self._unequal:
+            return np.ones(bodies.count)
+        spreading, diameter = self.spreading, 2.0 * bodies.radius
+        volume = place.volume
+        surface = spreading.smooth(spreading.deposit(place, (volume / diameter)[:, None])) / self.fluid.grid.cell_volume
+        around = spreading.gather(place, np.concatenate([solid[None], surface]))
+        ratio: Array = diameter * around[:, 1] / around[:, 0]
+        return ratio
+
+    def _resistance(self, bodies: Bodies, met: Met, ratio: Array) -> Array:
         """Drag over slip, b (N,) [kg/s]; of the fluid's model."""
         factor = np.zeros(bodies.count)
         if self._factors is None:
             return factor
-        self.outside += self._factors(met.reynolds, met.voidage, *self._ranges, factor)
+        self.outside += self._factors(met.reynolds, met.voidage, ratio, *self._ranges, factor)
         resistance: Array = 6.0 * math.pi * self.fluid.viscosity * bodies.radius * met.voidage * factor
         return resistance / met.voidage if self.fluid.model == "B" else resistance
 
@@ -299,22 +315,35 @@ def _by_id(values: Array, rows: np.ndarray) -> Array:
     return sorted_values
 
 
-def _ranges(drag: Law | None) -> tuple[float, float, float, float]:
-    card = drag.ranges if drag else {}
-    return (*card.get("reynolds", (0.0, math.inf)), *card.get("voidage", (0.0, 1.0)))
+def _ranges(drag: Law | None) -> tuple[tuple[float, float], ...]:
+    """Ranges of a drag law: of the Reynolds number, the voidage, the diameter ratio."""
+    card, everywhere = drag.ranges if drag else {}, (0.0, math.inf)
+    return tuple(card.get(name, everywhere) for name in ("reynolds", "voidage", "diameter_ratio"))
 
 
 @cache
-def _drag_loop(law: Callable[..., float]) -> Any:
+def _drag_loop(law: Callable[..., float], unequal: bool) -> Any:
     """The loop that asks a law for every particle; small, and compiled for the law that a run has chosen."""
+    asked = law if unequal else _of_equals(law)
 
     @njit(parallel=True, error_model="numpy")
-    def factors(reynolds, voidage, least_reynolds, most_reynolds, least_voidage, most_voidage, factor):
+    def factors(reynolds, voidage, ratio, numbers, voidages, ratios, factor):
         outside = 0
         for n in prange(len(reynolds)):
-            factor[n] = law(reynolds[n], voidage[n])
-            beyond = reynolds[n] < least_reynolds or reynolds[n] > most_reynolds
-            outside += 1 if beyond or voidage[n] < least_voidage or voidage[n] > most_voidage else 0
+            factor[n] = asked(reynolds[n], voidage[n], ratio[n])
+            beyond = reynolds[n] < numbers[0] or reynolds[n] > numbers[1]
+            beyond = beyond or voidage[n] < voidages[0] or voidage[n] > voidages[1]
+            outside += 1 if beyond or ratio[n] < ratios[0] or ratio[n] > ratios[1] else 0
         return outside
 
     return factors
+
+
+def _of_equals(law: Callable[..., float]) -> Callable[..., float]:
+    """A law that knows of equal spheres only, where a diameter ratio is offered, too."""
+
+    @njit(error_model="numpy")
+    def equals(reynolds, voidage, ratio):
+        return law(reynolds, voidage)
+
+    return equals  # type: ignore[no-any-return]

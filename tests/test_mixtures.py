@@ -1,0 +1,249 @@
+"""Beds of several species: they hold what was asked for, start where they should, and their words are checked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cfddem import open_run
+from cfddem.assembly import assemble
+from cfddem.card import card
+from cfddem.case import Case
+from cfddem.coupling.exchange import Met
+from cfddem.errors import InputError
+from cfddem.expected import bed_of
+from cfddem.mixture import sinking
+from cfddem.placement import grains_of
+from cfddem.report import buoyant_weight, report
+from cfddem.run import Run
+from closures.drag_resolved import beetstra, beetstra_polydisperse
+
+MIXTURE = """
+title = "Glass beads and larger, lighter pellets"
+[fluid]
+density = 1000.0
+viscosity = 1e-3
+[material.glass]
+density = 2500.0
+youngs_modulus = 60e9
+contact_modulus = 2e6
+poisson = 0.25
+restitution = 0.9
+friction = 0.3
+[material.plastic]
+density = 1500.0
+youngs_modulus = 2e9
+contact_modulus = 2e6
+poisson = 0.3
+restitution = 0.8
+friction = 0.2
+[column]
+width = 0.012
+height = 0.042
+cell = 0.003
+[bed]
+start = "suspended"
+inlet_velocity = 0.05
+[bed.species.beads]
+material = "glass"
+diameter = 1e-3
+count = 200
+[bed.species.pellets]
+material = "plastic"
+diameter = 2e-3
+spread = 0.05
+count = 40
+[laws]
+drag = "beetstra_polydisperse"
+lubrication = "none"
+[run]
+until = 0.012
+every = 0.004
+history_every = 0.002
+reference_speed = 0.1
+"""
+
+
+def mixture(**given: Any) -> Case:
+    return Case.from_text(MIXTURE, "bed.toml", {name.replace("__", "."): value for name, value in given.items()})
+
+
+def test_a_mixture_written_and_read_again_is_the_same() -> None:
+    case = mixture()
+    assert Case.from_text(case.to_toml()) == case
+    coarser = case.with_(**{"bed.species.beads.diameter": 1.5e-3})
+    assert coarser.bed.species["beads"].diameter == 1.5e-3 and coarser.bed.diameter > case.bed.diameter
+    assert Case.from_text(coarser.to_toml()) == coarser
+
+
+def test_the_diameter_of_a_mixture_is_its_sauter_mean() -> None:
+    case = mixture(bed__species__pellets__spread=0.0)
+    volume = 200 * 1e-3**3 + 40 * 2e-3**3
+    assert case.bed.diameter == pytest.approx(volume / (200 * 1e-3**2 + 40 * 2e-3**2), rel=1e-12)
+    assert case.particle_count == 240
+    assert case.solid_density == pytest.approx((200 * 1e-9 * 2500.0 + 40 * 8e-9 * 1500.0) / volume, rel=1e-12)
+
+
+def test_fractions_are_of_the_volume_of_a_poured_bed() -> None:
+    case = Case.from_text(MIXTURE.replace("count = 200", "fraction = 0.25").replace("count = 40", "fraction = 0.75"),
+                          "bed.toml", {"bed.height": 0.012})  # fmt: skip
+    grains = grains_of(case)
+    volumes = np.bincount(grains.species, math.pi / 6.0 * grains.diameter**3)
+    assert volumes.sum() == pytest.approx(0.58 * 0.012**3, rel=0.03)
+    assert volumes / volumes.sum() == pytest.approx([0.25, 0.75], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"bed.count": 7}, "--set bed.count = 7: must be left out where species are given"),
+        ({"bed.diameter": 1e-3}, "--set bed.diameter = 0.001: must be left out where species are given"),
+        ({"bed.material": "glass"}, "bed.material = 'glass': must be left out where species are given"),
+        ({"bed.species.beads.material": "glas"}, "bed.species.beads.material = 'glas': must be one of glass, plastic"),
+        ({"bed.species.beads.fraction": 0.5}, "bed.species.beads.fraction = 0.5: must be left out where bed.height"),
+        ({"bed.species.beads.cuont": 3}, "bed.species.beads.cuont = 3: must be one of"),
+        ({"bed.species.beads.diameter": -1.0}, "bed.species.beads.diameter = -1.0: must be above 0"),
+        ({"bed.height": 0.01}, "bed.toml:27: bed.species.beads.fraction: must be given"),
+        (
+            {"bed.species.sand/gravel": {"diameter": 1e-3, "count": 3, "material": "glass"}},
+            "bed.species.sand/gravel = 'sand/gravel': must be made of letters, digits, _ and -",
+        ),
+        ({"bed.arrangement": "layerd"}, "did you mean 'layers'"),
+        (
+            {"bed.species.beads.sizes": [[1e-3, 1.0]]},
+            "bed.species.beads.diameter = 0.001: must be left out where sizes",
+        ),
+    ],
+    ids=str,
+)
+def test_a_mistake_in_a_species_is_told_with_key_and_limit(given: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        Case.from_text(MIXTURE, "bed.toml", given)
+    assert said in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_species_without_diameter_is_told_with_its_line() -> None:
+    text = MIXTURE.replace("diameter = 1e-3\n", "")
+    line = 1 + text.split("\n").index("[bed.species.beads]")
+    with pytest.raises(InputError, match=rf"bed.toml:{line}: bed.species.beads.diameter: must be given"):
+        Case.from_text(text, "bed.toml")
+
+
+def test_sizes_of_a_table_have_its_shares_of_the_volume() -> None:
+    sizes = [[1e-3, 0.2], [1.5e-3, 0.5], [2e-3, 0.3]]
+    case = Case.from_text(
+        MIXTURE.replace("diameter = 1e-3", f"sizes = {sizes}").replace("count = 200", "count = 20000")
+    )
+    beads = grains_of(case).diameter[:20_000]
+    volumes = np.array([(beads[beads == d] ** 3).sum() for d, _ in sizes])
+    assert volumes / volumes.sum() == pytest.approx([share for _, share in sizes], abs=0.015)
+    sauter = 1.0 / sum(share / d for d, share in sizes)
+    assert case.bed.species["beads"].diameter == pytest.approx(sauter, rel=1e-12)
+    assert (beads**3).mean() * math.pi / 6.0 == pytest.approx(case.bed.species["beads"].mean_volume, rel=0.02)
+
+
+@pytest.mark.parametrize("distribution", ["normal", "log_normal"])
+def test_a_spread_is_the_deviation_over_the_mean(distribution: str) -> None:
+    """Tails beyond three deviations are cut off: the spread is 1.5 % less."""
+    given = {"count": 100_000, "spread": 0.2, "distribution": distribution}
+    case = mixture(**{f"bed__species__beads__{name}": value for name, value in given.items()})
+    beads = grains_of(case).diameter[:100_000]
+    assert beads.mean() == pytest.approx(1e-3, rel=2e-3)
+    assert beads.std() / beads.mean() == pytest.approx(0.2, rel=0.03)
+    assert math.pi / 6.0 * (beads**3).mean() == pytest.approx(case.bed.species["beads"].mean_volume, rel=0.01)
+    assert (beads**3).mean() / (beads**2).mean() == pytest.approx(case.bed.species["beads"].sauter, rel=0.01)
+
+
+def test_where_the_stream_carries_a_mixture_the_forces_on_its_species_cancel() -> None:
+    case = mixture()
+    known = bed_of(case)
+    assert 0.42 < known.voidage < 1.0
+    forces = sinking(case, known.inlet, known.voidage)
+    excess = {name: abs(case.material_of(each).density - 1000.0) for name, each in case.species.items()}
+    left = [forces[name] * excess[name] * case.volumes[name] for name in forces]
+    assert abs(sum(left)) < 1e-6 * sum(map(abs, left))
+    assert max(map(abs, forces.values())) > 0.01
+
+
+def test_the_card_tells_of_a_law_that_does_not_know_of_sizes() -> None:
+    assert not any(each.key == "laws.drag" for each in card(mixture()).findings)
+    told = [each for each in card(mixture(laws__drag="beetstra")).findings if each.key == "laws.drag"]
+    assert "equal spheres" in told[0].reason and "beetstra_polydisperse" in told[0].remedy
+
+
+def test_a_mixture_of_one_species_is_the_bed_itself() -> None:
+    """The same particles at the same places, to the last bit."""
+    alone = Case.from_text(
+        MIXTURE[: MIXTURE.index("[bed.species.beads]")]
+        + 'material = "plastic"\ndiameter = 2e-3\nspread = 0.05\ncount = 40\n'
+        + MIXTURE[MIXTURE.index("[laws]") :],
+        "bed.toml",
+        {"bed.start": "packed"},
+    )
+    text = MIXTURE.replace('[bed.species.beads]\nmaterial = "glass"\ndiameter = 1e-3\ncount = 200\n', "")
+    named = Case.from_text(text, "bed.toml", {"bed.start": "packed"})
+    one, other = assemble(alone).particles.bodies, assemble(named).particles.bodies
+    for left, right in zip(one, other):
+        assert np.array_equal(left, right)
+    assert buoyant_weight(alone) == buoyant_weight(named)
+
+
+@pytest.mark.parametrize("start", ["suspended", "poured"])
+def test_layers_start_one_above_the_other(start: str) -> None:
+    case = mixture(bed__arrangement="layers", bed__start=start, fluid=None)
+    bodies = assemble(case).particles.bodies
+    species = grains_of(case).species[bodies.id]
+    height = [float(np.median(bodies.position[species == kind, 2])) for kind in (0, 1)]
+    assert height[1] > height[0] + 1.5e-3
+    assert np.array_equal(bodies.density, np.where(species == 0, 2500.0, 1500.0))
+    mixed = assemble(case.with_(**{"bed.arrangement": "mixed"})).particles.bodies
+    means = [mixed.position[grains_of(case).species[mixed.id] == kind, 2].mean() for kind in (0, 1)]
+    assert abs(means[1] - means[0]) < 0.25 * mixed.position[:, 2].max()
+
+
+def test_drag_is_asked_with_the_diameter_over_the_sauter_mean_around() -> None:
+    """Spread evenly, the mean around is that of the whole, but for chance and for the sphere itself."""
+    case = mixture(
+        column__sides="periodic", column__ends="periodic", column__height=0.012, bed__species__pellets__spread=0
+    )
+    parts = assemble(case.with_(**{"bed.species.beads.count": 300}))
+    bodies, exchange = parts.particles.bodies, parts.exchange
+    assert exchange is not None
+    place = exchange.spreading.place(bodies.position, bodies.radius)
+    solid = exchange.spreading.solid_fraction(place)
+    ratio = exchange._diameter_ratio(bodies, place, solid)
+    sauter = (bodies.radius**3).sum() / (bodies.radius**2).sum() * 2.0
+    for diameter in (1e-3, 2e-3):
+        assert ratio[bodies.radius == 0.5 * diameter].mean() == pytest.approx(diameter / sauter, rel=0.1)
+    reynolds, voidage, none = np.full(bodies.count, 20.0), np.full(bodies.count, 0.7), np.zeros((bodies.count, 3))
+    resistance = exchange._resistance(bodies, Met(none, none, voidage, reynolds, voidage), ratio)
+    for row in (0, bodies.count - 1):
+        factor = beetstra_polydisperse(20.0, 0.7, ratio[row])
+        stokes = 3.0 * math.pi * 1e-3 * 2.0 * bodies.radius[row]
+        assert resistance[row] == pytest.approx(stokes * 0.7 * factor, rel=1e-12)
+        assert not math.isclose(factor, beetstra(20.0, 0.7), rel_tol=0.05)
+
+
+def test_a_run_records_species_and_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    case = mixture()
+    Run.begin(case, tmp_path / "whole").go()
+    Run.begin(
+        case.with_(**{"run.until": 0.004, "run.every": 0.004, "run.history_every": 0.002}), tmp_path / "parts"
+    ).go()
+    Run.resume(tmp_path / "parts", until=0.012).go()
+    whole, parts = open_run(tmp_path / "whole"), open_run(tmp_path / "parts")
+    last, other = whole.particles(), parts.particles()
+    assert all(np.array_equal(last[name], other[name]) for name in last)
+    assert np.array_equal(last["species"], np.repeat([0, 1], [200, 40]))
+    volume, height = last["radius"].astype(float) ** 3, last["position"][:, 2].astype(float)
+    for kind, name in enumerate(("beads", "pellets")):
+        mine = last["species"] == kind
+        mean = (volume[mine] * height[mine]).sum() / volume[mine].sum()
+        assert whole.history[f"mean_height_{name}"][-1] == pytest.approx(mean, rel=1e-5)
+        assert whole.unit(f"mean_height_{name}") == "m"
+    assert "mean_height_pellets" in report(tmp_path / "whole")["measures"]
