@@ -115,6 +115,42 @@ def fluidising_velocity(
     return reynolds_in_balance(number, voidage, drag) * viscosity / (fluid_density * diameter)
 
 
+def inversion_velocity(
+    terminal_velocities: tuple[float, float],
+    exponents: tuple[float, float],
+    densities: tuple[float, float],
+    fluid_density: float,
+) -> float:
+    r"""Superficial velocity at which two species of a liquid bed change places, by the bulk densities of their layers.
+
+    .. math:: (1-\varepsilon_1)(\rho_1-\rho_f) = (1-\varepsilon_2)(\rho_2-\rho_f),\qquad
+              \varepsilon_i = (U/u_i)^{1/n_i}
+
+    terminal_velocities  u, of each species, at voidage 1 [m/s]
+    exponents            n, of the expansion of each alone by Richardson and Zaki [-]
+    densities            rho, of the solids [kg/m3]
+    fluid_density        rho_f [kg/m3]
+    returns              U, below both terminal velocities [m/s]; nan where the same species is below at all of them
+
+    The layer of the larger bulk density lies below; the two change places where it is the same. Holds where both layers
+    are looser than packed. Epstein & LeClair, Chem. Eng. Sci. 40 (1985) 1517, after Moritomi et al., ibid. 37 (1982)
+    1751, who saw it.
+
+    >>> round(inversion_velocity((1.0, 4.0), (1.0, 1.0), (3000.0, 2000.0), 1000.0), 4)     # 2 (1 - U) = 1 - U/4
+    0.5714
+    """
+
+    def excess(velocity: float) -> float:
+        first, second = (
+            (1.0 - (velocity / terminal) ** (1.0 / exponent)) * (density - fluid_density)
+            for terminal, exponent, density in zip(terminal_velocities, exponents, densities)
+        )
+        return first - second
+
+    low, high = 0.0, min(terminal_velocities)
+    return _root(excess, low, high) if excess(low) * excess(high) < 0.0 else float("nan")
+
+
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:
     from scipy.optimize import brentq  # here, because whoever only reads laws need not wait for scipy
 

@@ -1,4 +1,4 @@
-"""Beds beside what was measured on them, or what published laws say: sedimentation, fluidisation, bubbling gas beds.
+"""Beds beside what was measured on them, or what published laws say: settling, fluidisation, bubbles, spouts, species.
 
 Runs are kept as folders. One that was stopped goes on where it was; one that is there is not run again.
 """
@@ -23,15 +23,28 @@ from closures.bed import exponent_richardson_zaki
 from scenarios.defluidisation import onsets
 from scenarios.gas_bed import mueller, van_wachem
 from scenarios.sedimentation import SOLID_FRACTIONS, SYRUP, Settling, between_walls, exponent, in_periodic_box, vessel
+from scenarios.segregation import VELOCITIES, balance, figure, mixture, separation, thresholds
+from scenarios.spouted_bed import BED_HEIGHT, SPOUTED, profiles
+from scenarios.spouted_bed import bed as spout
 from scenarios.validation import Row, Tell
 
 MUELLER_HEIGHT, PROBE = 0.05, 0.045
 """Height seen of Mueller's bed, and height of the pressure probe in van Wachem's [m]."""
 
+LEAST_APART = 0.8
+"""Two species are apart on the side foretold where their separation is within this of 1."""
+
 
 def study(folder: Path, tell: Tell) -> list[Row]:
     """Run the beds, and return the table."""
-    return [*sedimentation(tell), *defluidised(folder, tell), *bubbling(folder, tell), *flat(folder, tell)]
+    return [
+        *sedimentation(tell),
+        *defluidised(folder, tell),
+        *segregated(folder, tell),
+        *bubbling(folder, tell),
+        *flat(folder, tell),
+        *spouted(folder, tell),
+    ]
 
 
 def sedimentation(tell: Tell) -> list[Row]:
@@ -67,6 +80,43 @@ def defluidised(folder: Path, tell: Tell) -> list[Row]:
         Row("defluidised: minimum velocity over balance, down", down.velocity / down.balance, 1.0, 0.05),
         Row("voidage of the bed less after than before", down.voidage - up.voidage),
     ]
+
+
+def segregated(folder: Path, tell: Tell) -> list[Row]:
+    """Who is above, on both sides of the velocity at which layers of two species are equally dense."""
+    published, end = thresholds(mixture()), 12.0
+    rows = [
+        Row(
+            "two species change places: by the drag law", balance(mixture()), float(np.mean(list(published.values()))),
+            unit="m/s", note=f"published: {min(published.values()):.3g} to {max(published.values()):.3g}",
+        )
+    ]  # fmt: skip
+    runs = {}
+    for velocity in VELOCITIES:
+        case, slow = mixture(velocity), velocity < min(published.values())
+        runs[velocity] = run = finished(case, folder, f"segregation_{velocity:g}", tell, {"run.until": end})
+        beads, pellets = case.species
+        apart = separation(run.history, (beads, pellets) if slow else (pellets, beads), 0.75 * end)
+        above = pellets if slow else beads
+        rows.append(Row(f"{above} above at {velocity:g} m/s: 0 mixed, 1 in layers", apart, 1.0, LEAST_APART))
+    figure(runs, folder / "segregation.png")
+    return rows
+
+
+def spouted(folder: Path, tell: Tell) -> list[Row]:
+    """A slice of the bed of Yue et al. (2020); its measured profiles are not at hand."""
+    case, begin = spout(), 1.0
+    run = finished(case, folder, "spouted", tell, {"run.until": 4.0, "run.average_from": begin})
+    drop = block_average(run.history["pressure_drop"][run.history["time"] >= begin])
+    weight = buoyant_weight(case) / case.column.floor_area
+    note = f"error {drop.error / weight:.2g}; reference at the largest depth that spouts"
+    rows = [Row("spouted: pressure drop over weight", drop.mean / weight, SPOUTED, note=note)]
+    for profile in profiles(run, case.column.width, begin):
+        level = f"spouted, at {profile.height / BED_HEIGHT:.2f} of the bed's height:"
+        fastest = float(np.nanmax(profile.speed, initial=0.0))
+        rows.append(Row(f"{level} greatest mean speed", fastest, unit="m/s"))
+        rows.append(Row(f"{level} width of the spout", profile.spout_width, unit="m"))
+    return rows
 
 
 def bubbling(folder: Path, tell: Tell) -> list[Row]:

@@ -3,23 +3,32 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from cfddem.card import card
 from cfddem.case import Case
+from cfddem.expected import bed_of
 from cfddem.gallery import gallery
+from cfddem.mixture import sinking
 from cfddem.report import buoyant_weight
 from closures.balance import fluidising_velocity
-from closures.bed import exponent_richardson_zaki
+from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
 from closures.drag import ergun
+from closures.numbers import archimedes
 from scenarios.defluidisation import onsets
 from scenarios.gas_bed import mueller, standard_bed, van_wachem
 from scenarios.sedimentation import Settling, exponent, in_periodic_box
+from scenarios.segregation import VELOCITIES, balance, mixture, separation, thresholds
+from scenarios.spouted_bed import bed as spout
+from scenarios.spouted_bed import profiles
 
 
-@pytest.mark.parametrize("name", ["gas-bed", "gas-bed-flat", "defluidisation", "sedimentation"])
+@pytest.mark.parametrize(
+    "name", ["gas-bed", "gas-bed-flat", "defluidisation", "sedimentation", "segregation", "spouted-bed"]
+)
 def test_no_bed_of_the_gallery_is_refused(name: str) -> None:
     assert card(Case.from_toml(gallery()[name])).colour != "red"
 
@@ -69,6 +78,69 @@ def test_onset_of_an_exact_bed_is_the_balance() -> None:
     for onset in onsets(case, history):
         assert onset.balance == pytest.approx(balance, rel=1e-12)
         assert onset.velocity == pytest.approx(balance, rel=1e-6)
+
+
+def test_both_sides_of_the_threshold_are_run() -> None:
+    """Published laws of expansion and the drag law of the run agree on who sinks at both velocities."""
+    slow, fast = VELOCITIES
+    assert len(thresholds(mixture())) == 3
+    for threshold in (*thresholds(mixture()).values(), balance(mixture())):
+        assert 1.2 * slow < threshold < fast / 1.15
+
+
+def test_drag_of_equal_spheres_foretells_the_wrong_species() -> None:
+    """Without the mean size around, large light pellets sink already in the slow stream, against the published law."""
+    slow = VELOCITIES[0]
+    equal = mixture(slow).with_(**{"laws.drag": "beetstra"})
+    assert slow < min(thresholds(equal).values())
+    assert sinking(mixture(slow), slow, bed_of(mixture(slow)).voidage)["pellets"] < -0.02
+    assert sinking(equal, slow, bed_of(equal).voidage)["pellets"] > 0.02
+
+
+def test_layers_of_equal_bulk_density_change_places() -> None:
+    """At the threshold of Richardson and Zaki, with their voidages, both layers weigh the same."""
+    case = mixture()
+    velocity = thresholds(case)["Richardson-Zaki"]
+    bulk = []
+    for name, each in case.species.items():
+        density = case.material_of(each).density
+        reynolds = terminal_reynolds_brown_lawler(archimedes(each.diameter, density, 998.0, 1e-3, 9.81))
+        terminal = reynolds * 1e-3 / (998.0 * each.diameter)
+        voidage = expanded_voidage(velocity, terminal, exponent_richardson_zaki(reynolds, 0.0))
+        assert voidage > 0.45, name
+        bulk.append((1.0 - voidage) * (density - 998.0))
+    assert bulk[0] == pytest.approx(bulk[1], rel=1e-9)
+
+
+def test_separation_of_layers_of_a_mixture_and_upside_down() -> None:
+    time = np.linspace(0.0, 1.0, 5)
+    history = {"time": time, "mean_height_a": 0.01 + 0.0 * time, "mean_height_b": 0.025 + 0.0 * time}
+    history["bed_height"] = np.full(5, 0.03)
+    assert separation(history, ("a", "b"), 0.5) == pytest.approx(1.0, rel=1e-12)
+    assert separation(history, ("b", "a"), 0.5) == pytest.approx(-1.0, rel=1e-12)
+    assert separation(history | {"mean_height_b": history["mean_height_a"]}, ("a", "b"), 0.5) == 0.0
+
+
+def test_the_spout_is_where_grains_go_up() -> None:
+    """Grains that rise within 30 mm of the middle and sink beside it; two snapshots of unequal speed."""
+    width, generator = 0.28, np.random.default_rng(1)
+    x, z = generator.uniform(0.0, width, 40_000), generator.uniform(0.0, 0.1, 40_000)
+    inner = np.abs(x - 0.5 * width) < 0.028
+
+    def particles(snapshot: int) -> dict[str, np.ndarray]:
+        upward = np.where(inner, 1.0 + snapshot, -0.1)
+        zero = np.zeros_like(x)
+        return {"position": np.stack([x, zero, z], axis=1), "velocity": np.stack([zero, zero, upward], axis=1)}
+
+    run = SimpleNamespace(times=np.array([0.0, 1.0, 2.0]), particles=particles)
+    (profile,) = profiles(run, width, 1.0, heights=[0.05])  # type: ignore[arg-type]
+    assert profile.spout_width == pytest.approx(0.056, rel=1e-12)
+    assert np.nanmax(profile.speed) == pytest.approx(2.5, rel=1e-12)
+    assert np.nanmin(profile.upward) == pytest.approx(-0.1, rel=1e-12)
+
+
+def test_the_slice_of_the_spouted_bed_is_its_share_of_the_experiment() -> None:
+    assert spout().particle_count / 175_800 == pytest.approx(spout().column.size[1] / 0.04, rel=1e-3)
 
 
 @pytest.mark.slow
