@@ -145,7 +145,7 @@ def inversion_velocity(
             (1.0 - (velocity / terminal) ** (1.0 / exponent)) * (density - fluid_density)
             for terminal, exponent, density in zip(terminal_velocities, exponents, densities)
         )
-        return first - second
+        return float(first - second)
 
     low, high = 0.0, min(terminal_velocities)
     return _root(excess, low, high) if excess(low) * excess(high) < 0.0 else float("nan")
