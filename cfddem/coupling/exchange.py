@@ -32,7 +32,8 @@ from numba import njit
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.coupling import exchange_loops as loops
 from cfddem.coupling.lift import lift_force, vorticity
-from cfddem.coupling.own_wind import MODES, OwnWind
+from cfddem.coupling.own_wind import OwnWind
+from cfddem.coupling.own_wind_tables import MODES
 from cfddem.coupling.voidage import Placement, Spreading
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver

@@ -9,9 +9,10 @@ and the equations of the grid are. Per force, at a place f within its cell (0 to
 
 where G is the flow of the grid's own Stokes equations, smoothing included, between cells that lie Delta apart. It is
 a sum over waves, each of which builds up at its own rate, nu times its eigenvalue L; waves of like L are taken
-together, which makes few winds. A moving particle leaves its wind behind: with s the width of the kernel,
-:math:`s^2 = M\eta/(2a_0)` where F a_0/rho is the first acceleration, every rate grows by nu/s^2 times
-:func:`closures.disturbance.left_behind`, and the steady sum is Oseen's, :func:`closures.disturbance.oseen_share`.
+together, which makes few winds. A moving particle leaves its wind behind: of each wave with the wave number k along
+its way the share :math:`1/(1 + (Uk/\nu L)^2)` is left, which gives the steady sum (Oseen's, on the grid). With s the
+width of the kernel, :math:`s^2 = M\eta/(2a_0)` where F a_0/rho is the first acceleration, every rate grows by nu/s^2
+times :func:`closures.disturbance.left_behind`; so their sum is near the steady one, and what is left is scaled away.
 
 Where particles are many, the drag of the others holds the wind back (Brinkman), which adds beta/(eps rho) to each
 rate. And drag laws of dense beds are made for means that count every particle, this one too: of both disturbances
@@ -24,19 +25,12 @@ import math
 
 import numpy as np
 
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.coupling.own_wind_tables import PER_DECADE, tables
 from cfddem.coupling.voidage import Placement, Spreading
 from cfddem.fluid.grid import Array
 from cfddem.kernels import inline, prange, threaded
-from closures.disturbance import left_behind, oseen_share
-
-CELLS = 48
-"""Cells along the shortest edge of the lattice on which a kernel's flow is tabulated."""
-
-_PERIODIC_STOKES = 2.837297
-"""Hasimoto: in a cubic array of pitch L a force moves slower by this over 6 pi eta L."""
-
-MODES = 8
-"""Number of winds of a particle."""
+from closures.disturbance import left_behind
 
 
 class OwnWind:
@@ -48,12 +42,12 @@ class OwnWind:
     def __init__(self, spreading: Spreading) -> None:
         grid = spreading.grid
         self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(spreading.mapping == "linear")
-        self._flow, self._rates, self._density = _tables(spreading)
+        self._tables = tables(spreading)
 
     def solid(self, place: Placement) -> Array:
         """The part of the solid fraction that each particle sees which is its own (N,)."""
         own = np.empty(len(place.volume))
-        _own_solid(place.position, place.volume, self._density, *self._cell, own)
+        _own_solid(place.position, place.volume, self._tables.solid, *self._cell, own)
         return own
 
     def advance(
@@ -80,56 +74,8 @@ class OwnWind:
             winds[rows] = 0.0
             return
         _build_up(
-            place.position, *self._cell, rows, drag, slip, screening, self._flow, self._rates, density, viscosity,
-            step, winds,
+            place.position, *self._cell, rows, drag, slip, screening, *self._tables[1:], density, viscosity, step, winds
         )  # fmt: skip
-
-
-def _tables(spreading: Spreading) -> tuple[Array, Array, Array]:
-    """What a force does to cells so many cells apart, the rates of its winds, and the own volume there.
-
-    Of a force along x, y, z: steady velocity of every wind times viscosity [1/m], then first acceleration times
-    density [1/m3], as tables (3 MODES + 3, 2, 2, 2); rates over the viscosity nu (3, MODES) [1/m2]; volume (2, 2, 2)
-    [1/m3].
-
-    Fourier sums over a lattice large enough to be endless but for the mean flow of its images, which is known.
-    """
-    grid = spreading.grid
-    spacing = np.array(grid.spacing)
-    flat = np.array(grid.cells) == 1
-    spacing = np.where(flat, spacing[~flat].min() if (~flat).any() else spacing[0], spacing)
-    length = CELLS * spacing.max()
-    counts = np.rint(length / spacing).astype(int)
-    waves = np.meshgrid(*(2.0 * np.pi * np.fft.fftfreq(n) for n in counts[::-1]), indexing="ij")[::-1]
-    steps = [2.0 * np.sin(0.5 * wave) / h for wave, h in zip(waves, spacing)]
-    laplacian = sum(step**2 for step in steps)
-    laplacian[0, 0, 0] = np.inf
-    smoothing = 1.0 - sum(a * (h * step) ** 2 for a, h, step in zip(spreading.strength, spacing, steps))
-    kernel = smoothing**spreading.sweeps
-    volume = float(np.prod(spacing))
-
-    def near(symbol: Array) -> Array:
-        values = np.fft.ifftn(symbol).real[:2, :2, :2]
-        return values / volume
-
-    # waves of like eigenvalue make one wind
-    finite = np.where(np.isfinite(laplacian), laplacian, 1.0)
-    smallest, largest = float(np.min(laplacian)), float(finite.max())
-    wind = np.clip((MODES * np.log(finite / smallest) / np.log(largest / smallest)).astype(int), 0, MODES - 1)
-    images = _PERIODIC_STOKES / (6.0 * math.pi * float(np.cbrt(np.prod(counts * spacing))))
-    flow, rates, acceleration = [], np.zeros((3, MODES)), []
-    for d in range(3):
-        # half of a cell's force acts on each of its faces, and a cell sees the mean of its faces
-        seen = kernel**2 * np.cos(0.5 * waves[d]) ** 2
-        along = seen * (1.0 - steps[d] ** 2 / laplacian)
-        along[0, 0, 0] = 0.0
-        for k in range(MODES):
-            part = np.where(wind == k, along, 0.0)
-            steady = float((part / laplacian).sum())
-            rates[d, k] = float(part.sum()) / steady if steady > 0.0 else smallest
-            flow.append(near(part / laplacian) + (images if k == 0 else 0.0))
-        acceleration.append(near(along))
-    return np.array(flow + acceleration), rates, near(kernel)
 
 
 @inline
@@ -159,10 +105,20 @@ def _own_solid(position, volume, table, origin, inverse, linear, own):
         own[n] = volume[n] * _seen(table, _shares(n, position, origin, inverse, linear))
 
 
+@inline
+def _steady(moving, slowest, wave_number, shares):
+    """Steady velocity times viscosity per force [1/m] at U/nu [1/m]: a power of it between those tabulated."""
+    place = max(PER_DECADE * math.log10(max(wave_number, slowest) / slowest), 0.0)
+    node = min(int(place), len(moving) - 2)
+    low, high = _seen(moving[node], shares), _seen(moving[node + 1], shares)
+    return low * (high / low) ** (place - node)
+
+
 @threaded
 def _build_up(
-    position, origin, inverse, linear, rows, drag, slip, screening, flow, rates, density, viscosity, step, winds
-):
+    position, origin, inverse, linear, rows, drag, slip, screening, flow, rates, start, slowest, moving, density,
+    viscosity, step, winds,
+):  # fmt: skip
     """Exact relaxation of every wind towards what a steady force would make of it."""
     modes, diffusivity = rates.shape[1], viscosity / density
     for n in prange(len(rows)):
@@ -171,16 +127,15 @@ def _build_up(
         for d in range(3):
             creeping = 0.0
             for k in range(modes):
-                creeping += _seen(flow[modes * d + k], shares)
-            square = 0.5 * creeping / _seen(flow[3 * modes + d], shares)
-            reynolds = speed * math.sqrt(square) / diffusivity
-            blown = left_behind(reynolds) / square
-            moving = 0.0
+                creeping += _seen(flow[d, k], shares)
+            square = 0.5 * creeping / _seen(start[d], shares)
+            blown = left_behind(speed * math.sqrt(square) / diffusivity) / square
+            total = 0.0
             for k in range(modes):
-                moving += _seen(flow[modes * d + k], shares) * rates[d, k] / (rates[d, k] + blown)
-            scale = -oseen_share(reynolds) * creeping / moving * drag[n, d] / viscosity
+                total += _seen(flow[d, k], shares) * rates[d, k] / (rates[d, k] + blown)
+            scale = -_steady(moving[d], slowest, speed / diffusivity, shares) / total * drag[n, d] / viscosity
             for k in range(modes):
-                steady = scale * _seen(flow[modes * d + k], shares) * rates[d, k] / (rates[d, k] + blown)
+                steady = scale * _seen(flow[d, k], shares) * rates[d, k] / (rates[d, k] + blown)
                 fading = diffusivity * (rates[d, k] + blown)
                 left = math.exp(-step * (fading + screening[n]))
                 steady *= fading / (fading + screening[n])
