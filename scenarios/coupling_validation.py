@@ -134,20 +134,22 @@ def conserved(curves: Curves) -> list[Row]:
 
 
 def liquid_beds(curves: Curves) -> list[Row]:
-    """Alumina beads fluidised by water at four velocities."""
-    beds = [liquid_bed.fluidise(velocity) for velocity in liquid_bed.VELOCITIES]
+    """Beads of alumina and of alginate fluidised by water."""
     rows = []
-    for bed in beds:
-        name = f"alumina in water, {bed.velocity:g} m/s"
-        rows.append(Row(f"{name}: pressure drop over buoyant weight", bed.drop_over_weight, 1.0, 0.01))
-        rows.append(Row(f"{name}: voidage against mean of published laws", bed.voidage, bed.expected, 0.03))
-    exponent = liquid_bed.exponent(beds)
-    rows.append(Row("alumina in water: exponent over that of Richardson-Zaki", exponent / beds[0].exponent, 1.0, 0.1))
-    curves["liquid_beds"] = {
-        "velocity": (np.array([bed.velocity for bed in beds]), "m/s"),
-        "voidage": (np.array([bed.voidage for bed in beds]), "-"),
-        "expected": (np.array([bed.expected for bed in beds]), "-"),
-    }
+    for material, study in liquid_bed.STUDIES.items():
+        beds = [liquid_bed.fluidise(study, velocity) for velocity in study.velocities]
+        for bed in beds:
+            name = f"{material} in water, {bed.velocity:g} m/s"
+            rows.append(Row(f"{name}: pressure drop over buoyant weight", bed.drop_over_weight, 1.0, 0.01))
+            rows.append(Row(f"{name}: voidage against mean of published laws", bed.voidage, bed.expected, 0.03))
+            rows.append(Row(f"{name}: voidage against the drag law's own balance", bed.voidage, bed.balance))
+        exponent = liquid_bed.exponent(beds) / beds[0].exponent
+        rows.append(Row(f"{material} in water: exponent over that of Richardson-Zaki", exponent, 1.0, 0.1))
+        curves[f"liquid_bed/{material}"] = {
+            "velocity": (np.array([bed.velocity for bed in beds]), "m/s"),
+            "voidage": (np.array([bed.voidage for bed in beds]), "-"),
+            "expected": (np.array([bed.expected for bed in beds]), "-"),
+        }
     return rows
 
 
@@ -180,9 +182,10 @@ def _draw(folder: Path, curves: Curves) -> None:
     axes[1].plot(fall["time"][0], fall["equation"][0], ":", color=ORANGE, label="equation of motion")
     label(axes[1], "time", "s", "speed of fall", "m/s")
     legend(axes[1])
-    beds = curves["liquid_beds"]
-    axes[2].loglog(beds["voidage"][0], beds["velocity"][0], "o-", color=BLUE, label="run")
-    axes[2].loglog(beds["expected"][0], beds["velocity"][0], "o-", color=GREY, label="mean of published laws")
+    for material, colour in (("alumina", BLUE), ("alginate", ORANGE)):
+        beds = curves[f"liquid_bed/{material}"]
+        axes[2].loglog(beds["voidage"][0], beds["velocity"][0], "o-", color=colour, label=material)
+        axes[2].loglog(beds["expected"][0], beds["velocity"][0], ":", color=colour, label="mean of published laws")
     label(axes[2], "voidage", "-", "superficial velocity", "m/s")
     legend(axes[2])
     save(figure, folder / "coupling.png")
