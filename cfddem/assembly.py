@@ -53,6 +53,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         box=periodic_box(case),
         domain=_domain(case),
         record=case.run.collisions,
+        energies=case.run.energy,
     )
     if case.fluid is None:
         return Parts(solver, None, None)

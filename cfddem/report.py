@@ -15,6 +15,7 @@ from cfddem.case import Case
 from cfddem.errors import InputError
 from cfddem.expected import LIQUID
 from cfddem.placement import grains_of
+from cfddem.record import energy
 from cfddem.record.quantities import MEAN_HEIGHT
 from cfddem.record.reading import Run, open_run
 from cfddem.record.series import block_average, stationarity
@@ -36,7 +37,8 @@ def report(folder: Path) -> dict[str, Any]:
 
     folder   of the run
     returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
-             (law, computed, expected, ratio), `ledger`, `warnings`, `wall_time`, `card`, `provenance`
+             (law, computed, expected, ratio), `ledger`, `energy` (lines of the energy ledger at the end [J], where the
+             case asks for one), `warnings`, `wall_time`, `card`, `provenance`
     """
     run = open_run(folder)
     if not len(run.history.get("time", ())):
@@ -57,6 +59,7 @@ def report(folder: Path) -> dict[str, Any]:
         "measures": measures,
         "laws": laws,
         "ledger": _ledger(run),
+        "energy": _energy(run),
         "warnings": _warnings(run, case, measures, laws),
         "wall_time": run.about.get("wall_time", {}),
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": _last(run, "fluid_steps")},
@@ -118,6 +121,24 @@ def _ledger(run: Run) -> dict[str, float]:
         if name in history
     }
     return ledger | {"particles_lost": float(history["particle_count"][0] - history["particle_count"][-1])}
+
+
+def _energy(run: Run) -> dict[str, float]:
+    """The energy ledger at the end [J]; empty where the run has none."""
+    lines = (name for name in energy.FIELDS if name in run.history)
+    return {name.removeprefix("energy_"): float(run.history[name][-1]) for name in lines}
+
+
+def energy_lines(ledger: dict[str, float]) -> list[tuple[str, str, float, float]]:
+    """Group, line, energy [J] and its part of what was put in [-], in the order in which they are read.
+
+    A line that is nothing is left out.
+    """
+    put_in = max(ledger["put_in"], 1e-300)
+    groups = {"stored since the start": energy.STORED, "gained": energy.GAINED, "lost": energy.LOST}
+    lines = [(group, name, ledger.get(name, 0.0)) for group, names in groups.items() for name in names]
+    lines = [line for line in lines if line[2] != 0.0] + [("not explained", "remainder", ledger["remainder"])]
+    return [(group, name, value, value / put_in) for group, name, value in lines]
 
 
 # ---------------------------------------------------------------- laws
@@ -248,6 +269,11 @@ def lines(result: dict[str, Any]) -> list[str]:
             out.append(f"  {row['law']:<40} {row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}")
     out += ["", "  ledger, largest over the run"]
     out += [f"  {name.replace('_', ' '):<24} {value:.2g}" for name, value in result["ledger"].items()]
+    if result.get("energy"):
+        put_in = result["energy"]["put_in"]
+        out += ["", f"  energy, of {put_in:.4g} J put in"]
+        for group, name, joules, part in energy_lines(result["energy"]):
+            out.append(f"  {group:<24} {name.replace('_', ' '):<24} {joules:>12.4g} J {100.0 * part:>9.3f} %")
     total = sum(result["wall_time"].values())
     if total:
         parts = sorted(result["wall_time"].items(), key=lambda each: -each[1])

@@ -19,7 +19,7 @@ from cfddem.errors import InputError, RunFailed, RunStopped, UnstableStep
 from cfddem.particles.guard import guard
 from cfddem.particles.state import Bodies, kinetic_energy
 from cfddem.placement import species_of
-from cfddem.record import checkpoint
+from cfddem.record import checkpoint, energy
 from cfddem.record.ledger import exchange_imbalance, volume_imbalance
 from cfddem.record.measures import (
     bed_height,
@@ -40,6 +40,7 @@ FIELDS = {
     "exchange_imbalance": ("1", "momentum given by the fluid and not got by particles, over that given"),
     "volume_imbalance": ("1", "volume gained by a cell against its faces, over the largest flux"),
     "outside_range": ("1", "how often the drag law was asked outside of its range, so far"),
+    **energy.FIELDS,
 }
 """What a run records beside the known quantities."""
 
@@ -293,6 +294,8 @@ def measure(simulation: Simulation) -> dict[str, float]:
         "particle_count": float(bodies.count),
         "contact_count": float((simulation.particles.edges.force != 0.0).any(axis=1).sum()),
     }
+    if simulation.energy is not None:
+        row |= simulation.energy.row()
     row |= _mean_heights(simulation.case, bodies)
     if fluid is None or simulation.exchange is None:
         return row

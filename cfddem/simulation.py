@@ -14,6 +14,7 @@ from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
 from cfddem.errors import RunFailed
 from cfddem.particles.clocks import check_step
 from cfddem.particles.state import Bodies
+from cfddem.record.energy import EnergyLedger
 
 CLOCKS_EVERY = 20
 """Fluid steps between two readings of the particles' clocks."""
@@ -31,6 +32,7 @@ class Simulation:
         parts = assemble(case, progress)
         self.particles, self.fluid, self.exchange = parts.particles, parts.fluid, parts.exchange
         self.gravity = np.array(case.laws.gravity)
+        self.energy = self._ledger()
         self.steps = 0
         self.binding = ""
         self.wall = self.particles.wall
@@ -55,7 +57,12 @@ class Simulation:
             wall.lap("fluid")
             self.exchange.answer(bodies, offer, self.gravity)
             wall.lap("forces of the fluid")
+            if self.energy is not None:
+                self.energy.fluid_has_moved(offer)
+                wall.lap("energies")
         particles.advance(step / substeps, substeps)
+        if self.energy is not None:
+            self.energy.particles_have_moved()
         self.steps += 1
 
     def until(self, time: float) -> None:
@@ -74,6 +81,8 @@ class Simulation:
         }
         if self.fluid is not None and self.exchange is not None:
             parts |= {"fluid": self.fluid.checkpoint(), "exchange": self.exchange.checkpoint()}
+        if self.energy is not None:
+            parts |= {"energy": self.energy.checkpoint()}
         return parts
 
     @classmethod
@@ -89,9 +98,18 @@ class Simulation:
         if simulation.fluid is not None and simulation.exchange is not None:
             simulation.fluid.restore(state["fluid"])
             simulation.exchange.restore(state["exchange"])
+        simulation.energy = simulation._ledger()
+        if simulation.energy is not None:
+            simulation.energy.restore(state["energy"])
         simulation.steps, simulation._particle_step = int(state["steps"]), float(state["particle_step"])
         simulation.binding, simulation.wall = "", simulation.particles.wall
         return simulation
+
+    def _ledger(self) -> EnergyLedger | None:
+        """The energy ledger, where the case asks for one."""
+        if not self.case.run.energy:
+            return None
+        return EnergyLedger(self.particles, self.fluid, self.exchange, self.gravity)
 
     # ------------------------------------------------------------ time steps
 

@@ -6,10 +6,11 @@ import numpy as np
 
 from cfddem.kernels import inline
 from cfddem.particles.forces import pair_mass_and_radius, pair_row, pair_viscosity, relative_velocity
-from cfddem.particles.pairs import geometry
+from cfddem.particles.pairs import ENTRY, geometry
 from cfddem.particles.surfaces import portion
 from cfddem.particles.vectors import across, at, dot, times
 from closures.friction import dry_or_lubricated
+from closures.minimum_gap import elastohydrodynamic
 from closures.numbers import stokes
 
 ENCOUNTER = np.dtype(
@@ -22,10 +23,14 @@ ENCOUNTER = np.dtype(
         ("stokes", "f8"),  # of the approach, normal; infinite without a film [-]
         ("approach_speed", "f8"),  # normal speed at the begin [m/s]
         ("minimum_gap", "f8"),  # h_min [m]
+        ("roughness_gap", "f8"),  # h_sigma, the smallest that h_min can be [m]
+        ("elastohydrodynamic_gap", "f8"),  # h_eps at the approach speed; above h_sigma it is h_min [m]
         ("deformed", "?"),  # the film's pressure, not the asperities, set h_min
         ("friction", "f8"),  # coefficient in force [-]
         ("restitution", "f8"),  # normal speed out over in [-]
         ("restitution_tangential", "f8"),  # tangential speed out over in; NaN for a head-on meeting [-]
+        ("closest_gap", "f8"),  # smallest gap that the pair came to; below h_min the solids met [m]
+        ("weight", "f8"),  # how many encounters the row stands for: 1 unless the record is sampled [-]
     ],
     align=True,
 )
@@ -35,13 +40,15 @@ ENCOUNTER = np.dtype(
 def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
     """Note the begin of an encounter, or write a row at its end; returns the number of rows.
 
-    Of the begin an edge keeps five numbers: time, normal speed, tangential velocity.
+    Of the begin an edge keeps five numbers: time, normal speed, tangential velocity; and the closest gap since then.
     """
     separation, distance, gap = geometry(k, bodies, edges, shift)
     reduced_radius, inverse_mass = pair_mass_and_radius(k, bodies, edges)
     reach = laws.cutoff_ratio * reduced_radius if laws.film else 0.0
-    entry = 5 * k
+    entry = ENTRY * k
     known = not np.isnan(edges.entry[entry])
+    if known and gap < edges.entry[entry + 5]:
+        edges.entry[entry + 5] = gap
     if known == (gap <= reach) or portion(edges, k) == 0.0:
         return count
     normal = times(1.0 / distance, separation)
@@ -50,6 +57,7 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
     if not known:
         edges.entry[entry], edges.entry[entry + 1] = time, normal_speed
         edges.entry[entry + 2], edges.entry[entry + 3], edges.entry[entry + 4] = tangential
+        edges.entry[entry + 5] = gap
         return count
 
     row, materials = rows[count], pair_row(k, bodies, edges, walls, table)
@@ -65,6 +73,10 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
         stokes(1.0 / inverse_mass, speed, pair_viscosity(k, bodies, edges), reduced_radius) if laws.film else np.inf
     )
     row.minimum_gap = edges.minimum_gap[k]
+    row.roughness_gap, row.elastohydrodynamic_gap = materials.roughness_gap, 0.0
+    if laws.film and speed > 0.0:
+        viscosity = pair_viscosity(k, bodies, edges)
+        row.elastohydrodynamic_gap = elastohydrodynamic(viscosity, speed, materials.film_modulus, reduced_radius)
     row.deformed = row.minimum_gap > materials.roughness_gap
     row.friction = dry_or_lubricated(
         row.minimum_gap, materials.roughness_gap, materials.friction, materials.friction_lubricated
@@ -72,5 +84,6 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
     row.restitution = normal_speed / speed
     sideways = dot(before, before)
     row.restitution_tangential = dot(tangential, before) / sideways if sideways > 0.0 else np.nan
+    row.closest_gap, row.weight = edges.entry[entry + 5], 1.0
     edges.entry[entry] = np.nan
     return count + 1

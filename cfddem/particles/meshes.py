@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.kernels import inline, kernel
+from cfddem.particles.pairs import ENTRY
 from cfddem.particles.surfaces import (
     DISTANCE,
     FEATURE,
@@ -215,10 +216,10 @@ def _copy_memory(edges, donor, k):
         edges.approach_speed[k] = edges.approach_speed[donor]
         edges.accounted_gap[k] = edges.accounted_gap[donor]
         edges.resistance[k] = edges.resistance[donor]
-    if len(edges.entry) > 0 and not np.isnan(edges.entry[5 * k]):  # an encounter goes on where the contact is now
-        begin, own = edges.entry[5 * donor], edges.entry[5 * k]
+    if len(edges.entry) > 0 and not np.isnan(edges.entry[ENTRY * k]):  # an encounter goes on where the contact is now
+        begin, own = edges.entry[ENTRY * donor], edges.entry[ENTRY * k]
         moves = np.isnan(begin) or own < begin
-        for x in range(5):
+        for x in range(ENTRY):
             if moves:
-                edges.entry[5 * donor + x] = edges.entry[5 * k + x]
-            edges.entry[5 * k + x] = np.nan
+                edges.entry[ENTRY * donor + x] = edges.entry[ENTRY * k + x]
+            edges.entry[ENTRY * k + x] = np.nan

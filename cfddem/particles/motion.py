@@ -22,7 +22,7 @@ from cfddem.particles.pair_loops import (
     wet_pairs,
     wet_pairs_threaded,
 )
-from cfddem.particles.pairs import geometry
+from cfddem.particles.pairs import ENTRY, geometry
 from cfddem.particles.surfaces import TURN, advance_walls, portion, touched
 from cfddem.particles.vectors import at, dot, minus, plus, put, times
 
@@ -257,9 +257,9 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
         for chunk in range(CHUNKS):
             if not farthest[chunk] <= largest:
                 largest = farthest[chunk]
-        for k in range(len(edges.entry) // 5):
+        for k in range(len(edges.entry) // ENTRY):
             noted = observe(k, bodies, edges, walls, shift, table, laws, time + done * step, log, noted)
-        full = len(log) - noted < len(edges.entry) // 5
+        full = len(log) - noted < len(edges.entry) // ENTRY
         if done >= steps or full or not largest < reach * reach:
             return done, largest, noted
 

@@ -12,6 +12,7 @@ import numpy as np
 from cfddem.errors import InputError
 from cfddem.particles.clocks import Clocks, check_step, clocks
 from cfddem.particles.encounters import ENCOUNTER
+from cfddem.particles.energies import Energies
 from cfddem.particles.forces import Laws
 from cfddem.particles.guard import guard
 from cfddem.particles.meshes import meet_walls
@@ -20,6 +21,7 @@ from cfddem.particles.near_walls import assemble, check_walls
 from cfddem.particles.neighbours import list_edges, locality_order, wrap
 from cfddem.particles.pairs import Edges, gaps, remember, shifts, wall_forces
 from cfddem.particles.state import Bodies
+from cfddem.particles.surfaces import Walls
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls import Wall
 from cfddem.record.collisions import CollisionRecord
@@ -54,6 +56,7 @@ class ParticleSolver:
     skin     allowance of the neighbour list; found and tuned in the run if not given [m]
     sort_every  re-sort many particles by place at every so many lists
     record   keep a record of encounters, in `collisions`
+    energies  count energy by channel, in `energies`; costs time
     check_steps  refuse time steps above the stability limit
     after    an earlier run over the same particles and walls, whose pairs are remembered
     """
@@ -72,6 +75,7 @@ class ParticleSolver:
         skin: float | None = None,
         sort_every: int = 5,
         record: bool = False,
+        energies: bool = False,
         check_steps: bool = True,
         after: ParticleSolver | None = None,
     ) -> None:
@@ -102,6 +106,12 @@ class ParticleSolver:
             self._recall(after, fresh)
         self._take_list(fresh)
         self.refresh()
+        self.energies = Energies(self) if energies else None
+
+    @property
+    def views(self) -> tuple[Bodies, Edges, Walls, np.ndarray]:
+        """Bodies, edges and walls as compiled loops take them, and what to add to separations across borders."""
+        return self._views
 
     @property
     def _reach_ratio(self) -> float:
@@ -150,13 +160,20 @@ class ParticleSolver:
         where one is no number any more, has left or was pressed through.
         """
         self.wall.start()
+        counting, first = self.energies, True
         while steps > 0:
             if self._checking and step > self._accepted:
                 check_step(step, self._limits())
                 self._accepted = step
-            done, farthest, noted = self._march(step, steps)
+            if counting is not None:
+                counting.before(self, step, first)
+            done, farthest, noted = self._march(step, steps if counting is None else 1)
             self.wall.lap("pairs and motion")
             steps -= done
+            if counting is not None:
+                counting.after(self, step, steps == 0)
+                self.wall.lap("energies")
+            first = False
             if self.collisions is not None:
                 self.collisions.keep(noted)
             self.steps += done
@@ -170,7 +187,9 @@ class ParticleSolver:
 
     def checkpoint(self) -> dict[str, Any]:
         """Copies of everything the next step depends on, age and order of the list included."""
+        counted = {} if self.energies is None else {"energies": self.energies.checkpoint()}
         return {
+            **counted,
             "bodies": _copied(self.bodies),
             "edges": _copied(self.edges),
             "walls": _copied(self.walls),
@@ -200,6 +219,8 @@ class ParticleSolver:
         self._origin[:] = state["origin"]
         self.walls.travel[:] = travel
         self.edges.touch[:] = state["edges"]["touch"]
+        if self.energies is not None:
+            self.energies.restore(state["energies"])
 
     def _march(self, step: float, steps: int) -> tuple[int, float, int]:
         record = self.collisions
@@ -279,7 +300,8 @@ class ParticleSolver:
 
         order  old row of each new one; the number of old rows for a newcomer, who remembers nothing
         """
-        count = self.bodies.count
+        count, counting = self.bodies.count, self.energies
+        had = 0.0 if counting is None else counting.mechanical(self)
         old = self.edges._replace(start=np.append(self.edges.start, self.edges.start[-1]))
         place = np.full(count + 1, -1, np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
@@ -292,6 +314,8 @@ class ParticleSolver:
         springs = fresh.spring.copy()
         self.refresh()
         fresh.spring[:] = springs  # no time has passed in which contacts could slide
+        if counting is not None:
+            counting.fed += counting.mechanical(self) - had
 
     def _recall(self, earlier: ParticleSolver, fresh: Edges) -> None:
         """Take over what the pairs of an earlier run remember."""

@@ -1,7 +1,7 @@
 """The ledger: what must not change, counted by another route than the one that moves it.
 
 Momentum that particles got is summed over particles, momentum that the fluid gave over cells; volume is summed
-over the faces of cells; particles are counted.
+over the faces of cells; particles are counted. Energy is in :mod:`cfddem.record.energy`.
 """
 
 from __future__ import annotations

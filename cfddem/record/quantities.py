@@ -47,10 +47,14 @@ KNOWN = {
     "stokes": Quantity("1", "Stokes number of the approach, normal"),
     "approach_speed": Quantity("m/s", "normal speed when the pair came within reach"),
     "minimum_gap": Quantity("m", "smallest gap of the film"),
+    "roughness_gap": Quantity("m", "gap at which asperities touch"),
+    "elastohydrodynamic_gap": Quantity("m", "gap at which the pressure of the film deforms the solids, at that speed"),
     "deformed": Quantity("1", "1 where the pressure of the film, not the asperities, set the smallest gap"),
     "friction": Quantity("1", "coefficient of friction in force"),
     "restitution": Quantity("1", "normal speed after over before"),
     "restitution_tangential": Quantity("1", "tangential speed after over before"),
+    "closest_gap": Quantity("m", "smallest gap that the pair came to; below the smallest gap of the film solids met"),
+    "weight": Quantity("1", "number of encounters that the row stands for"),
 }
 
 MEAN_HEIGHT = "mean_height_"

@@ -19,7 +19,7 @@ from cfddem.errors import RunFailed
 from cfddem.record.files import write_whole
 from cfddem.record.measures import voidage_profile
 from cfddem.record.reading import Run, open_run
-from cfddem.report import buoyant_weight, case_of, steadiness
+from cfddem.report import buoyant_weight, case_of, energy_lines, steadiness
 from cfddem.report import report as summary
 from cfddem.view.plots import BLUE, GREY, ORANGE, SKY, blank, label, panels
 
@@ -57,6 +57,7 @@ $laws
 $profile
 <h2>Ledger</h2>
 $ledger
+$energy
 <h2>Wall time</h2>
 $wall
 <h2>What the run was</h2>
@@ -98,6 +99,7 @@ def render(run: Run, result: dict[str, Any]) -> str:
         laws=_laws(result["laws"]),
         profile=_profile(run, case, result),
         ledger=_table(("largest over the run", ""), _named(result["ledger"], 2)),
+        energy=_energy(result["energy"]),
         wall=_wall(result["wall_time"]),
         card=_card(result["card"]),
         case=escape(run.case_text),
@@ -121,6 +123,17 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence
 
 def _named(values: dict[str, float], digits: int) -> list[tuple[str, str]]:
     return [(name.replace("_", " "), f"{value:.{digits}g}") for name, value in values.items()]
+
+
+def _energy(ledger: dict[str, float]) -> str:
+    if not ledger:
+        return ""
+    rows = [
+        (group, name.replace("_", " "), f"{value:.4g}", f"{100.0 * part:.3f}")
+        for group, name, value, part in energy_lines(ledger)
+    ]
+    head = ("energy", f"of {ledger['put_in']:.4g} J put in", "J", "%")
+    return f"<h2>Energy</h2>{_table(head, rows, (2, 3))}"
 
 
 def _warnings(found: list[str]) -> str:

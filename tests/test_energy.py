@@ -1,0 +1,175 @@
+"""The energy ledger: work is counted force by force, stored energy is read from the state, and the two agree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from disturbed_runs import TINY
+
+from cfddem import open_run
+from cfddem.case import Case
+from cfddem.errors import InputError
+from cfddem.fluid.energies import face_volumes, kinetic_energy, works
+from cfddem.kernels import use_threads
+from cfddem.materials import Material, pair_table
+from cfddem.particles.energies import CHANNELS
+from cfddem.particles.forces import CONSTANT_TORQUE, JKR, RESCALED, VERLET, Laws
+from cfddem.particles.packing import lattice
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import bodies
+from cfddem.particles.state import kinetic_energy as of_spheres
+from cfddem.particles.walls import Plane
+from cfddem.report import energy_lines, lines, report
+from cfddem.run import Run
+from cfddem.simulation import Simulation
+from closures.contact import hertz_force, spring_energy
+
+ROUGH = Material(
+    density=2500, youngs_modulus=60e9, contact_modulus=1e6, poisson=0.25, restitution=0.9, friction=0.3,
+    friction_lubricated=0.1, rolling_friction=0.02, roughness=1e-6,
+)  # fmt: skip
+
+
+def box(
+    *, viscosity: float = 0.0, laws: Laws | None = None, gravity: float = 0.0, lid: float = 0.0, count: int = 100
+) -> ParticleSolver:
+    """Spheres that fly, spin and collide in a box whose lid slides."""
+    random, size = np.random.default_rng(2), 0.012
+    places = lattice(2e-3, ((0.0, 0.0, 0.0), (size, size, size)), spacing=1.2, seed=1)[:count]
+    spheres = bodies(
+        places, 1e-3, 2500.0, velocity=random.normal(0.0, 0.3, (count, 3)), spin=random.normal(0.0, 300.0, (count, 3)),
+        viscosity=viscosity,
+    )  # fmt: skip
+    walls = [Plane(point=(0.0 if sign > 0.0 else size,) * 3, normal=tuple(sign * np.eye(3)[axis]),
+                   velocity=(lid, 0.0, 0.0) if axis == 2 and sign < 0.0 else (0.0, 0.0, 0.0))
+             for axis in range(3) for sign in (1.0, -1.0)]  # fmt: skip
+    chosen = laws or Laws(film=viscosity > 0.0)
+    return ParticleSolver(
+        spheres, pair_table([ROUGH]), walls=walls, laws=chosen, gravity=(0.0, 0.0, -gravity), energies=True
+    )
+
+
+def unexplained(run: ParticleSolver, steps: int) -> tuple[float, dict[str, float]]:
+    """Energy that the count does not explain, over what was put in; and the count."""
+    assert run.energies is not None
+    before = run.energies.mechanical(run)
+    run.advance(run.recommended_step(1.0), steps)
+    counted = dict(zip(CHANNELS, run.energies.totals))
+    put_in = before + sum(max(counted[name], 0.0) for name in ("walls", "fall"))
+    gained = sum(counted[name] for name in ("walls", "fall", "stiffening"))
+    lost = sum(counted[name] for name in ("film", "contact_damping", "friction", "rolling"))
+    return (run.energies.mechanical(run) - before - gained + lost) / put_in, counted
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {},
+        {"gravity": 9.81, "lid": 0.5},
+        {"laws": Laws(spring=RESCALED)},
+        {"laws": Laws(rolling=CONSTANT_TORQUE)},
+        {"viscosity": 1e-3},
+        {"viscosity": 1e-2, "gravity": 9.81, "lid": 0.5},
+    ],
+    ids=["dry", "dry, gravity and a sliding lid", "rescaled springs", "rolling", "film", "thick film"],
+)
+def test_a_box_of_colliding_spheres_accounts_for_its_energy(asked: dict) -> None:
+    """Within 1 %; every channel that is there takes a part."""
+    run = box(**asked)
+    left, counted = unexplained(run, 4000)
+    assert abs(left) < 0.01, counted
+    assert counted["contact_damping"] > 0.05 * of_spheres(run.bodies)
+    assert counted["friction"] > 0.0
+    assert (counted["film"] > 0.0) == ("viscosity" in asked)
+    assert (counted["walls"] != 0.0) == ("lid" in asked)
+    assert (counted["rolling"] > 0.0) == ("laws" in asked and asked["laws"].rolling > 0)
+
+
+def test_the_count_changes_no_bit_and_hangs_on_no_thread() -> None:
+    """On one thread, and on all; counted, and not."""
+    found = []
+    for threads in (1, None):
+        before = use_threads(None)
+        use_threads(threads)
+        run = box(viscosity=1e-3, count=100)
+        assert run.energies is not None
+        run.advance(2e-5, 300)
+        use_threads(before)
+        found.append((run.energies.totals.copy(), run.bodies.velocity.copy()))
+    assert np.array_equal(found[0][0], found[1][0])
+    plain = box(viscosity=1e-3, count=100)
+    plain.energies = None
+    plain.advance(2e-5, 300)
+    assert np.array_equal(plain.bodies.velocity, found[0][1])
+
+
+def test_particles_that_are_fed_bring_their_energy() -> None:
+    run = box()
+    assert run.energies is not None
+    run.advance(2e-5, 50)
+    had = run.energies.mechanical(run)
+    gone = np.zeros(run.bodies.count, bool)
+    gone[::3] = True
+    taken = run.remove(gone)
+    assert -run.energies.fed > of_spheres(taken)  # and what their springs held
+    assert run.energies.mechanical(run) == pytest.approx(had + run.energies.fed, rel=1e-12)
+    run.advance(2e-5, 10)
+
+
+@pytest.mark.parametrize("laws", [Laws(cohesion=JKR), Laws(film=True, integrator=VERLET)], ids=["cohesion", "verlet"])
+def test_laws_whose_energy_is_not_counted_are_refused(laws: Laws) -> None:
+    with pytest.raises(InputError, match="energies: must be"):
+        box(laws=laws, viscosity=1e-3 if laws.film else 0.0)
+
+
+@pytest.mark.parametrize("minimum_gap", [0.0, 1e-6, 1e-4])
+def test_the_energy_of_a_spring_is_the_integral_of_its_force(minimum_gap: float) -> None:
+    overlap = np.linspace(0.0, 2e-5, 200_001)
+    force = [hertz_force(1e9, each) * (min(each / minimum_gap, 1.0) if minimum_gap else 1.0) for each in overlap]
+    assert spring_energy(1e9, 1.5, 2e-5, minimum_gap) == pytest.approx(np.trapezoid(force, overlap), rel=1e-6)
+
+
+# ---------------------------------------------------------------- with a fluid
+
+LIQUID = TINY.replace("collisions = true", "energy = true")
+assert "energy" in LIQUID
+
+
+@pytest.mark.parametrize("model", ["A", "B"])
+def test_terms_of_the_momentum_balance_add_up_to_the_kinetic_energy(model: str) -> None:
+    """To round-off, in a bed that a liquid begins to lift."""
+    run = Simulation(Case.from_text(LIQUID).with_(**{"laws.model": model, "run.energy": False}))
+    assert run.fluid is not None
+    volumes = face_volumes(run.fluid)
+    for _ in range(5):
+        before = kinetic_energy(run.fluid, volumes)
+        run.step()
+        done = works(run.fluid, volumes)
+        gained = sum(done) - done.kinetic - done.held
+        assert done.kinetic == pytest.approx(kinetic_energy(run.fluid, volumes) - before, rel=1e-9)
+        assert gained == pytest.approx(done.kinetic, abs=1e-9 * sum(map(abs, done)))
+
+
+def test_a_liquid_bed_accounts_for_its_energy(tmp_path: Path) -> None:
+    """Remainder below 1 % of what was put in; drag takes most; a run that was stopped counts on."""
+    case = Case.from_text(LIQUID)
+    whole = Run.begin(case, tmp_path / "whole")
+    whole.go()
+    ledger = report(tmp_path / "whole")["energy"]
+    assert abs(ledger["remainder"]) < 0.01 * ledger["put_in"], ledger
+    assert ledger["inflow"] > 0.0 and ledger["drag"] > 0.3 * ledger["put_in"]
+    assert ledger["film"] > 0.0 and ledger["viscous"] > 0.0
+    assert sum(part for group, _, _, part in energy_lines(ledger) if group == "lost") < 1.1
+    text = "\n".join(lines(report(tmp_path / "whole")))
+    assert "J put in" in text and "remainder" in text
+
+    half = Run.begin(case.with_(**{"run.until": 0.5 * case.run.until}), tmp_path / "half")
+    half.every, half.interval, half.rows_per_snapshot = whole.every, whole.interval, whole.rows_per_snapshot
+    half.go()
+    Run.resume(tmp_path / "half", until=case.run.until).go()
+    one, other = open_run(tmp_path / "whole").history, open_run(tmp_path / "half").history
+    for name in one:
+        if name.startswith("energy_"):
+            assert np.array_equal(one[name], other[name]), name
