@@ -27,6 +27,7 @@ from cfddem.errors import InputError
 TARGETS: dict[str, str] = {
     "binary-collision": "scenarios.binary_collision_validation",
     "particles": "scenarios.particles_validation",
+    "fluid": "scenarios.fluid_validation",
     "coupling": "scenarios.coupling_validation",
     "beds": "scenarios.beds_validation",
     "wet-tumbler": "scenarios.wet_tumbler_validation",
