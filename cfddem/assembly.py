@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -114,13 +115,15 @@ def walls_of(case: Case) -> list[Wall]:
 
 def laws_of(case: Case) -> Laws:
     """Switches of the particle loop."""
-    wet = case.fluid is not None and case.fluid.viscosity > 0.0 and case.laws.lubrication == "nijssen"
+    wet = case.fluid is not None and case.fluid.viscosity > 0.0 and case.laws.lubrication != "none"
+    own: dict[str, Any] = {kind: law.function for kind, law in case.laws.pair_laws.items()} if wet else {}
     return Laws(
         film=wet,
         friction_onset=FRICTION_ONSETS[case.laws.friction_onset],
         contact=CONTACTS[case.laws.contact],
         normal_stiffness=case.laws.normal_stiffness,
         tangential_stiffness=case.laws.tangential_stiffness,
+        **own,
     )
 
 

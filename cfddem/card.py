@@ -167,7 +167,9 @@ def _film_rows(case: Case, pair: Encounter) -> Iterator[Row]:
     group = f"collisions{among} at {pair.speed:.3g} m/s"
     if pair.gap > 0.0:
         yield Row(group, "St", pair.stokes, "", "inertia of a pair against its film")
-        regime = "elasticity of the solids" if pair.film_gap > pair.roughness_gap else "roughness"
+        own = case.laws.pair_laws.get("minimum_gap")
+        film = "elasticity of the solids" if own is None else own.name
+        regime = film if pair.film_gap > pair.roughness_gap else "roughness"
         yield Row(group, "minimum gap", pair.gap, "m", f"set by {regime}")
         yield Row(group, "minimum gap / roughness", pair.gap / pair.roughness_gap)
         if pair.softening < 1.0:

@@ -13,14 +13,18 @@ from inspect import signature
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from cfddem.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
 from cfddem.case_text import parsed, put, read_text
+from cfddem.chosen_laws import chosen
 from cfddem.errors import InputError, nearest
 from cfddem.materials import Checked, Fluid, Material
 from cfddem.mistakes import Key, described, key_lines, line_of, refused, shown
 from closures.law import Law
+
+BUILT_IN = {"drag": ("none",), "minimum_gap": ("elastohydrodynamic",), "lubrication": ("nijssen", "none")}
+"""What a case may say for a law that is no law to be looked up: nothing, or what is compiled into the pair loop."""
 
 
 class Column(Checked):
@@ -68,7 +72,12 @@ class CaseLaws(Checked):
 
     drag: str | Callable[..., float] | None = Field("di_felice", description="name of a drag law, or a law")
     model: Literal["A", "B"] = Field("A", description="who carries the pressure gradient")
-    lubrication: Literal["nijssen", "none"] = Field("nijssen", description="the film between two close spheres")
+    lubrication: str | Callable[..., float] = Field(
+        "nijssen", description="the film between two close spheres: nijssen, none, a law's name, or a law"
+    )
+    minimum_gap: str | Callable[..., float] = Field(
+        "elastohydrodynamic", description="how close a film lets solids come, if not to their asperities: name, or law"
+    )
     contact: Literal["hertz", "linear"] = Field("hertz", description="normal contact")
     normal_stiffness: float = Field(0.0, ge=0, description="of the linear contact [N/m]")
     tangential_stiffness: float = Field(0.0, ge=0, description="of the linear contact [N/m]")
@@ -82,19 +91,24 @@ class CaseLaws(Checked):
     convection: Literal["limited", "central"] = Field("limited", description="scheme of the fluid")
     gravity: Point = Field((0.0, 0.0, -9.81), description="g [m/s2]")
 
-    @field_validator("drag")
+    @field_validator("drag", "minimum_gap", "lubrication")
     @classmethod
-    def _drag_is_on_the_shelf(cls, value: Any) -> Any:
-        if isinstance(value, str) and value != "none":
-            _drag_named(value)
+    def _laws_are_on_the_shelf(cls, value: Any, about: ValidationInfo) -> Any:
+        kind = about.field_name or ""
+        if value not in BUILT_IN.get(kind, ()) and (isinstance(value, str) or kind != "drag"):
+            chosen(kind, value)
         return value
 
     @property
     def drag_law(self) -> Law | None:
         """The drag law, with its range and source; None where there is no drag."""
-        if self.drag is None or self.drag == "none":
-            return None
-        return _drag_named(self.drag) if isinstance(self.drag, str) else _drag_of_ones_own(self.drag)
+        return None if self.drag is None or self.drag in BUILT_IN["drag"] else chosen("drag", self.drag)
+
+    @property
+    def pair_laws(self) -> dict[str, Law]:
+        """The laws that take the place of those built into the pair loop, by their kind."""
+        given = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication")}
+        return {kind: chosen(kind, law) for kind, law in given.items() if law not in BUILT_IN[kind]}
 
     def drag_function(self, diameter_ratio: float = 1.0) -> Callable[[float, float], float] | None:
         """The drag law of a sphere by Reynolds number and voidage, among others of a Sauter mean; None without drag.
@@ -256,8 +270,9 @@ class Case(Checked):
         import tomli_w
 
         values = self.model_dump(exclude_defaults=True, exclude_none=True)
-        if callable(self.laws.drag):
-            values["laws"]["drag"] = getattr(self.laws.drag, "__name__", "own law")
+        for kind in BUILT_IN:
+            if callable(law := getattr(self.laws, kind)):
+                values["laws"][kind] = getattr(law, "__name__", "own law")
         return tomli_w.dumps(values)
 
     def with_(self, **changes: Any) -> Case:
@@ -295,26 +310,3 @@ def _mistakes_in_names(refusal: ValidationError, values: Mapping[str, Any]) -> l
     other = column.get("material")
     names = [described([each]) for each in known]
     return list(_unknown_names(names, told, other if isinstance(other, str) else None))
-
-
-def _drag_named(name: str) -> Law:
-    """The drag law of a name: of the shelf, or of an installed package that offers laws."""
-    from closures import shelf
-
-    shelf.fill()
-    laws = shelf.SHELF["drag"]
-    if name not in laws:
-        shelf.fill_from_packages()
-    if name not in laws:
-        raise InputError("drag", shown(name), nearest(name, laws))
-    return laws[name]
-
-
-def _drag_of_ones_own(function: Callable[..., float]) -> Law:
-    """The card of a drag law that is passed as a function."""
-    from closures.law import page
-
-    try:
-        return page(function)
-    except KeyError as failure:
-        raise InputError("laws.drag", None, "a law", str(failure.args[0])) from None

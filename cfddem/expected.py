@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from cfddem.bed import POURED_SOLID_FRACTION, Species
 from cfddem.case import Case
+from cfddem.chosen_laws import GAP_ARGUMENTS, asked_by_name
 from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
 from cfddem.fluid.division import VISCOUS, cell_counts
 from cfddem.materials import pair_table
@@ -156,13 +157,20 @@ def _encounter(case: Case, known: Bed, name: str, species: Species) -> Encounter
         speed,
         numbers.stokes(mass, speed, viscosity, radius) if viscosity > 0.0 else math.inf,
         float(row["roughness_gap"]) if wet else 0.0,
-        minimum_gap.elastohydrodynamic(viscosity, speed, real, radius) if wet else 0.0,
-        minimum_gap.elastohydrodynamic(viscosity, speed, soft, radius) if wet else 0.0,
+        _film_gap(case, float(row["roughness_gap"]), speed, viscosity, real, radius) if wet else 0.0,
+        _film_gap(case, float(row["roughness_gap"]), speed, viscosity, soft, radius) if wet else 0.0,
         contact.hertz_largest_overlap(mass, stiffness, speed),
         contact.hertz_largest_overlap(mass, real_stiffness, speed),
         (load / stiffness) ** (2.0 / 3.0),
         soft / real,
     )
+
+
+def _film_gap(case: Case, roughness: float, speed: float, viscosity: float, modulus: float, radius: float) -> float:
+    """Gap at which the film turns two particles back, by the law that the case has chosen [m]."""
+    own = case.laws.pair_laws.get("minimum_gap")
+    asked = (roughness, speed, viscosity, modulus, radius)
+    return asked_by_name(own.function if own else minimum_gap.elastohydrodynamic, GAP_ARGUMENTS, asked)
 
 
 def _pair(case: Case, species: Species):  # type: ignore[no-untyped-def]

@@ -72,7 +72,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
         spheres = pour_into(
             table, diameters, grains.density, walls, *_room(case, float(diameters.max())), box=periodic_box(case),
             seed=bed.seed, material=grains.material, layer=_layer(case, grains), gravity=abs(case.laws.gravity[2]),
-            laws=laws._replace(film=False), at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
+            laws=laws.dry(), at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
         )  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start == "packed":

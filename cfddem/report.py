@@ -240,7 +240,11 @@ def _warnings(run: Run, case: Case, measures: dict[str, Any], laws: list[dict[st
     if run.missing:
         found.append(f"{len(run.missing)} snapshots are missing")
     outside = _last(run, "outside_range")
-    if outside:
+    own = [law.name for law in case.laws.pair_laws.values()]
+    if outside and own:
+        names = ", ".join([str(case.laws.drag), *own])
+        found.append(f"the laws {names} were asked outside of their ranges {outside} times")
+    elif outside:
         asked = _last(run, "fluid_steps") * float(run.history["particle_count"].mean())
         share = f", {100.0 * outside / asked:.2g} % of all times it was asked" if asked else ""
         found.append(f"the drag law {case.laws.drag} was asked outside of its range {outside} times{share}")

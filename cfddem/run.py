@@ -39,7 +39,10 @@ FIELDS = {
     "fastest": ("m/s", "speed of the fastest particle"),
     "exchange_imbalance": ("1", "momentum given by the fluid and not got by particles, over that given"),
     "volume_imbalance": ("1", "volume gained by a cell against its faces, over the largest flux"),
-    "outside_range": ("1", "how often the drag law was asked outside of its range, so far"),
+    "outside_range": (
+        "1",
+        "how often drag law, or minimum gap and film of one's own, were asked outside of their range, so far",
+    ),
     **energy.FIELDS,
 }
 """What a run records beside the known quantities."""
@@ -313,7 +316,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
         + entrance_rise(fluid.volume_flux(2)[0], fluid.mean_voidage[0], fluid.density, grid.open[0]),
         "exchange_imbalance": exchange_imbalance(fluid, simulation.exchange),
         "volume_imbalance": volume_imbalance(fluid),
-        "outside_range": float(simulation.exchange.outside),
+        "outside_range": float(simulation.exchange.outside + simulation.particles.outside),
     }
     return row
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 
 from closures.drag import ergun
 from closures.law import Law, page
+from closures.lubrication import film_strength
 
 Curve = Callable[[float], float]
 
@@ -26,6 +27,7 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "reduced_radius": (1e-5, 1e-2),
     "stokes": (1.0, 1e3),
     "archimedes": (1e-2, 1e8),
+    "gap": (1e-9, 1e-4),
     "minimum_gap": (1e-8, 1e-6),
     "cutoff_gap": (1e-5, 1e-2),
     "poisson": (0.1, 0.45),
@@ -45,8 +47,10 @@ def check(law: Callable[..., float]) -> list[str]:
     Every law must give finite numbers in its range, and the same ones when compiled. Drag must be finite at rest, tend
     to Stokes drag within 5 %, rise with velocity and crowding, not jump by more than 0.5 %, and be between 0.3 and 2
     times Ergun's in a creeping dense bed. A minimum gap must be positive and not fall with viscosity, speed or
-    roughness. Added mass must start at 1/2 and not fall with crowding. Restitution must stay between 0 and 1 and not
-    fall with the Stokes number. Shear lift must vanish with the shear.
+    roughness. The resistance of a film must not be negative, rise with the gap, or fall with viscosity or radius, and
+    be between a third of Brenner's and three times as much where spheres nearly touch. Added mass must start at 1/2
+    and not fall with crowding. Restitution must stay between 0 and 1 and not fall with the Stokes number. Shear lift
+    must vanish with the shear.
 
     >>> from closures.drag import di_felice, gidaspow
     >>> check(di_felice)
@@ -241,6 +245,30 @@ def _other_kind(
     return rules
 
 
+def _film(card: Law) -> Iterator[str]:
+    """Rules of a film's resistance; other laws of its kind, parts of one, have none."""
+    names = _arguments(card)
+    if not {"gap", "viscosity", "reduced_radius"} <= set(names):
+        return
+    middle = {name: samples(card, name, 3)[1] for name in names}
+
+    def curve_of(name: str) -> Curve:
+        return lambda value: card.function(**{**middle, name: value})
+
+    gaps = samples(card, "gap", 101)
+    falling = _falls(gaps, lambda gap: -curve_of("gap")(gap))
+    if falling is not None:
+        yield f"rises with gap at gap = {falling:.3g}"
+    yield from _other_kind((0.0, math.inf), ("viscosity", "reduced_radius"))(card)
+    near = {**middle, "gap": gaps[0]}
+    share = card.function(**near) * near["gap"] / film_strength(near["viscosity"], near["reduced_radius"])
+    if not 1.0 / 3.0 <= share <= 3.0:
+        yield (
+            f"is {share:.2g} times Brenner's, 6 pi eta R*^2/h, at gap = {gaps[0]:.3g}: it is a force per rate of the "
+            "gap, and R* = R_i R_j/(R_i + R_j)"
+        )
+
+
 def _added_mass(card: Law) -> Iterator[str]:
     alone = card.function(1.0)
     if not math.isclose(alone, 0.5):
@@ -266,6 +294,7 @@ def _nothing_more(_: Law) -> Iterator[str]:
 KINDS: dict[str, Callable[[Law], Iterator[str]]] = {
     "drag": _drag,
     "minimum_gap": _other_kind((5e-324, math.inf), ("viscosity", "approach_speed", "roughness")),
+    "lubrication": _film,
     "restitution": _other_kind((0.0, 1.0), ("stokes",), takes=frozenset({"stokes", "restitution"})),
     "added_mass": _added_mass,
     "lift": _lift,

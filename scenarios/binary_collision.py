@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
+from cfddem.chosen_laws import GAP_ARGUMENTS, asked_by_name, chosen
 from cfddem.errors import InputError, UnstableStep, nearest
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import CONTACTS, DRIFT, FRICTION_ONSETS, INTEGRATORS, SPRINGS, Laws
@@ -59,7 +61,7 @@ class Collision:
     rebound_angle_striker: float  # of the striker's own velocity against the line of centres at contact [deg]
     rebound_angle_relative: float  # of the relative velocity against the line of centres at contact [deg]
     minimum_gap: float  # h_min [m]; 0 when dry
-    mechanism: str  # "roughness" or "elastohydrodynamic"; "dry" without a film
+    mechanism: str  # "roughness" or "elastohydrodynamic", or the name of one's own law; "dry" without a film
     friction_used: float  # [-]
     stop_gap: float | None  # where a pair that does not separate has come to rest [m]
     spin: tuple[float, float]  # of striker and target about the plane's normal [rad/s]
@@ -89,6 +91,8 @@ def collide(
     friction_onset: str = "film",
     spring: str = "total",
     step_fraction: float | None = None,
+    minimum_gap: Callable[..., float] | None = None,
+    lubrication: Callable[..., float] | None = None,
 ) -> Collision:
     r"""Let one body strike another that rests, in a fluid of the particle engine.
 
@@ -107,6 +111,8 @@ def collide(
     friction_onset  "film": at h_min, weighed by the lever; "overlap": at h = 0, as in the published figures
     spring          "total" tangential displacement, or "rescaled" while loading
     step_fraction   of the Hertz time; 0.02, or 0.005 for an oblique impact with the sudden onset "overlap" [-]
+    minimum_gap     a law of one's own for h_min, in the place of the elastohydrodynamic one
+    lubrication     a law of one's own for the resistance of the film
     returns         :class:`Collision`
 
     >>> wall = collide(MATERIALS["glass"], against="wall", velocity=0.2, stokes=50)
@@ -128,10 +134,13 @@ def collide(
         friction_onset=_choice("friction_onset", friction_onset, FRICTION_ONSETS),
         contact=CONTACTS["hertz"],
         spring=_choice("spring", spring, SPRINGS),
+        minimum_gap=minimum_gap,
+        lubrication=lubrication,
     )
+    laws.check()
     full = _choice("trajectory", trajectory, {"frozen": False, "full": True})
     table = pair_table(materials)
-    setting = _setting(table, materials, diameters, against, velocity, viscosity, angle, step_fraction)
+    setting = _setting(table, materials, diameters, against, velocity, viscosity, angle, step_fraction, laws)
     caveats = _film_clock(setting, laws, step_fraction)
     simulation = stage(setting, table, materials, laws, full, spin)
     history = follow(simulation, setting, full)
@@ -211,11 +220,14 @@ def _setting(
     viscosity: float,
     angle: float,
     step_fraction: float,
+    laws: Laws,
 ) -> Setting:
     reduced_radius, reduced_mass = _masses(materials, diameters, against)
     row = table[0, 1]
     stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), reduced_radius)
-    deformed = elastohydrodynamic(viscosity, velocity, float(row["film_modulus"]), reduced_radius)
+    roughness = float(row["roughness_gap"])
+    asked = (roughness, velocity, viscosity, float(row["film_modulus"]), reduced_radius)
+    deformed = asked_by_name(laws.minimum_gap or elastohydrodynamic, GAP_ARGUMENTS, asked)
     return Setting(
         radius=(0.5 * diameters[0], math.inf if against == "wall" else 0.5 * diameters[1]),
         reduced_radius=reduced_radius,
@@ -225,7 +237,7 @@ def _setting(
         viscosity=viscosity,
         stiffness=stiffness,
         impact_step=step_fraction * timescales.hertz_time(reduced_mass, stiffness, velocity),
-        minimum_gap=max(float(row["roughness_gap"]), deformed) if viscosity > 0.0 else 0.0,
+        minimum_gap=max(roughness, deformed) if viscosity > 0.0 else 0.0,
         film_speed=lubrication.film_strength(viscosity, reduced_radius) / reduced_mass,
     )
 
@@ -280,7 +292,8 @@ def _result(
     friction = dry_or_lubricated(
         minimum_gap, float(row["roughness_gap"]), float(row["friction"]), float(row["friction_lubricated"])
     )
-    mechanism = "elastohydrodynamic" if minimum_gap > row["roughness_gap"] else "roughness"
+    deformed = "elastohydrodynamic" if laws.minimum_gap is None else chosen("minimum_gap", laws.minimum_gap).name
+    mechanism = deformed if minimum_gap > row["roughness_gap"] else "roughness"
     return Collision(
         stokes=setting.speed / setting.film_speed if laws.film else math.inf,
         outcome=outcome,

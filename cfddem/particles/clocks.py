@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from cfddem.chosen_laws import FILM_ARGUMENTS, asked_by_name
 from cfddem.kernels import kernel
 from cfddem.particles.forces import LINEAR, VERLET, Laws
 from cfddem.particles.pairs import Edges
@@ -44,10 +45,19 @@ def clocks(
             steps = math.inf, math.inf
         hertz, impact = min(hertz, steps[0]), min(impact, steps[1])
         if laws.film and laws.integrator == VERLET:
-            strength = lubrication.film_strength(float(bodies.viscosity.max()), radius)
-            film = min(film, 2.0 * timescales.film_time(mass, strength, float(row["roughness_gap"])))
-    overlap = STABLE / math.sqrt(max(_largest_rate(bodies, edges, walls, gap, table, laws), 1e-300))
+            strongest = _film_strength(laws, float(bodies.viscosity.max()), radius, float(row["roughness_gap"]))
+            film = min(film, 2.0 * timescales.film_time(mass, strongest, float(row["roughness_gap"])))
+    built_in = laws._replace(minimum_gap=None, lubrication=None)
+    overlap = STABLE / math.sqrt(max(_largest_rate(bodies, edges, walls, gap, table, built_in), 1e-300))
     return Clocks(hertz, impact, overlap, film, crossing_step(float(bodies.radius.min()), speed))
+
+
+def _film_strength(laws: Laws, viscosity: float, reduced_radius: float, gap: float) -> float:
+    """Resistance of a film at the gap of asperities, times that gap [N s]."""
+    if laws.lubrication is None:
+        return lubrication.film_strength(viscosity, reduced_radius)
+    numbers = (gap, viscosity, reduced_radius, gap, laws.cutoff_ratio * reduced_radius)
+    return gap * asked_by_name(laws.lubrication, FILM_ARGUMENTS, numbers)
 
 
 def _lightest_pairs(bodies: Bodies, table: np.ndarray) -> list[tuple[float, float, np.ndarray]]:

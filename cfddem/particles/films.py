@@ -10,6 +10,14 @@ import numpy as np
 
 from cfddem.kernels import inline
 from cfddem.particles.forces import LEAST, pair_mass_and_radius, pair_row, pair_viscosity, relative_velocity
+from cfddem.particles.own_laws import (
+    film_is_outside,
+    gap_is_outside,
+    own_film,
+    own_minimum_gap,
+    own_resistance,
+    speed_after_own_film,
+)
 from cfddem.particles.pairs import THICKEST, geometry
 from cfddem.particles.surfaces import portion
 from cfddem.particles.vectors import dot, put, times
@@ -32,8 +40,16 @@ def moisten(gap, viscosity, reduced_radius, memory, row, laws):
     unknown = accounted_gap == np.inf
     approach_speed = 0.0 if begins else approach_speed
     minimum_gap = roughness if begins or (unknown and not within) else minimum_gap
+    if laws.minimum_gap is not None and begins:
+        minimum_gap = own_minimum_gap(roughness, 0.0, viscosity, row.film_modulus, reduced_radius, laws)
     accounted_gap = gap if not within or (begins and unknown) else accounted_gap
-    resistance = film_strength(viscosity, reduced_radius) / max(gap, minimum_gap)
+    if laws.lubrication is None:
+        resistance = film_strength(viscosity, reduced_radius) / max(gap, minimum_gap)
+    else:
+        resistance = own_film(gap, viscosity, reduced_radius, minimum_gap, laws)
+        resistance = (
+            LEAST if resistance < LEAST else resistance
+        )  # an encounter lasts where a film of finite extent ends
     return resistance if within else 0.0, approach_speed, minimum_gap, accounted_gap
 
 
@@ -51,14 +67,21 @@ def wet(k, bodies, edges, walls, shift, table, laws):
 
 
 @inline
-def encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row):
+def encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row, laws):
     """Remember the largest approach speed, and the minimum gap that belongs to it."""
-    if -normal_speed > edges.approach_speed[k] and gap > edges.minimum_gap[k]:
-        # slower approaches end on asperities, and need not be noted
-        slowest = elastohydrodynamic_speed(row.roughness_gap, viscosity, row.film_modulus, reduced_radius)
-        edges.approach_speed[k] = max(-normal_speed, slowest)
-        deformed = elastohydrodynamic(viscosity, -normal_speed, row.film_modulus, reduced_radius)
-        edges.minimum_gap[k] = max(row.roughness_gap, min(deformed, THICKEST * reduced_radius))
+    if not (-normal_speed > edges.approach_speed[k] and gap > edges.minimum_gap[k]):
+        return
+    if laws.minimum_gap is not None:
+        asked = (row.roughness_gap, -normal_speed, viscosity, row.film_modulus, reduced_radius, laws)
+        edges.approach_speed[k] = -normal_speed
+        edges.minimum_gap[k] = own_minimum_gap(*asked)
+        edges.outside[k] += gap_is_outside(*asked)
+        return
+    # slower approaches end on asperities, and need not be noted
+    slowest = elastohydrodynamic_speed(row.roughness_gap, viscosity, row.film_modulus, reduced_radius)
+    edges.approach_speed[k] = max(-normal_speed, slowest)
+    deformed = elastohydrodynamic(viscosity, -normal_speed, row.film_modulus, reduced_radius)
+    edges.minimum_gap[k] = max(row.roughness_gap, min(deformed, THICKEST * reduced_radius))
 
 
 @inline
@@ -69,9 +92,15 @@ def film_force(k, bodies, edges, walls, shift, table, laws):
     normal = times(1.0 / distance, separation)
     normal_speed = dot(relative_velocity(k, bodies, edges), normal)
     viscosity = pair_viscosity(k, bodies, edges)
-    encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, pair_row(k, bodies, edges, walls, table))
-    strength = film_strength(viscosity, reduced_radius)
-    resistance = film_resistance(strength, gap, edges.minimum_gap[k], laws.cutoff_ratio * reduced_radius)
+    row = pair_row(k, bodies, edges, walls, table)
+    encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row, laws)
+    if laws.lubrication is None:
+        strength = film_strength(viscosity, reduced_radius)
+        resistance = film_resistance(strength, gap, edges.minimum_gap[k], laws.cutoff_ratio * reduced_radius)
+    else:
+        resistance = own_resistance(gap, viscosity, reduced_radius, edges.minimum_gap[k], laws)
+        if edges.resistance[k] > 0.0:
+            edges.outside[k] += film_is_outside(gap, viscosity, reduced_radius, edges.minimum_gap[k], laws)
     return times(-portion(edges, k) * resistance * normal_speed, normal)
 
 
@@ -95,7 +124,7 @@ def squeeze_shortly(speed, gap, reduced_radius, rate, memory, laws, step):
     cutoff = laws.cutoff_ratio * reduced_radius
     new_speed = speed_after_short_step(speed, gap, accounted_gap, step, strength_per_mass, minimum_gap, cutoff)
     faster = -speed > approach_speed and gap > minimum_gap
-    found = new_speed == new_speed and not faster
+    found = new_speed == new_speed and not faster and laws.lubrication is None
     new_speed = never_faster(new_speed, speed)
     impulse = (new_speed - speed) * resistance / max(rate, LEAST)
     return (
@@ -124,17 +153,17 @@ def squeeze(k, bodies, edges, walls, shift, table, laws, step):
     if k < edges.between_particles:
         rate += bodies.film_rate[j]
     strength_per_mass = rate * max(gap, edges.minimum_gap[k])
-    row = pair_row(k, bodies, edges, walls, table)
-    encounter(k, edges, normal_speed, gap, pair_viscosity(k, bodies, edges), reduced_radius, row)
-    new_speed = speed_after_film(
-        normal_speed,
-        gap,
-        edges.accounted_gap[k],
-        step,
-        strength_per_mass,
-        edges.minimum_gap[k],
-        laws.cutoff_ratio * reduced_radius,
-    )
+    viscosity, row = pair_viscosity(k, bodies, edges), pair_row(k, bodies, edges, walls, table)
+    encounter(k, edges, normal_speed, gap, viscosity, reduced_radius, row, laws)
+    minimum_gap, given = edges.minimum_gap[k], edges.accounted_gap[k]
+    if laws.lubrication is None:
+        cutoff = laws.cutoff_ratio * reduced_radius
+        new_speed = speed_after_film(normal_speed, gap, given, step, strength_per_mass, minimum_gap, cutoff)
+    else:
+        film = (viscosity, reduced_radius, minimum_gap, laws)
+        inverse_mass = rate * portion(edges, k) / edges.resistance[k]
+        new_speed = speed_after_own_film(normal_speed, gap, given, step, inverse_mass, *film)
+        edges.outside[k] += film_is_outside(gap, *film)
     new_speed = never_faster(new_speed, normal_speed)
     edges.accounted_gap[k] = gap + step * new_speed
     put(edges.impulse, k, times((new_speed - normal_speed) * edges.resistance[k] / rate, normal))

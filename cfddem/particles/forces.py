@@ -7,10 +7,13 @@ that calls it runs on several pairs at once.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from cfddem.chosen_laws import OF_THE_PAIR_LOOP, chosen
 from cfddem.errors import InputError
 from cfddem.kernels import inline
+from cfddem.particles.own_laws import address
 from cfddem.particles.surfaces import SURFACE, touched
 from cfddem.particles.vectors import across, at, cross, dot, either, minus, plus, times
 from closures.blend import contact_share
@@ -65,6 +68,8 @@ class Laws(NamedTuple):
     normal_stiffness: float = 0.0  # of the linear contact [N/m]
     tangential_stiffness: float = 0.0  # of the linear contact [N/m]
     rolling_damping: float = 0.3  # of the rolling dashpot, over critical; 0.3 as in Ai et al. (2011) [-]
+    minimum_gap: Callable[..., float] | None = None  # a law of one's own for h_min, or the one that is built in
+    lubrication: Callable[..., float] | None = None  # a law of one's own for the resistance of a film
 
     def without_the_absent(self) -> Laws:
         """The same laws with each choice that is not made as None, which a loop compiled for it leaves out."""
@@ -72,12 +77,28 @@ class Laws(NamedTuple):
         absent: dict[str, Any] = {name: None for name in choices if not getattr(self, name)}
         return self._replace(**absent)
 
+    def dry(self) -> Laws:
+        """The same laws without films."""
+        return self._replace(film=False, minimum_gap=None, lubrication=None)
+
+    def for_loops(self) -> Laws:
+        """The same laws with those of one's own as loops take them."""
+        own: dict[str, Any] = {
+            name: address(getattr(self, name), name) for name in OF_THE_PAIR_LOOP if getattr(self, name) is not None
+        }
+        return self._replace(**own)
+
     def check(self) -> None:
         """Refuse choices that exclude each other."""
         if self.cohesion and self.film:
             raise InputError("cohesion", self.cohesion, "absent where there are films; adhesion is that of dry solids")
         if self.cohesion and self.contact != HERTZ:
             raise InputError("cohesion", self.cohesion, "with the contact of Hertz; linear springs do not adhere")
+        for kind in OF_THE_PAIR_LOOP:
+            if (law := getattr(self, kind)) is not None:
+                name = chosen(kind, law).name
+                if not self.film:
+                    raise InputError(kind, name, "absent where there are no films", "take Laws(film=True)")
 
 
 class Meeting(NamedTuple):

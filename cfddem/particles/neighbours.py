@@ -50,6 +50,7 @@ def list_edges(
     record: bool = False,
     roughness: float = 0.0,
     rolling: bool = False,
+    counted: bool = False,
 ) -> Edges:
     """A fresh pair graph of all that is closer than the reach of the film plus a skin.
 
@@ -59,6 +60,7 @@ def list_edges(
     record        keep the begin of encounters, for a record of them
     roughness     largest gap at which asperities hold a pair apart [m]
     rolling       keep what resists rolling
+    counted       count how often laws of one's own are asked outside of their range
     """
     largest = float(bodies.radius.max())
     reach = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
@@ -86,6 +88,7 @@ def list_edges(
         film=cutoff_ratio > 0.0,
         record=record,
         rolling=rolling,
+        counted=counted,
     )
 
 

@@ -43,6 +43,7 @@ class Edges(NamedTuple):
     touch: np.ndarray  # (particle-wall edges, 18) how sphere and wall stand: columns in `surfaces`
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
     incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
+    outside: np.ndarray  # (n,) int64, how often laws of one's own were asked outside of their range; else (0,)
 
 
 ENTRY = 6
@@ -73,6 +74,7 @@ def edges(
     film: bool,
     record: bool = False,
     rolling: bool = False,
+    counted: bool = False,
 ) -> Edges:
     """A fresh graph over `count` particles; pairs that have never met.
 
@@ -82,6 +84,7 @@ def edges(
     film                  keep what films remember
     record                keep the begin of encounters, for a record of them
     rolling               keep what resists rolling
+    counted               count how often laws of one's own are asked outside of their range
     """
     number = len(first)
     films = number if film else 0
@@ -107,6 +110,7 @@ def edges(
         np.zeros((number - int(between_particles), TOUCH)),
         start,
         incident,
+        np.zeros(number if counted else 0, np.int64),
     )
 
 

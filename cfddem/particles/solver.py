@@ -85,6 +85,7 @@ class ParticleSolver:
         self._walled = True if walls else None
         self.laws = laws or Laws()
         self.laws.check()
+        self._loop_laws = self.laws.for_loops()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
         few = bodies.count < THREADING_PAYS
@@ -97,6 +98,7 @@ class ParticleSolver:
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
         self.time, self.steps = 0.0, 0
+        self._outside = 0
         self.collisions = CollisionRecord() if record else None
         self.wall = Stopwatch()
         wrap(self.bodies.position, self.box)
@@ -121,6 +123,11 @@ class ParticleSolver:
     def gap(self) -> np.ndarray:
         """Gap of every listed pair [m]."""
         return gaps(self.edges, self.bodies, self.walls, self.box)
+
+    @property
+    def outside(self) -> int:
+        """How often laws of one's own, minimum gap or film, were asked outside of their range."""
+        return self._outside + int(self.edges.outside.sum())
 
     def refresh(self) -> None:
         """Find the forces at the present places, as after a change of state from outside."""
@@ -197,6 +204,7 @@ class ParticleSolver:
             "clock": {
                 "time": self.time, "steps": self.steps, "skin": self.skin,
                 "lists": self._lists, "listed_at": self._listed_at, "accepted": self._accepted,
+                "outside": self._outside,
             },
         }  # fmt: skip
 
@@ -207,13 +215,14 @@ class ParticleSolver:
         walls = dict(zip(self.walls._fields, self.walls)) | state["walls"]
         self.walls = type(self.walls)(**{name: np.array(each) for name, each in walls.items()})
         edges: dict[str, Any] = {
-            name: np.array(each) if np.ndim(each) else int(each) for name, each in state["edges"].items()
+            name: np.array(each) if np.ndim(each) else int(each)
+            for name, each in ({"outside": self.edges.outside} | state["edges"]).items()
         }
         clock = state["clock"]
         self.time, self.steps, self.skin = float(clock["time"]), int(clock["steps"]), float(clock["skin"])
         self._next_id = max(self._next_id, int(self.bodies.id.max()) + 1)
         self._lists, self._listed_at = int(clock["lists"]), int(clock["listed_at"])
-        self._accepted = float(clock.get("accepted", 0.0))
+        self._accepted, self._outside = float(clock.get("accepted", 0.0)), int(clock.get("outside", 0))
         travel = self.walls.travel.copy()
         self._take_list(Edges(**edges))
         self._origin[:] = state["origin"]
@@ -230,7 +239,7 @@ class ParticleSolver:
             self._walled,
             self._views[3],
             self.table,
-            self.laws.without_the_absent() if large else self.laws,
+            self._loop_laws.without_the_absent() if large else self._loop_laws,
             self.free,
             self.gravity,
             step,
@@ -253,7 +262,8 @@ class ParticleSolver:
     def _listed(self) -> Edges:
         record, roughness = self.collisions is not None, float(self.table["roughness_gap"].max())
         ratio, rolling = self._reach_ratio, bool(self.laws.rolling)
-        return list_edges(self.bodies, self.walls, ratio, self.skin, self.box, record, roughness, rolling)
+        counted = self._loop_laws.minimum_gap is not None or self._loop_laws.lubrication is not None
+        return list_edges(self.bodies, self.walls, ratio, self.skin, self.box, record, roughness, rolling, counted)
 
     def _relist(self) -> None:
         """Find the pairs anew; what they remember and the forces at hand are carried over."""
@@ -263,6 +273,7 @@ class ParticleSolver:
         self._tune_skin()
         fresh = self._listed()
         remember(old, fresh, order, _inverse(order))
+        self._outside += int(old.outside.sum())
         del old
         self._take_list(fresh)
         if self._lists % CHECK_EVERY == 0:
@@ -309,6 +320,7 @@ class ParticleSolver:
         wrap(made.position, self.box)
         fresh = self._listed()
         remember(old, fresh, order.astype(np.int32), place)
+        self._outside += int(old.outside.sum())
         self._take_list(fresh)
         self._accepted, self._listed_at = 0.0, self.steps
         springs = fresh.spring.copy()
