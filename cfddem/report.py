@@ -18,6 +18,7 @@ from cfddem.placement import grains_of
 from cfddem.record import energy
 from cfddem.record.quantities import MEAN_HEIGHT
 from cfddem.record.reading import Run, open_run
+from cfddem.record.regimes import RegimeMap, regime_map
 from cfddem.record.series import block_average, stationarity
 from closures import bed as laws_of_beds
 from closures import numbers
@@ -38,7 +39,8 @@ def report(folder: Path) -> dict[str, Any]:
     folder   of the run
     returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
              (law, computed, expected, ratio), `ledger`, `energy` (lines of the energy ledger at the end [J], where the
-             case asks for one), `warnings`, `wall_time`, `card`, `provenance`
+             case asks for one), `encounters` (of the window, where those on films are recorded), `warnings`,
+             `wall_time`, `card`, `provenance`
     """
     run = open_run(folder)
     if not len(run.history.get("time", ())):
@@ -60,6 +62,7 @@ def report(folder: Path) -> dict[str, Any]:
         "laws": laws,
         "ledger": _ledger(run),
         "energy": _energy(run),
+        "encounters": _encounters(run, begin),
         "warnings": _warnings(run, case, measures, laws),
         "wall_time": run.about.get("wall_time", {}),
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": _last(run, "fluid_steps")},
@@ -127,6 +130,28 @@ def _energy(run: Run) -> dict[str, float]:
     """The energy ledger at the end [J]; empty where the run has none."""
     lines = (name for name in energy.FIELDS if name in run.history)
     return {name.removeprefix("energy_"): float(run.history[name][-1]) for name in lines}
+
+
+def _encounters(run: Run, begin: float) -> dict[str, float]:
+    """How hard the encounters of the window were; empty where none on films were recorded."""
+    found = recorded_regimes(run, begin)
+    if found is None:
+        return {}
+    return {
+        "number": found.encounters,
+        "median_stokes": found.median_stokes,
+        "solids_meet": found.solids_meet,
+        "film_deforms": found.deformed,
+    }
+
+
+def recorded_regimes(run: Run, begin: float) -> RegimeMap | None:
+    """The regime map of all encounters that ended after a time [s]; None where none on films were recorded."""
+    rows = run.collisions
+    if "weight" not in rows:
+        return None
+    late = (rows["end"] >= begin) & np.isfinite(rows["stokes"]) & (rows["stokes"] > 0.0)
+    return regime_map({name: column[late] for name, column in rows.items()}) if late.any() else None
 
 
 def energy_lines(ledger: dict[str, float]) -> list[tuple[str, str, float, float]]:
@@ -273,6 +298,13 @@ def lines(result: dict[str, Any]) -> list[str]:
             out.append(f"  {row['law']:<40} {row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}")
     out += ["", "  ledger, largest over the run"]
     out += [f"  {name.replace('_', ' '):<24} {value:.2g}" for name, value in result["ledger"].items()]
+    if result.get("encounters"):
+        met = result["encounters"]
+        out += [
+            "",
+            f"  {met['number']:.0f} encounters on films: median St {met['median_stokes']:.3g}; the solids meet in "
+            f"{100.0 * met['solids_meet']:.3g} %, the film deforms them in {100.0 * met['film_deforms']:.3g} %",
+        ]
     if result.get("energy"):
         put_in = result["energy"]["put_in"]
         out += ["", f"  energy, of {put_in:.4g} J put in"]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from disturbed_runs import TINY
 
+from cfddem.case import Case
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
 from cfddem.particles.encounters import ENCOUNTER
@@ -13,6 +17,10 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
 from cfddem.record.collisions import CollisionRecord
 from cfddem.record.regimes import regime_map
+from cfddem.report import lines, report
+from cfddem.run import Run
+from cfddem.view.page import page
+from cfddem.view.plots import encounters
 from closures.minimum_gap import elastohydrodynamic
 
 
@@ -117,3 +125,14 @@ def test_the_map_counts_every_encounter_once() -> None:
 def test_a_record_without_films_has_no_map() -> None:
     with pytest.raises(InputError, match=r"encounters = 1: must be some that approach on a film"):
         regime_map({"stokes": np.array([np.inf])})
+
+
+def test_a_report_shows_the_map_where_encounters_were_recorded(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    Run.begin(Case.from_text(TINY.replace("until = 0.024", "until = 0.06")), folder).go()
+    found = report(folder)
+    met = found["encounters"]
+    assert met["number"] >= 1.0 and met["median_stokes"] > 0.0 and 0.0 <= met["solids_meet"] <= 1.0
+    assert any("encounters on films: median St" in line for line in lines(found))
+    assert "regime map of encounters" in page(folder, tmp_path / "page.html", found).read_text()
+    assert encounters(folder, tmp_path / "map.png").stat().st_size > 10_000

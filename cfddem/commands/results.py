@@ -42,6 +42,7 @@ def view(
     colour: Annotated[str, Parameter(help="of the spheres: speed, or a recorded field")] = "speed",
     movie: Annotated[Path | None, Parameter(help="film of all snapshots instead, .mp4 or .gif")] = None,
     history: Annotated[bool, Parameter(help="curves in time instead", negative="")] = False,
+    encounters: Annotated[bool, Parameter(help="map of the encounters instead, where recorded", negative="")] = False,
     window: Annotated[bool, Parameter(help="on the screen instead", negative="")] = False,
 ) -> None:
     """Make a picture of a run, a film, or curves in time.
@@ -57,6 +58,8 @@ def view(
         on_screen(folder, colour)
     elif movie is not None:
         print(pictures.movie(folder, movie, show=panels, colour=colour))
+    elif encounters:
+        print(plots.encounters(folder, output))
     elif history:
         print(plots.history(folder, output))
     else:

@@ -19,9 +19,9 @@ from cfddem.errors import RunFailed
 from cfddem.record.files import write_whole
 from cfddem.record.measures import voidage_profile
 from cfddem.record.reading import Run, open_run
-from cfddem.report import buoyant_weight, case_of, energy_lines, steadiness
+from cfddem.report import buoyant_weight, case_of, energy_lines, recorded_regimes, steadiness
 from cfddem.report import report as summary
-from cfddem.view.plots import BLUE, GREY, ORANGE, SKY, blank, label, panels
+from cfddem.view.plots import BLUE, GREY, ORANGE, SKY, blank, draw_regimes, label, panels
 
 MOST_PROFILES = 40
 """Snapshots of the window that the profile of the voidage is averaged over, at most."""
@@ -58,6 +58,7 @@ $profile
 <h2>Ledger</h2>
 $ledger
 $energy
+$encounters
 <h2>Wall time</h2>
 $wall
 <h2>What the run was</h2>
@@ -100,6 +101,7 @@ def render(run: Run, result: dict[str, Any]) -> str:
         profile=_profile(run, case, result),
         ledger=_table(("largest over the run", ""), _named(result["ledger"], 2)),
         energy=_energy(result["energy"]),
+        encounters=_encounters(run, begin),
         wall=_wall(result["wall_time"]),
         card=_card(result["card"]),
         case=escape(run.case_text),
@@ -224,6 +226,19 @@ def _series(run: Run, case: Case, result: dict[str, Any]) -> Any:
         each.set_ylabel(name)
     axes[-1].set_xlabel("time  [s]   (grey: window of the means, orange)")
     return figure
+
+
+def _encounters(run: Run, begin: float) -> str:
+    """The regime map, where encounters on films were recorded."""
+    found = recorded_regimes(run, begin)
+    if found is None:
+        return ""
+    figure, axes = panels(1, width=6.4, height=4.6)
+    draw_regimes(axes, found)
+    return f"<h2>Encounters</h2>{_image(figure, 'regime map of encounters')}" + (
+        f"<p>{found.encounters:.0f} encounters of the window. Above the dashed line the film's pressure keeps the "
+        "solids apart, below it asperities do; right of the orange line most encounters bring the solids together.</p>"
+    )
 
 
 def _weight(case: Case) -> float | None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from cfddem.record.regimes import RegimeMap
+
 BLUE, SKY, ORANGE, GREEN, RED, GREY = "#0b4f8a", "#56a6d9", "#e07b00", "#1b8a5a", "#b8323c", "#7a7a7a"
 """Colours that stay apart in print and for the colour-blind."""
 
@@ -121,6 +123,52 @@ def history(folder: str | Path, output: str | Path | None = None, columns: Seque
     output = Path(f"{run.folder.resolve().name}-history.png" if output is None else output)
     save(figure, output)
     return output
+
+
+def encounters(folder: str | Path, output: str | Path | None = None) -> Path:
+    """The regime map of a run's encounters.
+
+    folder   of a run
+    output   PNG; NAME-encounters.png in this folder if not given
+    returns  the file
+    errors   InputError for a run that has no record of encounters on films
+    """
+    from cfddem.record.reading import open_run
+    from cfddem.record.regimes import regime_map
+
+    run = open_run(folder)
+    found = regime_map(run.collisions)
+    figure, axes = panels(1, width=6.4, height=4.8)
+    draw_regimes(axes, found, run.folder.resolve().name)
+    output = Path(f"{run.folder.resolve().name}-encounters.png" if output is None else output)
+    save(figure, output)
+    return output
+
+
+def draw_regimes(axes: Axes, found: RegimeMap, title: str = "", most: float | None = None) -> Any:
+    """Density of encounters over Stokes number and h_eps/h_sigma; the line is where half of them bring solids together.
+
+    most     density of the darkest shade; that of the map if not given
+    returns  the shades, for a scale
+    """
+    import numpy as np
+
+    shown = np.where(found.density > 0.0, found.density, np.nan)
+    shades = axes.pcolormesh(found.stokes, found.thickness, shown, cmap="Blues", vmin=0.0, vmax=most, rasterized=True)
+    middle = [np.sqrt(borders[1:] * borders[:-1]) for borders in (found.stokes, found.thickness)]
+    column = np.nansum(found.met * found.density, axis=0) / np.maximum(np.nansum(found.density, axis=0), 1e-300)
+    crossed = np.flatnonzero((column[:-1] < 0.5) & (column[1:] >= 0.5))
+    if len(crossed):
+        axes.axvline(float(found.stokes[crossed[0] + 1]), color=ORANGE, linewidth=1.2)
+    low, high = min(found.thickness[0], 0.5), max(found.thickness[-1], 2.0)
+    axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")
+    axes.set(xscale="log", yscale="log", xlim=(middle[0][0], middle[0][-1]), ylim=(low, high))
+    label(axes, "Stokes number of the approach", "-", "elastohydrodynamic gap over roughness", "-", title)
+    axes.text(
+        0.02, 0.98, f"median St {found.median_stokes:.3g}\nsolids meet in {100.0 * found.solids_meet:.3g} %",
+        transform=axes.transAxes, ha="left", va="top", fontsize=9.5,
+    )  # fmt: skip
+    return shades
 
 
 def label(axes: Axes, x: str, x_unit: str, y: str, y_unit: str, title: str = "") -> None:
