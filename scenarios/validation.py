@@ -30,6 +30,7 @@ TARGETS: dict[str, str] = {
     "fluid": "scenarios.fluid_validation",
     "coupling": "scenarios.coupling_validation",
     "beds": "scenarios.beds_validation",
+    "lubrication": "scenarios.lubrication_study_validation",
     "wet-tumbler": "scenarios.wet_tumbler_validation",
     "wet": "scenarios.wet_validation",
 }
