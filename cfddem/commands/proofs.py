@@ -14,7 +14,9 @@ from cfddem.errors import InputError, nearest
 
 
 def validate(
-    target: Annotated[str, Parameter(help="binary-collision, or all")] = "all",
+    target: Annotated[
+        str, Parameter(help="binary-collision, particles, fluid, coupling, beds, wet, wet-tumbler, or all")
+    ] = "all",
     *,
     output: Annotated[Path, Parameter(help="folder for figures, tables and histories")] = Path("results/validation"),
     json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
