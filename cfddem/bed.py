@@ -9,12 +9,13 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 
 from cfddem.errors import InputError
 from cfddem.materials import Checked
+from cfddem.mistakes import shown
 
 Positive = Annotated[float, Field(gt=0)]
 Point = tuple[float, float, float]
 Sizes = tuple[tuple[Positive, Annotated[float, Field(ge=0)]], ...]
 
-Name = Annotated[str, Field(pattern=r"^\w[\w-]*$", max_length=40)]
+Name = Annotated[str, Field(pattern=r"^\w[\w-]*$", max_length=24)]
 
 POURED_SOLID_FRACTION = 0.58
 """Solid fraction of a poured bed, by which a bed's height is turned into a number of particles, and back."""
@@ -52,7 +53,7 @@ class Species(Checked):
                     raise InputError(name, getattr(self, name), "left out where sizes are given")
             if not sum(share for _, share in self.sizes) > 0.0:
                 raise InputError("sizes", None, "a list with a share of the volume above 0")
-            object.__setattr__(self, "diameter", self.sauter)
+            object.__setattr__(self, "diameter", self._sauter_of_sizes())
         elif self.diameter == 0.0 and not self._is_mixture:
             raise InputError("diameter", None, "given", "diameter is d; the mean where sizes differ [m]")
         return self
@@ -87,6 +88,12 @@ class Species(Checked):
     def sauter(self) -> float:
         """Sauter mean of the diameter: that of spheres with the same volume over surface [m]."""
         return self.mean_power(3) / self.mean_power(2)
+
+    def _sauter_of_sizes(self) -> float:
+        try:
+            return self.sauter
+        except ArithmeticError:
+            raise InputError("sizes", shown(self.sizes), "a list of diameters whose cubes can be added up") from None
 
     @property
     def smallest(self) -> float:
@@ -169,9 +176,19 @@ class Bed(Species):
         total = sum(part.fraction or 0.0 for part in self.species.values())
         if self.height and abs(total - 1.0) > _SAME:
             raise InputError("species", None, "given with fractions that add up to 1", f"here to {total:.6g}")
-        volumes = self.volumes(1.0)
-        surfaces = sum(volume / self.species[name].sauter for name, volume in volumes.items())
-        object.__setattr__(self, "diameter", sum(volumes.values()) / surfaces)
+        object.__setattr__(self, "diameter", self._sauter_of_all())
+
+    def _sauter_of_all(self) -> float:
+        """Sauter mean of the diameters of all species [m]."""
+        try:
+            volumes = self.volumes(1.0)
+            surfaces = sum(volume / self.species[name].sauter for name, volume in volumes.items())
+            mean = sum(volumes.values()) / surfaces
+        except ArithmeticError:
+            mean = math.nan
+        if not 0.0 < mean < math.inf:
+            raise InputError("species", None, "given with diameters whose cubes can be added up", "they are in m")
+        return mean
 
     def volumes(self, whole: float) -> dict[str, float]:
         """Volume of the particles of each species [m3].

@@ -136,9 +136,9 @@ def _flow_rows(case: Case, bed: Bed) -> Iterator[Row]:
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"of the {'superficial inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes)
-    slowest = "particle of the slowest species" if case.bed.species else "particle"
+    slowest = "the slowest species" if case.bed.species else "one particle"
     yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {bed_drag(case).__name__}")
-    yield Row(group, "u_t", bed.terminal, "m/s", f"of one {slowest} alone, Brown and Lawler")
+    yield Row(group, "u_t", bed.terminal, "m/s", f"of {slowest} alone, Brown and Lawler")
     if bed.inlet and bed.onset and bed.terminal:
         yield Row(group, "u / u_mf", bed.inlet / bed.onset)
         yield Row(group, "u / u_t", bed.inlet / bed.terminal)

@@ -156,4 +156,7 @@ def _root(excess: Callable[[float], float], low: float, high: float) -> float:
 
     if low == high:
         return low
-    return float(brentq(excess, low, high, xtol=1e-300, rtol=1e-12, maxiter=500))
+    try:
+        return float(brentq(excess, low, high, xtol=1e-300, rtol=1e-12, maxiter=500))
+    except RuntimeError as failure:
+        raise ArithmeticError(f"no balance between {low:g} and {high:g}: {failure}") from failure

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from example_case import TEXT
+from example_case import MIXTURE, TEXT
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -217,8 +217,9 @@ ENDINGS = [
 @st.composite
 def mutated_files(draw: st.DrawFn) -> bytes:
     """A case file with a few things wrong: values, keys, text, bytes."""
-    values = copy.deepcopy(tomllib.loads(TEXT))
-    tables = [values, *(each for each in values.values() if isinstance(each, dict)), values["material"]["alumina"]]
+    values = copy.deepcopy(tomllib.loads(draw(st.sampled_from([TEXT, MIXTURE]))))
+    tables = [values, *(each for each in values.values() if isinstance(each, dict)), *values["material"].values()]
+    tables += values["bed"].get("species", {}).values()
     known = [name for part in Case.model_json_schema()["$defs"].values() for name in part["properties"]]
     for _ in range(draw(st.integers(0, 4))):
         table = draw(st.sampled_from(tables))

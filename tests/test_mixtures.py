@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from example_case import MIXTURE
 
 from cfddem import open_run
 from cfddem.assembly import assemble
@@ -21,51 +22,6 @@ from cfddem.placement import grains_of
 from cfddem.report import buoyant_weight, report
 from cfddem.run import Run
 from closures.drag_resolved import beetstra, beetstra_polydisperse
-
-MIXTURE = """
-title = "Glass beads and larger, lighter pellets"
-[fluid]
-density = 1000.0
-viscosity = 1e-3
-[material.glass]
-density = 2500.0
-youngs_modulus = 60e9
-contact_modulus = 2e6
-poisson = 0.25
-restitution = 0.9
-friction = 0.3
-[material.plastic]
-density = 1500.0
-youngs_modulus = 2e9
-contact_modulus = 2e6
-poisson = 0.3
-restitution = 0.8
-friction = 0.2
-[column]
-width = 0.012
-height = 0.042
-cell = 0.003
-[bed]
-start = "suspended"
-inlet_velocity = 0.05
-[bed.species.beads]
-material = "glass"
-diameter = 1e-3
-count = 200
-[bed.species.pellets]
-material = "plastic"
-diameter = 2e-3
-spread = 0.05
-count = 40
-[laws]
-drag = "beetstra_polydisperse"
-lubrication = "none"
-[run]
-until = 0.012
-every = 0.004
-history_every = 0.002
-reference_speed = 0.1
-"""
 
 
 def mixture(**given: Any) -> Case:
