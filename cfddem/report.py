@@ -25,8 +25,8 @@ from closures import numbers
 from closures.law import SHELF
 
 MEASURES = (
-    "bed_height", "bed_voidage", "bed_voidage_pressure", "pressure_drop", "granular_temperature", "fastest",
-    "contact_count",
+    "bed_height", "bed_voidage", "bed_voidage_pressure", "pressure_drop", "wall_support", "granular_temperature",
+    "fastest", "contact_count",
 )  # fmt: skip
 
 FREE_SIDES = ("free_slip", "periodic")

@@ -314,6 +314,7 @@ def measure(simulation: Simulation) -> dict[str, float]:
         ),
         "pressure_drop": pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open)
         + entrance_rise(fluid.volume_flux(2)[0], fluid.mean_voidage[0], fluid.density, grid.open[0]),
+        "wall_support": -float(simulation.particles.wall_force[:, 2].sum()) / floor,
         "exchange_imbalance": exchange_imbalance(fluid, simulation.exchange),
         "volume_imbalance": volume_imbalance(fluid),
         "outside_range": float(simulation.exchange.outside + simulation.particles.outside),

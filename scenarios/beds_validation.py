@@ -128,7 +128,7 @@ def bubbling(folder: Path, tell: Tell) -> list[Row]:
     note = f"standard error {height.error:.2g}"
     return [
         Row("Mueller: height", height.mean, MUELLER_HEIGHT, 0.15 * MUELLER_HEIGHT, "m", note),
-        _weight("Mueller", case, run.history["pressure_drop"][window]),
+        *_weight("Mueller", case, run.history, window),
     ]
 
 
@@ -147,7 +147,7 @@ def flat(folder: Path, tell: Tell) -> list[Row]:
         Row("van Wachem: frequency of height", spectrum(heights, interval).main, 2.65, 0.53, "Hz"),
         Row("van Wachem: deviation of pressure over that measured, log2", math.log2(pressures.std() / 82.0), 0.0, 1.0),
         Row("van Wachem: frequency of pressure", spectrum(pressures, between).main, 2.25, 0.45, "Hz"),
-        _weight("van Wachem", case, run.history["pressure_drop"][window]),
+        *_weight("van Wachem", case, run.history, window),
     ]
 
 
@@ -174,9 +174,15 @@ def finished(case: Case, folder: Path, name: str, tell: Tell, changes: dict[str,
     return open_run(home)
 
 
-def _weight(name: str, case: Case, drops: np.ndarray) -> Row:
-    drop = block_average(drops)
+def _weight(name: str, case: Case, history: dict[str, np.ndarray], window: np.ndarray) -> list[Row]:
+    """What carries a bed: the fluid, and together with it what grains pass to the floor and the sides."""
     weight = buoyant_weight(case) / case.column.floor_area
-    return Row(
-        f"{name}: pressure drop over weight", drop.mean / weight, 1.0, 0.03, note=f"error {drop.error / weight:.2g}"
-    )
+    drop = block_average(history["pressure_drop"][window])
+    walls = block_average(history["wall_support"][window])
+    note = f"error {drop.error / weight:.2g}"
+    return [
+        Row(f"{name}: pressure drop over weight", drop.mean / weight, 1.0, 0.03, note=note),
+        Row(
+            f"{name}: pressure drop and support of the walls over weight", (drop.mean + walls.mean) / weight, 1.0, 0.01
+        ),
+    ]

@@ -33,6 +33,7 @@ KNOWN = {
     "pressure": Quantity("Pa", "pressure without the hydrostatic one"),
     "bed_height": Quantity("m", "height below which 99 % of the particle volume lies"),
     "pressure_drop": Quantity("Pa", "pressure drop from below the floor, without the hydrostatic one"),
+    "wall_support": Quantity("Pa", "weight that floor and sides carry by contact, over the floor"),
     "bed_voidage": Quantity("1", "mean voidage of the bed, by its height"),
     "bed_voidage_pressure": Quantity("1", "mean voidage of the bed, by the slope of the pressure within it"),
     "granular_temperature": Quantity("m2/s2", "third of the mean square of the fluctuating velocity"),
