@@ -14,6 +14,8 @@ from cfddem.expected import bed_of
 from cfddem.gallery import gallery
 from cfddem.mixture import sinking
 from cfddem.report import buoyant_weight
+from cfddem.run import measure
+from cfddem.simulation import Simulation
 from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
 from closures.drag import ergun
@@ -141,6 +143,17 @@ def test_the_spout_is_where_grains_go_up() -> None:
 
 def test_the_slice_of_the_spouted_bed_is_its_share_of_the_experiment() -> None:
     assert spout().particle_count / 175_800 == pytest.approx(spout().column.size[1] / 0.04, rel=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("velocity", "above"), [*zip(VELOCITIES, ("pellets", "beads"))])
+def test_species_sink_on_the_side_of_the_published_threshold(velocity: float, above: str) -> None:
+    """Equal bulk densities of the layers at 0.082 to 0.088 m/s (Epstein & LeClair, Chem. Eng. Sci. 40, 1517)."""
+    simulation = Simulation(mixture(velocity))
+    simulation.until(2.0)
+    row = measure(simulation)
+    below = next(name for name in simulation.case.species if name != above)
+    assert row[f"mean_height_{above}"] - row[f"mean_height_{below}"] > 0.05 * row["bed_height"]
 
 
 @pytest.mark.slow
