@@ -139,9 +139,7 @@ class CaseRun(Checked):
     reference_speed: Positive | None = Field(
         None, description="fastest collision expected; estimated if not given [m/s]"
     )
-    energy: bool = Field(
-        False, description="keep the energy ledger, channel by channel; takes a third of the time more"
-    )
+    energy: bool = Field(False, description="keep the energy ledger, by channel; a run takes up to half as long again")
     collisions: bool = Field(False, description="record every encounter of two bodies, from first to last touch")
 
 

@@ -173,3 +173,13 @@ def test_a_liquid_bed_accounts_for_its_energy(tmp_path: Path) -> None:
     for name in one:
         if name.startswith("energy_"):
             assert np.array_equal(one[name], other[name]), name
+
+
+def test_dry_spheres_that_fall_on_a_floor_account_for_their_energy(tmp_path: Path) -> None:
+    changes = {"fluid": None, "bed.inlet_velocity": 0.0, "run.until": 0.1, "run.every": 0.05}
+    Run.begin(Case.from_text(LIQUID).with_(**changes), tmp_path / "run").go()
+    ledger = report(tmp_path / "run")["energy"]
+    assert -ledger["potential"] > 0.5 * ledger["put_in"]
+    assert ledger["contact_damping"] > 0.1 * ledger["put_in"] and ledger["friction"] > 0.0
+    assert not {"drag", "inflow", "fluid_kinetic"} & ledger.keys()
+    assert abs(ledger["remainder"]) < 0.01 * ledger["put_in"], ledger

@@ -15,7 +15,7 @@ from cfddem.errors import InputError, nearest
 
 def validate(
     target: Annotated[
-        str, Parameter(help="binary-collision, particles, fluid, coupling, beds, wet, wet-tumbler, or all")
+        str, Parameter(help="binary-collision, particles, fluid, coupling, beds, lubrication, wet, wet-tumbler, or all")
     ] = "all",
     *,
     output: Annotated[Path, Parameter(help="folder for figures, tables and histories")] = Path("results/validation"),

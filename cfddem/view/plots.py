@@ -155,14 +155,13 @@ def draw_regimes(axes: Axes, found: RegimeMap, title: str = "", most: float | No
 
     shown = np.where(found.density > 0.0, found.density, np.nan)
     shades = axes.pcolormesh(found.stokes, found.thickness, shown, cmap="Blues", vmin=0.0, vmax=most, rasterized=True)
-    middle = [np.sqrt(borders[1:] * borders[:-1]) for borders in (found.stokes, found.thickness)]
     column = np.nansum(found.met * found.density, axis=0) / np.maximum(np.nansum(found.density, axis=0), 1e-300)
     crossed = np.flatnonzero((column[:-1] < 0.5) & (column[1:] >= 0.5))
     if len(crossed):
         axes.axvline(float(found.stokes[crossed[0] + 1]), color=ORANGE, linewidth=1.2)
     low, high = min(found.thickness[0], 0.5), max(found.thickness[-1], 2.0)
     axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")
-    axes.set(xscale="log", yscale="log", xlim=(middle[0][0], middle[0][-1]), ylim=(low, high))
+    axes.set(xscale="log", yscale="log", xlim=(found.stokes[0], found.stokes[-1]), ylim=(low, high))
     label(axes, "Stokes number of the approach", "-", "elastohydrodynamic gap over roughness", "-", title)
     axes.text(
         0.02, 0.98, f"median St {found.median_stokes:.3g}\nsolids meet in {100.0 * found.solids_meet:.3g} %",
