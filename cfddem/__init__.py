@@ -9,6 +9,8 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Box": "cfddem.particles.walls",
+    "BridgeLaws": "cfddem.particles.bridge_loops",
+    "Bridges": "cfddem.particles.bridges",
     "Case": "cfddem.case",
     "CfddemError": "cfddem.errors",
     "Cone": "cfddem.particles.walls",

@@ -18,15 +18,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from cfddem.errors import InputError, RunFailed, nearest
+from cfddem.particles.bridge_loops import BRIDGE_FILMS, CUTS, PULLS, TANGENTIALS, BridgeLaws
 from closures import contact
 from closures.lubrication import film_strength
 from closures.minimum_gap import glass_transition
 from scenarios import wet_pair_motion as motion
-from scenarios.wet_pair_motion import CONSTANT, DAVIS, DEFORMING, NASE, NONE, STATE, STATIC, ZERO, Numbers
+from scenarios.wet_pair_motion import STATE, Numbers
 
-BRIDGES = {"deforming": DEFORMING, "static": STATIC}
-CUTS = {"zero": ZERO, "constant": CONSTANT}
-TANGENTIAL: dict[str | None, int] = {"davis": DAVIS, "nase": NASE, None: NONE}
+BRIDGES = {name: BRIDGE_FILMS[name] for name in ("deforming", "static")}
+TANGENTIAL: dict[str | None, int] = {None: TANGENTIALS["none"], **TANGENTIALS}
 
 TRANSITION_PRESSURES = {
     ("static", "constant"): 4.9e6,
@@ -110,10 +110,13 @@ def collide_wet(
     _check("poisson", poisson, -1.0 < poisson <= 0.5, "above -1 and at most 0.5")
     for name, value in (("friction", friction), ("surface_tension", surface_tension)):
         _check(name, value, 0.0 <= value < math.inf, "at least 0 and finite")
-    kinds = (
-        _choice("bridge", bridge, BRIDGES),
-        _choice("cut", cut, CUTS),
-        _choice("tangential", tangential, TANGENTIAL),
+    liquid = BridgeLaws(
+        viscosity=viscosity,
+        surface_tension=surface_tension,
+        film=_choice("bridge", bridge, BRIDGES),
+        cut=_choice("cut", cut, CUTS),
+        tangential=_choice("tangential", tangential, TANGENTIAL),
+        pull=PULLS["constant" if capillary else "none"],
     )
     pressure = TRANSITION_PRESSURES[bridge, cut] if glass_transition_pressure is None else glass_transition_pressure
     _check("glass_transition_pressure", pressure, 0.0 < pressure < math.inf, "above 0 and finite")
@@ -126,15 +129,11 @@ def collide_wet(
         minimum_gap=glass_transition(viscosity, speed, pressure, 0.5 * radius, film),
         radius=radius,
         mass=mass,
-        viscosity=viscosity,
-        surface_tension=surface_tension if capillary else 0.0,
         modulus=contact.reduced_modulus(youngs_modulus, poisson, youngs_modulus, poisson),
         shear_modulus=contact.reduced_shear_modulus(youngs_modulus, poisson, youngs_modulus, poisson),
         damping_ratio=contact.damping_ratio(restitution),
         friction=friction,
-        bridge=kinds[0],
-        cut=kinds[1],
-        tangential=kinds[2],
+        liquid=liquid,
     )
     parted, time, state, rows = _run(numbers, angle, duration, keep=True)
     bounces = parted and (angle == 0.0 or _run(numbers, 0.0, duration, keep=False)[0])

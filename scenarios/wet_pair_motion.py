@@ -11,31 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.kernels import kernel
-from closures.bridge import (
-    constant_capillary,
-    constant_cut,
-    davis_tangential,
-    deforming_share,
-    nase_tangential,
-    static_share,
-    zero_cut,
-)
+from cfddem.particles.bridge_loops import BridgeLaws, pull_of, resistances
 from closures.contact import hertz_damping, hertz_force, hertz_stiffness, mindlin_stiffness
 from closures.friction import coulomb_limit
-from closures.lubrication import film_strength
 from scenarios.adaptive import STAGES, next_length, stepper
 
 GAP, ANGLE, APPROACH, TURNING, SPIN, SPRING, STATE = 0, 1, 2, 3, 4, 5, 6
-STATIC, DEFORMING = 0, 1
-ZERO, CONSTANT = 0, 1
-NONE, DAVIS, NASE = 0, 1, 2
 
 PARTED, ENDED, FULL, STUCK = 0, 1, 2, 3
 """Why the march returns."""
 
 MOST_STEPS = 5_000_000
-SMALLEST_GAP = 1e-9
-"""Below this the logarithm of the film is held where nothing else holds it [m]."""
 
 
 class Numbers(NamedTuple):
@@ -46,32 +32,11 @@ class Numbers(NamedTuple):
     minimum_gap: float  # h_min [m]
     radius: float  # [m]
     mass: float  # of one sphere [kg]
-    viscosity: float  # [Pa s]
-    surface_tension: float  # 0 without a capillary pull [N/m]
     modulus: float  # E* [Pa]
     shear_modulus: float  # G* [Pa]
     damping_ratio: float  # of Tsuji's dashpot [-]
     friction: float  # [-]
-    bridge: int
-    cut: int
-    tangential: int
-
-
-@kernel
-def film_resistance(gap, numbers):
-    """Resistance of the film along and across the line of centres."""
-    reduced_radius = 0.5 * numbers.radius
-    at = max(constant_cut(gap, numbers.minimum_gap) if numbers.cut == CONSTANT else gap, SMALLEST_GAP)
-    share = deforming_share(at, numbers.film) if numbers.bridge == DEFORMING else static_share(at, numbers.film)
-    along = film_strength(numbers.viscosity, reduced_radius) * share / at
-    across = 0.0
-    if numbers.tangential == DAVIS:
-        across = davis_tangential(numbers.viscosity, reduced_radius, at, numbers.film)
-    elif numbers.tangential == NASE:
-        across = nase_tangential(numbers.viscosity, reduced_radius, at, numbers.film)
-    if numbers.cut == ZERO:
-        return zero_cut(along, gap, numbers.minimum_gap), zero_cut(across, gap, numbers.minimum_gap)
-    return along, across
+    liquid: BridgeLaws
 
 
 @kernel
@@ -99,11 +64,9 @@ def rates(state, modes, numbers, slopes, at):
     """Slopes of the state; `modes` is not used, all that changes with the gap is in the laws."""
     film, speed = numbers.film, numbers.speed
     gap, approach, sliding = film * state[GAP], speed * state[APPROACH], slip(state, numbers)
-    push, drag = film_resistance(gap, numbers)
-    push *= approach
+    push, drag = resistances(gap, film, numbers.minimum_gap, 0.5 * numbers.radius, numbers.liquid)
+    push = push * approach - pull_of(gap, film, 0.0, 0.5 * numbers.radius, numbers.liquid)
     drag *= sliding
-    if gap < film:
-        push -= constant_capillary(numbers.surface_tension, 0.5 * numbers.radius)
     slopes[at + SPRING] = 0.0
     if gap < 0.0:
         along, across, _ = solid(-gap, approach, sliding, film * state[SPRING], numbers)

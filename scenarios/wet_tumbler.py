@@ -2,9 +2,9 @@
 
 What you'll learn: how large agglomerates of wet spheres grow, against the capillary number of the stirring.
 
-Spheres with films of their own tumble in a periodic box, carried by a steady cellular flow. Contacts and the viscous
-part of the films are the particle engine's; bridges and the drag of the flow are laid over it in kicks
-(:mod:`scenarios.wet_bridges`). The flow does not feel the spheres, and its drag is linear.
+Spheres with films of their own tumble in a periodic box, carried by a steady cellular flow. Contacts, the viscous
+part of the films and the liquid bridges are the particle engine's; the drag of the flow is laid over it in kicks. The
+flow does not feel the spheres, and its drag is linear.
 
 >>> from scenarios.wet_tumbler import tumble
 >>> result = tumble(capillary_number=0.05, count=60, until=0.01)
@@ -22,11 +22,12 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
+from cfddem.particles.bridge_loops import BridgeLaws
+from cfddem.particles.bridges import Bridges
 from cfddem.particles.forces import Laws
 from cfddem.particles.packing import random_packing
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import bodies
-from scenarios.wet_bridges import NEVER, Bridges
 
 GRAIN = Material(
     density=2500,
@@ -62,7 +63,8 @@ class Tumbling:
     spheres: int
     momentum_error: float  # change of momentum less the impulse of the flow, over the sum of m |v| [-]
     liquid_error: float  # change of the liquid in films and bridges, relative [-]
-    bridge_set: Bridges = field(repr=False)  # the end, and the engine's run in it
+    agglomerates: np.ndarray = field(repr=False)  # that each sphere is in at the end, by row of the run (N,)
+    run: ParticleSolver = field(repr=False)  # at the end
 
     def late(self, values: np.ndarray) -> float:
         """Mean over the last half of the run."""
@@ -113,19 +115,22 @@ def tumble(
     if not 0.0 <= film_spread < 1.0:
         raise InputError("film_spread", film_spread, "at least 0 and below 1")
     surface_tension = viscosity * max(shear_rate, 1.0) * diameter / capillary_number
-    run = _spheres(count, diameter, film, viscosity, solid_fraction, seed)
     thickness = film * (1.0 + film_spread * np.random.default_rng(seed).uniform(-1.0, 1.0, count))
-    bridges = Bridges(run, thickness[run.bodies.id], surface_tension, math.radians(contact_angle), viscosity)
+    liquid = BridgeLaws(viscosity, surface_tension, math.radians(contact_angle), every=SUBSTEPS)
+    run, bridges = _spheres(diameter, thickness, film, liquid, solid_fraction, seed)
     flow = Flow(run, shear_rate, drag_time)
     run.bodies.velocity[:] = flow.speed
     run.refresh()
-    start, liquid = _momentum(run), bridges.liquid
+    start, all_liquid = _momentum(run), bridges.liquid
     step = run.clocks(2.0 * shear_rate * diameter).recommended
     rounds = max(1, round(until / samples / SUBSTEPS / step))
     counted = [_count(bridges)]
     for sample in range(samples):
         for _ in range(rounds):
-            advance(bridges, flow, step)
+            flow.kick(0.5 * SUBSTEPS * step)
+            run.advance(step, SUBSTEPS)
+            flow.update()
+            flow.kick(0.5 * SUBSTEPS * step)
         counted.append(_count(bridges))
         if progress is not None:
             progress((sample + 1) / samples)
@@ -144,8 +149,9 @@ def tumble(
         broken=bridges.broken,
         spheres=len(np.unique(run.bodies.id)),
         momentum_error=float(drift),
-        liquid_error=abs(bridges.liquid / liquid - 1.0),
-        bridge_set=bridges,
+        liquid_error=abs(bridges.liquid / all_liquid - 1.0),
+        agglomerates=bridges.agglomerates,
+        run=run,
     )
 
 
@@ -176,33 +182,18 @@ class Flow:
         self.impulse += (bodies.mass[:, None] * gain).sum(axis=0)
 
 
-def advance(bridges: Bridges, flow: Flow | None, step: float, substeps: int = SUBSTEPS) -> None:
-    """A few steps of the engine between two half kicks of bridges and flow."""
-    half = 0.5 * substeps * step
-    bridges.kick(half)
-    if flow is not None:
-        flow.kick(half)
-    bridges.run.advance(step, substeps)
-    bridges.update()
-    if flow is not None:
-        flow.update()
-        flow.kick(half)
-    bridges.kick(half)
-
-
 def _spheres(
-    count: int, diameter: float, film: float, viscosity: float, solid_fraction: float, seed: int
-) -> ParticleSolver:
+    diameter: float, thickness: np.ndarray, film: float, liquid: BridgeLaws, solid_fraction: float, seed: int
+) -> tuple[ParticleSolver, Bridges]:
     """Spheres at random places of a periodic box, none in reach of another's film; films reach as far as two layers."""
     room = diameter + 4.0 * film
-    places, box = random_packing(np.full(count, room), solid_fraction * (room / diameter) ** 3, seed)
+    places, box = random_packing(np.full(len(thickness), room), solid_fraction * (room / diameter) ** 3, seed)
+    spheres = bodies(places, 0.5 * diameter, GRAIN.density, viscosity=liquid.viscosity)
+    bridges = Bridges(spheres, thickness, liquid)
+    laws = Laws(film=True, cutoff_ratio=2.0 * film / (0.25 * diameter))
     return ParticleSolver(
-        bodies(places, 0.5 * diameter, GRAIN.density, viscosity=viscosity),
-        pair_table([GRAIN]),
-        laws=Laws(film=True, cutoff_ratio=2.0 * film / (0.25 * diameter)),
-        box=(box[0], box[1], box[2]),
-        sort_every=NEVER,
-    )
+        spheres, pair_table([GRAIN]), laws=laws, box=(box[0], box[1], box[2]), bridges=bridges
+    ), bridges
 
 
 def _momentum(run: ParticleSolver) -> np.ndarray:
@@ -212,4 +203,4 @@ def _momentum(run: ParticleSolver) -> np.ndarray:
 def _count(bridges: Bridges) -> tuple[float, float, float, float]:
     """Mean, weighed and largest size of the agglomerates, and bridges per sphere."""
     size = np.bincount(bridges.agglomerates)
-    return float(size.mean()), float((size**2).sum() / size.sum()), float(size.max()), len(bridges.first) / size.sum()
+    return float(size.mean()), float((size**2).sum() / size.sum()), float(size.max()), bridges.count / size.sum()

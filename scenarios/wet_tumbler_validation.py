@@ -88,9 +88,9 @@ def draw_spheres(path: Path, runs: list[Tumbling]) -> None:
     figure, axes = panels(len(runs), width=6.2 * len(runs), height=5.4)
     norm, scale = LogNorm(1.0, max(float(run.largest_size[-1]) for run in runs)), mpl.colormaps["viridis_r"]
     for axis, run in zip(np.atleast_1d(axes), runs):
-        spheres, box = run.bridge_set.run.bodies, run.bridge_set.run.box
+        spheres, box = run.run.bodies, run.run.box
         place = 1e3 * (spheres.position % box)
-        named = run.bridge_set.agglomerates
+        named = run.agglomerates
         order = np.argsort(-place[:, 1])
         near = 1.0 - place[order, 1] / (1e3 * box[1])  # 0 at the back, 1 in front
         colour = scale(norm(np.bincount(named)[named][order]))

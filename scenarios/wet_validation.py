@@ -16,6 +16,7 @@ from scenarios.three_spheres import simulate
 from scenarios.three_spheres_validation import first_above, of
 from scenarios.validation import Columns, Row, Tell, reference, worst, write_histories
 from scenarios.wet_pair import TRANSITION_PRESSURES, collide_wet
+from scenarios.wet_pair_engine import simulate as in_engine
 
 Curves = dict[str, Columns]
 HEAD_ON_CRITICAL = {
@@ -103,6 +104,30 @@ def soft_and_hard() -> list[Row]:
     ]
 
 
+ENGINE: tuple[dict[str, Any], ...] = (
+    *({"stokes": 2.0, "angle": 45.0, "friction": 0.05, "bridge": b, "cut": c} for b, c in TRANSITION_PRESSURES),
+    *({"stokes": stokes, "angle": 60.0} for stokes in (0.5, 0.8, 1.0, 1.2, 4.0)),
+    {"stokes": 1.2, "angle": 60.0, "tangential": "nase"},
+    {"stokes": 0.5, "angle": 60.0, "capillary": True},
+)
+"""Collisions that are made in the particle engine, too."""
+
+
+def engine_pairs(_: Path, __: Curves) -> list[Row]:
+    """Wet pair in the particle engine: Cartesian, with its contact and a liquid bridge, beside the polar equations."""
+    restitutions, spins, times = [], [], []
+    for given in ENGINE:
+        polar, engine = collide_wet(**given), in_engine(**given)
+        restitutions.append((given["stokes"], engine.restitution / polar.restitution, 1.0))
+        spins.append((given["stokes"], engine.spin / polar.spin, 1.0))
+        times.append((given["stokes"], (engine.separation_time or math.nan) / (polar.separation_time or math.nan), 1.0))
+    return [
+        worst("engine over own integrator: restitution", restitutions, 0.01),
+        worst("engine over own integrator: spin", spins, 0.01),
+        worst("engine over own integrator: time of parting", times, 0.01),
+    ]
+
+
 def thick_films(_: Path, __: Curves) -> list[Row]:
     """Thick films: the law of Singh et al. is the lower of its two planes and has no jump."""
     jumps = []
@@ -149,6 +174,7 @@ def pair_figures(folder: Path, curves: Curves) -> list[Row]:
 PARTS: tuple[Callable[[Path, Curves], list[Row]], ...] = (
     *three_spheres_validation.PARTS,
     pairs,
+    engine_pairs,
     thick_films,
     pair_figures,
 )

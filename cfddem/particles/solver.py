@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.errors import InputError
+from cfddem.particles.bridges import Bridges
 from cfddem.particles.clocks import Clocks, check_step, clocks
 from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.energies import Energies
@@ -56,6 +57,7 @@ class ParticleSolver:
     skin     allowance of the neighbour list; found and tuned in the run if not given [m]
     sort_every  re-sort many particles by place at every so many lists
     record   keep a record of encounters, in `collisions`
+    bridges  liquid bridges between the particles, :class:`cfddem.particles.bridges.Bridges`
     energies  count energy by channel, in `energies`; costs time
     check_steps  refuse time steps above the stability limit
     after    an earlier run over the same particles and walls, whose pairs are remembered
@@ -75,6 +77,7 @@ class ParticleSolver:
         skin: float | None = None,
         sort_every: int = 5,
         record: bool = False,
+        bridges: Bridges | None = None,
         energies: bool = False,
         check_steps: bool = True,
         after: ParticleSolver | None = None,
@@ -85,6 +88,8 @@ class ParticleSolver:
         self._walled = True if walls else None
         self.laws = laws or Laws()
         self.laws.check()
+        if energies and bridges is not None:
+            raise InputError("energies", True, "false with liquid bridges", "what these do is not counted")
         self._loop_laws = self.laws.for_loops()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
@@ -100,6 +105,7 @@ class ParticleSolver:
         self.time, self.steps = 0.0, 0
         self._outside = 0
         self.collisions = CollisionRecord() if record else None
+        self.bridges = bridges
         self.wall = Stopwatch()
         wrap(self.bodies.position, self.box)
         self._next_order()
@@ -108,6 +114,8 @@ class ParticleSolver:
             self._recall(after, fresh)
         self._take_list(fresh)
         self.refresh()
+        if bridges is not None:
+            bridges.update(self._views[1], self.box)
         self.energies = Energies(self) if energies else None
 
     @property
@@ -117,7 +125,8 @@ class ParticleSolver:
 
     @property
     def _reach_ratio(self) -> float:
-        return self.laws.cutoff_ratio if self.laws.film else 0.0
+        reach = self.laws.cutoff_ratio if self.laws.film else 0.0
+        return reach if self.bridges is None else max(reach, self.bridges.reach_ratio)
 
     @property
     def gap(self) -> np.ndarray:
@@ -166,6 +175,20 @@ class ParticleSolver:
         Raises UnstableStep where the step is above what contacts allow, and RunFailed, naming the particle,
         where one is no number any more, has left or was pressed through.
         """
+        if self.bridges is None:
+            self._advance(step, steps)
+            return
+        while steps > 0:
+            several = min(self.bridges.laws.every, steps)
+            self.bridges.kick(self.box, 0.5 * several * step, backwards=False)
+            self._advance(step, several)
+            self.bridges.update(self._views[1], self.box)
+            self.bridges.kick(self.box, 0.5 * several * step, backwards=True)
+            self.wall.lap("liquid bridges")
+            steps -= several
+
+    def _advance(self, step: float, steps: int) -> None:
+        """Move by a number of steps in which bridges do nothing."""
         self.wall.start()
         counting, first = self.energies, True
         while steps > 0:
@@ -200,6 +223,7 @@ class ParticleSolver:
             "bodies": _copied(self.bodies),
             "edges": _copied(self.edges),
             "walls": _copied(self.walls),
+            **({} if self.bridges is None else {"bridges": self.bridges.checkpoint()}),
             "origin": self._origin.copy(),
             "clock": {
                 "time": self.time, "steps": self.steps, "skin": self.skin,
@@ -224,6 +248,8 @@ class ParticleSolver:
         self._lists, self._listed_at = int(clock["lists"]), int(clock["listed_at"])
         self._accepted, self._outside = float(clock.get("accepted", 0.0)), int(clock.get("outside", 0))
         travel = self.walls.travel.copy()
+        if self.bridges is not None:
+            self.bridges.restore(state["bridges"])
         self._take_list(Edges(**edges))
         self._origin[:] = state["origin"]
         self.walls.travel[:] = travel
@@ -256,6 +282,8 @@ class ParticleSolver:
         self._origin = self.bodies.position.copy()
         self._views = (flat(self.bodies), flat(edges), flat(self.walls), shifts(self.box).reshape(-1))
         self.walls.travel[:] = 0.0
+        if self.bridges is not None:
+            self.bridges.take(self.bodies)
         if self._walled:
             meet_walls(*self._views[:3], self.free, self._reach_ratio)
 
