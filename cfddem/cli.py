@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import textwrap
 
 from cyclopts import App, CycloptsError
 
 from cfddem import __version__
 from cfddem.commands import cases, collisions, knowledge, proofs, results
 from cfddem.errors import CfddemError
+
+WIDTH = 100
+"""Widest line on a terminal [characters]."""
 
 app = App(
     name="cfddem",
@@ -42,20 +47,29 @@ def main() -> None:
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
     except CycloptsError as mistake:
-        print("cfddem: " + " ".join(str(mistake).split()), file=sys.stderr)
+        _tell(" ".join(str(mistake).split()))
         sys.exit(2)
     except CfddemError as failure:
         for line in str(failure).splitlines():
-            print(f"cfddem: {line}", file=sys.stderr)
+            _tell(line)
         sys.exit(failure.exit_code)
     except BrokenPipeError:  # whoever read the output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as failure:  # a disk that is full, a folder that cannot be written to
-        print(f"cfddem: {failure.filename or 'file'}: {failure.strerror or failure}", file=sys.stderr)
+        _tell(f"{failure.filename or 'file'}: {failure.strerror or failure}")
         sys.exit(2)
     except KeyboardInterrupt:
-        print("cfddem: stopped", file=sys.stderr)
+        _tell("stopped")
         sys.exit(130)
+
+
+def _tell(mistake: str) -> None:
+    """Print a mistake: broken between words on a terminal, one line where a program reads it."""
+    line = f"cfddem: {mistake}"
+    if sys.stderr.isatty():
+        width = min(WIDTH, shutil.get_terminal_size().columns)
+        line = textwrap.fill(line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    print(line, file=sys.stderr)
 
 
 if __name__ == "__main__":

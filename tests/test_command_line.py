@@ -114,6 +114,21 @@ def test_a_material_that_cannot_be_is_refused_in_one_line(values: dict[str, floa
     assert "\n" not in str(refusal.value)
 
 
+def test_a_long_mistake_is_broken_between_words_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["cfddem", "check", "liquid-bed", "--set", "bed.diametr=0.003"])
+    monkeypatch.setenv("COLUMNS", "120")
+    with redirect_stderr(Terminal()) as seen, pytest.raises(SystemExit):
+        main()
+    told = seen.getvalue().splitlines()
+    assert len(told) > 1 and max(map(len, told)) <= WIDTH
+    assert " ".join(line.strip() for line in told) == call(*sys.argv[1:]).err.strip()
+
+
 def test_json_can_be_parsed_and_holds_the_whole_result() -> None:
     done = call("collide", "--material", "glass", "--stokes", "50", "--velocity", "0.1", "--json")
     assert done.code == 0, done.err
