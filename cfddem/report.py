@@ -160,7 +160,12 @@ def energy_lines(ledger: dict[str, float]) -> list[tuple[str, str, float, float]
     A line that is nothing is left out.
     """
     put_in = max(ledger["put_in"], 1e-300)
-    groups = {"stored since the start": energy.STORED, "gained": energy.GAINED, "lost": energy.LOST}
+    groups = {
+        "stored since the start": energy.STORED,
+        "gained": energy.GAINED,
+        "lost": energy.LOST,
+        "between the phases": energy.PASSED,
+    }
     lines = [(group, name, ledger.get(name, 0.0)) for group, names in groups.items() for name in names]
     lines = [line for line in lines if line[2] != 0.0] + [("not explained", "remainder", ledger["remainder"])]
     return [(group, name, value, value / put_in) for group, name, value in lines]

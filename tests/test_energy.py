@@ -162,6 +162,9 @@ def test_a_liquid_bed_accounts_for_its_energy(tmp_path: Path) -> None:
     assert ledger["inflow"] > 0.0 and ledger["drag"] > 0.3 * ledger["put_in"]
     assert ledger["film"] > 0.0 and ledger["viscous"] > 0.0
     assert sum(part for group, _, _, part in energy_lines(ledger) if group == "lost") < 1.1
+    between = ledger["drag"] + ledger["drag_in_cells"] + ledger["implicit_drag"]
+    assert ledger["drag_from_fluid"] - ledger["drag_to_particles"] == pytest.approx(between, rel=1e-9)
+    assert ledger["pressure_from_fluid"] == pytest.approx(ledger["pressure_to_particles"], abs=0.05 * ledger["put_in"])
     text = "\n".join(lines(report(tmp_path / "whole")))
     assert "J put in" in text and "remainder" in text
 

@@ -55,6 +55,14 @@ LOST = {
 }
 """Where energy goes."""
 
+PASSED = {
+    "drag_from_fluid": "by the fluid to drag",
+    "drag_to_particles": "by drag to the particles",
+    "pressure_from_fluid": "by the fluid where its pressure moves the volume of particles",
+    "pressure_to_particles": "by the pressure to the particles",
+}
+"""What passes between the phases; lost is what one gives and the other does not get."""
+
 _OF_FLUID = {
     *(
         "fluid_kinetic",
@@ -68,12 +76,14 @@ _OF_FLUID = {
         "pressure_in_cells",
     ),
     *("implicit_drag", "viscous", "convection", "lift_and_added_mass"),
+    *PASSED,
 }
 
 FIELDS = {
     **{f"energy_{name}": ("J", f"energy {text}, since the start") for name, text in STORED.items()},
     **{f"energy_{name}": ("J", f"energy gained {text}") for name, text in GAINED.items()},
     **{f"energy_{name}": ("J", f"energy lost {text}") for name, text in LOST.items()},
+    **{f"energy_{name}": ("J", f"energy given {text}") for name, text in PASSED.items()},
     "energy_put_in": ("J", "energy at the start in motion and springs, gained since then, or fallen"),
     "energy_remainder": ("J", "energy that the ledger does not explain"),
 }
@@ -109,7 +119,7 @@ class EnergyLedger:
         self._volumes = np.zeros(0) if fluid is None else face_volumes(fluid)
         self._pending: _Pending | None = None
         self._recent = (0.0, 0.0)  # work of the pressure on what particles displaced in the last two fluid steps [J]
-        self.sums = dict.fromkeys([*GAINED, *LOST, "fallen"], 0.0)
+        self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
         self.start = self._stored()
 
     def fluid_has_moved(self, offer: Offer) -> None:
@@ -128,6 +138,8 @@ class EnergyLedger:
         sums["implicit_drag"] -= done.implicit
         sums["drag_in_cells"] -= done.drag - done.held
         sums["lift_and_added_mass"] -= done.source
+        sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
+        sums["pressure_from_fluid"] -= done.solids
 
         drag = self.exchange.drag_impulse[bodies.id] / offer.step
         spreading = self.exchange.spreading
@@ -161,12 +173,15 @@ class EnergyLedger:
         aside = float((pending.aside * way).sum())
         driven = float((pending.driving * way).sum())
         sums["drag"] += carried - by_drag
+        sums["drag_to_particles"] += by_drag
         sums["drag_in_cells"] -= carried
         sums["lift_and_added_mass"] -= aside
         sums["fallen"] += float((pending.weight * count.path).sum())
         sums["driving"] += driven
         displaced = -float((pending.volume * (self._pressure_at(pending.pressure) - pending.before)).sum())
-        sums["pressure_in_cells"] += displaced - float((pressure * way).sum())
+        by_pressure = float((pressure * way).sum())
+        sums["pressure_to_particles"] += by_pressure
+        sums["pressure_in_cells"] += displaced - by_pressure
         self._recent = (displaced, self._recent[0])
         self._pending = None
 
@@ -174,7 +189,7 @@ class EnergyLedger:
         """The ledger now: a line for each column of `FIELDS` that the run can have [J]."""
         stored, sums = self._stored(), self._totals()
         lines = {name: stored[name] - self.start[name] for name in stored}
-        names = [name for name in [*GAINED, *LOST] if self.fluid is not None or name not in _OF_FLUID]
+        names = [name for name in [*GAINED, *LOST, *PASSED] if self.fluid is not None or name not in _OF_FLUID]
         lines |= {name: sums[name] for name in names}
         put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
         put_in += self.start.get("fluid_kinetic", 0.0) + max(-lines["potential"], 0.0)
