@@ -126,6 +126,13 @@ def test_axes_colour_bar_and_title_speak(renders, bed):
     assert figure.axes[0].get_xlim() == (0.0, 0.1) and figure.axes[0].get_ylim() == (0.0, 0.2)
 
 
+def test_a_long_title_stays_within_a_narrow_picture(bed, monkeypatch):
+    monkeypatch.setattr("cfddem.view.stage._title", lambda run: "Liquid-fluidised bed of alumina beads")
+    figure = Stage.of(open_run(bed), [2], ("voidage",), "speed", None).figure(2)
+    left, right = figure._suptitle.get_window_extent().intervalx
+    assert 0.0 < left < right < figure.bbox.width
+
+
 def test_a_run_of_particles_alone_is_framed_by_them(renders, tmp_path):
     run = RunFolder.create(tmp_path / "run", "", {})
     points = {"position": np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 3.0]]), "radius": np.array([0.1, 0.2])}

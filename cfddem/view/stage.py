@@ -89,7 +89,10 @@ class Stage:
             pixels = (round(place.panel[0] * _SHARP), round(place.panel[1] * _SHARP))
             getattr(self, f"_{name}")(panel, bar, snapshot, pixels)
             self._finish(panel, place.panel)
-        figure.suptitle(f"{_title(self.run)},  t = {self.run.times[snapshot]:.4g} s", fontsize=12, fontweight="bold")
+        title = f"{_title(self.run)},  t = {self.run.times[snapshot]:.4g} s"
+        heading = figure.suptitle(title, fontsize=12, fontweight="bold")
+        too_wide = heading.get_window_extent().width / (0.96 * figure.bbox.width)
+        heading.set_fontsize(12 / max(1.0, too_wide))
         return figure
 
     @property
