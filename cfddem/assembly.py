@@ -17,7 +17,7 @@ from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, 
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
 from cfddem.materials import pair_table
-from cfddem.particles.forces import CONTACTS, FRICTION_ONSETS, Laws
+from cfddem.particles.forces import COHESIONS, CONTACTS, FRICTION_ONSETS, ROLLINGS, Laws
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Bodies
 from cfddem.particles.walls import Cylinder, Plane, Wall
@@ -115,14 +115,17 @@ def walls_of(case: Case) -> list[Wall]:
 
 def laws_of(case: Case) -> Laws:
     """Switches of the particle loop."""
-    wet = case.fluid is not None and case.fluid.viscosity > 0.0 and case.laws.lubrication != "none"
-    own: dict[str, Any] = {kind: law.function for kind, law in case.laws.pair_laws.items()} if wet else {}
+    laws = case.laws
+    own: dict[str, Any] = {kind: law.function for kind, law in laws.pair_laws.items()} if case.has_films else {}
     return Laws(
-        film=wet,
-        friction_onset=FRICTION_ONSETS[case.laws.friction_onset],
-        contact=CONTACTS[case.laws.contact],
-        normal_stiffness=case.laws.normal_stiffness,
-        tangential_stiffness=case.laws.tangential_stiffness,
+        film=case.has_films,
+        friction_onset=FRICTION_ONSETS[laws.friction_onset],
+        contact=CONTACTS[laws.contact],
+        normal_stiffness=laws.normal_stiffness,
+        tangential_stiffness=laws.tangential_stiffness,
+        rolling=ROLLINGS[laws.rolling],
+        rolling_damping=laws.rolling_damping,
+        cohesion=COHESIONS[laws.cohesion],
         **own,
     )
 

@@ -82,6 +82,13 @@ class CaseLaws(Checked):
     normal_stiffness: float = Field(0.0, ge=0, description="of the linear contact [N/m]")
     tangential_stiffness: float = Field(0.0, ge=0, description="of the linear contact [N/m]")
     friction_onset: Literal["film", "overlap"] = Field("film", description="where friction sets in")
+    rolling: Literal["free", "constant_torque", "spring_dashpot"] = Field(
+        "free", description="what resists rolling, by the rolling_friction of the materials"
+    )
+    rolling_damping: float = Field(0.3, ge=0, description="of the rolling dashpot, over critical [-]")
+    cohesion: Literal["none", "jkr"] = Field(
+        "none", description="what holds dry solids together, by their surface_energy; not where there are films"
+    )
     added_mass: float = Field(0.0, ge=0, description="coefficient C_m of C_m rho V; 0.5 for a sphere alone [-]")
     lift: bool = Field(False, description="lift of shear (Saffman-Mei) and of spin (Magnus)")
     viscous_stress: bool = Field(False, description="V div(tau) on particles, in model A")
@@ -220,6 +227,11 @@ class Case(Checked):
         volumes, species = self.volumes, self.species
         mass = sum(volume * self.material_of(species[name]).density for name, volume in volumes.items())
         return mass / sum(volumes.values())
+
+    @property
+    def has_films(self) -> bool:
+        """Is there a film between two close spheres?"""
+        return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.lubrication != "none"
 
     @property
     def particle_count(self) -> int:

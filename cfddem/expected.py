@@ -151,7 +151,7 @@ def _encounter(case: Case, known: Bed, name: str, species: Species) -> Encounter
     stiffness, real_stiffness = contact.hertz_stiffness(soft, radius), contact.hertz_stiffness(real, radius)
     load = known.weight * species.diameter**2
     viscosity = 0.0 if case.fluid is None else case.fluid.viscosity
-    wet = viscosity > 0.0 and case.laws.lubrication != "none"
+    wet = case.has_films
     return Encounter(
         name,
         speed,

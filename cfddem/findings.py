@@ -56,7 +56,14 @@ class Finding:
 
 def findings(case: Case, bed: Bed, pair: Encounter, steps: Steps, cost: Cost) -> list[Finding]:
     """All that speaks against a run, red first."""
-    found = [*_room(case, bed), *_particles(case), *_contacts(case, pair), *_steps(case, steps), *_cost(case, cost)]
+    found = [
+        *_room(case, bed),
+        *_particles(case),
+        *_contacts(case, pair),
+        *_surfaces(case),
+        *_steps(case, steps),
+        *_cost(case, cost),
+    ]
     if case.fluid is not None:
         found += [*_kernel(case, steps), *_flow(case, bed), *_drag(case, bed)]
     return sorted(found, key=lambda each: each.colour != "red")
@@ -156,6 +163,29 @@ def _contacts(case: Case, pair: Encounter) -> Iterator[Finding]:
             f"{what} spheres {100.0 * part:.2g} % of a diameter into each other; more than {100.0 * DEEP:g} % is soft",
             f"take {softer * (part / (0.5 * DEEP)) ** power:.1g} Pa",
         )  # fmt: skip
+
+
+def _surfaces(case: Case) -> Iterator[Finding]:
+    """Do the laws of rolling and of adhesion find what they need in the materials, and the materials their laws?"""
+    laws, materials = case.laws, case.material.values()
+    if laws.cohesion != "none" and case.has_films:
+        yield Finding(
+            "red", "laws.cohesion", f"{laws.cohesion} is the adhesion of dry solids, but there are films",
+            'laws.lubrication = "none"',
+        )  # fmt: skip
+    if laws.cohesion != "none" and laws.contact != "hertz":
+        yield Finding("red", "laws.cohesion", "linear springs do not adhere", 'laws.contact = "hertz"')
+    for key, law, none, needed in (
+        ("rolling", laws.rolling, "free", "rolling_friction"),
+        ("cohesion", laws.cohesion, "none", "surface_energy"),
+    ):
+        found = max(getattr(each, needed) for each in materials) > 0.0
+        if law != none and not found:
+            yield Finding(
+                "amber", f"laws.{key}", f"{law} without effect: no material has it", f"give material.{needed}"
+            )
+        if law == none and found:
+            yield Finding("amber", f"material.{needed}", f'not used: laws.{key} is "{none}"', f"choose laws.{key}")
 
 
 def _steps(case: Case, steps: Steps) -> Iterator[Finding]:

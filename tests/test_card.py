@@ -105,6 +105,9 @@ def test_softening_shows_in_the_contact_and_not_in_the_film() -> None:
         ({"run.until": 1e6}, "amber", "run.until", "days on one core"),
         ({"run.average_from": 5.0}, "amber", "run.average_from", "not before the end"),
         ({"bed.diameter": 1e-200}, "red", "case", "SI units"),
+        ({"laws.cohesion": "jkr"}, "red", "laws.cohesion", "but there are films"),
+        ({"laws.rolling": "spring_dashpot"}, "amber", "laws.rolling", "give material.rolling_friction"),
+        ({"material.alumina.surface_energy": 0.01}, "amber", "material.surface_energy", 'laws.cohesion is "none"'),
     ],
     ids=str,
 )

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from impacts import STEP, Pair, kinetic_energy
 
+from cfddem import Case, Simulation
 from cfddem.errors import InputError
 from cfddem.materials import Material, pair_table
 from cfddem.particles.forces import CONSTANT_TORQUE, LINEAR, SPRING_DASHPOT, Laws
@@ -173,3 +174,22 @@ def test_unlike_solids_take_the_lower_coefficient() -> None:
     assert pair_table([BALL, rough], {(0, 1): {"rolling_friction": 0.3}})[1, 0]["rolling_friction"] == 0.3
     with pytest.raises(InputError, match="rolling_friction"):
         Material(density=2500, youngs_modulus=1e8, poisson=0.3, rolling_friction=-0.1)
+
+
+@pytest.mark.parametrize(("rolling", "kept"), [("free", 5.0 / 7.0), ("constant_torque", 0.0)])
+def test_a_case_says_what_resists_rolling(rolling: str, kept: float) -> None:
+    """A sphere set sliding on the floor of a dry case: it rolls on with 5/7 of its speed, or comes to rest."""
+    case = Case(
+        material={
+            "glass": {
+                "density": 2500.0, "youngs_modulus": 1e7, "poisson": 0.25, "friction": 0.5, "rolling_friction": 0.1,
+            }
+        },
+        column={"width": 0.04, "height": 0.01, "cell": 0.01},
+        bed={"diameter": 2e-3, "positions": [(0.005, 0.02, 0.001)], "velocity": (0.1, 0.0, 0.0)},
+        laws={"rolling": rolling},
+        run={"until": 0.25},
+    )  # fmt: skip
+    simulation = Simulation(case)
+    simulation.until(0.25)
+    assert simulation.particles.bodies.velocity[0, 0] / 0.1 == pytest.approx(kept, abs=0.01)
