@@ -80,30 +80,44 @@ def _most_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
+def _on_its_own_line(what: str) -> None:
+    print(f"\r{what:<60}\r", end="", file=sys.stderr, flush=True)
+
+
 class _Announcer(event.Listener):
-    """One line of progress while loops compile for the first time."""
+    """Says which loop is being compiled, and nothing when it is."""
 
     def __init__(self) -> None:
         self.compiled, self.depth = 0, 0
+        self.say: Callable[[str], None] | None = None
 
     def on_start(self, seen: event.Event) -> None:
         """A compilation begins; those of the helpers inside a loop are part of it."""
         self.depth += 1
-        if self.depth == 1:
+        if self.depth == 1 and self.say is not None:
             self.compiled += 1
-            print(f"\rcompiling loop {self.compiled} (kept for next time) ...", end="", file=sys.stderr, flush=True)
+            self.say(f"compiling loop {self.compiled} (kept for next time) ...")
 
     def on_end(self, seen: event.Event) -> None:
         """A compilation has ended."""
         self.depth -= 1
-        if self.depth == 0:
-            print("\r" + " " * 60 + "\r", end="", file=sys.stderr, flush=True)
+        if self.depth == 0 and self.say is not None:
+            self.say("")
 
 
-def announce_compilation() -> None:
-    """Tell the person at the terminal when loops are being compiled."""
-    if sys.stderr.isatty():
-        event.register("numba:compile", _Announcer())
+_announcer = _Announcer()
+
+
+def announce_compilation(say: Callable[[str], None] = _on_its_own_line) -> None:
+    """Tell the person at the terminal when loops are being compiled.
+
+    say  is told which loop, and an empty text when it is done; the line of the terminal if not given
+    """
+    if not sys.stderr.isatty():
+        return
+    if _announcer.say is None:
+        event.register("numba:compile", _announcer)
+    _announcer.say = say
 
 
 def serial_and_threaded(function: Callable[..., Any], **swapped: Any) -> tuple[Any, Any]:

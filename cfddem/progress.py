@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from cfddem.errors import CfddemError, InputError
+from cfddem.kernels import announce_compilation
 
 if TYPE_CHECKING:
     from cfddem.run import Run
@@ -37,6 +38,10 @@ class Line:
         """What is being prepared."""
         self._bar.update(self._task, description=what)
         _log.info(what)
+
+    def compiling(self, what: str) -> None:
+        """Which loop is being compiled meanwhile; an empty text when it is done."""
+        self._bar.update(self._task, status=what, refresh=True)
 
     def update(self, run: Run) -> None:
         """How far the run is; the log gets a line for every row of history."""
@@ -76,7 +81,12 @@ def live_line(log: Path | None = None) -> Iterator[Line]:
         transient=True,
     )
     with _logged(log), bar:
-        yield Line(bar)
+        line = Line(bar)
+        announce_compilation(line.compiling)
+        try:
+            yield line
+        finally:
+            announce_compilation()
 
 
 @contextmanager

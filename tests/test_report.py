@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+import re
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -12,12 +13,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import njit
+from rich.progress import Progress
 
 from cfddem import cli
 from cfddem.assembly import grid_of
 from cfddem.case import Case
 from cfddem.errors import InputError
-from cfddem.progress import live_line, status_of
+from cfddem.kernels import announce_compilation
+from cfddem.progress import Line, live_line, status_of
 from cfddem.record.measures import voidage_by_pressure
 from cfddem.record.output import RunFolder
 from cfddem.record.provenance import provenance
@@ -254,3 +258,24 @@ def test_the_log_gets_a_line_for_every_row_and_nothing_is_said_in_a_pipe(
     assert capfd.readouterr().err == 2 * "a checkpoint is damaged\n"
     with pytest.raises(InputError, match=r"log = .*: must be a file that can be written"), live_line(tmp_path):
         pass
+
+
+def test_the_live_line_says_what_is_prepared_and_which_loop_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    bar = Progress(disable=True)
+    line, seen = Line(bar), []
+
+    def compiling(what: str) -> None:
+        line.compiling(what)
+        seen.append((bar.tasks[0].description, bar.tasks[0].fields["status"]))
+
+    line.say("pouring 10 particles")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    announce_compilation(compiling)
+    try:
+        helper = njit(lambda x: 2.0 * x)
+        njit(lambda x: helper(x) + 1.0)(1.0)
+    finally:
+        announce_compilation()
+    (before, told), (after, nothing) = seen
+    assert before == after == "pouring 10 particles"
+    assert re.fullmatch(r"compiling loop \d+ \(kept for next time\) \.\.\.", told) and nothing == ""

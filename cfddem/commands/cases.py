@@ -82,7 +82,6 @@ def run(
     described = Case.from_toml(path, overrides(set or []))
     for finding in refuse_red(described).findings:
         print("\n".join(finding.lines("cfddem: ")), file=sys.stderr)
-    tell_of_compilation()
     from cfddem.kernels import use_threads
     from cfddem.progress import live_line
     from cfddem.report import lines
@@ -109,7 +108,6 @@ def resume(
 
     Example: cfddem resume bed --until 0.03
     """
-    tell_of_compilation()
     from cfddem.kernels import use_threads
     from cfddem.progress import live_line
     from cfddem.record.reading import newest_run
