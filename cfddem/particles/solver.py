@@ -209,8 +209,9 @@ class ParticleSolver:
             self.steps += done
             self.time += done * step
             moved_far = not farthest < (0.5 * self.skin) ** 2
-            if moved_far or (steps == 0 and self.bodies.count >= THREADING_PAYS):
-                guard(self.bodies, self.edges, self.gap, self.domain, self.time, step, self.walls.wall)
+            if moved_far or steps == 0:  # no pair can have passed through each other between two lists
+                gap = self.gap if moved_far else None
+                guard(self.bodies, self.edges, gap, self.domain, self.time, step, self.walls.wall)
             if moved_far:
                 self._relist()
             self.wall.lap("neighbour lists")
