@@ -406,3 +406,15 @@ def test_mean_residence_time_is_not_low_for_long_stays() -> None:
     assert series.mean_residence_time(time, inside) == pytest.approx(8.0, rel=0.02)
     assert len(series.residence_times(time, inside)) < 0.15 * len(entries)
     assert series.mean_residence_time(time, np.ones((201, 3), bool)) == np.inf
+
+
+@pytest.mark.parametrize("hundreds", range(1, 40))
+def test_bed_height_where_equal_spheres_add_up_to_the_share(hundreds: int) -> None:
+    """Of n hundred spheres n fly far above: the bed ends with the highest of the others."""
+    rng = np.random.default_rng(hundreds)
+    height = rng.uniform(0.0, 1.0, 100 * hundreds)
+    height[: 99 * hundreds].sort()
+    height[99 * hundreds :] += 5.0
+    place = np.column_stack([np.zeros((len(height), 2)), height])
+    top = height[: 99 * hundreds].max() + 1e-3
+    assert measures.bed_height(place, np.full(len(height), 1e-3)) == pytest.approx(top, abs=1e-6)
