@@ -41,7 +41,7 @@ def bed_height(position: Array, radius: Array, share: float = 0.99) -> float:
     centre, volume = np.asarray(position)[:, 2], _volume(radius)
     order = np.argsort(centre)
     below = np.cumsum(volume[order])
-    wanted = share * below[-1] * (1.0 - 1e-12)  # equal spheres can add up to the share but for their last bits
+    wanted = share * below[-1]
     guess, reach = centre[order[np.searchsorted(below, wanted)]], float(np.max(radius))
     near = np.abs(centre - guess) <= 3.0 * reach  # the rest lies wholly below or above whatever is tried
     surely = volume[centre < guess - 3.0 * reach].sum()
@@ -49,6 +49,9 @@ def bed_height(position: Array, radius: Array, share: float = 0.99) -> float:
     def excess(height: float) -> float:
         return float(surely + _volume_below(height, centre[near], radius[near]).sum() - wanted)
 
+    if excess(guess + 2.0 * reach) <= 0.0:  # whole spheres add up to the share, but for its last bits
+        lower = centre <= guess
+        return float((centre[lower] + radius[lower]).max())
     return float(brentq(excess, guess - 2.0 * reach, guess + 2.0 * reach, xtol=1e-12 * reach, rtol=1e-15))
 
 
