@@ -167,7 +167,7 @@ class FluidState:
     def _viscous_force(self) -> Array:
         """div tau on the faces (3, ...) [N/m3]."""
         self._thicken(self._velocity, np.ones_like(self._mean_voidage))
-        force = np.empty_like(self._velocity)
+        force = np.zeros_like(self._velocity)  # what lies outside of the box is asked for, and dropped
         transport(
             self._velocity, self._mean_voidage, self._thickness, self._buried, 0.0, self._inverse, 0.0,
             self._flux, self._expansion, force,
