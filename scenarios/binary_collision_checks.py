@@ -14,9 +14,7 @@ from cfddem.errors import UnstableStep
 from cfddem.materials import Material, pair_table
 from closures.minimum_gap import elastohydrodynamic
 from scenarios.binary_collision import MATERIALS, Collision, collide
-from scenarios.validation import Columns, Row, numbers, worst
-
-Curves = dict[str, Columns]
+from scenarios.validation import Columns, Curves, Row, numbers, worst
 
 DRY = 0.97  # e_dry of the four materials
 CUTOFF = 12.7e-3 / 4  # R* of two equal spheres and the reach of their film [m]

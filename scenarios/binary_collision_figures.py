@@ -10,9 +10,7 @@ import numpy as np
 
 from cfddem.view.plots import BLUE, GREEN, GREY, ORANGE, RED, SKY, decades, label, legend, panels, save, shades
 from closures.restitution import legendre
-from scenarios.validation import Columns
-
-Curves = dict[str, Columns]
+from scenarios.validation import Curves
 
 MATERIAL_STYLES = {
     "steel_smooth": ("steel, smooth (24 nm)", BLUE),

@@ -19,10 +19,10 @@ from closures.restitution import critical_stokes, immersed, legendre, stop_gap
 from scenarios import binary_collision_checks as checks
 from scenarios import binary_collision_figures as figures
 from scenarios.binary_collision import MATERIALS, collide
-from scenarios.binary_collision_checks import CUTOFF, DRY, SPEED, WATER, Curves
+from scenarios.binary_collision_checks import CUTOFF, DRY, SPEED, WATER
 from scenarios.bouncing_sphere import SPEED as FALL_SPEED
 from scenarios.bouncing_sphere import bounce, speed_after_contact
-from scenarios.validation import Row, Tell, numbers, worst, write_histories
+from scenarios.validation import Curves, Row, Tell, in_parts, numbers, worst
 
 GLYCEROL_80 = 60.1e-3  # 80 % by weight at 20 C [Pa s]
 CLASSES: dict[str, tuple[str, float, tuple[float, float, float]]] = {
@@ -35,15 +35,7 @@ CLASSES: dict[str, tuple[str, float, tuple[float, float, float]]] = {
 
 def study(folder: Path, tell: Tell) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
-    rows: list[Row] = []
-    curves: Curves = {}
-    for part in PARTS:
-        tell((part.__doc__ or "").splitlines()[0])
-        rows += part(curves)
-    tell("figures")
-    write_histories(folder / "histories.h5", curves)
-    figures.draw(folder, curves)
-    return rows
+    return in_parts(PARTS, figures.draw, folder, tell)
 
 
 def gap_histories(curves: Curves) -> list[Row]:

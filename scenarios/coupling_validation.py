@@ -15,9 +15,8 @@ from cfddem.case import Case
 from cfddem.simulation import Simulation
 from cfddem.view.plots import BLUE, GREY, ORANGE, label, legend, panels, save
 from scenarios import liquid_bed, packed_bed, settling
-from scenarios.validation import Columns, Row, Tell, numbers, reference, worst, write_histories
+from scenarios.validation import Curves, Row, Tell, in_parts, numbers, reference, worst
 
-Curves = dict[str, Columns]
 REYNOLDS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0)
 CELLS = (2.0, 4.0, 10.0)
 PLACES = (0.5, 0.25, 0.0)
@@ -26,14 +25,7 @@ PLACES = (0.5, 0.25, 0.0)
 
 def study(folder: Path, tell: Tell) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
-    rows: list[Row] = []
-    curves: Curves = {}
-    for part in PARTS:
-        tell((part.__doc__ or "").splitlines()[0])
-        rows += part(curves)
-    write_histories(folder / "histories.h5", curves)
-    _draw(folder, curves)
-    return rows
+    return in_parts(PARTS, _draw, folder, tell)
 
 
 def terminal_velocities(curves: Curves) -> list[Row]:

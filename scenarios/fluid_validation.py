@@ -13,23 +13,15 @@ import numpy as np
 from cfddem.view.plots import BLUE, GREY, ORANGE, label, legend, panels, save
 from scenarios.fluid_checks import cavity, duct, fixed_bed, ghia, order, pipe, sound, taylor_green, water_at_rest
 from scenarios.fluid_manufactured import error
-from scenarios.validation import Columns, Row, Tell, worst, write_histories
+from scenarios.validation import Curves, Row, Tell, in_parts, worst
 
-Curves = dict[str, Columns]
 CAVITIES = ((100, 10.0), (400, 35.0), (1000, 50.0))
 """Reynolds numbers, and times at which the flow stands [s]."""
 
 
 def study(folder: Path, tell: Tell) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
-    rows: list[Row] = []
-    curves: Curves = {}
-    for part in (orders, channels, beds, cavities):
-        tell((part.__doc__ or "").splitlines()[0])
-        rows += part(curves)
-    write_histories(folder / "histories.h5", curves)
-    _draw(folder, curves)
-    return rows
+    return in_parts((orders, channels, beds, cavities), _draw, folder, tell)
 
 
 def orders(curves: Curves) -> list[Row]:

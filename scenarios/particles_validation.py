@@ -16,23 +16,15 @@ import numpy as np
 from cfddem.errors import RunFailed
 from cfddem.view.plots import BLUE, GREY, ORANGE, label, legend, panels, save
 from scenarios import particles_checks as checks
-from scenarios.validation import Columns, Row, Tell, reference, worst, write_histories
+from scenarios.validation import Curves, Row, Tell, in_parts, reference, worst
 
-Curves = dict[str, Columns]
 ANGLE = 9.0
 """Impacts of Kharaz et al. are judged from this angle on; e_t below it divides two small numbers [deg]."""
 
 
 def study(folder: Path, tell: Tell) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
-    rows: list[Row] = []
-    curves: Curves = {}
-    for part in PARTS:
-        tell((part.__doc__ or "").splitlines()[0])
-        rows += part(curves)
-    write_histories(folder / "histories.h5", curves)
-    _draw(folder, curves)
-    return rows
+    return in_parts(PARTS, _draw, folder, tell)
 
 
 def falling(curves: Curves) -> list[Row]:

@@ -43,6 +43,9 @@ Tell = Callable[[str], None]
 Columns = Mapping[str, tuple[Any, str]]
 """Arrays by name, each with its unit ("-" where it has none)."""
 
+Curves = dict[str, Columns]
+"""What the parts of a target leave for its histories and figures, by name."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -79,6 +82,21 @@ def worst(quantity: str, points: Iterable[tuple[float, float, float]], limit: fl
     _, value, reference = max(listed, key=lambda point: _size(point[1] - point[2]))
     kept = [{"at": at, "value": value, "reference": reference} for at, value, reference in listed]
     return Row(f"{quantity} ({len(listed)})", value, reference, limit, points=kept, **more)
+
+
+def in_parts(
+    parts: Iterable[Callable[[Curves], list[Row]]], draw: Callable[[Path, Curves], None], folder: Path, tell: Tell
+) -> list[Row]:
+    """Run the parts of a target, write histories and figures, and return the table."""
+    rows: list[Row] = []
+    curves: Curves = {}
+    for part in parts:
+        tell((part.__doc__ or "").splitlines()[0])
+        rows += part(curves)
+    tell("figures")
+    write_histories(folder / "histories.h5", curves)
+    draw(folder, curves)
+    return rows
 
 
 def _size(difference: float) -> float:
