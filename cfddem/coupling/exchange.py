@@ -163,7 +163,7 @@ class Exchange:
             self.own_wind.advance(
                 place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
             )
-        self._trail = [self._trail[-1], _by_id(bodies.position, rows)]
+        self._trail = [self._trail[-1], bodies.by_id(bodies.position)]
         self._last_step = offer.step
 
     @property
@@ -306,14 +306,8 @@ class Exchange:
             grown[bodies.id[fresh], :3] = bodies.velocity[fresh]
             self._memory = grown
             self._winds = np.concatenate([self._winds, np.zeros((most - len(self._winds), *self._winds.shape[1:]))])
-            here = _by_id(bodies.position, bodies.id)
+            here = bodies.by_id(bodies.position)
             self._trail = [np.concatenate([trail, here[len(trail) :]]) for trail in self._trail or [here[:0]] * 2]
-
-
-def _by_id(values: Array, rows: np.ndarray) -> Array:
-    sorted_values = np.empty((int(rows.max(initial=-1)) + 1, values.shape[1]))
-    sorted_values[rows] = values
-    return sorted_values
 
 
 def _ranges(drag: Law | None) -> tuple[tuple[float, float], ...]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from cfddem.kernels import inline, prange, threaded
+from cfddem.fluid.momentum import implicitness
+from cfddem.kernels import prange, threaded
 
 
 @threaded
@@ -31,12 +32,6 @@ def meet(seen, volume, radius, velocity, rows, winds, own, density, viscosity, s
             slip[n, d] = seen[n, d] - wind[n, d] - velocity[n, d]
             square += slip[n, d] * slip[n, d]
         reynolds[n] = density * 2.0 * radius[n] * voidage[n] * math.sqrt(square) / max(viscosity, 1e-300)
-
-
-@inline
-def implicitness(stiffness):
-    """theta of the drag on a particle; 1/2 for weak, 1 for stiff drag."""
-    return (1.0 + stiffness) / (2.0 + stiffness)
 
 
 @threaded

@@ -21,6 +21,7 @@ from cfddem.particles.motion import march, march_threaded
 from cfddem.particles.near_walls import assemble, check_walls
 from cfddem.particles.neighbours import list_edges, locality_order, wrap
 from cfddem.particles.pairs import Edges, gaps, remember, shifts, wall_forces
+from cfddem.particles.skin import FIRST_SKIN, tuned
 from cfddem.particles.state import Bodies
 from cfddem.particles.surfaces import Walls
 from cfddem.particles.vectors import flat
@@ -30,12 +31,6 @@ from cfddem.stopwatch import Stopwatch
 
 THREADING_PAYS = 1000
 """From this many particles on, loops run on all threads; on one they still work on several pairs at once."""
-
-LISTING_COSTS = (8.0, 2.0)
-"""Steps that a new list takes, over what a skin of one radius adds to a step; for few particles and for many."""
-
-NARROWEST, WIDEST = 0.01, 0.6
-"""Bounds of the skin that is found in the run, over the mean radius."""
 
 CHECK_EVERY = 20
 """The time step is looked at again at every so many lists."""
@@ -93,8 +88,7 @@ class ParticleSolver:
         self._loop_laws = self.laws.for_loops()
         self.gravity, self.free = gravity, free
         self._skin_is_given = skin is not None
-        few = bodies.count < THREADING_PAYS
-        self.skin = (0.1 if few else 0.02) * float(bodies.radius.mean()) if skin is None else skin
+        self.skin = FIRST_SKIN[self._many] * float(bodies.radius.mean()) if skin is None else skin
         self.domain = None if domain is None else np.array(domain, float)
         self.sort_every = sort_every
         self._lists, self._listed_at = -1, 0
@@ -122,6 +116,10 @@ class ParticleSolver:
     def views(self) -> tuple[Bodies, Edges, Walls, np.ndarray]:
         """Bodies, edges and walls as compiled loops take them, and what to add to separations across borders."""
         return self._views
+
+    @property
+    def _many(self) -> bool:
+        return self.bodies.count >= THREADING_PAYS
 
     @property
     def _reach_ratio(self) -> float:
@@ -260,7 +258,7 @@ class ParticleSolver:
 
     def _march(self, step: float, steps: int) -> tuple[int, float, int]:
         record = self.collisions
-        large = self.bodies.count >= THREADING_PAYS
+        large = self._many
         return (march_threaded if large else march)(  # type: ignore[no-any-return]
             *self._views[:3],
             self._walled,
@@ -372,26 +370,19 @@ class ParticleSolver:
     def _next_order(self) -> np.ndarray:
         """Re-sort the particles now and then, so that near particles have near rows; returns the old rows."""
         self._lists += 1
-        if self.bodies.count < THREADING_PAYS or self._lists % self.sort_every:
+        if not self._many or self._lists % self.sort_every:
             return np.arange(self.bodies.count, dtype=np.int32)
         order = locality_order(self.bodies.position, 2.0 * float(self.bodies.radius.mean()))
         self.bodies.reorder(order)
         return order
 
     def _tune_skin(self) -> None:
-        """Choose the skin at which finding the pairs anew and looking at those that do not touch cost the same.
-
-        The time between two lists grows with the skin, and so does the number of pairs in them.
-        """
+        """Choose the skin of the next list by how long the last one has lasted."""
         age, self._listed_at = self.steps - self._listed_at, self.steps
         if self._skin_is_given or age == 0:
             return
-        radius = float(self.bodies.radius.mean())
-        best = radius * math.sqrt(LISTING_COSTS[self.bodies.count >= THREADING_PAYS] * self.skin / (radius * age))
-        best = min(max(best, 0.5 * self.skin), 2.0 * self.skin)
-        largest = float(self.bodies.radius.max())
-        room = 0.5 * float(self.box.min()) - (2.0 + 0.5 * self._reach_ratio) * largest
-        self.skin = min(max(best, NARROWEST * radius), WIDEST * radius, max(self.skin, 0.99 * room))
+        room = 0.5 * float(self.box.min()) - (2.0 + 0.5 * self._reach_ratio) * float(self.bodies.radius.max())
+        self.skin = tuned(self.skin, age, float(self.bodies.radius.mean()), self._many, room)
 
 
 def _copied(arrays: Any) -> dict[str, Any]:

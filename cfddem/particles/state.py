@@ -37,6 +37,12 @@ class Bodies(NamedTuple):
         for array in self:
             array[:] = array[order]
 
+    def by_id(self, values: np.ndarray) -> np.ndarray:
+        """Rows of the particles (N, ...) in the order of their ids; zero for ids that are gone."""
+        placed = np.zeros((int(self.id.max(initial=-1)) + 1, *values.shape[1:]))
+        placed[self.id] = values
+        return placed
+
     @property
     def volume(self) -> np.ndarray:
         """Volume of each particle (N,) [m3]."""

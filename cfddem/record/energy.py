@@ -145,17 +145,17 @@ class EnergyLedger:
         spreading = self.exchange.spreading
         weight = spreading.gather(offer.place, spreading.smooth(np.moveaxis(fluid.drag_exchange()[0], -1, 0)))
         acting = offer.target + drag / np.maximum(weight * offer.resistance[:, None], 1e-300)
-        volume, ids = bodies.volume[:, None], bodies.id
+        volume = bodies.volume[:, None]
         pressure = spreading.smooth(np.ascontiguousarray(fluid.pressure)[None])
         model_a = float(fluid.model == "A")
         self._pending = _Pending(
             step=offer.step,
-            drag=_by_id(drag, ids),
-            acting=_by_id(acting, ids),
-            weight=_by_id((bodies.mass[:, None] - fluid.density * volume) * self.gravity, ids),
-            aside=_by_id(offer.explicit, ids),
-            driving=_by_id(model_a * volume * fluid.boundaries.driving, ids),
-            volume=_by_id(model_a * volume, ids)[:, 0],
+            drag=bodies.by_id(drag),
+            acting=bodies.by_id(acting),
+            weight=bodies.by_id((bodies.mass[:, None] - fluid.density * volume) * self.gravity),
+            aside=bodies.by_id(offer.explicit),
+            driving=bodies.by_id(model_a * volume * fluid.boundaries.driving),
+            volume=bodies.by_id(model_a * bodies.volume),
             pressure=pressure,
             before=self._pressure_at(pressure),
         )
@@ -218,12 +218,12 @@ class EnergyLedger:
         """Pressure at every particle, by the weights with which its volume is spread; by id (n,) [Pa]."""
         assert self.exchange is not None
         spreading, bodies = self.exchange.spreading, self.particles.bodies
-        seen = spreading.gather(spreading.place(bodies.position, bodies.radius), smoothed)
-        return _by_id(seen, bodies.id)[:, 0]
+        seen = spreading.gather_at(bodies.position, bodies.radius, smoothed)
+        return bodies.by_id(seen[:, 0])
 
     def _applied(self) -> Array:
         bodies = self.particles.bodies
-        return _by_id(bodies.applied, bodies.id)
+        return bodies.by_id(bodies.applied)
 
     def _totals(self) -> dict[str, float]:
         """All lines that are counted."""
@@ -259,9 +259,3 @@ class EnergyLedger:
             # the voidage that the fluid has felt is that before the last step and a half
             "under_way": -(self._recent[0] + 0.5 * self._recent[1]),
         }
-
-
-def _by_id(values: Array, ids: np.ndarray) -> Array:
-    placed = np.zeros((int(ids.max(initial=-1)) + 1, values.shape[1]))
-    placed[ids] = values
-    return placed
