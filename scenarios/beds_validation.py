@@ -20,7 +20,7 @@ from cfddem.record.series import block_average, even, spectrum
 from cfddem.report import buoyant_weight
 from cfddem.run import Run
 from closures.bed import exponent_richardson_zaki
-from scenarios.defluidisation import onsets
+from scenarios.defluidisation import layers, onsets
 from scenarios.gas_bed import mueller, van_wachem
 from scenarios.sedimentation import SOLID_FRACTIONS, SYRUP, Settling, between_walls, exponent, in_periodic_box, vessel
 from scenarios.segregation import VELOCITIES, balance, figure, mixture, separation, thresholds
@@ -73,8 +73,8 @@ def defluidised(folder: Path, tell: Tell) -> list[Row]:
     case = Case.from_toml(gallery()["defluidisation"])
     assert not isinstance(case.bed.inlet_velocity, float)
     slow = tuple((5.0 * time, speed) for time, speed in case.bed.inlet_velocity)
-    history = finished(case, folder, "defluidisation", tell, {"bed.inlet_velocity": slow, "run.until": 6.5}).history
-    up, down = onsets(case.with_(**{"bed.inlet_velocity": slow}), history)
+    run = finished(case, folder, "defluidisation", tell, {"bed.inlet_velocity": slow, "run.until": 6.5})
+    up, down = onsets(case.with_(**{"bed.inlet_velocity": slow}), run.history, layers(run))
     return [
         Row("fluidised: minimum velocity over balance, up", up.velocity / up.balance, 1.0, 0.05),
         Row("defluidised: minimum velocity over balance, down", down.velocity / down.balance, 1.0, 0.05),

@@ -1,7 +1,9 @@
 """A bed is fluidised and let down again: where the pressure drop reaches the weight, on the way up and on the way down.
 
 Minimum fluidisation is where the pressure drop of the packed bed, continued, meets the weight of the bed. It is
-compared with the balance of weight and drag by the drag law itself at the voidage that the bed really has.
+compared with the balance of weight and drag by the drag law itself at the voidage that the bed really has, layer by
+layer: a bed of twenty spheres is loose at its floor and at its top, and one voidage for all of it, from its height,
+is wrong by a hundredth, which is a tenth of the velocity.
 """
 
 from __future__ import annotations
@@ -13,8 +15,9 @@ import numpy as np
 
 from cfddem.case import Case
 from cfddem.errors import InputError
+from cfddem.record.reading import Run as Written
 from cfddem.report import buoyant_weight
-from closures.balance import fluidising_velocity
+from closures.balance import Drag, fluidising_velocity
 
 PACKED = (0.2, 0.8)
 """Pressure drop over weight between which the bed is taken for packed."""
@@ -25,15 +28,30 @@ class Onset:
     """Minimum fluidisation on one branch of the ramp."""
 
     velocity: float  # superficial, where the packed bed's pressure drop meets the weight [m/s]
-    voidage: float  # of the packed bed
-    balance: float  # velocity by the drag law at that voidage [m/s]
+    voidage: float  # of the packed bed, mean over its grains
+    balance: float  # velocity by the drag law at the voidages of its layers [m/s]
 
 
-def onsets(case: Case, history: Mapping[str, np.ndarray]) -> tuple[Onset, Onset]:
+@dataclass(frozen=True)
+class Layers:
+    """Voidage of a bed over its height, in the course of time."""
+
+    time: np.ndarray  # (n,) [s]
+    voidage: np.ndarray  # (n, levels) mean over the column at each level
+
+
+def layers(run: Written) -> Layers:
+    """Those of a run, from its snapshots."""
+    places = range(len(run.times))
+    return Layers(run.times, np.array([run.fluid("voidage", place).mean(axis=(1, 2)) for place in places]))
+
+
+def onsets(case: Case, history: Mapping[str, np.ndarray], bed: Layers) -> tuple[Onset, Onset]:
     """Minimum fluidisation on the way up and on the way down.
 
     case     whose inlet velocity is a list of [time, velocity] that rises and falls
     history  of its run
+    bed      its layers in snapshots, at least one while the bed is packed on either way
     """
     inlet = case.bed.inlet_velocity
     if isinstance(inlet, float):
@@ -41,21 +59,44 @@ def onsets(case: Case, history: Mapping[str, np.ndarray]) -> tuple[Onset, Onset]
     times, speeds = np.array(inlet).T
     velocity = np.interp(history["time"], times, speeds)
     share = history["pressure_drop"] * case.column.floor_area / buoyant_weight(case)
-    rising = history["time"] < times[int(np.argmax(speeds))]
-    return tuple(_onset(case, velocity[b], share[b], history["bed_voidage"][b]) for b in (rising, ~rising))  # type: ignore[return-value]
+    turn = times[int(np.argmax(speeds))]
+    ways = []
+    for rising in (True, False):
+        packed = (share > PACKED[0]) & (share < PACKED[1]) & ((history["time"] < turn) == rising)
+        if packed.sum() < 4:
+            raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
+        begin, end = history["time"][packed][[0, -1]]
+        seen = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
+        if len(seen) == 0:
+            raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
+        ways.append(_onset(case, velocity[packed], share[packed], seen.mean(axis=0)))
+    return ways[0], ways[1]
 
 
 def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndarray) -> Onset:
-    packed = (share > PACKED[0]) & (share < PACKED[1])
-    if packed.sum() < 4:
-        raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
-    powers = np.stack([velocity[packed], velocity[packed] ** 2], axis=1)
-    (viscous, inertial), *_ = np.linalg.lstsq(powers, share[packed], rcond=None)
+    powers = np.stack([velocity, velocity**2], axis=1)
+    (viscous, inertial), *_ = np.linalg.lstsq(powers, share, rcond=None)
     found = 2.0 / (viscous + np.sqrt(viscous**2 + 4.0 * inertial))
-    own = float(voidage[packed].mean())
     assert case.fluid is not None and case.laws.drag_law is not None
+    own = float(np.average(voidage, weights=1.0 - voidage))
     balance = fluidising_velocity(
         case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, own,
-        case.laws.drag_law.function, abs(case.laws.gravity[2]),
+        in_layers(case.laws.drag_law.function, voidage), abs(case.laws.gravity[2]),
     )  # fmt: skip
     return Onset(float(found), own, balance)
+
+
+def in_layers(drag: Drag, voidages: np.ndarray) -> Drag:
+    """A drag law for a bed in layers: one stream passes all, and each grain feels the voidage of its own layer.
+
+    drag      F(reynolds, voidage)
+    voidages  (levels,) of layers of the same thickness
+    returns   F such that F / voidage is the mean over all grains, whatever single voidage it is asked with
+    """
+    solids = 1.0 - voidages
+    filled = [(share, own) for share, own in zip(solids / solids.sum(), voidages.tolist()) if share > 0.0]
+
+    def mean(reynolds: float, voidage: float) -> float:
+        return voidage * sum(share * drag(reynolds, own) / own for share, own in filled)
+
+    return mean

@@ -20,7 +20,7 @@ from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
 from closures.drag import ergun
 from closures.numbers import archimedes
-from scenarios.defluidisation import onsets
+from scenarios.defluidisation import Layers, in_layers, onsets
 from scenarios.gas_bed import mueller, standard_bed, van_wachem
 from scenarios.sedimentation import Settling, exponent, in_periodic_box
 from scenarios.segregation import VELOCITIES, balance, mixture, separation, thresholds
@@ -76,10 +76,19 @@ def test_onset_of_an_exact_bed_is_the_balance() -> None:
 
     weight = buoyant_weight(case) / case.column.floor_area
     drop = weight * np.minimum(pull(velocity) / pull(np.array([balance])), 1.0)
-    history = {"time": time, "pressure_drop": drop, "bed_voidage": np.full(300, 0.42)}
-    for onset in onsets(case, history):
+    history = {"time": time, "pressure_drop": drop}
+    bed = Layers(time[::10], np.tile([0.42, 0.42, 1.0], (30, 1)))
+    for onset in onsets(case, history, bed):
         assert onset.balance == pytest.approx(balance, rel=1e-12)
         assert onset.velocity == pytest.approx(balance, rel=1e-6)
+
+
+def test_layers_of_a_bed_carry_what_the_law_says_of_each() -> None:
+    """At one Reynolds number, the pull on two layers is the sum of both: each grain at its own voidage."""
+    loose, dense = 0.5, 0.4
+    together = in_layers(ergun, np.array([dense, loose, 1.0]))
+    pulls = [ergun(20.0, own) / own * (1.0 - own) for own in (dense, loose)]
+    assert together(20.0, 0.7) / 0.7 == pytest.approx(sum(pulls) / (2.0 - loose - dense), rel=1e-14)
 
 
 def test_both_sides_of_the_threshold_are_run() -> None:
