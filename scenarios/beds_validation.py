@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,13 +14,13 @@ from cfddem.case import Case
 from cfddem.gallery import gallery
 from cfddem.record.measures import pressure_drop
 from cfddem.record.reading import Run as Written
-from cfddem.record.reading import open_run
 from cfddem.record.series import block_average, even, spectrum
 from cfddem.report import buoyant_weight
-from cfddem.run import Run
 from closures.bed import exponent_richardson_zaki
 from scenarios.defluidisation import layers, onsets
 from scenarios.gas_bed import mueller, van_wachem
+from scenarios.kept_runs import finished
+from scenarios.refinement import refined
 from scenarios.sedimentation import SOLID_FRACTIONS, SYRUP, Settling, between_walls, exponent, in_periodic_box, vessel
 from scenarios.segregation import VELOCITIES, balance, figure, mixture, separation, thresholds
 from scenarios.spouted_bed import BED_HEIGHT, SPOUTED, profiles
@@ -44,6 +43,7 @@ def study(folder: Path, tell: Tell) -> list[Row]:
         *bubbling(folder, tell),
         *flat(folder, tell),
         *spouted(folder, tell),
+        *refined(folder, tell),
     ]
 
 
@@ -158,20 +158,6 @@ def probe(run: Written, begin: float, height: float = PROBE) -> tuple[np.ndarray
     places = np.flatnonzero(run.times > begin)
     drops = [pressure_drop(run.fluid("pressure", int(place)), run.grid.spacing, height, top) for place in places]
     return run.times[places], np.array(drops)
-
-
-def finished(case: Case, folder: Path, name: str, tell: Tell, changes: dict[str, Any]) -> Written:
-    """The run of a changed case in its folder: made, gone on with, or there already."""
-    home = folder / name
-
-    def live(run: Run) -> None:
-        tell(f"{name}: {run.simulation.time:.3g} of {run.end:g} s")
-
-    if not (home / "run.json").exists():
-        Run.begin(case.with_(**changes), home, report=live, progress=tell).go()
-    elif open_run(home).status != "finished":
-        Run.resume(home, report=live, progress=tell).go()
-    return open_run(home)
 
 
 def _weight(name: str, case: Case, history: dict[str, np.ndarray], window: np.ndarray) -> list[Row]:

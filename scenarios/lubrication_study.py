@@ -22,7 +22,7 @@ from cfddem.record.reading import Run as Written
 from cfddem.record.reading import open_run
 from cfddem.record.regimes import regime_map
 from cfddem.report import expansion_exponents, window_of
-from scenarios.beds_validation import finished
+from scenarios.kept_runs import finished
 from scenarios.validation import Tell
 
 Array = NDArray[np.float64]

@@ -11,8 +11,10 @@ import pytest
 from cfddem.card import card
 from cfddem.case import Case
 from cfddem.expected import bed_of
+from cfddem.fluid.division import cell_counts
 from cfddem.gallery import gallery
 from cfddem.mixture import sinking
+from cfddem.record.series import block_average
 from cfddem.report import buoyant_weight
 from cfddem.run import measure
 from cfddem.simulation import Simulation
@@ -22,6 +24,7 @@ from closures.drag import ergun
 from closures.numbers import archimedes
 from scenarios.defluidisation import Layers, in_layers, onsets
 from scenarios.gas_bed import mueller, standard_bed, van_wachem
+from scenarios.refinement import Bed, Means, compared, gas, liquid, variants
 from scenarios.sedimentation import Settling, exponent, in_periodic_box
 from scenarios.segregation import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.spouted_bed import bed as spout
@@ -171,3 +174,31 @@ def test_hindered_settling_follows_richardson_and_zaki() -> None:
     found = [in_periodic_box(share, way=20.0) for share in (0.1, 0.3)]
     reynolds = 1000.0 * found[0].terminal * 5e-4 / 8.9e-4
     assert exponent(found)[0] == pytest.approx(exponent_richardson_zaki(reynolds, 0.0), rel=0.1)
+
+
+@pytest.mark.parametrize("bed", [liquid(), gas()], ids=["liquid", "gas"])
+def test_refinement_changes_numbers_only(bed: Bed) -> None:
+    """Cells, step and contact modulus change, one cell across stays one, and the kernel keeps its width."""
+    for changes, _ in variants(bed.case).values():
+        changed = bed.case.with_(**changes)
+        assert set(changes) <= {"column.cell", "run.step"} | {
+            f"material.{name}.contact_modulus" for name in changed.material
+        }
+        assert changed.laws.smoothing == bed.case.laws.smoothing
+        counts = cell_counts(changed.column.size, changed.column.cell)
+        before = cell_counts(bed.case.column.size, bed.case.column.cell)
+        finer = "column.cell" in changes
+        assert all(n == (b if b == 1 or not finer else 1.5 * b) for n, b in zip(counts, before))
+
+
+def test_a_larger_deviation_is_seen() -> None:
+    """Twice the pressure fluctuations at the same mean: the ratio of the deviations is 2, and the limit of 5 % fails."""
+    time = np.linspace(0.0, 10.0, 1000)
+
+    def means(size: float) -> Means:
+        wave = size * np.sin(20.0 * time)
+        return Means(block_average(1.0 + 0.0 * time), block_average(100.0 + wave), block_average(wave**2))
+
+    rows = compared("bed", means(2.0), means(1.0), gusty=True)
+    assert [row.verdict for row in rows] == ["holds", "holds", "FAILS"]
+    assert rows[2].value == pytest.approx(2.0, rel=1e-9)
