@@ -192,7 +192,7 @@ def test_refinement_changes_numbers_only(bed: Bed) -> None:
 
 
 def test_a_larger_deviation_is_seen() -> None:
-    """Twice the pressure fluctuations at the same mean: the ratio of the deviations is 2, and the limit of 5 % fails."""
+    """Twice the fluctuations of pressure at the same mean: the ratio of deviations is 2, and the limit of 5 % fails."""
     time = np.linspace(0.0, 10.0, 1000)
 
     def means(size: float) -> Means:
