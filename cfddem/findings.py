@@ -314,7 +314,7 @@ def _drag(case: Case, bed: Bed) -> Iterator[Finding]:
         if not low <= value <= high:
             yield Finding(
                 "amber", "laws.drag", f"{law.name} was fitted for {name} {low:g} to {high:g}; here it is {value:.3g}",
-                "cfddem explain lists the laws and their ranges",
+                "cfddem explain lists laws, and cfddem explain NAME says the range of one",
             )  # fmt: skip
     if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
         yield Finding(

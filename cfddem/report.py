@@ -20,6 +20,7 @@ from cfddem.record.quantities import MEAN_HEIGHT
 from cfddem.record.reading import Run, open_run
 from cfddem.record.regimes import RegimeMap, regime_map
 from cfddem.record.series import block_average, stationarity
+from cfddem.run_warnings import counted, warnings_of
 from closures import bed as laws_of_beds
 from closures import numbers
 from closures.law import SHELF
@@ -63,9 +64,9 @@ def report(folder: Path) -> dict[str, Any]:
         "ledger": _ledger(run),
         "energy": _energy(run),
         "encounters": _encounters(run, begin),
-        "warnings": _warnings(run, case, measures, laws),
+        "warnings": warnings_of(run, case, measures, laws),
         "wall_time": run.about.get("wall_time", {}),
-        "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": _last(run, "fluid_steps")},
+        "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": counted(run, "fluid_steps")},
         "card": card(case).summary(),
         "provenance": run.provenance,
     }
@@ -108,11 +109,6 @@ def steadiness(measured: dict[str, Any]) -> str:
         return "stationary"
     drift = measured["drift"]
     return f"drifts, by {drift:+.2g}" if abs(drift) > 3.0 * measured["drift_error"] else "still settling"
-
-
-def _last(run: Run, name: str) -> int:
-    column = run.history.get(name, np.zeros(0))
-    return int(column[-1]) if len(column) else 0
 
 
 def _ledger(run: Run) -> dict[str, float]:
@@ -255,37 +251,7 @@ def _compared(what: str, computed: float, expected: float, unit: str, law: str =
     }  # fmt: skip
 
 
-# ---------------------------------------------------------------- what speaks against the run
-
-
-def _warnings(run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> list[str]:
-    """One line each: how the run ended, laws outside of their range, series that still move, the card's findings."""
-    found = []
-    if run.status in ("failed", "stopped"):
-        found.append(
-            f"the run was {run.status}: {run.message}" if run.status == "stopped" else f"failed: {run.message}"
-        )
-    elif run.status == "running":
-        found.append("the run is under way, or was killed")
-    if run.missing:
-        found.append(f"{len(run.missing)} snapshots are missing")
-    outside = _last(run, "outside_range")
-    own = [law.name for law in case.laws.pair_laws.values()]
-    if outside and own:
-        names = ", ".join([str(case.laws.drag), *own])
-        found.append(f"the laws {names} were asked outside of their ranges {outside} times")
-    elif outside:
-        asked = _last(run, "fluid_steps") * float(run.history["particle_count"].mean())
-        share = f", {100.0 * outside / asked:.2g} % of all times it was asked" if asked else ""
-        found.append(f"the drag law {case.laws.drag} was asked outside of its range {outside} times{share}")
-    found += [f"{row['law']}: {row['outside_range']}" for row in laws if row["outside_range"]]
-    moving = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is False]
-    if moving:
-        found.append(f"not stationary in the window: {', '.join(moving)}; run longer, or set run.average_from later")
-    short = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is None]
-    if short:
-        found.append("the window holds too few rows for errors; run longer, or set run.history_every smaller")
-    return found
+# ---------------------------------------------------------------- as text
 
 
 def lines(result: dict[str, Any]) -> list[str]:

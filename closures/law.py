@@ -28,6 +28,11 @@ class Law:
         """Names of the arguments that lie outside the range the law was fitted to."""
         return [name for name, (low, high) in self.ranges.items() if not low <= arguments[name] <= high]
 
+    @property
+    def fitted_for(self) -> str:
+        """The range the law was fitted to, in words: `reynolds 0.01 to 300, voidage 0.5 to 0.9`."""
+        return ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in self.ranges.items())
+
 
 SHELF: dict[str, dict[str, Law]] = {}
 """All laws by kind and name."""

@@ -29,6 +29,7 @@ from cfddem.report import as_json, lines, report
 from cfddem.run import FIELDS
 from cfddem.view.page import page
 from closures import bed as laws_of_beds
+from closures.law import SHELF, Law
 
 BED = """
 title = "Beads <in> water & more"
@@ -135,7 +136,7 @@ def test_dry_particles_have_a_report_too(tmp_path: Path) -> None:
 
 def test_what_speaks_against_the_run_is_counted(tmp_path: Path) -> None:
     said = "\n".join(report(made_up(tmp_path / "steady"))["warnings"])
-    assert "di_felice was asked outside of its range 8000 times, 0.1 % of all times" in said
+    assert "di_felice was asked outside of its range 8000 times, 0.1 % of all: voidage 0.4 to 1; compare" in said
     assert "not stationary" not in said
     drifting = report(made_up(tmp_path / "drifts", trend=5e-3))
     assert drifting["measures"]["bed_height"]["stationary"] is False
@@ -143,6 +144,27 @@ def test_what_speaks_against_the_run_is_counted(tmp_path: Path) -> None:
     short = report(made_up(tmp_path / "short", rows=11))
     assert any("too few rows" in each for each in short["warnings"])
     assert max(map(len, lines(drifting))) <= 100
+
+
+@pytest.mark.parametrize(
+    ("laws", "ranges"),
+    [
+        ('drag = "wen_yu"', ["wen_yu", "voidage 0.4 to 1, reynolds 0 to 1000"]),
+        ('drag = "tenneti"', ["tenneti", "voidage 0.5 to 1, reynolds 0 to 300"]),
+        ('minimum_gap = "of_ones_own"', ["di_felice voidage 0.4 to 1; of_ones_own approach_speed 0 to 0.1"]),
+    ],
+)
+def test_a_law_asked_outside_of_its_range_is_named_with_the_range(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, laws: str, ranges: list[str]
+) -> None:
+    own = Law("of_ones_own", "minimum_gap", "here", {"approach_speed": (0.0, 0.1)}, lambda roughness: roughness)
+    monkeypatch.setitem(SHELF["minimum_gap"], "of_ones_own", own)
+    run = report(made_up(tmp_path / "run", f"{BED}[laws]\n{laws}\n"))
+    said = [each for each in run["warnings"] if "outside of" in each]
+    assert len(said) == 1 and all(each in said[0] for each in [*ranges, "cfddem explain"])
+    first = next(place for place, line in enumerate(lines(run)) if "outside of" in line)
+    assert all(len(line) <= 100 for line in lines(run))
+    assert "cfddem explain" in " ".join(lines(run)[first : first + 2])  # in two lines
 
 
 class Page(HTMLParser):
