@@ -14,6 +14,7 @@ from cfddem.card import card
 from cfddem.case import Case
 from cfddem.errors import InputError
 from cfddem.expected import LIQUID
+from cfddem.lone_sphere import beside_its_drag_law
 from cfddem.placement import grains_of
 from cfddem.record import energy
 from cfddem.record.quantities import MEAN_HEIGHT
@@ -29,6 +30,9 @@ MEASURES = (
     "bed_height", "bed_voidage", "bed_voidage_pressure", "pressure_drop", "wall_support", "granular_temperature",
     "fastest", "contact_count",
 )  # fmt: skip
+
+OF_ONE = ("bed_height", "wall_support", "fastest", "contact_count")
+"""What is told of a sphere alone, which is no bed."""
 
 FREE_SIDES = ("free_slip", "periodic")
 """Sides that do not hold the flow back: the bed is then as wide as one likes."""
@@ -50,9 +54,10 @@ def report(folder: Path) -> dict[str, Any]:
     begin, end = window_of(run, case)
     inside = run.history["time"] >= begin
     heights = [name for name in run.history if name.startswith(MEAN_HEIGHT)]
-    measures = {name: _measured(run, name, inside) for name in (*MEASURES, *heights) if name in run.history}
+    told = OF_ONE if case.particle_count == 1 else (*MEASURES, *heights)
+    measures = {name: _measured(run, name, inside) for name in told if name in run.history}
     measures = {name: each for name, each in measures.items() if each["known"] > 0.5}
-    laws = _laws(case, measures)
+    laws = [*_laws(case, measures), *(_compared(*row) for row in beside_its_drag_law(run, case))]
     return {
         "case": case.title or folder.resolve().name,
         "folder": str(folder),
@@ -264,9 +269,10 @@ def lines(result: dict[str, Any]) -> list[str]:
         value = f"{each['mean']:.4g}{error} {unit}".rstrip()
         out.append(f"  {name.replace('_', ' '):<24} {value:<28} {steadiness(each)}")
     if result["laws"]:
-        out += ["", f"  {'law':<40} {'run':>10} {'law':>10} {'ratio':>7}"]
+        wide = max(40, *(len(row["law"]) for row in result["laws"]))
+        out += ["", f"  {'law':<{wide}} {'run':>10} {'law':>10} {'ratio':>7}"]
         for row in result["laws"]:
-            out.append(f"  {row['law']:<40} {row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}")
+            out.append(f"  {row['law']:<{wide}} {row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}")
     out += ["", "  ledger, largest over the run"]
     out += [f"  {name.replace('_', ' '):<24} {value:.2g}" for name, value in result["ledger"].items()]
     if result.get("encounters"):

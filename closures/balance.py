@@ -87,6 +87,51 @@ def terminal_velocity(
     return fluidising_velocity(diameter, density, fluid_density, viscosity, 1.0, drag, gravity)
 
 
+def speed_after(
+    time: float,
+    speed: float,
+    diameter: float,
+    density: float,
+    fluid_density: float,
+    viscosity: float,
+    drag: Drag,
+    gravity: float = 9.81,
+    added_mass: float = 0.0,
+) -> float:
+    r"""Speed of a sphere alone that falls, or rises, some time later, by its equation of motion with any drag law.
+
+    .. math:: (\rho_p + C_m\rho_f)V\dot v = |\rho_p - \rho_f|Vg - 3\pi\eta d\,F(Re)\,v
+
+    time           t, until then [s]
+    speed          v now, in the direction in which it falls or rises [m/s]
+    diameter       d [m]
+    density        rho_p, of the sphere [kg/m3]
+    fluid_density  rho_f [kg/m3]
+    viscosity      eta, dynamic [Pa s]
+    drag           F(reynolds, voidage)
+    gravity        g [m/s2]
+    added_mass     C_m; 0.5 for a sphere alone [-]
+    returns        v then [m/s], to 1e-9 relative
+
+    >>> from closures.drag_single import stokes
+    >>> relaxation = 2500 * 1e-8 / 18e-3              # of a sphere of 0.1 mm in water, by Stokes: u_t (1 - 1/e)
+    >>> round(speed_after(relaxation, 0.0, 1e-4, 2500.0, 1000.0, 1e-3, stokes) / 8.175e-3, 6)
+    0.632121
+    """
+    from scipy.integrate import solve_ivp  # here, because whoever only reads laws need not wait for scipy
+
+    inertia = (density + added_mass * fluid_density) / 6.0
+    weight = abs(density - fluid_density) / 6.0 * gravity
+    friction = 3.0 * viscosity / diameter**2
+
+    def acceleration(_: float, v: list[float]) -> float:
+        factor = drag(fluid_density * diameter * abs(float(v[0])) / viscosity, 1.0)
+        return (weight - friction * factor * float(v[0])) / inertia
+
+    solved = solve_ivp(acceleration, (0.0, time), [speed], t_eval=[time], rtol=1e-9, atol=1e-15)
+    return float(solved.y[0, -1])
+
+
 def fluidising_velocity(
     diameter: float,
     density: float,

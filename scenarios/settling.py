@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from cfddem.case import Case
 from cfddem.gallery import gallery
 from cfddem.simulation import Simulation
-from closures.balance import terminal_velocity
+from closures.balance import speed_after, terminal_velocity
 from closures.drag_single import schiller_naumann
 from closures.law import SHELF
 from scenarios.validation import numbers
@@ -91,23 +91,14 @@ def release(case: Case) -> tuple[np.ndarray, np.ndarray]:
 
 
 def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
-    """Speed of the same sphere by the ordinary differential equation of its drag law, alone in an endless fluid.
-
-    .. math:: (\\rho_p + C_m\\rho)V\\dot v = (\\rho_p - \\rho)Vg - 3\\pi\\eta d\\,F(Re)\\,v
-    """
+    """Speed of the same sphere from rest by the equation of motion of its drag law, alone in an endless fluid [m/s]."""
     assert case.fluid is not None and isinstance(case.laws.drag, str)
-    law, fluid, diameter = SHELF["drag"][case.laws.drag].function, case.fluid, case.bed.diameter
-    volume = math.pi / 6.0 * diameter**3
-    inertia = (case.solid.density + case.laws.added_mass * fluid.density) * volume
-    weight = (case.solid.density - fluid.density) * volume * abs(case.laws.gravity[2])
-
-    def acceleration(_: float, speed: np.ndarray) -> np.ndarray:
-        factor = law(fluid.density * diameter * abs(float(speed[0])) / fluid.viscosity, 1.0)
-        return (weight - 3.0 * math.pi * fluid.viscosity * diameter * factor * speed) / inertia
-
-    solved = solve_ivp(acceleration, (0.0, times[-1]), [0.0], t_eval=times, rtol=1e-9, atol=1e-12)
-    speeds: np.ndarray = solved.y[0]
-    return speeds
+    law, gravity = SHELF["drag"][case.laws.drag].function, abs(case.laws.gravity[2])
+    sphere = (case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, law, gravity)
+    speeds = [0.0]
+    for begin, end in pairwise(times):
+        speeds.append(speed_after(end - begin, speeds[-1], *sphere, case.laws.added_mass))
+    return np.array(speeds)
 
 
 def mordant() -> Case:

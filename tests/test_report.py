@@ -167,6 +167,57 @@ def test_a_law_asked_outside_of_its_range_is_named_with_the_range(
     assert "cfddem explain" in " ".join(lines(run)[first : first + 2])  # in two lines
 
 
+ALONE = """
+[fluid]
+density = 1000.0
+viscosity = 1e-3
+[material.sphere]
+density = 2500.0
+youngs_modulus = 1e3
+poisson = 0.25
+[column]
+width = 0.01
+height = 0.02
+cell = 0.001
+sides = "free_slip"
+[bed]
+diameter = 1e-4
+positions = [[0.005, 0.005, 0.015]]
+inlet_velocity = 1e-3
+[laws]
+drag = "stokes"
+[run]
+until = 0.01
+"""
+
+
+@pytest.mark.parametrize("density", [2500.0, 400.0])
+def test_a_sphere_alone_is_held_against_its_drag_law(tmp_path: Path, density: float) -> None:
+    """Stokes drag from rest: u_t (1 - exp(-t/tau)), here with a speed 2 % too high from 4 ms on, until it touches."""
+    text = ALONE.replace("2500.0", f"{density}")
+    grid = grid_of(Case.from_text(text).column)
+    terminal = (density - 1000.0) * 9.81 * 1e-8 / 18e-3
+    run = RunFolder.create(tmp_path / "run", text, {}, grid, FIELDS)
+    for k, time in enumerate(np.linspace(0.0, 0.01, 51)):
+        fall = terminal * -math.expm1(-time * 18e-3 / (density * 1e-8)) * (1.02 if time > 3.99e-3 else 1.0)
+        touches = k == 50
+        velocity = [[0.0, 0.0, 0.0 if touches else 1e-3 - fall]]
+        numbers = {"particle_count": 1.0, "contact_count": float(touches), "granular_temperature": math.nan}
+        run.append_history({"time": time, "bed_height": 0.015, "fastest": abs(velocity[0][2]), **numbers})
+        wind = np.zeros((*grid.shape, 3))
+        wind[..., 2] = 1e-3
+        run.write_snapshot(time, k, {"velocity": wind, "voidage": np.ones(grid.shape)}, {
+            "position": np.full((1, 3), 0.01), "velocity": np.array(velocity), "id": np.zeros(1, int),
+        })  # fmt: skip
+    run.finish("finished")
+    last, worst = report(tmp_path / "run")["laws"]
+    assert last["law"] == "terminal velocity by stokes"
+    assert last["expected"] == pytest.approx(abs(terminal), rel=1e-9)
+    assert last["computed"] == pytest.approx(1.02 * abs(terminal) * -math.expm1(-0.0098 * 1.8e6 / density), rel=1e-4)
+    assert worst["law"].startswith("equation of motion") and worst["ratio"] == pytest.approx(1.02, rel=1e-4)
+    assert "terminal velocity by stokes" in page(tmp_path / "run", tmp_path / "alone.html").read_text()
+
+
 class Page(HTMLParser):
     """What stands on a page, and what it would fetch from elsewhere."""
 

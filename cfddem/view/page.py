@@ -51,7 +51,7 @@ $warnings
 <h2>Measures</h2>
 $measures
 $series
-<h2>Laws of beds</h2>
+<h2>Laws</h2>
 $laws
 <h2>Profile</h2>
 $profile
@@ -157,7 +157,7 @@ def _measures(measures: dict[str, Any]) -> str:
 
 def _laws(laws: list[dict[str, Any]]) -> str:
     if not laws:
-        return "<p>No law of beds applies to this case.</p>"
+        return "<p>No law of beds or of a sphere alone applies to this case.</p>"
     rows = [
         (each["law"], f"{each['computed']:.4g}", f"{each['expected']:.4g}", f"{each['ratio']:.3f}", each["unit"],
          each["outside_range"])
@@ -216,9 +216,10 @@ def _series(run: Run, case: Case, result: dict[str, Any]) -> Any:
         named = "pressure drop\n[Pa]" if weight is None else "pressure drop\nover weight  [-]"
         curves.append((named, history["pressure_drop"] / (weight or 1.0)))
     curves.append(("granular\ntemperature  [m2/s2]", history["granular_temperature"]))
-    figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.9 * len(curves), sharex=True)
     begin, end = result["window"]
     inside = history["time"] >= begin
+    curves = [each for each in curves if np.isfinite(each[1][inside]).any()]  # one particle has no temperature
+    figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.9 * len(curves), sharex=True)
     for each, (name, values) in zip(axes, curves):
         each.axvspan(begin, end, color="#f3f3f3", zorder=0)
         each.plot(history["time"], values, color=BLUE)
