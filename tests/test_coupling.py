@@ -68,7 +68,7 @@ def test_gathering_is_the_adjoint_of_spreading() -> None:
     random = np.random.default_rng(1)
     carried, field = random.normal(size=(200, 2)), random.normal(size=(2, *grid.shape))
     there = (spreading.smooth(spreading.deposit(place, carried)) * field).sum()
-    back = (carried * spreading.gather(place, spreading.smooth(field))).sum()
+    back = (carried * spreading.gather(place.footprint, spreading.smooth(field))).sum()
     assert there == pytest.approx(back, rel=1e-12)
 
 

@@ -34,7 +34,7 @@ from cfddem.coupling import exchange_loops as loops
 from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import OwnWind
 from cfddem.coupling.own_wind_tables import MODES
-from cfddem.coupling.voidage import Placement, Spreading
+from cfddem.coupling.voidage import Footprint, Placement, Spreading
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.kernels import prange
@@ -109,7 +109,7 @@ class Exchange:
         self._ranges = _ranges(drag)
         self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
         self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # by id: own winds [m/s]
-        self._trail: list[Array] = []  # positions by id at the two steps before
+        self._trail: list[Footprint] = []  # by id at the two steps before
         self._last_step = 0.0
 
     # ------------------------------------------------------------ around one fluid step
@@ -152,7 +152,7 @@ class Exchange:
         rows, place, fluid, spreading = bodies.id, offer.place, self.fluid, self.spreading
         weight, velocity, _ = fluid.drag_exchange()
         fields = np.moveaxis(np.concatenate([weight, weight * velocity], axis=-1), -1, 0)
-        seen = spreading.gather(place, spreading.smooth(fields))
+        seen = spreading.gather(place.footprint, spreading.smooth(fields))
         pressure, drag = self._pressure_force(bodies, place), np.empty((bodies.count, 3))
         loops.settle(
             rows, seen, offer.resistance, offer.target, pressure, offer.explicit, place.volume, bodies.mass,
@@ -163,7 +163,7 @@ class Exchange:
             self.own_wind.advance(
                 place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
             )
-        self._trail = [self._trail[-1], bodies.by_id(bodies.position)]
+        self._trail = [self._trail[-1], _by_id(bodies, place.footprint)]
         self._last_step = offer.step
 
     @property
@@ -181,7 +181,7 @@ class Exchange:
         return {
             "memory": self._memory.copy(),
             "winds": self._winds.copy(),
-            "trail": {str(n): each.copy() for n, each in enumerate(self._trail)},
+            "trail": {str(n): each._asdict() for n, each in enumerate(self._trail)},
             "last_step": self._last_step,
             "outside": self.outside,
         }
@@ -189,7 +189,8 @@ class Exchange:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a `checkpoint()`."""
         self._memory, self._winds = np.array(state["memory"]), np.array(state["winds"])
-        self._trail = [np.array(state["trail"][name]) for name in sorted(state["trail"])]
+        kept = [state["trail"][name] for name in sorted(state["trail"])]
+        self._trail = [Footprint(np.array(each["cells"]), np.array(each["weights"])) for each in kept]
         self._last_step, self.outside = float(state["last_step"]), int(state["outside"])
 
     # ------------------------------------------------------------ terms
@@ -199,10 +200,12 @@ class Exchange:
         fluid, spreading = self.fluid, self.spreading
         force = np.zeros_like(slip)
         if self.viscous_stress:
-            force += place.volume[:, None] * spreading.gather(place, spreading.smooth(fluid.cell_viscous_force()))
+            force += place.volume[:, None] * spreading.gather(
+                place.footprint, spreading.smooth(fluid.cell_viscous_force())
+            )
         if self.lift and fluid.viscosity > 0.0:
             curl = vorticity(np.moveaxis(fluid.velocity, -1, 0), fluid.grid.spacing)
-            seen = spreading.gather(place, spreading.smooth(curl))
+            seen = spreading.gather(place.footprint, spreading.smooth(curl))
             force += lift_force(slip, seen, bodies.spin, bodies.radius, fluid.density, fluid.viscosity)
         return force
 
@@ -239,7 +242,7 @@ class Exchange:
         """What every particle meets, less what it makes of it itself."""
         spreading, fluid = self.spreading, self.fluid
         velocity = spreading.smooth(np.moveaxis(fluid.velocity, -1, 0))
-        seen = spreading.gather(place, np.concatenate([velocity, solid[None]]))
+        seen = spreading.gather(place.footprint, np.concatenate([velocity, solid[None]]))
         own = np.zeros(bodies.count) if self.own_wind is None else self.own_wind.solid(place)
         scalars, vectors = np.empty((3, bodies.count)), np.empty((2, bodies.count, 3))
         met = Met(*vectors, *scalars)
@@ -259,7 +262,7 @@ class Exchange:
         spreading, diameter = self.spreading, 2.0 * bodies.radius
         volume = place.volume
         surface = spreading.smooth(spreading.deposit(place, (volume / diameter)[:, None])) / self.fluid.grid.cell_volume
-        around = spreading.gather(place, np.concatenate([solid[None], surface]))
+        around = spreading.gather(place.footprint, np.concatenate([solid[None], surface]))
         ratio: Array = diameter * around[:, 1] / around[:, 0]
         return ratio
 
@@ -287,13 +290,10 @@ class Exchange:
         """
         if self.fluid.model == "B":
             return np.zeros((bodies.count, 3))
-        spreading = self.spreading
+        spreading, force = self.spreading, np.empty((bodies.count, 3))
         gradient = spreading.smooth(self.fluid.cell_pressure_gradient())
-        force = np.empty((bodies.count, 3))
-        loops.press(
-            place.volume, *(spreading.gather_at(trail[bodies.id], bodies.radius, gradient) for trail in self._trail),
-            spreading.gather(place, gradient), force,
-        )  # fmt: skip
+        seen = (spreading.gather(footprint, gradient) for footprint in (*self._trail, place.footprint))
+        loops.press(place.volume, bodies.id, *seen, force)
         return force
 
     def _make_room(self, bodies: Bodies) -> None:
@@ -306,8 +306,17 @@ class Exchange:
             grown[bodies.id[fresh], :3] = bodies.velocity[fresh]
             self._memory = grown
             self._winds = np.concatenate([self._winds, np.zeros((most - len(self._winds), *self._winds.shape[1:]))])
-            here = bodies.by_id(bodies.position)
-            self._trail = [np.concatenate([trail, here[len(trail) :]]) for trail in self._trail or [here[:0]] * 2]
+            here = _by_id(bodies, self.spreading.footprint(bodies.position, bodies.radius))
+            self._trail = [_longer(trail, here) for trail in self._trail or [Footprint(*(a[:0] for a in here))] * 2]
+
+
+def _by_id(bodies: Bodies, footprint: Footprint) -> Footprint:
+    return Footprint(*(bodies.by_id(each) for each in footprint))
+
+
+def _longer(old: Footprint, all_of_now: Footprint) -> Footprint:
+    """Footprints of then, and for whom there was none those of now."""
+    return Footprint(*(np.concatenate([then, now[len(then) :]]) for then, now in zip(old, all_of_now)))
 
 
 def _ranges(drag: Law | None) -> tuple[tuple[float, float], ...]:

@@ -63,11 +63,13 @@ def other_force(rows, memory, velocity, inertia, last_step, force):
 
 
 @threaded
-def press(volume, before, between, now, force):
-    """Force of the pressure gradients (N, 3) [Pa/m] seen at the last three places, by the weights of their voidage."""
+def press(volume, rows, before, between, now, force):
+    """Force (N, 3) [N] of the pressure gradients [Pa/m] seen from the last three places, by the weights of their
+    voidage; those from the two places before are known by rows."""
     for n in prange(len(volume)):
+        k = rows[n]
         for d in range(3):
-            force[n, d] = -volume[n] * (0.25 * before[n, d] + 0.5 * between[n, d] + 0.25 * now[n, d])
+            force[n, d] = -volume[n] * (0.25 * before[k, d] + 0.5 * between[k, d] + 0.25 * now[n, d])
 
 
 @threaded

@@ -16,31 +16,27 @@ def cell_and_share(coordinate, linear):
     return start, linear * (coordinate - 0.5 * linear - start)
 
 
-@inline
-def cells_and_weights(n, s, position, radius, offsets, linear, origin, inverse, home):
-    """The eight cells over which piece s of particle n is spread, and its weight in each."""
+@threaded
+def footprints(position, radius, offsets, linear, origin, inverse, home, cells, weights):
+    """The cells over which every particle is spread, eight for each of its pieces, and its weight in each (N, m)."""
     pz, py, px = home.shape
-    i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
-    j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
-    k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
-    i0, i1 = min(max(i + 1, 0), px - 1), min(max(i + 2, 0), px - 1)
-    j0, j1 = min(max(j + 1, 0), py - 1), min(max(j + 2, 0), py - 1)
-    k0, k1 = min(max(k + 1, 0), pz - 1), min(max(k + 2, 0), pz - 1)
-    cells = (
-        home[k0, j0, i0], home[k0, j0, i1], home[k0, j1, i0], home[k0, j1, i1],
-        home[k1, j0, i0], home[k1, j0, i1], home[k1, j1, i0], home[k1, j1, i1],
-    )  # fmt: skip
-    below, above = (1.0 - c) / len(offsets), c / len(offsets)
-    q00, q01, q10, q11 = (1.0 - b) * (1.0 - a), (1.0 - b) * a, b * (1.0 - a), b * a
-    weights = (
-        q00 * below, q01 * below, q10 * below, q11 * below,
-        q00 * above, q01 * above, q10 * above, q11 * above,
-    )  # fmt: skip
-    return cells, weights
+    for n in prange(len(position)):
+        for s in range(len(offsets)):
+            i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
+            j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
+            k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
+            share = 1.0 / len(offsets)
+            for corner in range(8):
+                up, back, right = corner >> 2, corner >> 1 & 1, corner & 1
+                x, y = min(max(i + 1 + right, 0), px - 1), min(max(j + 1 + back, 0), py - 1)
+                z = min(max(k + 1 + up, 0), pz - 1)
+                across = (b if back else 1.0 - b) * (a if right else 1.0 - a)
+                cells[n, 8 * s + corner] = home[z, y, x]
+                weights[n, 8 * s + corner] = share * (c if up else 1.0 - c) * across
 
 
 @threaded
-def deposit(position, radius, order, start, values, offsets, linear, origin, inverse, home, fields):
+def deposit(order, start, values, cells, weights, fields):
     """Slabs of even number together, then odd ones, then a last one that would touch the first round a period."""
     slabs = len(start) - 1
     even = slabs - slabs % 2
@@ -49,38 +45,30 @@ def deposit(position, radius, order, start, values, offsets, linear, origin, inv
         for half in prange((last - first + 1) // 2):
             slab = first + 2 * half
             for place in range(start[slab], start[slab + 1]):
-                _spread(order[place], position, radius, values, offsets, linear, origin, inverse, home, fields)
+                _spread(order[place], values, cells, weights, fields)
 
 
 @kernel
-def _spread(n, position, radius, values, offsets, linear, origin, inverse, home, fields):
+def _spread(n, values, cells, weights, fields):
     """Add what one particle carries to its cells."""
-    for s in range(len(offsets)):
-        c, w = cells_and_weights(n, s, position, radius, offsets, linear, origin, inverse, home)
+    for s in range(cells.shape[1]):
+        cell, weight = cells[n, s], weights[n, s]
         for m in range(values.shape[1]):
-            value = values[n, m]
-            fields[c[0], m] += w[0] * value
-            fields[c[1], m] += w[1] * value
-            fields[c[2], m] += w[2] * value
-            fields[c[3], m] += w[3] * value
-            fields[c[4], m] += w[4] * value
-            fields[c[5], m] += w[5] * value
-            fields[c[6], m] += w[6] * value
-            fields[c[7], m] += w[7] * value
+            fields[cell, m] += weight * values[n, m]
 
 
 @threaded
-def gather(position, radius, cells, offsets, linear, origin, inverse, home, values):
-    """Every particle takes from its cells, with the weights of `_spread`."""
-    for n in prange(len(position)):
+def gather(cells, weights, field, values):
+    """Every particle takes from its cells, with the weights of `_spread`: field (cells, m) gives values (N, m)."""
+    for n in prange(len(values)):
         for m in range(values.shape[1]):
-            values[n, m] = 0.0
-        for s in range(len(offsets)):
-            c, w = cells_and_weights(n, s, position, radius, offsets, linear, origin, inverse, home)
-            for m in range(values.shape[1]):
-                low = (w[0] * cells[c[0], m] + w[1] * cells[c[1], m]) + (w[2] * cells[c[2], m] + w[3] * cells[c[3], m])
-                high = (w[4] * cells[c[4], m] + w[5] * cells[c[5], m]) + (w[6] * cells[c[6], m] + w[7] * cells[c[7], m])
-                values[n, m] += low + high
+            total = 0.0
+            for s in range(0, cells.shape[1], 8):
+                c, w = cells[n, s : s + 8], weights[n, s : s + 8]
+                low = (w[0] * field[c[0], m] + w[1] * field[c[1], m]) + (w[2] * field[c[2], m] + w[3] * field[c[3], m])
+                high = (w[4] * field[c[4], m] + w[5] * field[c[5], m]) + (w[6] * field[c[6], m] + w[7] * field[c[7], m])
+                total += low + high
+            values[n, m] = total
 
 
 @threaded

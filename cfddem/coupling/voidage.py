@@ -33,6 +33,13 @@ SLAB = 4
 """Layers of cells that one thread fills at a time, at least; slabs that are filled together never touch."""
 
 
+class Footprint(NamedTuple):
+    """Over which cells particles are spread, and by which weights."""
+
+    cells: np.ndarray  # (N, m) uint32, cells counted through the whole grid
+    weights: Array  # (N, m), the sum of a row is 1
+
+
 class Placement(NamedTuple):
     """Particles among the cells at one instant."""
 
@@ -41,6 +48,7 @@ class Placement(NamedTuple):
     volume: Array  # (N,) [m3]
     order: np.ndarray  # rows sorted by slab
     start: np.ndarray  # (slabs + 1,) where the rows of a slab begin in `order`
+    footprint: Footprint
 
 
 class Spreading:
@@ -86,27 +94,28 @@ class Spreading:
         slab = np.clip(layers // SLAB, 0, slabs - 1).astype(np.uint16)  # short numbers are sorted fastest
         order = np.argsort(slab, kind="stable")
         start = np.concatenate(([0], np.cumsum(np.bincount(slab, minlength=slabs))))
-        return Placement(position.copy(), radius, (4.0 / 3.0) * math.pi * radius**3, order, start)
+        volume = (4.0 / 3.0) * math.pi * radius**3
+        return Placement(position.copy(), radius, volume, order, start, self.footprint(position, radius))
+
+    def footprint(self, position: Array, radius: Array) -> Footprint:
+        """Cells and weights of particles at places (N, 3) [m]."""
+        shape = len(position), 8 * len(self._offsets)
+        footprint = Footprint(np.empty(shape, np.uint32), np.empty(shape))
+        loops.footprints(
+            position, radius, self._offsets, self._linear, self._origin, self._inverse, self._home, *footprint
+        )
+        return footprint
 
     def deposit(self, place: Placement, values: Array) -> Array:
         """Sum over particles of weight times value: values (N, m) give fields (m, nz, ny, nx)."""
         fields = np.zeros((math.prod(self.grid.cells), values.shape[1]))
-        spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
-        loops.deposit(
-            place.position, place.radius, place.order, place.start, np.ascontiguousarray(values), *spread, fields
-        )
+        loops.deposit(place.order, place.start, np.ascontiguousarray(values), *place.footprint, fields)
         return np.ascontiguousarray(fields.T).reshape(-1, *self.grid.shape)
 
-    def gather(self, place: Placement, fields: Array) -> Array:
+    def gather(self, footprint: Footprint, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle: (N, m). The adjoint of `deposit`."""
-        return self.gather_at(place.position, place.radius, fields)
-
-    def gather_at(self, position: Array, radius: Array, fields: Array) -> Array:
-        """The same at other places (N, 3) [m] of particles."""
-        cells = np.ascontiguousarray(fields.reshape(len(fields), -1).T)
-        values = np.empty((len(position), len(fields)))
-        spread = (self._offsets, self._linear, self._origin, self._inverse, self._home)
-        loops.gather(position, radius, cells, *spread, values)
+        values = np.empty((len(footprint.cells), len(fields)))
+        loops.gather(*footprint, np.ascontiguousarray(fields.reshape(len(fields), -1).T), values)
         return values
 
     def smooth(self, fields: Array) -> Array:

@@ -19,6 +19,7 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.fluid.conditions import SIDES, Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.ghosts import continue_cells, fill_side
 from cfddem.fluid.grid import HIGH, LOW, Array, Grid, layers
 
 
@@ -62,6 +63,7 @@ class Boundaries:
                 raise InputError(f"boundaries.{name}", None, "one of " + ", ".join(SIDES))
         self.grid = grid
         self.periodic, self.driving = np.zeros(3, dtype=bool), np.zeros(3)
+        self._cells = np.array(grid.cells)
         self.sides: list[Side] = []
         for axis in range(3):
             plain: Condition = FreeSlip() if grid.cells[axis] == 1 else NoSlip()
@@ -224,10 +226,10 @@ class Boundaries:
 
     def blocked_faces(self) -> np.ndarray:
         """(3, ...) true on faces of which a solid cell is one side."""
-        solid = np.zeros(self.grid.padded_shape, dtype=bool)
+        solid = np.zeros(self.grid.padded_shape)
         self.grid.inner(solid)[:] = ~self.grid.open
         self.fill_cells(solid)
-        return np.stack([solid | np.roll(solid, 1, axis=2 - d) for d in range(3)])
+        return np.stack([(solid + np.roll(solid, 1, axis=2 - d)) > 0.0 for d in range(3)])
 
     # ------------------------------------------------------------ ghost cells
 
@@ -243,14 +245,8 @@ class Boundaries:
             array[layers(axis, ghost)] = array[layers(axis, LOW + (ghost - LOW) % n)]
 
     def fill_cells(self, array: Array) -> None:
-        """Ghosts of a cell field (..., nz, ny, nx): periodic, or the value of the nearest cell."""
-        for axis in range(3):
-            if self.periodic[axis]:
-                self._wrap_axis(array, axis)
-                continue
-            n = self.grid.cells[axis]
-            array[layers(axis, slice(LOW))] = array[layers(axis, slice(LOW, LOW + 1))]
-            array[layers(axis, slice(n + LOW, None))] = array[layers(axis, slice(n + LOW - 1, n + LOW))]
+        """Ghosts of a cell field (nz, ny, nx), or of several: periodic, or the value of the nearest cell."""
+        continue_cells(array[None] if array.ndim == 3 else array, self._cells, self.periodic)
 
     def fill_pressure(self, pressure: Array, correction: bool = False) -> None:
         """First ghost layer of a pressure: given on outlets (zero for a correction), no gradient at walls."""
@@ -283,34 +279,4 @@ class Boundaries:
             else:
                 for side in self.sides:
                     if side.axis == axis:
-                        self._fill_side(side, velocity)
-
-    def _fill_side(self, side: Side, velocity: Array) -> None:
-        n, axis = self.grid.cells[side.axis], side.axis
-        face = n + LOW if side.high else LOW
-        inside = (n + LOW - 1, max(n + LOW - 2, LOW)) if side.high else (LOW, min(LOW + 1, n + LOW - 1))
-        beyond = (n + LOW, n + LOW + 1, n + LOW + 2) if side.high else (LOW - 1, LOW - 2)
-        normal = velocity[axis]
-        layer = side.layer
-        at_face, mirror, opens = side.wall[axis], side.mirror, side.outlet.any()
-        leaves: Any = True
-        if opens:
-            at_face = np.where(side.outlet, layer(normal, face), at_face)
-            # Fluid that flows back through an outlet comes from rest: it brings no momentum.
-            leaves = np.where(side.outlet, at_face * side.inward <= 0.0, True)
-            mirror = mirror * leaves
-        layer(normal, face)[:] = at_face
-        for component in range(3):
-            values = velocity[component]
-            if component == axis:
-                neighbour = layer(values, face - 1 if side.high else face + 1)
-                outside = 2.0 * at_face - neighbour
-                if opens:
-                    outside = np.where(side.outlet, at_face * leaves, outside)
-                for ghost in (face + 1, face + 2) if side.high else (face - 1, face - 2):
-                    if 0 <= ghost < values.shape[2 - axis]:
-                        layer(values, ghost)[:] = outside
-            else:
-                fixed = np.where(side.mirror < 0.0, 2.0 * side.wall[component], 0.0)
-                for ghost, source in zip(beyond, (*inside, inside[1])):
-                    layer(values, ghost)[:] = mirror * layer(values, source) + fixed
+                        fill_side(velocity, axis, side.high, self.grid.cells[axis], side.wall, side.mirror, side.outlet)

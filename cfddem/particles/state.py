@@ -39,7 +39,7 @@ class Bodies(NamedTuple):
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """Rows of the particles (N, ...) in the order of their ids; zero for ids that are gone."""
-        placed = np.zeros((int(self.id.max(initial=-1)) + 1, *values.shape[1:]))
+        placed = np.zeros((int(self.id.max(initial=-1)) + 1, *values.shape[1:]), values.dtype)
         placed[self.id] = values
         return placed
 

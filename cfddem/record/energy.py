@@ -143,7 +143,7 @@ class EnergyLedger:
 
         drag = self.exchange.drag_impulse[bodies.id] / offer.step
         spreading = self.exchange.spreading
-        weight = spreading.gather(offer.place, spreading.smooth(np.moveaxis(fluid.drag_exchange()[0], -1, 0)))
+        weight = spreading.gather(offer.place.footprint, spreading.smooth(np.moveaxis(fluid.drag_exchange()[0], -1, 0)))
         acting = offer.target + drag / np.maximum(weight * offer.resistance[:, None], 1e-300)
         volume = bodies.volume[:, None]
         pressure = spreading.smooth(np.ascontiguousarray(fluid.pressure)[None])
@@ -218,7 +218,7 @@ class EnergyLedger:
         """Pressure at every particle, by the weights with which its volume is spread; by id (n,) [Pa]."""
         assert self.exchange is not None
         spreading, bodies = self.exchange.spreading, self.particles.bodies
-        seen = spreading.gather_at(bodies.position, bodies.radius, smoothed)
+        seen = spreading.gather(spreading.footprint(bodies.position, bodies.radius), smoothed)
         return bodies.by_id(seen[:, 0])
 
     def _applied(self) -> Array:
