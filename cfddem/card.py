@@ -14,7 +14,9 @@ from typing import Any
 from cfddem.case import Case
 from cfddem.errors import CfddemError, InputError
 from cfddem.expected import Bed, Cost, Encounter, Steps, bed_of, cost_of, encounter_of, steps_of
-from cfddem.findings import WIDTH, Finding, bubbles, findings
+from cfddem.finding import WIDTH, Finding
+from cfddem.findings import findings
+from cfddem.findings_flow import bubbles
 from cfddem.mixture import bed_drag, sinking
 from closures import timescales
 

@@ -17,14 +17,11 @@ from pydantic import Field, ValidationError, ValidationInfo, field_validator, mo
 
 from cfddem.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
 from cfddem.case_text import parsed, put, read_text
-from cfddem.chosen_laws import chosen
+from cfddem.chosen_laws import BUILT_IN, chosen
 from cfddem.errors import InputError, nearest
 from cfddem.materials import Checked, Fluid, Material
 from cfddem.mistakes import Key, described, key_lines, line_of, refused, shown
 from closures.law import Law
-
-BUILT_IN = {"drag": ("none",), "minimum_gap": ("elastohydrodynamic",), "lubrication": ("nijssen", "none")}
-"""What a case may say for a law that is no law to be looked up: nothing, or what is compiled into the pair loop."""
 
 
 class Column(Checked):

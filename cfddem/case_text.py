@@ -54,7 +54,9 @@ def parsed(text: str, name: str) -> dict[str, Any]:
         reason, _, where = str(failure).partition(" (at ")
         found = re.match(r"line (\d+), column (\d+)", where)
         place = f"{name}:{found[1]}" if found else name
-        raise InputError(place, None, "valid TOML", f"{reason} in column {found[2]}" if found else reason) from None
+        where = f" in column {found[2]}" if found else ""
+        remedy = "; texts stand in quotation marks" if reason == "Invalid value" else ""
+        raise InputError(place, None, "valid TOML", reason + where + remedy) from None
 
 
 def put(values: dict[str, Any], keys: list[str], value: Any, whole: str) -> None:

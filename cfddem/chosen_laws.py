@@ -15,6 +15,9 @@ GAP_ARGUMENTS = ("roughness", "approach_speed", "viscosity", "reduced_modulus", 
 FILM_ARGUMENTS = ("gap", "viscosity", "reduced_radius", "minimum_gap", "cutoff_gap")
 """What a law of a film may ask for, by these names: [m], [Pa s], [m], [m], [m]; the first three it must."""
 
+BUILT_IN = {"drag": ("none",), "minimum_gap": ("elastohydrodynamic",), "lubrication": ("nijssen", "none")}
+"""What a case may say for a law that is no law to be looked up: nothing, or what is compiled into the pair loop."""
+
 OF_THE_PAIR_LOOP: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "minimum_gap": (GAP_ARGUMENTS, ()),
     "lubrication": (FILM_ARGUMENTS, FILM_ARGUMENTS[:3]),
@@ -28,13 +31,19 @@ def chosen(kind: str, law: str | Callable[..., float]) -> Law:
     kind  "drag", "minimum_gap" or "lubrication"
     """
     card = _named(kind, law) if isinstance(law, str) else _of_ones_own(kind, law)
-    if kind in OF_THE_PAIR_LOOP:
+    if not _can_be_asked(kind, card):
         may, must = OF_THE_PAIR_LOOP[kind]
-        taken = set(inspect.signature(card.function).parameters)
-        if card.kind != kind or not set(must) <= taken <= set(may):
-            asked = f"it may take {', '.join(may)}" + (f", and must take {', '.join(must)}" if must else "")
-            raise InputError(kind, card.name, f"a law of kind {kind!r} that the pair loop can ask", asked)
+        asked = f"it may take {', '.join(may)}" + (f", and must take {', '.join(must)}" if must else "")
+        raise InputError(kind, card.name, f"a law of kind {kind!r} that the pair loop can ask", asked)
     return card
+
+
+def _can_be_asked(kind: str, card: Law) -> bool:
+    """Whether a law takes what those who ask laws of this kind have to give."""
+    if kind not in OF_THE_PAIR_LOOP:
+        return True
+    may, must = OF_THE_PAIR_LOOP[kind]
+    return card.kind == kind and set(must) <= set(inspect.signature(card.function).parameters) <= set(may)
 
 
 def asked_by_name(law: Callable[..., float], names: Sequence[str], numbers: Sequence[float]) -> float:
@@ -51,7 +60,9 @@ def _named(kind: str, name: str) -> Law:
     if name not in laws:
         shelf.fill_from_packages()
     if name not in laws:
-        raise InputError(kind, shown(name), nearest(name, laws))
+        known = [*BUILT_IN[kind], *(each.name for each in laws.values() if _can_be_asked(kind, each))]
+        remedy = "cfddem explain lists all laws"
+        raise InputError(kind, shown(name), nearest(name, dict.fromkeys(known)), remedy)
     return laws[name]
 
 

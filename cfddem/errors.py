@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
+MANY = 10
+"""More known words than this are not all told where one of them is near [-]."""
+
 
 class CfddemError(Exception):
     """Any failure that the user can do something about; never shown as a traceback by the command line."""
@@ -48,11 +51,13 @@ class RunStopped(CfddemError):
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """The limit to state for an unknown word: the known ones, and the nearest first.
+    """The limit to state for an unknown word: the known ones, or the nearest of many, and the very nearest.
 
     >>> nearest("restituton", ["friction", "restitution"])
     "one of friction, restitution (did you mean 'restitution'?)"
     """
     words = list(known)
-    close = get_close_matches(word, words, n=1)
-    return f"one of {', '.join(words)}" + (f" (did you mean {close[0]!r}?)" if close else "")
+    close = get_close_matches(word, words, n=3)
+    shown = words if len(words) <= (MANY if close else 2 * MANY) else close or words[:MANY]
+    more = f" and {len(words) - len(shown)} more" if len(shown) < len(words) else ""
+    return f"one of {', '.join(shown)}{more}" + (f" (did you mean {close[0]!r}?)" if close else "")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-import textwrap
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -14,6 +12,8 @@ import numpy as np
 from cfddem.bed import POURED_SOLID_FRACTION
 from cfddem.case import Case
 from cfddem.expected import LIQUID, Bed, Cost, Encounter, Steps
+from cfddem.finding import Finding
+from cfddem.findings_flow import of_the_drag, of_the_flow, of_the_kernel
 
 DENSEST = 0.64
 """Solid fraction of a random close packing: no bed of equal spheres is denser."""
@@ -21,42 +21,24 @@ DENSEST = 0.64
 SUSPENDED = math.pi / 6.0 / 1.02**3
 """Solid fraction that a cubic lattice holds with a fiftieth of a diameter between neighbours."""
 
-NARROWEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
-"""Kernel, as a box of equal variance, over the diameter: below the first a sphere overfills its box."""
-
 DEEP, DEEPEST = 0.02, 0.1
 """Overlap over the diameter: from the first on contacts are soft, from the second spheres pass into each other."""
 
-UNEQUAL = 1.2
-"""Species whose diameters differ by this and more want a drag law that knows of sizes."""
+LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID = 5.0, 1e-4, 5e-5, 10.0
+"""Gases lighter than the first [kg/m3] are less viscous than the second [Pa s], common liquids more than the third,
+common solids denser than the fourth [kg/m3]; else a number may have been given in other units."""
 
-WIDTH = 100
-"""Columns of a terminal."""
-
-LONG = 86_400.0
-"""A run that takes longer than a day is worth a second thought [s]."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that speaks against a run."""
-
-    colour: Literal["amber", "red"]
-    key: str  # of the case
-    reason: str  # what, with number and limit
-    remedy: str
-
-    def lines(self, opening: str = "") -> list[str]:
-        """The finding as text, at most 100 columns wide."""
-        return textwrap.wrap(f"{opening}{self.colour}: {self}", WIDTH, subsequent_indent="  ")
-
-    def __str__(self) -> str:
-        return f"{self.key}: {self.reason}; {self.remedy}"
+LONG, ENDLESS = 86_400.0, 365.0 * 86_400.0
+"""A run that takes longer than a day is worth a second thought; one of a year will not end [s]."""
 
 
 def findings(case: Case, bed: Bed, pair: Encounter, steps: Steps, cost: Cost) -> list[Finding]:
-    """All that speaks against a run, red first."""
+    """All that speaks against a run, red first; a particle that is larger than the column makes all else idle."""
+    too_large = list(_size(case))
+    if too_large:
+        return too_large
     found = [
+        *_units(case),
         *_room(case, bed),
         *_particles(case),
         *_contacts(case, pair),
@@ -65,22 +47,44 @@ def findings(case: Case, bed: Bed, pair: Encounter, steps: Steps, cost: Cost) ->
         *_cost(case, cost),
     ]
     if case.fluid is not None:
-        found += [*_kernel(case, steps), *_flow(case, bed), *_drag(case, bed)]
+        found += [*of_the_kernel(case, steps), *of_the_flow(case, bed), *of_the_drag(case, bed)]
     return sorted(found, key=lambda each: each.colour != "red")
+
+
+def _size(case: Case) -> Iterator[Finding]:
+    """Does one particle fit into the column?"""
+    diameter, narrowest = case.bed.largest, min(case.column.size)
+    if diameter > narrowest * (1.0 + 1e-9):
+        yield Finding(
+            "red", _key(case, "diameter"), f"{diameter:.3g} m is more than the column's {narrowest:.3g} m",
+            "widen the column, or give both in metres",
+        )  # fmt: skip
+
+
+def _units(case: Case) -> Iterator[Finding]:
+    """Are densities and viscosities of a size that fluids and solids have in SI units?"""
+    fluid = case.fluid
+    if fluid is not None and fluid.density < LIGHT_GAS and fluid.viscosity > VISCOUS_GAS:
+        yield Finding(
+            "amber", "fluid.density", f"{fluid.density:.3g} kg/m3 is that of a gas, {fluid.viscosity:.3g} Pa s is not",
+            "water has 1000 kg/m3 and 1e-3 Pa s, air 1.2 and 1.8e-5",
+        )  # fmt: skip
+    if fluid is not None and fluid.density >= LIQUID and 0.0 < fluid.viscosity < THIN_LIQUID:
+        yield Finding(
+            "amber", "fluid.viscosity", f"{fluid.viscosity:.3g} Pa s is less than that of any common liquid",
+            "give the dynamic viscosity, water has 1e-3 Pa s; the kinematic one times the density",
+        )  # fmt: skip
+    for name, solid in case.material.items():
+        if solid.density < LIGHT_SOLID:
+            yield Finding(
+                "amber", f"material.{name}.density", f"{solid.density:.3g} kg/m3 is less than that of any common solid",
+                "densities are in kg/m3: glass has 2500",
+            )  # fmt: skip
 
 
 def _room(case: Case, bed: Bed) -> Iterator[Finding]:
     """Do the particles fit into the column, and does the bed?"""
     column, diameter = case.column, case.bed.largest
-    narrowest = min(column.size)
-    if diameter > narrowest * (1.0 + 1e-9):
-        yield Finding(
-            "red",
-            _key(case, "diameter"),
-            f"{diameter:.3g} m is more than the column's {narrowest:.3g} m",
-            "widen the column",
-        )
-        return
     fraction = bed.solids / (column.floor_area * column.height)
     most = int(bed.count / fraction * (SUSPENDED if case.bed.start == "suspended" else POURED_SOLID_FRACTION))
     count = _key(case, "count")
@@ -221,7 +225,8 @@ def _cost(case: Case, cost: Cost) -> Iterator[Finding]:
         )  # fmt: skip
     if cost.seconds > LONG:
         yield Finding(
-            "amber", "run.until", f"takes about {cost.seconds / LONG:.2g} days on one core",
+            "red" if cost.seconds > ENDLESS else "amber", "run.until",
+            f"takes about {cost.seconds / LONG:.2g} days on one core",
             "soften material.contact_modulus, take fewer particles, or a shorter run",
         )  # fmt: skip
     if cost.disk > 50e9 or cost.snapshots > 100_000:
@@ -237,93 +242,3 @@ def memory() -> float:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):
         return math.inf
-
-
-# ---------------------------------------------------------------- with a fluid
-
-
-def _kernel(case: Case, steps: Steps) -> Iterator[Finding]:
-    """Is what a particle fills large enough for it?"""
-    assert steps.cells is not None
-    spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
-    smallest, diameter = min(spacing, default=min(case.column.size)), case.bed.largest
-    own = 0.0 if case.laws.mapping == "divided" else 1.0 / math.sqrt(6.0)
-    sphere = diameter / math.sqrt(20.0) if case.laws.mapping == "divided" else 0.0
-    deviation = max(case.laws.smoothing * diameter, own * smallest, math.hypot(sphere, smallest / math.sqrt(12.0)))
-    width = math.sqrt(12.0) * deviation / diameter
-    if width < NARROW_KERNEL:
-        yield Finding(
-            "red" if width < NARROWEST_KERNEL else "amber", "column.cell",
-            f"{smallest:.3g} m spreads a particle over {width:.2g} diameters; a bed needs {NARROW_KERNEL:g}",
-            f"take cells of {3.0 * diameter:.2g} m, or laws.smoothing = 1.5",
-        )  # fmt: skip
-    if case.laws.smoothing * diameter > 12.0 * smallest:
-        yield Finding(
-            "amber", "column.cell",
-            f"{smallest:.3g} m is far below the kernel of {case.laws.smoothing * diameter:.3g} m, which costs time",
-            f"take cells of {2.0 * diameter:.2g} m or more",
-        )  # fmt: skip
-
-
-def _flow(case: Case, bed: Bed) -> Iterator[Finding]:
-    """Does the flow fluidise the bed, and leave it in the column?"""
-    assert case.fluid is not None
-    inlet, ends = case.bed.inlet_velocity, case.column.ends
-    if case.fluid.viscosity == 0.0 and case.laws.drag_law is not None:
-        yield Finding(
-            "red", "fluid.viscosity", "0 Pa s: drag laws need a viscous fluid", 'set it, or laws.drag = "none"'
-        )
-    weight = case.laws.gravity[2] * (case.solid_density - case.fluid.density)
-    if case.bed.start == "poured" and case.laws.gravity[2] >= 0.0:
-        yield Finding("red", "laws.gravity", "does not point down, but the bed is poured", 'bed.start = "suspended"')
-    if ends != "flow" and (case.bed.inlet_speed > 0.0):
-        yield Finding(
-            "amber", "bed.inlet_velocity", f"is not used, as column.ends = {ends!r}", 'set column.ends = "flow"'
-        )
-    if ends == "periodic" and math.hypot(*case.laws.gravity) > 0.0:
-        yield Finding("amber", "column.ends", "periodic along gravity: all falls faster and faster", "set laws.gravity")
-    if case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or case.laws.gravity[2] == 0.0:
-        return
-    if weight > 0.0:
-        yield Finding(
-            "amber", "material.density", "particles float, and the flow lifts them to the lid", "turn gravity"
-        )
-    elif bed.inlet > bed.terminal:
-        yield Finding(
-            "red" if isinstance(inlet, float) else "amber", "bed.inlet_velocity",
-            f"{bed.inlet:.3g} m/s is above the terminal velocity {bed.terminal:.3g} m/s: the bed is carried to the lid",
-            f"the bed is fluid from {bed.onset:.2g} m/s on; or set bed.fixed = true",
-        )  # fmt: skip
-    elif bed.inlet < bed.onset and case.bed.start == "poured":
-        yield Finding(
-            "amber", "bed.inlet_velocity", f"{bed.inlet:.3g} m/s is below minimum fluidisation, {bed.onset:.3g} m/s",
-            "the bed will stay packed; fixed = true makes that much faster",
-        )  # fmt: skip
-
-
-def _drag(case: Case, bed: Bed) -> Iterator[Finding]:
-    """Is the drag law asked inside the range it was fitted to?"""
-    law = case.laws.drag_law
-    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
-        return
-    voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
-    ratios = [each.sauter / case.bed.diameter for each in case.species.values()]
-    values = [("reynolds", bed.reynolds), ("voidage", voidage), *(("diameter_ratio", each) for each in ratios)]
-    for name, value in values:
-        low, high = law.ranges.get(name, (-math.inf, math.inf))
-        if not low <= value <= high:
-            yield Finding(
-                "amber", "laws.drag", f"{law.name} was fitted for {name} {low:g} to {high:g}; here it is {value:.3g}",
-                "cfddem explain lists laws, and cfddem explain NAME says the range of one",
-            )  # fmt: skip
-    if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
-        yield Finding(
-            "amber", "laws.drag",
-            f"{law.name} is for equal spheres; here species differ by {max(ratios) / min(ratios):.3g} in diameter",
-            "beetstra_polydisperse knows of sizes, on which it hangs who sinks",
-        )  # fmt: skip
-
-
-def bubbles(case: Case, bed: Bed) -> bool:
-    """Whether the bed bubbles, so that the laws of even expansion do not hold."""
-    return case.fluid is not None and case.fluid.density < LIQUID and bed.inlet > bed.onset

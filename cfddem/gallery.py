@@ -96,5 +96,5 @@ def full_key(key: str) -> str:
     if len(found) > 1:
         raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
     if not found:
-        raise InputError("key", key, nearest(key, {*Case.model_fields, *itertools.chain(*homes.values())}))
+        raise InputError("key", key, nearest(key, sorted({*Case.model_fields, *itertools.chain(*homes.values())})))
     return found[0]
