@@ -103,7 +103,9 @@ class Run:
 
         written = case.to_toml() if text is None else text
         refuse_taken(Path(folder), written)
+        begun = clock.monotonic()
         simulation = Simulation(case, progress)
+        simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # pouring, and compiling loops for it
         grid = None if simulation.fluid is None else simulation.fluid.grid
         fields = FIELDS | {
             f"{MEAN_HEIGHT}{name}": ("m", f"mean height of the centres of {name}") for name in case.bed.species

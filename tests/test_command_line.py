@@ -120,7 +120,7 @@ def test_a_long_mistake_is_broken_between_words_on_a_terminal(tmp_path: Path, mo
             return True
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["cfddem", "check", "liquid-bed", "--set", "bed.diametr=0.003"])
+    monkeypatch.setattr(sys, "argv", ["cfddem", "check", "liquid-bed", "--set", "laws.drag=x"])
     monkeypatch.setenv("COLUMNS", "120")
     with redirect_stderr(Terminal()) as seen, pytest.raises(SystemExit):
         main()

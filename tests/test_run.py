@@ -44,7 +44,7 @@ def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
     assert seen.history["contact_count"][-1] > 10
     parts = seen.about["wall_time"]
     steps = {"time steps", "voidage and drag", "fluid", "forces of the fluid", "pairs and motion", "neighbour lists"}
-    assert steps | {"measures", "snapshots", "checkpoints", "first calls"} <= parts.keys()
+    assert steps | {"measures", "snapshots", "checkpoints", "first calls", "preparation"} <= parts.keys()
     assert min(parts.values()) > 0.0
 
 
