@@ -148,6 +148,8 @@ class Bed(Species):
             times = [time for time, _ in self.inlet_velocity]
             if not times or sorted(set(times)) != times:
                 raise InputError("inlet_velocity", None, "a number, or [time, velocity] pairs in the order of time")
+        if self.slowest_inlet < 0.0:
+            raise InputError("inlet_velocity", self.slowest_inlet, "at least 0", "the inlet is below, and flows upward")
         return self
 
     @property
@@ -205,6 +207,12 @@ class Bed(Species):
         """Diameter of the largest species, or its largest class of sizes [m]."""
         parts: list[Species] = list(self.species.values()) or [self]
         return max(max((d for d, _ in part.sizes), default=part.diameter) for part in parts)
+
+    @property
+    def slowest_inlet(self) -> float:
+        """Superficial velocity through the floor, the smallest in time [m/s]."""
+        inlet = self.inlet_velocity
+        return inlet if isinstance(inlet, float) else min(speed for _, speed in inlet)
 
     @property
     def floor_speed(self) -> float:

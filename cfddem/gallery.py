@@ -11,6 +11,7 @@ from typing import Any
 
 from cfddem.case import Case
 from cfddem.errors import InputError, nearest
+from cfddem.materials import Material
 from cfddem.mistakes import parts_of
 
 
@@ -95,6 +96,8 @@ def full_key(key: str) -> str:
     found = [f"{name}.{key}" for name, words in homes.items() if key in words]
     if len(found) > 1:
         raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
+    if not found and key in Material.model_fields:
+        raise InputError("key", key, f"written out, material.NAME.{key}", "NAME is that of a solid of the case")
     if not found:
         raise InputError("key", key, nearest(key, sorted({*Case.model_fields, *itertools.chain(*homes.values())})))
     return found[0]

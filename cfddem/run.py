@@ -20,6 +20,7 @@ from cfddem.particles.guard import guard
 from cfddem.particles.state import Bodies, kinetic_energy
 from cfddem.placement import species_of
 from cfddem.record import checkpoint, energy
+from cfddem.record.folder import make_room, read_about, refuse_taken
 from cfddem.record.ledger import exchange_imbalance, volume_imbalance
 from cfddem.record.measures import (
     bed_height,
@@ -99,10 +100,9 @@ class Run:
         report    is called after every row of history
         progress  is told, in a line, what is being prepared
         """
-        from cfddem.record.folder import refuse_taken
-
         written = case.to_toml() if text is None else text
         refuse_taken(Path(folder), written)
+        make_room(Path(folder))
         begun = clock.monotonic()
         simulation = Simulation(case, progress)
         simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # pouring, and compiling loops for it
@@ -131,6 +131,7 @@ class Run:
         state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
         if state is not None and until is not None:
             _must_be_later(until, float(state["simulation"]["particles"]["clock"]["time"]))
+        before = read_about(folder)
         written = RunFolder.reopen(folder)
         overrides = ({} if state is None else state["overrides"]) | ({} if until is None else {"run.until": until})
         case = Case.from_text(written.case_text, str(folder / "case.toml"), overrides)
@@ -139,7 +140,13 @@ class Run:
             run = cls(Simulation(case, progress), written, report)
             run._write_beginning()
             return run
-        simulation = Simulation.restored(case, state["simulation"])
+        try:
+            simulation = Simulation.restored(case, state["simulation"])
+        except (KeyError, IndexError, TypeError) as failure:
+            if before["status"] != "running":
+                written.finish(before["status"], before["message"])
+            remedy = f"its checkpoint was written by another; run {folder}/case.toml anew into another folder"
+            raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
         simulation.wall.seconds.update(written.about.get("wall_time", {}))
         if simulation.particles.collisions is not None:
             simulation.particles.collisions.put_back(state["collisions"])

@@ -73,6 +73,8 @@ def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
             "column.sides = 'periodic': must be no_slip or",
         ),
         ({"column.sides": "freeslip"}, "did you mean 'free_slip'"),
+        ({"bed.inlet_velocity": -0.1}, "bed.inlet_velocity = -0.1: must be at least 0"),
+        ({"bed.inlet_velocity": [[0, 0.1], [1, -0.2]]}, "bed.inlet_velocity = -0.2: must be at least 0"),
         ({"bed.diametr": 1e-3}, "must be one of diameter and 15 more (did you mean 'diameter'?)"),
         ({"laws.drag": "wenyu"}, "laws.drag = 'wenyu': must be one of wen_yu and 18 more (did you mean 'wen_yu'?)"),
         ({"laws.lubrication": "nijsen"}, "must be one of nijssen, none (did you mean 'nijssen'?)"),

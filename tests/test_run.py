@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from cfddem.case import Case
 from cfddem.errors import InputError, RunFailed, RunStopped
 from cfddem.kernels import use_threads
 from cfddem.progress import status_of
+from cfddem.record import checkpoint
 from cfddem.record.output import RunFolder
 from cfddem.run import Run
 
@@ -46,6 +48,25 @@ def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
     steps = {"time steps", "voidage and drag", "fluid", "forces of the fluid", "pairs and motion", "neighbour lists"}
     assert steps | {"measures", "snapshots", "checkpoints", "first calls", "preparation"} <= parts.keys()
     assert min(parts.values()) > 0.0
+
+
+def test_a_run_of_another_version_is_left_as_it_is(
+    tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = shutil.copytree(undisturbed, tmp_path / "run")
+    state = checkpoint.newest(folder)
+    del state["simulation"]["exchange"]["last_step"]
+    monkeypatch.setattr(checkpoint, "newest", lambda _: state)
+    with pytest.raises(InputError, match=r"must be a run of this version of cfddem; .* run .*case.toml anew"):
+        Run.resume(folder, until=0.03)
+    assert open_run(folder).status == "finished"
+
+
+def test_a_folder_that_cannot_be_is_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cfddem.run.Simulation", lambda *_: pytest.fail("work was done"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="must be a folder that can be written to; not a directory"):
+        begin(tmp_path / "file" / "run")
 
 
 @pytest.mark.parametrize("rows", [6, 14])

@@ -25,12 +25,14 @@ def explain(
     Example: cfddem explain di_felice --plot di_felice.png
     """
     from cfddem import pages
+    from cfddem.record.files import must_have_folder
 
     if law is None:
         every = [pages.summary(each) for kind in pages.laws().values() for each in kind.values()]
         print(_json.dumps(every) if json else "\n".join(pages.listing()))
         return
     found = pages.find(law)
+    must_have_folder(plot)
     print(_json.dumps(pages.summary(found)) if json else "\n".join(pages.page(found)))
     if plot is not None:
         print(pages.plot(found, plot), file=sys.stderr if json else sys.stdout)

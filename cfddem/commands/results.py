@@ -18,11 +18,13 @@ def report(
 
     Example: cfddem report bed
     """
+    from cfddem.record.files import must_have_folder
     from cfddem.record.reading import newest_run
     from cfddem.report import as_json, lines
     from cfddem.report import report as summary
 
     folder = folder or newest_run(Path())
+    must_have_folder(output)
     result = summary(folder)
     if json and output is None:
         print(as_json(result))
@@ -49,11 +51,14 @@ def view(
 
     Example: cfddem view bed --movie bed.gif
     """
+    from cfddem.record.files import must_have_folder
     from cfddem.record.reading import newest_run
     from cfddem.view import pictures, plots
     from cfddem.view.window import window as on_screen
 
     folder, panels = folder or newest_run(Path()), show or ()
+    must_have_folder(output)
+    must_have_folder(movie)
     if window:
         on_screen(folder, colour)
     elif movie is not None:

@@ -11,7 +11,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from cfddem.errors import RunFailed
+from cfddem.errors import InputError, RunFailed
 
 PARTIAL = ".partial"
 """Ending of a file that is still being written; what a kill leaves of it is never read."""
@@ -22,7 +22,7 @@ _REMEDY = {
     errno.EACCES: "choose a folder you may write to",
     errno.EPERM: "choose a folder you may write to",
     errno.EROFS: "choose a folder on a disk that can be written",
-    errno.ENOENT: "the folder was removed or renamed during the run; put it back",
+    errno.ENOENT: "its folder is not there; make it, or put it back where it was moved during a run",
 }
 
 
@@ -51,6 +51,12 @@ def cannot(verb: str, path: Path, refusal: OSError) -> RunFailed:
     remedy = _REMEDY.get(refusal.errno or 0, "")
     reason = (refusal.strerror or str(refusal)).lower()
     return RunFailed(f"{path}: cannot {verb} it, {reason}" + (f"; {remedy}" if remedy else ""))
+
+
+def must_have_folder(output: Path | None) -> None:
+    """Say before the work is done that there is no folder for what it gives."""
+    if output is not None and not output.parent.is_dir():
+        raise InputError("output", str(output), "a file in a folder that is there", f"make {output.parent} first")
 
 
 def remove_partial(folder: Path) -> None:

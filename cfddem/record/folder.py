@@ -103,6 +103,15 @@ def refuse_taken(folder: Path, case_text: str) -> None:
         )
 
 
+def make_room(folder: Path) -> None:
+    """Make the folder of a run, or say why it cannot be; before any work is done for it."""
+    try:
+        (folder / "data").mkdir(parents=True, exist_ok=True)
+    except OSError as refusal:
+        reason = (refusal.strerror or str(refusal)).lower()
+        raise InputError("output", str(folder), "a folder that can be written to", reason) from refusal
+
+
 def lock(folder: Path) -> Any:
     """Hold a run for this process alone; the lock ends with the process, however it ends."""
     path = folder / ".lock"

@@ -27,7 +27,7 @@ import numpy as np
 from cfddem.errors import InputError, RunFailed
 from cfddem.record import checkpoint
 from cfddem.record.files import hdf5_in_memory, remove_partial, write_whole
-from cfddem.record.folder import FORMAT, lock, read_about, read_columns, refuse_taken, scan
+from cfddem.record.folder import FORMAT, lock, make_room, read_about, read_columns, refuse_taken, scan
 from cfddem.record.index import POINTS, Box, Layout, Snapshot, describe, index
 from cfddem.record.quantities import Quantity, quantity
 
@@ -84,12 +84,7 @@ class RunFolder:
             "fields": {name: tuple(each) for name, each in (fields or {}).items()},
             "provenance": dict(provenance),
         }
-        try:
-            (folder / "data").mkdir(parents=True, exist_ok=True)
-        except OSError as refusal:
-            raise InputError(
-                "output", str(folder), "a folder that can be written to", (refusal.strerror or str(refusal)).lower()
-            ) from refusal
+        make_room(folder)
         run = cls(folder, about, case_text)
         write_whole(folder / "case.toml", case_text.encode())
         run._write_about()
