@@ -24,9 +24,9 @@ SUSPENDED = math.pi / 6.0 / 1.02**3
 DEEP, DEEPEST = 0.02, 0.1
 """Overlap over the diameter: from the first on contacts are soft, from the second spheres pass into each other."""
 
-LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID = 5.0, 1e-4, 5e-5, 10.0
+LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID, SOFT_SOLID = 5.0, 1e-4, 5e-5, 10.0, 1e4
 """Gases lighter than the first [kg/m3] are less viscous than the second [Pa s], common liquids more than the third,
-common solids denser than the fourth [kg/m3]; else a number may have been given in other units."""
+common solids denser than the fourth [kg/m3] and stiffer than the last [Pa]; else the number may be in other units."""
 
 LONG, ENDLESS = 86_400.0, 365.0 * 86_400.0
 """A run that takes longer than a day is worth a second thought; one of a year will not end [s]."""
@@ -79,6 +79,12 @@ def _units(case: Case) -> Iterator[Finding]:
             yield Finding(
                 "amber", f"material.{name}.density", f"{solid.density:.3g} kg/m3 is less than that of any common solid",
                 "densities are in kg/m3: glass has 2500",
+            )  # fmt: skip
+        if solid.youngs_modulus < SOFT_SOLID:
+            yield Finding(
+                "amber", f"material.{name}.youngs_modulus",
+                f"{solid.youngs_modulus:.3g} Pa is less than that of any common solid",
+                "moduli are in Pa: glass has 6e10; contact_modulus softens contacts alone",
             )  # fmt: skip
 
 

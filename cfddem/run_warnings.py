@@ -36,7 +36,7 @@ def _of_the_end(run: Run) -> Iterator[str]:
     elif run.status == "failed":
         yield f"failed: {run.message}"
     elif run.status == "running":
-        yield "the run is under way, or was killed"
+        yield "the run is under way; if it was killed, cfddem resume goes on with it"
     if run.missing:
         yield f"{len(run.missing)} snapshots are missing"
 

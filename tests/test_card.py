@@ -95,6 +95,12 @@ def test_softening_shows_in_the_contact_and_not_in_the_film() -> None:
         ({"fluid.density": 0.997}, "amber", "fluid.density", "that of a gas"),
         ({"fluid.viscosity": 8.4e-7}, "amber", "fluid.viscosity", "give the dynamic viscosity"),
         ({"material.alumina.density": 3.5859}, "amber", "material.alumina.density", "are in kg/m3"),
+        (
+            {"material.alumina.youngs_modulus": 300.0, "material.alumina.contact_modulus": 300.0},
+            "amber",
+            "material.alumina.youngs_modulus",
+            "moduli are in Pa",
+        ),
         ({"run.until": 1e8}, "red", "run.until", "days on one core"),
         ({"bed.count": 12_000}, "red", "bed.count", "voidage 0.28, below 0.36 of a packing"),
         ({"bed.count": 9_900}, "red", "bed.count", "above the lid at 0.16 m"),
