@@ -147,8 +147,9 @@ def gallery() -> Iterator[tuple[str, str]]:
     for path in sorted((HOUSE / "scenarios").glob("*.md")):
         text = path.read_text().replace("../docs/images/", "../images/")
         text = re.sub(r"\]\(\.\./docs/([\w/-]+\.md)", r"](../\1", text)
-        text = re.sub(r"\[([^\]]+)\]\(([\w/]+\.(?:py|toml))\)", r"\1 (`scenarios/\2`)", text)
-        yield "gallery/" + ("index.md" if path.stem == "README" else path.name), text
+        index = path.stem == "README"  # its table wants the width
+        text = re.sub(r"\[([^\]]+)\]\(([\w/]+\.(?:py|toml))\)", r"\1" if index else r"\1 (`scenarios/\2`)", text)
+        yield ("gallery/index.md", f"---\nhide: [toc]\n---\n\n{text}") if index else (f"gallery/{path.name}", text)
 
 
 def _plain(text: str) -> str:
