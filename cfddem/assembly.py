@@ -83,6 +83,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         added_mass=case.laws.added_mass,
         own_wind=case.laws.own_wind,
         lift=case.laws.lift,
+        torque=case.laws.torque,
         viscous_stress=case.laws.viscous_stress,
     )
     return Parts(solver, fluid, exchange)

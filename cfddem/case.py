@@ -88,6 +88,7 @@ class CaseLaws(Checked):
     )
     added_mass: float = Field(0.0, ge=0, description="coefficient C_m of C_m rho V; 0.5 for a sphere alone [-]")
     lift: bool = Field(False, description="lift of shear (Saffman-Mei) and of spin (Magnus)")
+    torque: bool = Field(False, description="torque of the fluid against spin")
     viscous_stress: bool = Field(False, description="V div(tau) on particles, in model A")
     mapping: Literal["linear", "centroid", "divided"] = Field("linear", description="how particles fill cells")
     smoothing: float = Field(1.5, ge=0, description="standard deviation of the kernel over the mean diameter [-]")

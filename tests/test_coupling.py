@@ -10,9 +10,11 @@ import pytest
 
 from cfddem.case import Case
 from cfddem.coupling.lift import lift_force
+from cfddem.coupling.spin import turn_with_fluid
 from cfddem.coupling.voidage import MAPPINGS, Spreading
 from cfddem.errors import InputError
 from cfddem.fluid.grid import Grid, outside_cylinder
+from cfddem.particles.state import bodies, kinetic_energy
 from cfddem.simulation import Simulation
 from closures.drag import wen_yu
 from closures.lift import magnus
@@ -209,6 +211,19 @@ def test_a_particle_that_crosses_a_cell_in_a_step_is_refused() -> None:
     there = spreading.place(np.array([[0.025, 0.01, 0.01]]), np.array([1e-3]))
     with pytest.raises(InputError, match="fluid step"):
         spreading.solid_flux(here, there, 1e-3)
+
+
+def test_fluid_takes_spin_of_a_lone_sphere() -> None:
+    """Spin relative to half the vorticity falls as exp(-t/tau), tau = rho_p d^2/(60 eta), whatever the step."""
+    density, diameter, viscosity = 2500.0, 1e-4, 1e-3
+    spheres = bodies(np.zeros((1, 3)), 0.5 * diameter, density)
+    spheres.spin[:] = [30.0, 0.0, -10.0]
+    curl, slow = np.array([[0.0, 8.0, 0.0]]), density * diameter**2 / (60.0 * viscosity)
+    before = kinetic_energy(spheres)
+    gained = sum(turn_with_fluid(spheres, curl, 1000.0, viscosity, step) for step in (0.1 * slow, 0.4 * slow, slow))
+    kept = math.exp(-1.5)
+    assert spheres.spin[0] == pytest.approx([30.0 * kept, 4.0 - 4.0 * kept, -10.0 * kept], rel=1e-12)
+    assert gained == pytest.approx(kinetic_energy(spheres) - before, rel=1e-9)
 
 
 def test_lift_points_to_where_it_must() -> None:

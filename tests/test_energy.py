@@ -186,3 +186,21 @@ def test_dry_spheres_that_fall_on_a_floor_account_for_their_energy(tmp_path: Pat
     assert ledger["contact_damping"] > 0.1 * ledger["put_in"] and ledger["friction"] > 0.0
     assert not {"drag", "inflow", "fluid_kinetic"} & ledger.keys()
     assert abs(ledger["remainder"]) < 0.01 * ledger["put_in"], ledger
+
+
+def test_spin_lost_to_the_fluid_is_in_the_ledger() -> None:
+    """Fast spinning beads in still water, far apart: their spin goes to the torque of the fluid, and nowhere else."""
+    changes = {"laws.torque": True, "bed.inlet_velocity": 0.0, "bed.count": 20, "bed.start": "suspended"}
+    run = Simulation(Case.from_text(LIQUID).with_(**changes))
+    run.particles.bodies.spin[:] = [300.0, 0.0, 100.0]
+    run.particles.refresh()
+    run.energy = run._ledger()
+    assert run.energy is not None
+    for _ in range(10):
+        run.step()
+    row = run.energy.row()
+    spheres = run.particles.bodies
+    started = 0.2 * float((spheres.mass * spheres.radius**2).sum()) * (300.0**2 + 100.0**2)
+    left = 0.2 * float((spheres.mass * spheres.radius**2 * (spheres.spin**2).sum(axis=1)).sum())
+    assert row["energy_torque"] == pytest.approx(started - left, rel=0.02) and row["energy_torque"] > 0.05 * started
+    assert abs(row["energy_remainder"]) < 1e-3 * started

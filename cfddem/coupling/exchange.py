@@ -34,6 +34,7 @@ from cfddem.coupling import exchange_loops as loops
 from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import OwnWind
 from cfddem.coupling.own_wind_tables import MODES
+from cfddem.coupling.spin import turn_with_fluid
 from cfddem.coupling.voidage import Footprint, Placement, Spreading
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
@@ -84,6 +85,7 @@ class Exchange:
     drag        card of a drag law; None for none
     added_mass  coefficient C of the added mass C rho V; 0 for none
     lift        of shear (Saffman-Mei) and of spin (Magnus)
+    torque      of the fluid against spin relative to half its vorticity
     viscous_stress  V div(tau), in model A
     own_wind    take the velocity and the voidage that a lone particle itself makes out of what it meets
     """
@@ -97,12 +99,14 @@ class Exchange:
         added_mass: float = 0.0,
         own_wind: bool = True,
         lift: bool = False,
+        torque: bool = False,
         viscous_stress: bool = False,
     ) -> None:
         self.fluid, self.spreading, self.drag = fluid, spreading, drag
-        self.added_mass, self.lift = float(added_mass), lift
+        self.added_mass, self.lift, self.torque = float(added_mass), lift, torque
         self.viscous_stress = viscous_stress and fluid.model == "A"
         self.own_wind = OwnWind(spreading) if own_wind else None
+        self.spin_work = 0.0  # kinetic energy that the last torque of the fluid has given to the particles [J]
         self.outside = 0  # how often the drag law was asked outside of its range
         self._unequal = drag is not None and "diameter_ratio" in signature(drag.function).parameters
         self._factors = _drag_loop(drag.function, self._unequal) if drag else None
@@ -159,6 +163,9 @@ class Exchange:
             fluid.density, gravity, bodies.velocity, offer.slip, offer.step,
             self._memory, drag, bodies.applied, bodies.force,
         )  # fmt: skip
+        if self.torque and fluid.viscosity > 0.0:
+            curl = self._vorticity(place)
+            self.spin_work = turn_with_fluid(bodies, curl, fluid.density, fluid.viscosity, offer.step)
         if self.own_wind is not None:
             self.own_wind.advance(
                 place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
@@ -204,10 +211,14 @@ class Exchange:
                 place.footprint, spreading.smooth(fluid.cell_viscous_force())
             )
         if self.lift and fluid.viscosity > 0.0:
-            curl = vorticity(np.moveaxis(fluid.velocity, -1, 0), fluid.grid.spacing)
-            seen = spreading.gather(place.footprint, spreading.smooth(curl))
+            seen = self._vorticity(place)
             force += lift_force(slip, seen, bodies.spin, bodies.radius, fluid.density, fluid.viscosity)
         return force
+
+    def _vorticity(self, place: Placement) -> Array:
+        """Vorticity of the fluid around every particle (N, 3) [1/s]."""
+        curl = vorticity(np.moveaxis(self.fluid.velocity, -1, 0), self.fluid.grid.spacing)
+        return self.spreading.gather(place.footprint, self.spreading.smooth(curl))
 
     def _swept_along(self, bodies: Bodies, slip: Array, step: float) -> tuple[Array, Array]:
         r"""Force of the added mass, :math:`C\rho V(\dot u - \dot v)`; its second part is in the inertia already.

@@ -48,6 +48,7 @@ LOST = {
     "viscous": "by viscous stress",
     "convection": "by the scheme of convection",
     "lift_and_added_mass": "between fluid and particles by lift, viscous stress and added mass",
+    "torque": "by the torque of the fluid on spin",
     "film": "by films",
     "contact_damping": "by the dashpots of contacts",
     "friction": "by sliding",
@@ -75,7 +76,7 @@ _OF_FLUID = {
         "drag_in_cells",
         "pressure_in_cells",
     ),
-    *("implicit_drag", "viscous", "convection", "lift_and_added_mass"),
+    *("implicit_drag", "viscous", "convection", "lift_and_added_mass", "torque"),
     *PASSED,
 }
 
@@ -138,6 +139,7 @@ class EnergyLedger:
         sums["implicit_drag"] -= done.implicit
         sums["drag_in_cells"] -= done.drag - done.held
         sums["lift_and_added_mass"] -= done.source
+        sums["torque"] -= self.exchange.spin_work
         sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
         sums["pressure_from_fluid"] -= done.solids
 
