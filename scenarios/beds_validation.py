@@ -12,6 +12,7 @@ import numpy as np
 
 from cfddem.case import Case
 from cfddem.gallery import gallery
+from cfddem.record.bubbles import BubbleProfile, bubble_profile, find_bubbles
 from cfddem.record.measures import pressure_drop
 from cfddem.record.reading import Run as Written
 from cfddem.record.series import block_average, even, spectrum
@@ -29,6 +30,9 @@ from scenarios.validation import Row, Tell
 
 MUELLER_HEIGHT, PROBE = 0.05, 0.045
 """Height seen of Mueller's bed, and height of the pressure probe in van Wachem's [m]."""
+
+SLABS = np.linspace(0.0, 0.12, 5)
+"""Between which bubbles are counted by height [m]."""
 
 LEAST_APART = 0.8
 """Two species are apart on the side foretold where their separation is within this of 1."""
@@ -148,7 +152,30 @@ def flat(folder: Path, tell: Tell) -> list[Row]:
         Row("van Wachem: deviation of pressure over that measured, log2", math.log2(pressures.std() / 82.0), 0.0, 1.0),
         Row("van Wachem: frequency of pressure", spectrum(pressures, between).main, 2.25, 0.45, "Hz"),
         *_weight("van Wachem", case, run.history, window),
+        *growing(bubbles(run, 2.0)),
     ]
+
+
+def bubbles(run: Written, begin: float) -> BubbleProfile:
+    """Bubbles of a flat bed against height, from a time on [s]."""
+    assert run.grid is not None
+    places = np.flatnonzero(run.times > begin)
+    surfaces = np.interp(run.times[places], run.history["time"], run.history["bed_height"])
+    seen = [
+        find_bubbles(run.fluid("voidage", int(place)), run.grid.spacing, surface=float(surface), flat=True)
+        for place, surface in zip(places, surfaces)
+    ]
+    return bubble_profile(seen, SLABS)
+
+
+def growing(profile: BubbleProfile) -> list[Row]:
+    """Their size at each height, and whether it rises."""
+    rows = []
+    for low, high, number, size, error in zip(SLABS, SLABS[1:], *profile):
+        name = f"van Wachem: diameter of bubbles at {1e3 * low:.0f} to {1e3 * high:.0f} mm"
+        rows.append(Row(name, float(size), unit="m", note=f"{number:.2g} at a time, standard error {error:.2g}"))
+    shrinks = int(np.count_nonzero(np.diff(profile.diameter[profile.number > 0.0]) <= 0.0))
+    return [*rows, Row("van Wachem: heights at which bubbles are no larger than below", shrinks, 0.0, 0.0)]
 
 
 def probe(run: Written, begin: float, height: float = PROBE) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from cfddem.expected import bed_of
 from cfddem.fluid.division import cell_counts
 from cfddem.gallery import gallery
 from cfddem.mixture import sinking
+from cfddem.record.bubbles import BubbleProfile
 from cfddem.record.series import block_average
 from cfddem.report import buoyant_weight
 from cfddem.run import measure
@@ -22,6 +23,7 @@ from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
 from closures.drag import ergun
 from closures.numbers import archimedes
+from scenarios.beds_validation import growing
 from scenarios.defluidisation import Layers, in_layers, onsets
 from scenarios.gas_bed import mueller, standard_bed, van_wachem
 from scenarios.refinement import Bed, Means, compared, gas, liquid, variants
@@ -202,3 +204,11 @@ def test_a_larger_deviation_is_seen() -> None:
     rows = compared("bed", means(2.0), means(1.0), gusty=True)
     assert [row.verdict for row in rows] == ["holds", "holds", "FAILS"]
     assert rows[2].value == pytest.approx(2.0, rel=1e-9)
+
+
+def test_bubbles_that_do_not_grow_fail() -> None:
+    """Larger from slab to slab holds; one that is as large as those below does not; slabs without any do not count."""
+    number, error = np.array([1.0, 0.5, 0.2, 0.0]), np.full(4, 1e-4)
+    larger, same = np.array([0.01, 0.02, 0.03, np.nan]), np.array([0.01, 0.02, 0.02, np.nan])
+    assert growing(BubbleProfile(number, larger, error))[-1].verdict == "holds"
+    assert growing(BubbleProfile(number, same, error))[-1].verdict == "FAILS"
