@@ -18,7 +18,9 @@ def validate(
         str, Parameter(help="binary-collision, particles, fluid, coupling, beds, lubrication, wet, wet-tumbler, or all")
     ] = "all",
     *,
-    output: Annotated[Path, Parameter(help="folder for figures, tables and histories")] = Path("results/validation"),
+    output: Annotated[Path, Parameter(name=["--output", "-o"], help="folder for figures, tables and histories")] = Path(
+        "results/validation"
+    ),
     json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
 ) -> None:
     """Redraw published results and compare; exits 1 if a limit does not hold.

@@ -38,7 +38,9 @@ def report(
 def view(
     folder: Annotated[Path | None, Parameter(help="of a run; the newest one here if not given")] = None,
     *,
-    output: Annotated[Path | None, Parameter(help="PNG to write; NAME.png here if not given")] = None,
+    output: Annotated[
+        Path | None, Parameter(name=["--output", "-o"], help="PNG to write; NAME.png here if not given")
+    ] = None,
     snapshot: Annotated[int, Parameter(help="0 the first, -1 the last")] = -1,
     show: Annotated[list[str] | None, Parameter(help="spheres, voidage, bubbles, streamlines; repeat for more")] = None,
     colour: Annotated[str, Parameter(help="of the spheres: speed, or a recorded field")] = "speed",
@@ -75,7 +77,9 @@ def export(
     folder: Annotated[Path | None, Parameter(help="of a run; the newest one here if not given")] = None,
     *,
     to: Annotated[str, Parameter(help="vtu, csv or netcdf")] = "vtu",
-    output: Annotated[Path | None, Parameter(help="folder to write to; NAME-FORMAT here if not given")] = None,
+    output: Annotated[
+        Path | None, Parameter(name=["--output", "-o"], help="folder to write to; NAME-FORMAT here if not given")
+    ] = None,
     snapshot: Annotated[list[int] | None, Parameter(help="0 the first, -1 the last; all if not given")] = None,
 ) -> None:
     """Write a run in another format. ParaView, pyvista and h5py open run.vtkhdf as it is.

@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 BUBBLE = 0.8
 """Voidage on the border of a bubble."""
 
+ABOVE = 1.4
+"""Height that a picture shows over the largest height of the bed."""
+
 PANELS = ("spheres", "voidage", "bubbles", "streamlines")
 
 
@@ -273,9 +276,14 @@ def _edges(run: Run) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bounds(run: Run, snapshots: Sequence[int]) -> np.ndarray:
-    """What the pictures show of space: the grid, or else the particles with a little room (3, 2) [m]."""
+    """What the pictures show of space (3, 2) [m]: the grid up to where the bed ever came and a little higher, or else
+    the particles with a little room."""
     if run.grid is not None:
-        return np.stack(_edges(run), axis=1)
+        low, high = _edges(run)
+        heights = run.history.get("bed_height", np.zeros(0))
+        if np.isfinite(heights).any():
+            high[2] = min(high[2], low[2] + max(ABOVE * float(np.nanmax(heights)), float((high - low)[:2].max())))
+        return np.stack([low, high], axis=1)
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for each in snapshots:
         particles = run.particles(each)
