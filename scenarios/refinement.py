@@ -52,7 +52,7 @@ def gas() -> Bed:
     """Slugs of air in the narrow column of the gallery's ramp."""
     case = Case.from_toml(gallery()["defluidisation"])
     changes = {"title": "Slugging bed, for refinement", "bed.inlet_velocity": 0.6, "run.every": 0.25}
-    return Bed(case.with_(**changes), 1.0, 9.0)
+    return Bed(case.with_(**changes), 1.0, 6.0)
 
 
 def variants(case: Case) -> dict[str, tuple[dict[str, Any], str]]:
