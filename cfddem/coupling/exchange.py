@@ -21,16 +21,12 @@ a constant force. What one side loses the other receives to round-off, whatever 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cache
-from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.coupling import exchange_loops as loops
+from cfddem.coupling.drag_loop import DragLoop
 from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import OwnWind
 from cfddem.coupling.own_wind_tables import MODES
@@ -38,7 +34,6 @@ from cfddem.coupling.spin import turn_with_fluid
 from cfddem.coupling.voidage import Footprint, Placement, Spreading
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
-from cfddem.kernels import prange
 from cfddem.particles.state import Bodies
 from closures.law import Law
 
@@ -102,15 +97,13 @@ class Exchange:
         torque: bool = False,
         viscous_stress: bool = False,
     ) -> None:
-        self.fluid, self.spreading, self.drag = fluid, spreading, drag
+        self.fluid, self.spreading = fluid, spreading
         self.added_mass, self.lift, self.torque = float(added_mass), lift, torque
         self.viscous_stress = viscous_stress and fluid.model == "A"
         self.own_wind = OwnWind(spreading) if own_wind else None
         self.spin_work = 0.0  # kinetic energy that the last torque of the fluid has given to the particles [J]
         self.outside = 0  # how often the drag law was asked outside of its range
-        self._unequal = drag is not None and "diameter_ratio" in signature(drag.function).parameters
-        self._factors = _drag_loop(drag.function, self._unequal) if drag else None
-        self._ranges = _ranges(drag)
+        self._law = DragLoop(drag)
         self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
         self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # by id: own winds [m/s]
         self._trail: list[Footprint] = []  # by id at the two steps before
@@ -268,7 +261,7 @@ class Exchange:
 
         The Sauter mean is the volume of the particles around over the sum of theirs divided by the diameter.
         """
-        if not self._unequal:
+        if not self._law.knows_sizes:
             return np.ones(bodies.count)
         spreading, diameter = self.spreading, 2.0 * bodies.radius
         volume = place.volume
@@ -279,10 +272,8 @@ class Exchange:
 
     def _resistance(self, bodies: Bodies, met: Met, ratio: Array) -> Array:
         """Drag over slip, b (N,) [kg/s]; of the fluid's model."""
-        factor = np.zeros(bodies.count)
-        if self._factors is None:
-            return factor
-        self.outside += self._factors(met.reynolds, met.voidage, ratio, *self._ranges, factor)
+        factor, outside = self._law.factors(met.reynolds, met.voidage, ratio)
+        self.outside += outside
         resistance: Array = 6.0 * math.pi * self.fluid.viscosity * bodies.radius * met.voidage * factor
         return resistance / met.voidage if self.fluid.model == "B" else resistance
 
@@ -328,37 +319,3 @@ def _by_id(bodies: Bodies, footprint: Footprint) -> Footprint:
 def _longer(old: Footprint, all_of_now: Footprint) -> Footprint:
     """Footprints of then, and for whom there was none those of now."""
     return Footprint(*(np.concatenate([then, now[len(then) :]]) for then, now in zip(old, all_of_now)))
-
-
-def _ranges(drag: Law | None) -> tuple[tuple[float, float], ...]:
-    """Ranges of a drag law: of the Reynolds number, the voidage, the diameter ratio."""
-    card, everywhere = drag.ranges if drag else {}, (0.0, math.inf)
-    return tuple(card.get(name, everywhere) for name in ("reynolds", "voidage", "diameter_ratio"))
-
-
-@cache
-def _drag_loop(law: Callable[..., float], unequal: bool) -> Any:
-    """The loop that asks a law for every particle; small, and compiled for the law that a run has chosen."""
-    asked = law if unequal else _of_equals(law)
-
-    @njit(parallel=True, error_model="numpy")
-    def factors(reynolds, voidage, ratio, numbers, voidages, ratios, factor):
-        outside = 0
-        for n in prange(len(reynolds)):
-            factor[n] = asked(reynolds[n], voidage[n], ratio[n])
-            beyond = reynolds[n] < numbers[0] or reynolds[n] > numbers[1]
-            beyond = beyond or voidage[n] < voidages[0] or voidage[n] > voidages[1]
-            outside += 1 if beyond or ratio[n] < ratios[0] or ratio[n] > ratios[1] else 0
-        return outside
-
-    return factors
-
-
-def _of_equals(law: Callable[..., float]) -> Callable[..., float]:
-    """A law that knows of equal spheres only, where a diameter ratio is offered, too."""
-
-    @njit(error_model="numpy")
-    def equals(reynolds, voidage, ratio):
-        return law(reynolds, voidage)
-
-    return equals  # type: ignore[no-any-return]
