@@ -44,8 +44,8 @@ class Means(NamedTuple):
 
 def liquid() -> Bed:
     """Alginate beads in water, evenly fluidised."""
-    changes = {"title": "Liquid bed, for refinement", "column.width": 0.048, "bed.count": 3600, "run.step": 4e-5}
-    return Bed(alginate(0.009).with_(**changes), 4.0, 10.0)
+    changes = {"title": "Liquid bed, for refinement", "column.width": 0.032, "bed.count": 1600, "run.step": 4e-5}
+    return Bed(alginate(0.009).with_(**changes), 6.0, 9.0)
 
 
 def gas() -> Bed:
