@@ -16,6 +16,8 @@ from cfddem.errors import InputError, nearest
 from cfddem.record.quantities import KNOWN
 from cfddem.record.reading import Run
 from cfddem.view import rendering
+from cfddem.view.colours import bright, colour_bar, with_walls
+from cfddem.view.layout import Layout
 from cfddem.view.plots import BLUE, ORANGE, SKY, placed
 
 if TYPE_CHECKING:
@@ -27,6 +29,9 @@ BUBBLE = 0.8
 
 ABOVE = 1.4
 """Height that a picture shows over the largest height of the bed."""
+
+SHARP = 200
+"""Pixels of a rendered image per inch of paper."""
 
 PANELS = ("spheres", "voidage", "bubbles", "streamlines")
 
@@ -86,10 +91,10 @@ class Stage:
 
     def figure(self, snapshot: int) -> Figure:
         """The picture of one snapshot."""
-        place = _Layout.of(len(self.panels), self._size[1] / self._size[0])
+        place = Layout.of(len(self.panels), self._size[1] / self._size[0])
         figure, axes = placed(place.figure, place.boxes)
         for name, panel, bar in zip(self.panels, axes[::2], axes[1::2]):
-            pixels = (round(place.panel[0] * _SHARP), round(place.panel[1] * _SHARP))
+            pixels = (round(place.panel[0] * SHARP), round(place.panel[1] * SHARP))
             getattr(self, f"_{name}")(panel, bar, snapshot, pixels)
             self._finish(panel, place.panel)
         title = f"{_title(self.run)},  t = {self.run.times[snapshot]:.4g} s"
@@ -118,19 +123,19 @@ class Stage:
             middle = float(self.bounds[self.depth].mean())
             behind = position[:, self.depth] >= middle if self.depth == 1 else position[:, self.depth] <= middle
             title = f"spheres\nbehind {'xy'[self.depth]} = {middle:.3g} m"
-        colours = _bright("viridis")
+        colours = bright("viridis")
         image = rendering.spheres(
             position[behind], particles["radius"][behind], values[behind], self.bounds, self.depth,
             self.limits["spheres"], colours, pixels,
         )  # fmt: skip
         axes.imshow(image, extent=self._extent, aspect="equal", interpolation="antialiased")
-        _colour_bar(bar, colours, self.limits["spheres"], self.label)
+        colour_bar(bar, colours, self.limits["spheres"], self.label)
         axes.set_title(title, loc="left")
 
     def _voidage(self, axes: Axes, bar: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
         values, where = self._slice(self.run.fluid("voidage", snapshot))
         axes.imshow(
-            values, origin="lower", extent=self._grid_extent, cmap=_with_walls("Blues_r"), aspect="equal",
+            values, origin="lower", extent=self._grid_extent, cmap=with_walls("Blues_r"), aspect="equal",
             vmin=self.limits["voidage"][0], vmax=1.0, interpolation="nearest",
         )  # fmt: skip
         title = f"voidage\nat {where}"
@@ -138,7 +143,7 @@ class Stage:
             x, z = self._centres
             axes.contour(x, z, values, levels=[BUBBLE], colors=[ORANGE], linewidths=1.4)
             title += f", line: {BUBBLE:g}"
-        _colour_bar(bar, _with_walls("Blues_r"), self.limits["voidage"], "voidage  [-]")
+        colour_bar(bar, with_walls("Blues_r"), self.limits["voidage"], "voidage  [-]")
         axes.set_title(title, loc="left")
 
     def _bubbles(self, axes: Axes, bar: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
@@ -154,14 +159,14 @@ class Stage:
         velocity, where = self._slice(self.run.fluid("velocity", snapshot))
         speed = _magnitude(velocity)
         axes.imshow(
-            speed, origin="lower", extent=self._grid_extent, cmap=_with_walls("YlGnBu", 0.65), aspect="equal",
+            speed, origin="lower", extent=self._grid_extent, cmap=with_walls("YlGnBu", 0.65), aspect="equal",
             vmin=0.0, vmax=self.limits["streamlines"][1], interpolation="nearest",
         )  # fmt: skip
         x, z = self._centres
         if min(speed.shape) > 1 and np.nanmax(speed) > 0.0:
             along, up = velocity[..., 1 - self.depth], velocity[..., 2]
             axes.streamplot(x, z, along, up, color=BLUE, linewidth=0.7, arrowsize=0.7, density=1.1)
-        _colour_bar(bar, _with_walls("YlGnBu", 0.65), self.limits["streamlines"], "fluid speed  [m/s]")
+        colour_bar(bar, with_walls("YlGnBu", 0.65), self.limits["streamlines"], "fluid speed  [m/s]")
         axes.set_title(f"fluid\nat {where}", loc="left", fontsize=10.5)
 
     # ------------------------------------------------------------ geometry
@@ -208,40 +213,6 @@ class Stage:
         for side in axes.spines.values():
             side.set_visible(True)
             side.set_color("#888888")
-
-
-_LEFT, _GAP, _BAR, _RIGHT, _BELOW, _ABOVE, _TITLE = 0.85, 0.12, 0.14, 0.75, 0.62, 0.5, 0.42
-_WIDTH, _HEIGHT, _NARROWEST = 8.0, 6.0, 0.9
-_SIDE_BY_SIDE = 0.9  # height over width of the bed from which panels stand in a row, not in a column
-_SHARP = 200  # pixels of a rendered image per inch of paper
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """Where panels and their colour bars stand on the paper [inch]."""
-
-    figure: tuple[float, float]
-    panel: tuple[float, float]
-    boxes: tuple[tuple[float, float, float, float], ...]  # left, bottom, width, height: panel, bar, panel, bar ...
-
-    @classmethod
-    def of(cls, many: int, tall: float) -> _Layout:
-        """The layout for a number of panels whose height is `tall` times their width; no wider than 800 pixels show."""
-        beside = _LEFT + _GAP + _BAR + _RIGHT
-        columns = (2 if many > 1 else 1) if tall >= _SIDE_BY_SIDE else 1
-        rows = -(-many // columns)
-        width = min(_WIDTH / columns - beside, _HEIGHT / tall)
-        height = width * tall
-        if width < _NARROWEST:  # a very tall bed: rather a longer page than a strip
-            width, height = _NARROWEST, _NARROWEST * tall
-        step_x, step_y = max(width + beside, 3.4), height + _BELOW + _ABOVE
-        page = (columns * step_x, rows * step_y + _TITLE)
-        boxes = []
-        for place in range(many):
-            left = place % columns * step_x + _LEFT
-            bottom = page[1] - _TITLE - (place // columns + 1) * step_y + _BELOW
-            boxes += [(left, bottom, width, height), (left + width + _GAP, bottom, _BAR, height)]
-        return cls(page, (width, height), tuple(boxes))
 
 
 # ---------------------------------------------------------------- what is shown
@@ -323,33 +294,3 @@ def _bubbles(voidage: np.ndarray, grid: Any) -> tuple[Any, Any]:
     above = np.isin(regions, np.unique(regions[top]))[faces[:, 0]]
     closed, freeboard = (pyvista.PolyData.from_regular_faces(parts.points, faces[each]) for each in (~above, above))
     return closed.clean(), freeboard.clean()
-
-
-# ---------------------------------------------------------------- colours
-
-
-def _bright(name: str) -> Any:
-    """A colour map without its darkest end, where the shape of a sphere cannot be seen."""
-    import matplotlib as mpl
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap(mpl.colormaps[name](np.linspace(0.12, 1.0, 256)))
-
-
-def _with_walls(name: str, end: float = 1.0) -> Any:
-    """A colour map that shows what is no number in grey; `end` leaves out its last colours."""
-    import matplotlib as mpl
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap(mpl.colormaps[name](np.linspace(0.0, end, 256))).with_extremes(bad="#9a9a9a")
-
-
-def _colour_bar(axes: Axes, colours: Any, limits: tuple[float, float], label: str) -> None:
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    figure: Any = axes.figure
-    bar = figure.colorbar(ScalarMappable(Normalize(*limits), colours), cax=axes)
-    bar.set_label(label)
-    bar.outline.set_visible(False)
-    axes.locator_params(axis="y", nbins=6)
