@@ -14,8 +14,8 @@ import numpy as np
 from cfddem.case import Case
 from cfddem.expected import bed_of
 from cfddem.gallery import gallery
+from cfddem.history import measure
 from cfddem.report import buoyant_weight, expansion_exponents, expansion_laws
-from cfddem.run import measure
 from cfddem.simulation import Simulation
 
 

@@ -13,11 +13,11 @@ from cfddem.case import Case
 from cfddem.expected import bed_of
 from cfddem.fluid.division import cell_counts
 from cfddem.gallery import gallery
+from cfddem.history import measure
 from cfddem.mixture import sinking
 from cfddem.record.bubbles import BubbleProfile
 from cfddem.record.series import block_average
 from cfddem.report import buoyant_weight
-from cfddem.run import measure
 from cfddem.simulation import Simulation
 from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler

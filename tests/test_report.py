@@ -20,13 +20,13 @@ from cfddem import cli
 from cfddem.assembly import grid_of
 from cfddem.case import Case
 from cfddem.errors import InputError
+from cfddem.history import FIELDS
 from cfddem.kernels import announce_compilation
 from cfddem.progress import Line, live_line, status_of
 from cfddem.record.measures import voidage_by_pressure
 from cfddem.record.output import RunFolder
 from cfddem.record.provenance import provenance
 from cfddem.report import as_json, lines, report
-from cfddem.run import FIELDS
 from cfddem.view.page import page
 from closures import bed as laws_of_beds
 from closures.law import SHELF, Law
