@@ -19,6 +19,11 @@ from cfddem.record.energy import EnergyLedger
 CLOCKS_EVERY = 20
 """Fluid steps between two readings of the particles' clocks."""
 
+SLACK = 1e-6
+"""By how much a step may be longer than its limit, relatively. Time is summed with rounding; without slack the number
+of fluid steps up to a row of history would change by one now and then, and a fluid step of another length than the one
+before makes the particles displace the fluid at another rate: in a liquid, a shock of pressure."""
+
 
 class Simulation:
     """A run of a case.
@@ -138,10 +143,10 @@ class Simulation:
         self.binding = min(limits, key=limits.__getitem__)
         largest = limits[self.binding]
         left = until - self.time
-        step = largest if math.isinf(left) else left / max(1, math.ceil(left / largest * (1.0 - 1e-12)))
+        step = largest if math.isinf(left) else left / max(1, math.ceil(left / largest * (1.0 - SLACK)))
         if not step > 1e-12 * self.time:
             raise RunFailed(
                 f"the fluid step has fallen to {step:.3g} s at t = {self.time:.6g} s ({self.binding}): the run has "
                 "diverged; take larger cells, a smaller run.fluid_step, or a wider laws.smoothing"
             )
-        return step, max(1, math.ceil(step / self._particle_step * (1.0 - 1e-9)))
+        return step, max(1, math.ceil(step / self._particle_step * (1.0 - 2.0 * SLACK)))

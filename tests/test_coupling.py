@@ -18,6 +18,7 @@ from cfddem.particles.state import bodies, kinetic_energy
 from cfddem.simulation import Simulation
 from closures.drag import wen_yu
 from closures.lift import magnus
+from scenarios.coupling_validation import STIRRED
 
 SPACING = (0.010, 0.012, 0.009)
 
@@ -211,6 +212,20 @@ def test_a_particle_that_crosses_a_cell_in_a_step_is_refused() -> None:
     there = spreading.place(np.array([[0.025, 0.01, 0.01]]), np.array([1e-3]))
     with pytest.raises(InputError, match="fluid step"):
         spreading.solid_flux(here, there, 1e-3)
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-9, -1e-9])
+def test_rounding_of_the_time_does_not_change_the_step(late: float) -> None:
+    """Five steps of 1 ms to the next row stay five, of fifty steps of the particles each, however time was rounded."""
+    run = Simulation(STIRRED.with_(**{"run.step": 2e-5, "run.fluid_step": 1e-3, "run.reference_speed": 1e-3}))
+    run.particles.time = 2.0 + late
+    lengths = []
+    while run.time < 2.005 * (1.0 - 1e-12):
+        step, substeps = run._choose_steps(2.005)
+        lengths.append((step, substeps))
+        run.particles.time += step
+    assert [substeps for _, substeps in lengths] == [50] * 5
+    assert [step for step, _ in lengths] == pytest.approx([1e-3] * 5, rel=2e-6)
 
 
 def test_fluid_takes_spin_of_a_lone_sphere() -> None:
