@@ -174,7 +174,8 @@ def growing(profile: BubbleProfile) -> list[Row]:
     for low, high, number, size, error in zip(SLABS, SLABS[1:], *profile):
         name = f"van Wachem: diameter of bubbles at {1e3 * low:.0f} to {1e3 * high:.0f} mm"
         rows.append(Row(name, float(size), unit="m", note=f"{number:.2g} at a time, standard error {error:.2g}"))
-    shrinks = int(np.count_nonzero(np.diff(profile.diameter[profile.number > 0.0]) <= 0.0))
+    sizes = profile.diameter[profile.number > 0.0]
+    shrinks = float(np.count_nonzero(np.diff(sizes) <= 0.0)) if len(sizes) > 1 else math.nan
     return [*rows, Row("van Wachem: heights at which bubbles are no larger than below", shrinks, 0.0, 0.0)]
 
 

@@ -212,3 +212,5 @@ def test_bubbles_that_do_not_grow_fail() -> None:
     larger, same = np.array([0.01, 0.02, 0.03, np.nan]), np.array([0.01, 0.02, 0.02, np.nan])
     assert growing(BubbleProfile(number, larger, error))[-1].verdict == "holds"
     assert growing(BubbleProfile(number, same, error))[-1].verdict == "FAILS"
+    # a bed without bubbles shows nothing
+    assert growing(BubbleProfile(np.zeros(4), np.full(4, np.nan), error))[-1].verdict == "FAILS"

@@ -36,6 +36,7 @@ def turn_with_fluid(bodies: Bodies, curl: Array, density: float, viscosity: floa
 
 @threaded
 def _turn(spin, curl, radius, inverse_inertia, density, viscosity, step, gained):
+    """Relax the spin of every particle towards that of the fluid."""
     for n in prange(len(radius)):
         diameter, square = 2.0 * radius[n], 0.0
         for d in range(3):
