@@ -64,7 +64,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         grid,
         boundaries,
         density=case.fluid.density,
-        viscosity=case.fluid.viscosity,
+        viscosity=np.broadcast_to(case.fluid.viscosity_at(grid.centres()[2]), grid.shape),
         gravity=case.laws.gravity,
         model=case.laws.model,
         convection=case.laws.convection,

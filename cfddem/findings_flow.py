@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from cfddem.case import Case
 from cfddem.expected import LIQUID, Bed, Steps
 from cfddem.finding import Finding
@@ -17,6 +19,9 @@ FINEST = 6.0
 
 UNEQUAL = 1.2
 """Species whose diameters differ by this and more want a drag law that knows of sizes."""
+
+LAYERED = 2.0
+"""Factor between the viscosity in the bed and that of the estimates from which these mislead."""
 
 
 def of_the_kernel(case: Case, steps: Steps) -> Iterator[Finding]:
@@ -50,6 +55,13 @@ def of_the_flow(case: Case, bed: Bed) -> Iterator[Finding]:
         yield Finding(
             "red", "fluid.viscosity", "0 Pa s: drag laws need a viscous fluid", 'set it, or laws.drag = "none"'
         )
+    within = case.fluid.viscosity_at(np.linspace(0.0, min(bed.height, case.column.height), 50))
+    if not case.fluid.viscosity / LAYERED < within.min() <= within.max() < LAYERED * case.fluid.viscosity:
+        yield Finding(
+            "amber", "fluid.viscosity", f"estimates take {case.fluid.viscosity:.3g} Pa s; by viscosity_profile it is "
+            f"{within.min():.3g} to {within.max():.3g} Pa s in the bed",
+            "give the mean of the bed; the run keeps to the profile",
+        )  # fmt: skip
     weight = case.laws.gravity[2] * (case.solid_density - case.fluid.density)
     if case.bed.start == "poured" and case.laws.gravity[2] >= 0.0:
         yield Finding("red", "laws.gravity", "does not point down, but the bed is poured", 'bed.start = "suspended"')

@@ -66,10 +66,33 @@ class Material(Checked):
 
 
 class Fluid(Checked):
-    """A Newtonian fluid; viscosity 0 leaves the particles dry."""
+    """A Newtonian fluid, of one viscosity or in layers; viscosity 0 leaves the particles dry."""
 
     density: float = Field(gt=0, description="rho_f [kg/m3]")
     viscosity: float = Field(ge=0, description="eta, dynamic [Pa s]")
+    viscosity_profile: tuple[tuple[float, float], ...] = Field(
+        (), description="eta against height, [height, eta] pairs, straight between them; the card keeps to `viscosity`"
+    )
+
+    @model_validator(mode="after")
+    def _layers_from_below(self) -> Fluid:
+        heights, values = [height for height, _ in self.viscosity_profile], [eta for _, eta in self.viscosity_profile]
+        if sorted(set(heights)) != heights:
+            raise InputError("viscosity_profile", heights, "[height, eta] pairs in the order of height, in m and Pa s")
+        if self.viscosity_profile and not min(self.viscosity, *values) > 0.0:
+            raise InputError("viscosity_profile", min(self.viscosity, *values), "of positive viscosities, as viscosity")
+        return self
+
+    def viscosity_at(self, height: np.ndarray) -> np.ndarray:
+        """eta at heights [m] [Pa s].
+
+        >>> Fluid(density=1e3, viscosity=1e-3, viscosity_profile=((0.0, 1e-3), (0.1, 5e-3))).viscosity_at([0.05, 0.2])
+        array([0.003, 0.005])
+        """
+        if not self.viscosity_profile:
+            return np.full(np.shape(height), self.viscosity)
+        heights, values = np.array(self.viscosity_profile).T
+        return np.interp(height, heights, values)
 
 
 PAIR = np.dtype(

@@ -86,7 +86,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
         places = _suspended(len(diameters), float(diameters.max()), case.column.size, bed.seed)
     made = make_bodies(
         places, 0.5 * diameters, grains.density, velocity=np.array(bed.velocity), material=grains.material,
-        viscosity=case.fluid.viscosity if case.fluid else 0.0, fixed=bed.fixed,
+        viscosity=case.fluid.viscosity_at(places[:, 2]) if case.fluid else 0.0, fixed=bed.fixed,
     )  # fmt: skip
     if case.fluid is not None:
         made.inverse_mass[:] /= 1.0 + case.laws.added_mass * case.fluid.density / grains.density

@@ -94,6 +94,12 @@ def test_softening_shows_in_the_contact_and_not_in_the_film() -> None:
         ({"column.cell": 0.0005}, "amber", "column.cell", "far below the kernel"),
         ({"fluid.density": 0.997}, "amber", "fluid.density", "that of a gas"),
         ({"fluid.viscosity": 8.4e-7}, "amber", "fluid.viscosity", "give the dynamic viscosity"),
+        (
+            {"fluid.viscosity_profile": [[0.0, 1e-3], [0.04, 5e-3]]},
+            "amber",
+            "fluid.viscosity",
+            "it is 0.001 to 0.005 Pa s in the bed",
+        ),
         ({"material.alumina.density": 3.5859}, "amber", "material.alumina.density", "are in kg/m3"),
         (
             {"material.alumina.youngs_modulus": 300.0, "material.alumina.contact_modulus": 300.0},

@@ -73,6 +73,8 @@ def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
             "column.sides = 'periodic': must be no_slip or",
         ),
         ({"column.sides": "freeslip"}, "did you mean 'free_slip'"),
+        ({"fluid.viscosity_profile": [[0.1, 1e-3], [0.0, 2e-3]]}, "fluid.viscosity_profile = [0.1, 0.0]: must be"),
+        ({"fluid.viscosity_profile": [[0.0, 1e-3], [0.1, 0.0]]}, "fluid.viscosity_profile = 0.0: must be of positive"),
         ({"bed.inlet_velocity": -0.1}, "bed.inlet_velocity = -0.1: must be at least 0"),
         ({"bed.inlet_velocity": [[0, 0.1], [1, -0.2]]}, "bed.inlet_velocity = -0.2: must be at least 0"),
         ({"bed.diametr": 1e-3}, "must be one of diameter and 15 more (did you mean 'diameter'?)"),

@@ -231,11 +231,11 @@ def test_rounding_of_the_time_does_not_change_the_step(late: float) -> None:
 def test_fluid_takes_spin_of_a_lone_sphere() -> None:
     """Spin relative to half the vorticity falls as exp(-t/tau), tau = rho_p d^2/(60 eta), whatever the step."""
     density, diameter, viscosity = 2500.0, 1e-4, 1e-3
-    spheres = bodies(np.zeros((1, 3)), 0.5 * diameter, density)
+    spheres = bodies(np.zeros((1, 3)), 0.5 * diameter, density, viscosity=viscosity)
     spheres.spin[:] = [30.0, 0.0, -10.0]
     curl, slow = np.array([[0.0, 8.0, 0.0]]), density * diameter**2 / (60.0 * viscosity)
     before = kinetic_energy(spheres)
-    gained = sum(turn_with_fluid(spheres, curl, 1000.0, viscosity, step) for step in (0.1 * slow, 0.4 * slow, slow))
+    gained = sum(turn_with_fluid(spheres, curl, 1000.0, step) for step in (0.1 * slow, 0.4 * slow, slow))
     kept = math.exp(-1.5)
     assert spheres.spin[0] == pytest.approx([30.0 * kept, 4.0 - 4.0 * kept, -10.0 * kept], rel=1e-12)
     assert gained == pytest.approx(kinetic_energy(spheres) - before, rel=1e-9)
@@ -244,9 +244,38 @@ def test_fluid_takes_spin_of_a_lone_sphere() -> None:
 def test_lift_points_to_where_it_must() -> None:
     """A sphere that lags behind a shear flow goes to its fast side; one that spins backwards against it is lifted."""
     slip, still = np.array([[0.1, 0.0, 0.0]]), np.zeros((1, 3))
+    thick = np.array([1e-1])
     # u_x grows with y: the curl points to -z
-    shear = lift_force(slip, np.array([[0.0, 0.0, -10.0]]), np.array([[0.0, 0.0, -5.0]]), np.array([1e-3]), 1e3, 1e-1)
+    shear = lift_force(slip, np.array([[0.0, 0.0, -10.0]]), np.array([[0.0, 0.0, -5.0]]), np.array([1e-3]), 1e3, thick)
     assert shear[0, 1] > 0.0 and abs(shear[0, 0]) + abs(shear[0, 2]) < 1e-12 * shear[0, 1]
-    spun = lift_force(slip, still, np.array([[0.0, 0.0, 30.0]]), np.array([1e-3]), 1e3, 1e-1)
+    spun = lift_force(slip, still, np.array([[0.0, 0.0, 30.0]]), np.array([1e-3]), 1e3, thick)
     expected = math.pi / 8.0 * 1e3 * (2e-3) ** 3 * 30.0 * 0.1 * magnus(1e3 * 2e-3 * 0.1 / 1e-1)
     assert spun[0] == pytest.approx([0.0, -expected, 0.0])
+
+
+def test_drag_and_film_take_the_viscosity_of_the_fluid_where_they_are() -> None:
+    """In two layers of liquid, a pair at rest in each: what falls and what keeps from touching differ as they do."""
+    height, diameter, pitch = 0.08, 1e-3, 1.05e-3
+    case = suspension(
+        **{
+            "fluid.viscosity": 0.1,
+            "fluid.viscosity_profile": ((0.0, 0.4), (0.039, 0.4), (0.041, 0.1), (0.08, 0.1)),
+            "column.height": height,
+            "column.ends": "closed",
+            "column.sides": "free_slip",
+            "bed": {
+                "diameter": diameter,
+                "positions": [(5e-3 + side * pitch, 5e-3, z) for z in (0.02, 0.06) for side in (-0.5, 0.5)],
+            },
+            "laws": {"gravity": (0.0, 0.0, -9.81), "lubrication": "nijssen", "drag": "stokes"},
+        }
+    )
+    simulation = Simulation(case)
+    simulation.until(0.05)
+    bodies, edges = simulation.particles.bodies, simulation.particles.edges
+    order = np.argsort(bodies.id)
+    assert bodies.viscosity[order] == pytest.approx([0.4, 0.4, 0.1, 0.1], rel=1e-12)
+    falling = bodies.velocity[order, 2]
+    assert falling[0] / falling[2] == pytest.approx(0.25, rel=0.01)
+    resistance = {int(bodies.id[edges.first[k]]) // 2: edges.resistance[k] for k in range(edges.between_particles)}
+    assert resistance[0] / resistance[1] == pytest.approx(4.0, rel=0.01)

@@ -66,6 +66,22 @@ def test_poiseuille_flow_between_plates(voidage, model):
     assert order(errors)[0] > 1.9
 
 
+def test_shear_flow_of_a_layered_fluid():
+    """The stress is the same at all heights: u = U ln(mu(z)/mu_0)/ln(mu_1/mu_0) where mu grows linearly."""
+    errors = []
+    for n in (8, 16):
+        sides = {side: Periodic() for side in ("x_low", "x_high", "y_low", "y_high")}
+        sides |= {"z_low": NoSlip(), "z_high": NoSlip((1.0, 0.0, 0.0))}
+        grid = Grid((1, 1, n), (1.0 / n,) * 3)
+        thickness = np.broadcast_to(1.0 + 4.0 * grid.centres()[2], grid.shape)
+        fluid = FluidSolver(grid, sides, density=1.0, viscosity=thickness)
+        fluid.run_until(1.5)
+        z = grid.faces(0)[2]
+        errors.append(np.abs(fluid.face_velocity(0) - np.log(1.0 + 4.0 * z) / np.log(5.0)).max())
+    assert errors[1] < 0.02
+    assert errors[0] / errors[1] > 1.8  # of first order: beside a wall the fluid has the viscosity of its cell
+
+
 def test_poiseuille_flow_in_a_square_duct():
     """Against the series solution: second order in L2."""
     errors = [duct(n) for n in (8, 16)]

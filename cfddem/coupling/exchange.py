@@ -115,6 +115,7 @@ class Exchange:
         """What the particles bring into the coming fluid step of a length [s]: volume, drag and momentum."""
         spreading, fluid = self.spreading, self.fluid
         self._make_room(bodies)
+        bodies.viscosity[:] = fluid.viscosity_at(bodies.position)
         place = spreading.place(bodies.position, bodies.radius)
         solid = spreading.solid_fraction(place)
         met = self._meet(bodies, place, solid)
@@ -156,12 +157,12 @@ class Exchange:
             fluid.density, gravity, bodies.velocity, offer.slip, offer.step,
             self._memory, drag, bodies.applied, bodies.force,
         )  # fmt: skip
-        if self.torque and fluid.viscosity > 0.0:
+        if self.torque and fluid.viscous:
             curl = self._vorticity(place)
-            self.spin_work = turn_with_fluid(bodies, curl, fluid.density, fluid.viscosity, offer.step)
-        if self.own_wind is not None:
+            self.spin_work = turn_with_fluid(bodies, curl, fluid.density, offer.step)
+        if self.own_wind is not None and fluid.viscous:
             self.own_wind.advance(
-                place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, fluid.viscosity, offer.step
+                place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, bodies.viscosity, offer.step
             )
         self._trail = [self._trail[-1], _by_id(bodies, place.footprint)]
         self._last_step = offer.step
@@ -203,9 +204,9 @@ class Exchange:
             force += place.volume[:, None] * spreading.gather(
                 place.footprint, spreading.smooth(fluid.cell_viscous_force())
             )
-        if self.lift and fluid.viscosity > 0.0:
+        if self.lift and fluid.viscous:
             seen = self._vorticity(place)
-            force += lift_force(slip, seen, bodies.spin, bodies.radius, fluid.density, fluid.viscosity)
+            force += lift_force(slip, seen, bodies.spin, bodies.radius, fluid.density, bodies.viscosity)
         return force
 
     def _vorticity(self, place: Placement) -> Array:
@@ -251,8 +252,8 @@ class Exchange:
         scalars, vectors = np.empty((3, bodies.count)), np.empty((2, bodies.count, 3))
         met = Met(*vectors, *scalars)
         loops.meet(
-            seen, place.volume, bodies.radius, bodies.velocity, bodies.id, self._winds, own, fluid.density,
-            fluid.viscosity, *met,
+            seen, place.volume, bodies.radius, bodies.velocity, bodies.viscosity, bodies.id, self._winds, own,
+            fluid.density, *met,
         )  # fmt: skip
         return met
 
@@ -274,7 +275,7 @@ class Exchange:
         """Drag over slip, b (N,) [kg/s]; of the fluid's model."""
         factor, outside = self._law.factors(met.reynolds, met.voidage, ratio)
         self.outside += outside
-        resistance: Array = 6.0 * math.pi * self.fluid.viscosity * bodies.radius * met.voidage * factor
+        resistance: Array = 6.0 * math.pi * bodies.viscosity * bodies.radius * met.voidage * factor
         return resistance / met.voidage if self.fluid.model == "B" else resistance
 
     def _other_force(self, bodies: Bodies) -> Array:

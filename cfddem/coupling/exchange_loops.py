@@ -9,7 +9,7 @@ from cfddem.kernels import prange, threaded
 
 
 @threaded
-def meet(seen, volume, radius, velocity, rows, winds, own, density, viscosity, slip, wind, voidage, reynolds, others):
+def meet(seen, volume, radius, velocity, viscosity, rows, winds, own, density, slip, wind, voidage, reynolds, others):
     """Slip, voidage, Reynolds number and number of others around, less what a particle itself makes of them.
 
     seen    mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
@@ -31,7 +31,7 @@ def meet(seen, volume, radius, velocity, rows, winds, own, density, viscosity, s
             wind[n, d] = share * blown
             slip[n, d] = seen[n, d] - wind[n, d] - velocity[n, d]
             square += slip[n, d] * slip[n, d]
-        reynolds[n] = density * 2.0 * radius[n] * voidage[n] * math.sqrt(square) / max(viscosity, 1e-300)
+        reynolds[n] = density * 2.0 * radius[n] * voidage[n] * math.sqrt(square) / max(viscosity[n], 1e-300)
 
 
 @threaded

@@ -27,12 +27,13 @@ def vorticity(velocity: Array, spacing: tuple[float, float, float]) -> Array:
     )
 
 
-def lift_force(slip: Array, curl: Array, spin: Array, radius: Array, density: float, viscosity: float) -> Array:
+def lift_force(slip: Array, curl: Array, spin: Array, radius: Array, density: float, viscosity: Array) -> Array:
     """Lift of shear and of spin on every particle (N, 3) [N].
 
-    slip    u - v (N, 3) [m/s]
-    curl    vorticity of the fluid around the particle (N, 3) [1/s]
-    spin    of the particle (N, 3) [rad/s]
+    slip       u - v (N, 3) [m/s]
+    curl       vorticity of the fluid around the particle (N, 3) [1/s]
+    spin       of the particle (N, 3) [rad/s]
+    viscosity  of the fluid around the particle (N,), positive [Pa s]
     """
     force = np.empty_like(slip)
     _lift(slip, curl, spin, radius, density, viscosity, force)
@@ -49,13 +50,13 @@ def _lift(slip, curl, spin, radius, density, viscosity, force):
     """Saffman-Mei along slip x curl; Magnus along slip x spin, the spin that is left after half the curl."""
     for n in prange(len(radius)):
         u, w = _vector(slip, n), _vector(curl, n)
-        diameter = 2.0 * radius[n]
+        diameter, kinematic = 2.0 * radius[n], viscosity[n] / density
         speed, turning = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
-        reynolds = density * diameter * speed / viscosity
+        reynolds = diameter * speed / kinematic
         across = cross(u, w)
         size = math.sqrt(dot(across, across))
-        stokes = 3.0 * math.pi * viscosity * diameter * speed
-        shear = stokes * saffman_mei(reynolds, density * diameter * diameter * turning / viscosity) / max(size, 1e-300)
+        stokes = 3.0 * math.pi * viscosity[n] * diameter * speed
+        shear = stokes * saffman_mei(reynolds, diameter * diameter * turning / kinematic) / max(size, 1e-300)
         relative = minus(_vector(spin, n), times(0.5, w))
         twist = cross(u, relative)
         rolled = math.pi / 8.0 * density * diameter**3 * magnus(reynolds)

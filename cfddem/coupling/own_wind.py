@@ -59,7 +59,7 @@ class OwnWind:
         slip: Array,
         screening: Array,
         density: float,
-        viscosity: float,
+        viscosity: Array,
         step: float,
     ) -> None:
         """Let the own winds grow and fade over a step [s] in which the particles have pushed the fluid.
@@ -69,10 +69,8 @@ class OwnWind:
         drag       on the particles; the fluid felt its opposite (N, 3) [N]
         slip       u - v, without the own wind (N, 3) [m/s]
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
+        viscosity  of the fluid around each (N,), positive [Pa s]
         """
-        if viscosity <= 0.0:
-            winds[rows] = 0.0
-            return
         _build_up(
             place.position, *self._cell, rows, drag, slip, screening, *self._tables[1:], density, viscosity, step, winds
         )  # fmt: skip
@@ -120,8 +118,9 @@ def _build_up(
     viscosity, step, winds,
 ):  # fmt: skip
     """Exact relaxation of every wind towards what a steady force would make of it."""
-    modes, diffusivity = rates.shape[1], viscosity / density
+    modes = rates.shape[1]
     for n in prange(len(rows)):
+        diffusivity = viscosity[n] / density
         shares = _shares(n, position, origin, inverse, linear)
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
         for d in range(3):
@@ -133,7 +132,7 @@ def _build_up(
             total = 0.0
             for k in range(modes):
                 total += _seen(flow[d, k], shares) * rates[d, k] / (rates[d, k] + blown)
-            scale = -_steady(moving[d], slowest, speed / diffusivity, shares) / total * drag[n, d] / viscosity
+            scale = -_steady(moving[d], slowest, speed / diffusivity, shares) / total * drag[n, d] / viscosity[n]
             for k in range(modes):
                 steady = scale * _seen(flow[d, k], shares) * rates[d, k] / (rates[d, k] + blown)
                 fading = diffusivity * (rates[d, k] + blown)

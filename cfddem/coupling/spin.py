@@ -21,28 +21,28 @@ from cfddem.particles.state import Bodies
 from closures.lift import torque
 
 
-def turn_with_fluid(bodies: Bodies, curl: Array, density: float, viscosity: float, step: float) -> float:
+def turn_with_fluid(bodies: Bodies, curl: Array, density: float, step: float) -> float:
     """Change the spin of all particles by the torque of the fluid over a step [s].
 
-    curl       vorticity of the fluid around every particle (N, 3) [1/s]
-    density    of the fluid [kg/m3]
-    viscosity  of the fluid [Pa s]
-    returns    kinetic energy that the particles have gained [J]
+    bodies   with the viscosity of the fluid around each, positive
+    curl     vorticity of the fluid around every particle (N, 3) [1/s]
+    density  of the fluid [kg/m3]
+    returns  kinetic energy that the particles have gained [J]
     """
     gained = np.empty(bodies.count)
-    _turn(bodies.spin, curl, bodies.radius, bodies.inverse_inertia, density, viscosity, step, gained)
+    _turn(bodies.spin, curl, bodies.radius, bodies.viscosity, bodies.inverse_inertia, density, step, gained)
     return float(gained.sum())
 
 
 @threaded
-def _turn(spin, curl, radius, inverse_inertia, density, viscosity, step, gained):
+def _turn(spin, curl, radius, viscosity, inverse_inertia, density, step, gained):
     """Relax the spin of every particle towards that of the fluid."""
     for n in prange(len(radius)):
         diameter, square = 2.0 * radius[n], 0.0
         for d in range(3):
             square += (spin[n, d] - 0.5 * curl[n, d]) ** 2
-        factor = torque(density * diameter * diameter * math.sqrt(square) / viscosity)
-        kept = math.exp(-step * math.pi * viscosity * diameter**3 * factor * inverse_inertia[n])
+        factor = torque(density * diameter * diameter * math.sqrt(square) / viscosity[n])
+        kept = math.exp(-step * math.pi * viscosity[n] * diameter**3 * factor * inverse_inertia[n])
         work = 0.0
         for d in range(3):
             end = 0.5 * curl[n, d] + kept * (spin[n, d] - 0.5 * curl[n, d])

@@ -27,6 +27,19 @@ def checked_voidage(grid: Grid, voidage: Array | float) -> Array:
     return given
 
 
+def checked_viscosity(grid: Grid, viscosity: Array | float) -> Array:
+    """The viscosity (nz, ny, nx), if it is positive everywhere or zero everywhere."""
+    given = np.asarray(viscosity, dtype=float)
+    if given.shape not in ((), grid.shape):
+        raise InputError("fluid.viscosity", given.shape, f"a number, or of shape (nz, ny, nx) = {grid.shape}")
+    if not (np.isfinite(given).all() and given.min() >= 0.0):
+        bad = float(given[~(given >= 0.0) | np.isinf(given)].flat[0])
+        raise InputError("fluid.viscosity", bad, "zero or positive, in Pa s")
+    if given.min() == 0.0 < given.max():
+        raise InputError("fluid.viscosity", 0.0, "positive everywhere, or zero everywhere")
+    return np.broadcast_to(given, grid.shape)
+
+
 def checked_field(name: str, field: Array, shape: tuple[int, ...], negative: bool = True) -> Array:
     """A field handed to a step, if it has its shape and numbers everywhere."""
     given = np.asarray(field, dtype=float)

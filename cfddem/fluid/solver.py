@@ -70,7 +70,7 @@ class FluidSolver(FluidState):
     grid         Grid
     boundaries   side name -> condition or list of conditions (see `cfddem.fluid.boundaries`)
     density      rho [kg/m3]
-    viscosity    mu, dynamic [Pa s]
+    viscosity    mu, dynamic: a number, or of every cell (nz, ny, nx) [Pa s]
     gravity      g (x, y, z) [m/s2]; enters only the static pressure, see `cfddem.fluid.momentum`
     model        "A" or "B"
     convection   "limited" (upwind with the MC limiter, bounded) or "central" (unlimited, for smooth fields)
@@ -86,7 +86,7 @@ class FluidSolver(FluidState):
         boundaries: Mapping[str, Condition | Sequence[Condition]] | Boundaries | None = None,
         *,
         density: float,
-        viscosity: float,
+        viscosity: Array | float,
         gravity: Sequence[float] = (0.0, 0.0, 0.0),
         model: str = "A",
         convection: str = "limited",
@@ -97,8 +97,6 @@ class FluidSolver(FluidState):
     ) -> None:
         if not (np.isfinite(density) and density > 0.0):
             raise InputError("fluid.density", density, "a positive number, in kg/m3")
-        if not (np.isfinite(viscosity) and viscosity >= 0.0):
-            raise InputError("fluid.viscosity", viscosity, "zero or positive, in Pa s")
         if model not in ("A", "B"):
             raise InputError("fluid.model", model, '"A" or "B"')
         if convection not in ("limited", "central"):

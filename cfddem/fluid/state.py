@@ -12,6 +12,7 @@ import numpy as np
 
 from cfddem.errors import InputError
 from cfddem.fluid.boundaries import Boundaries
+from cfddem.fluid.checks import checked_viscosity
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, sample
 from cfddem.fluid.momentum import drag_seen, transport
 from cfddem.fluid.viscosity import eddy_viscosity, rim
@@ -19,6 +20,7 @@ from cfddem.fluid.viscosity import eddy_viscosity, rim
 _REMEMBERED = {
     "time": "time",
     "velocity": "_velocity",
+    "viscosity": "_viscosity",
     "pressure": "_pressure",
     "voidage": "voidage",
     "mean_voidage": "_mean_voidage",
@@ -35,13 +37,13 @@ class FluidState:
         grid: Grid,
         boundaries: Boundaries,
         density: float,
-        viscosity: float,
+        viscosity: Array | float,
         gravity: Sequence[float],
         smagorinsky: float,
         model_b: float,
     ) -> None:
         self.grid, self.boundaries = grid, boundaries
-        self.density, self.viscosity, self.smagorinsky = float(density), float(viscosity), float(smagorinsky)
+        self.density, self.smagorinsky = float(density), float(smagorinsky)
         self.gravity = np.asarray(gravity, dtype=float)
         self.time, self._last_step, self._model_b = 0.0, 0.0, model_b
         self.voidage = np.ones(grid.shape)
@@ -58,7 +60,8 @@ class FluidState:
         self._rate_a, self._rate_b, self._flux, self._mobility = (np.zeros(vector) for _ in range(4))
         self._drag_momentum, self._source = np.zeros(vector), np.zeros(vector)
         self._pressure, self._correction, self._expansion = (np.zeros(cells) for _ in range(3))
-        self._drag, self._thickness = np.zeros(cells), np.zeros(cells)
+        self._drag, self._thickness, self._viscosity = (np.zeros(cells) for _ in range(3))
+        self.set_viscosity(viscosity)
 
     # ------------------------------------------------------------ fields
 
@@ -87,6 +90,21 @@ class FluidState:
     def mean_voidage(self) -> Array:
         """Voidage in the middle of the last step of the voidage, the one stored with the velocity, a view."""
         return self.grid.inner(self._mean_voidage)
+
+    @property
+    def viscosity(self) -> Array:
+        """mu of every cell, without what is below the grid (nz, ny, nx) [Pa s], a view; see `set_viscosity`."""
+        return self.grid.inner(self._viscosity)
+
+    @property
+    def viscous(self) -> bool:
+        """Is this a viscous fluid?"""
+        return bool(self._viscosity.max() > 0.0)
+
+    def set_viscosity(self, viscosity: Array | float) -> None:
+        """Viscosity from now on: of every cell (nz, ny, nx), or a number [Pa s]; all positive, or all zero."""
+        self.viscosity[:] = checked_viscosity(self.grid, viscosity)
+        self.boundaries.fill_cells(self._viscosity)
 
     def face_velocity(self, axis: int) -> Array:
         """Component `axis` on its faces [m/s], both boundaries included, a view: (nz, ny, nx+1) for x."""
@@ -159,6 +177,13 @@ class FluidState:
             number = inner(self._solved[d]) + inner(np.roll(self._solved[d], -1, axis=2 - d))
             cells[d] = (low + high) / np.maximum(number, 1.0)
         return cells
+
+    def viscosity_at(self, points: Array) -> Array:
+        """mu at points (N, 3) [m], tri-linear between centres: (N,) [Pa s]."""
+        least, most = float(self._viscosity.min()), float(self._viscosity.max())
+        if least == most:
+            return np.full(len(points), most)  # free of the rounding of an interpolation
+        return self._at(self._viscosity[None], AT_CENTRES, points)[:, 0]
 
     def viscous_force_at(self, points: Array) -> Array:
         """div tau, the stress of the fluid between the particles (not times eps), at points (N, 3): (N, 3) [N/m3]."""
@@ -275,11 +300,11 @@ class FluidState:
             resolved = [h for h, n in zip(self.grid.spacing, self.grid.cells) if n > 1] or [0.0]
             width = float(np.prod(resolved)) ** (1.0 / len(resolved))
             eddy_viscosity(velocity, self.density * (self.smagorinsky * width) ** 2, self._inverse, self._thickness)
-            self._thickness += self.viscosity
+            self._thickness += self._viscosity
             self.boundaries.fill_cells(self._thickness)
             self._thickness *= voidage
         else:
-            np.multiply(voidage, self.viscosity, out=self._thickness)
+            np.multiply(voidage, self._viscosity, out=self._thickness)
         if self._rim is not None:
             cells, neighbours, shares = self._rim
             flat = self._thickness.ravel()

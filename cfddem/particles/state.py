@@ -63,7 +63,7 @@ def bodies(
     velocity: np.ndarray | float = 0.0,
     spin: np.ndarray | float = 0.0,
     material: np.ndarray | int = 0,
-    viscosity: float = 0.0,
+    viscosity: np.ndarray | float = 0.0,
     fixed: np.ndarray | bool = False,
 ) -> Bodies:
     """Make particles from what distinguishes them.
