@@ -21,8 +21,7 @@ CLOCKS_EVERY = 20
 
 SLACK = 1e-6
 """By how much a step may be longer than its limit, relatively. Time is summed with rounding; without slack the number
-of fluid steps up to a row of history would change by one now and then, and a fluid step of another length than the one
-before makes the particles displace the fluid at another rate: in a liquid, a shock of pressure."""
+of fluid steps up to a row of history would change by one now and then."""
 
 
 class Simulation:

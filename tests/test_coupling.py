@@ -228,6 +228,31 @@ def test_rounding_of_the_time_does_not_change_the_step(late: float) -> None:
     assert [step for step, _ in lengths] == pytest.approx([1e-3] * 5, rel=2e-6)
 
 
+def test_a_change_of_the_step_is_no_shock_of_pressure() -> None:
+    """Particles that sink displace the liquid at their own rate, however the length of the fluid's step changes."""
+    case = suspension(
+        **{
+            "laws.gravity": (0.0, 0.0, -9.81),
+            "laws.lubrication": "none",
+            "column.ends": "closed",
+            "column.height": 0.04,
+        }
+    )
+
+    def drops(steps: list[float]) -> list[float]:
+        """Pressure below less that above after each step [Pa]."""
+        run, found = Simulation(case), []
+        assert run.fluid is not None
+        for step in steps:
+            run.step(run.time + step)
+            found.append(float((run.fluid.pressure[0] - run.fluid.pressure[-1]).mean()))
+        return found
+
+    usual = 1e-3
+    changing, even = drops([usual] * 16 + [0.8 * usual, usual, 1.2 * usual] * 3), drops([usual] * 25)
+    assert changing == pytest.approx(even, rel=0.1)
+
+
 def test_fluid_takes_spin_of_a_lone_sphere() -> None:
     """Spin relative to half the vorticity falls as exp(-t/tau), tau = rho_p d^2/(60 eta), whatever the step."""
     density, diameter, viscosity = 2500.0, 1e-4, 1e-3

@@ -37,6 +37,9 @@ from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Bodies
 from closures.law import Law
 
+SETTLES = 0.01
+"""By which part of its distance to the step in use the usual step of the fluid moves in every step."""
+
 LEAST_VOIDAGE = 0.2
 """Below this no packing of spheres exists: particles overlap, or the kernel is too narrow for its cells."""
 
@@ -107,7 +110,7 @@ class Exchange:
         self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
         self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # by id: own winds [m/s]
         self._trail: list[Footprint] = []  # by id at the two steps before
-        self._last_step = 0.0
+        self._last_step = self._usual_step = 0.0
 
     # ------------------------------------------------------------ around one fluid step
 
@@ -116,7 +119,7 @@ class Exchange:
         spreading, fluid = self.spreading, self.fluid
         self._make_room(bodies)
         bodies.viscosity[:] = fluid.viscosity_at(bodies.position)
-        place = spreading.place(bodies.position, bodies.radius)
+        place = spreading.place(self._where(bodies, step), bodies.radius)
         solid = spreading.solid_fraction(place)
         met = self._meet(bodies, place, solid)
         drag = self._resistance(bodies, met, self._diameter_ratio(bodies, place, solid))
@@ -184,6 +187,7 @@ class Exchange:
             "winds": self._winds.copy(),
             "trail": {str(n): each._asdict() for n, each in enumerate(self._trail)},
             "last_step": self._last_step,
+            "usual_step": self._usual_step,
             "outside": self.outside,
         }
 
@@ -192,9 +196,22 @@ class Exchange:
         self._memory, self._winds = np.array(state["memory"]), np.array(state["winds"])
         kept = [state["trail"][name] for name in sorted(state["trail"])]
         self._trail = [Footprint(np.array(each["cells"]), np.array(each["weights"])) for each in kept]
-        self._last_step, self.outside = float(state["last_step"]), int(state["outside"])
+        self._last_step, self._usual_step = float(state["last_step"]), float(state["usual_step"])
+        self.outside = int(state["outside"])
 
     # ------------------------------------------------------------ terms
+
+    def _where(self, bodies: Bodies, step: float) -> Array:
+        r"""Where the fluid is to see the particles in a step h, :math:`x + (h - h_u)\,v` (N, 3) [m].
+
+        The voidage moves over a step from where particles were seen in the last to where they are seen in this
+        one. Between the two lies the last step of the particles, h_l, but h for the fluid; seen where they will be
+        by h less the usual step h_u, both intervals are h. Otherwise particles would displace the fluid at h_l/h
+        of their rate, a shock of pressure in a liquid. The usual step follows slowly.
+        """
+        usual = min(self._usual_step or step, 2.0 * step)  # nobody is seen further off than he flies in a step
+        self._usual_step = usual + SETTLES * (step - usual)
+        return bodies.position + (step - usual) * bodies.velocity
 
     def _aside(self, bodies: Bodies, place: Placement, slip: Array) -> Array:
         """Lift and viscous stress on every particle (N, 3) [N]."""
