@@ -56,13 +56,16 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         record=case.run.collisions,
         energies=case.run.energy,
     )
-    if case.fluid is None:
-        return Parts(solver, None, None)
+    return Parts(solver, None, None) if case.fluid is None else Parts(solver, *flow_of(case, spheres))
+
+
+def flow_of(case: Case, spheres: Bodies) -> tuple[FluidSolver, Exchange]:
+    """The fluid of a case around its particles, and what passes between the two."""
+    assert case.fluid is not None
     grid = grid_of(case.column)
-    boundaries = boundaries_of(case)
     fluid = FluidSolver(
         grid,
-        boundaries,
+        boundaries_of(case),
         density=case.fluid.density,
         viscosity=np.broadcast_to(case.fluid.viscosity_at(grid.centres()[2]), grid.shape),
         gravity=case.laws.gravity,
@@ -86,7 +89,7 @@ def assemble(case: Case, progress: Callable[[str], None] = lambda _: None, bodie
         torque=case.laws.torque,
         viscous_stress=case.laws.viscous_stress,
     )
-    return Parts(solver, fluid, exchange)
+    return fluid, exchange
 
 
 def materials_of(case: Case) -> np.ndarray:

@@ -84,6 +84,7 @@ def run(
         print("\n".join(finding.lines("cfddem: ")), file=sys.stderr)
     from cfddem.kernels import use_threads
     from cfddem.progress import live_line
+    from cfddem.rehearsal import rehearsal
     from cfddem.report import lines
     from cfddem.report import report as summary
     from cfddem.run import Run
@@ -92,7 +93,9 @@ def run(
     use_threads(threads)
     with live_line(log) as line:
         text = described.to_toml() if set else read_text(path)
-        Run.begin(described, folder, text=text, report=line.update, progress=line.say).go()
+        with rehearsal(described):
+            prepared = Run.begin(described, folder, text=text, report=line.update, progress=line.say)
+        prepared.go()
     print("\n".join(lines(summary(folder))))
     print(f"\nwritten to {folder}; see it with: cfddem view {folder}")
 
