@@ -107,9 +107,10 @@ class Exchange:
         self.spin_work = 0.0  # kinetic energy that the last torque of the fluid has given to the particles [J]
         self.outside = 0  # how often the drag law was asked outside of its range
         self._law = DragLoop(drag)
-        self._memory = np.zeros((0, 9))  # by id: velocity, drag impulse and wind of the last step
-        self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # by id: own winds [m/s]
-        self._trail: list[Footprint] = []  # by id at the two steps before
+        self._id = np.zeros(0, np.int64)  # whose rows the following are
+        self._memory = np.zeros((0, 9))  # velocity, drag impulse and wind of the last step
+        self._winds = np.zeros((0, MODES if own_wind else 0, 3))  # own winds [m/s]
+        self._trail = [spreading.footprint(np.zeros((0, 3)), np.zeros(0))] * 2  # at the two steps before
         self._last_step = self._usual_step = 0.0
 
     # ------------------------------------------------------------ around one fluid step
@@ -117,7 +118,7 @@ class Exchange:
     def offer(self, bodies: Bodies, step: float) -> Offer:
         """What the particles bring into the coming fluid step of a length [s]: volume, drag and momentum."""
         spreading, fluid = self.spreading, self.fluid
-        self._make_room(bodies)
+        self._follow(bodies)
         bodies.viscosity[:] = fluid.viscosity_at(bodies.position)
         place = spreading.place(self._where(bodies, step), bodies.radius)
         solid = spreading.solid_fraction(place)
@@ -150,13 +151,13 @@ class Exchange:
 
         gravity  (3,) [m/s2]; weight and buoyancy are among the forces applied
         """
-        rows, place, fluid, spreading = bodies.id, offer.place, self.fluid, self.spreading
+        place, fluid, spreading = offer.place, self.fluid, self.spreading
         weight, velocity, _ = fluid.drag_exchange()
         fields = np.moveaxis(np.concatenate([weight, weight * velocity], axis=-1), -1, 0)
         seen = spreading.gather(place.footprint, spreading.smooth(fields))
         pressure, drag = self._pressure_force(bodies, place), np.empty((bodies.count, 3))
         loops.settle(
-            rows, seen, offer.resistance, offer.target, pressure, offer.explicit, place.volume, bodies.mass,
+            seen, offer.resistance, offer.target, pressure, offer.explicit, place.volume, bodies.mass,
             fluid.density, gravity, bodies.velocity, offer.slip, offer.step,
             self._memory, drag, bodies.applied, bodies.force,
         )  # fmt: skip
@@ -165,14 +166,14 @@ class Exchange:
             self.spin_work = turn_with_fluid(bodies, curl, fluid.density, offer.step)
         if self.own_wind is not None and fluid.viscous:
             self.own_wind.advance(
-                place, rows, self._winds, drag, offer.slip, offer.screening, fluid.density, bodies.viscosity, offer.step
+                place, self._winds, drag, offer.slip, offer.screening, fluid.density, bodies.viscosity, offer.step
             )
-        self._trail = [self._trail[-1], _by_id(bodies, place.footprint)]
+        self._trail = [self._trail[-1], place.footprint]
         self._last_step = offer.step
 
     @property
     def drag_impulse(self) -> Array:
-        """Impulse of drag on every particle in the last fluid step, by id (n, 3) [N s]."""
+        """Impulse of drag on every particle in the last fluid step, as they stood in it (N, 3) [N s]."""
         return self._memory[:, 3:6]
 
     def inertia(self, bodies: Bodies) -> Array:
@@ -183,6 +184,7 @@ class Exchange:
     def checkpoint(self) -> dict[str, Any]:
         """Copies of what the next step depends on beside fluid and particles."""
         return {
+            "id": self._id.copy(),
             "memory": self._memory.copy(),
             "winds": self._winds.copy(),
             "trail": {str(n): each._asdict() for n, each in enumerate(self._trail)},
@@ -193,7 +195,7 @@ class Exchange:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a `checkpoint()`."""
-        self._memory, self._winds = np.array(state["memory"]), np.array(state["winds"])
+        self._id, self._memory, self._winds = (np.array(state[name]) for name in ("id", "memory", "winds"))
         kept = [state["trail"][name] for name in sorted(state["trail"])]
         self._trail = [Footprint(np.array(each["cells"]), np.array(each["weights"])) for each in kept]
         self._last_step, self._usual_step = float(state["last_step"]), float(state["usual_step"])
@@ -240,8 +242,7 @@ class Exchange:
         """
         if self.added_mass == 0.0 or self._last_step == 0.0:
             return np.zeros_like(slip), np.zeros_like(slip)
-        before = self._memory[bodies.id]
-        swept = self._added(bodies) * (slip + bodies.velocity - before[:, 6:]) / self._last_step
+        swept = self._added(bodies) * (slip + bodies.velocity - self._memory[:, 6:]) / self._last_step
         return swept, self.under_way(bodies) / step - swept
 
     def _returned(self, place: Placement, force: Array) -> Array | None:
@@ -253,7 +254,8 @@ class Exchange:
 
     def under_way(self, bodies: Bodies) -> Array:
         """Momentum that added mass has taken from every particle and the fluid gets in the next step (N, 3) [N s]."""
-        moved: Array = self._added(bodies) * (bodies.velocity - self._memory[bodies.id, :3])
+        self._follow(bodies)
+        moved: Array = self._added(bodies) * (bodies.velocity - self._memory[:, :3])
         return moved
 
     def _added(self, bodies: Bodies) -> Array:
@@ -269,8 +271,7 @@ class Exchange:
         scalars, vectors = np.empty((3, bodies.count)), np.empty((2, bodies.count, 3))
         met = Met(*vectors, *scalars)
         loops.meet(
-            seen, place.volume, bodies.radius, bodies.velocity, bodies.viscosity, bodies.id, self._winds, own,
-            fluid.density, *met,
+            seen, place.volume, bodies.radius, bodies.velocity, bodies.viscosity, self._winds, own, fluid.density, *met,
         )  # fmt: skip
         return met
 
@@ -300,7 +301,7 @@ class Exchange:
         if self._last_step == 0.0:
             return bodies.force
         force = np.empty((bodies.count, 3))
-        loops.other_force(bodies.id, self._memory, bodies.velocity, self.inertia(bodies), self._last_step, force)
+        loops.other_force(self._memory, bodies.velocity, self.inertia(bodies), self._last_step, force)
         return force
 
     def _pressure_force(self, bodies: Bodies, place: Placement) -> Array:
@@ -313,27 +314,26 @@ class Exchange:
         spreading, force = self.spreading, np.empty((bodies.count, 3))
         gradient = spreading.smooth(self.fluid.cell_pressure_gradient())
         seen = (spreading.gather(footprint, gradient) for footprint in (*self._trail, place.footprint))
-        loops.press(place.volume, bodies.id, *seen, force)
+        loops.press(place.volume, *seen, force)
         return force
 
-    def _make_room(self, bodies: Bodies) -> None:
-        """Rows for particles seen for the first time: as fast as they are now, with no drag yet."""
-        most = int(bodies.id.max(initial=-1)) + 1
-        if most > len(self._memory):
-            grown = np.zeros((most, 9))
-            grown[: len(self._memory)] = self._memory
-            fresh = bodies.id >= len(self._memory)
-            grown[bodies.id[fresh], :3] = bodies.velocity[fresh]
-            self._memory = grown
-            self._winds = np.concatenate([self._winds, np.zeros((most - len(self._winds), *self._winds.shape[1:]))])
-            here = _by_id(bodies, self.spreading.footprint(bodies.position, bodies.radius))
-            self._trail = [_longer(trail, here) for trail in self._trail or [Footprint(*(a[:0] for a in here))] * 2]
+    def _follow(self, bodies: Bodies) -> None:
+        """Bring what is remembered into the order of the particles now; of newcomers, that they were as they are."""
+        if np.array_equal(bodies.id, self._id):
+            return
+        row = np.full(int(max(bodies.id.max(initial=-1), self._id.max(initial=-1))) + 1, -1)
+        row[self._id] = np.arange(len(self._id))
+        row = row[bodies.id]
+        fresh = row < 0
+        self._id, self._memory, self._winds = bodies.id.copy(), _taken(self._memory, row), _taken(self._winds, row)
+        self._memory[fresh, :3] = bodies.velocity[fresh]
+        self._trail = [Footprint(*(_taken(each, row) for each in footprint)) for footprint in self._trail]
+        here = self.spreading.footprint(bodies.position[fresh], bodies.radius[fresh])
+        for footprint in self._trail:
+            footprint.cells[fresh], footprint.weights[fresh] = here
 
 
-def _by_id(bodies: Bodies, footprint: Footprint) -> Footprint:
-    return Footprint(*(bodies.by_id(each) for each in footprint))
-
-
-def _longer(old: Footprint, all_of_now: Footprint) -> Footprint:
-    """Footprints of then, and for whom there was none those of now."""
-    return Footprint(*(np.concatenate([then, now[len(then) :]]) for then, now in zip(old, all_of_now)))
+def _taken(values: np.ndarray, row: np.ndarray) -> np.ndarray:
+    """Rows of an array; of zeros for the row -1."""
+    taken: np.ndarray = np.concatenate([values, np.zeros((1, *values.shape[1:]), values.dtype)])[row]
+    return taken

@@ -9,11 +9,11 @@ from cfddem.kernels import prange, threaded
 
 
 @threaded
-def meet(seen, volume, radius, velocity, viscosity, rows, winds, own, density, slip, wind, voidage, reynolds, others):
+def meet(seen, volume, radius, velocity, viscosity, winds, own, density, slip, wind, voidage, reynolds, others):
     """Slip, voidage, Reynolds number and number of others around, less what a particle itself makes of them.
 
     seen    mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
-    rows    by which a particle's winds (n, modes, 3) [m/s] are known
+    winds   its own (N, modes, 3) [m/s]
     own     its own part of the solid fraction (N,) [-]; all zeros leaves everything as it is seen
     others  per volume [1/m3]
     wind    its own in what it sees (N, 3) [m/s]
@@ -27,7 +27,7 @@ def meet(seen, volume, radius, velocity, viscosity, rows, winds, own, density, s
         for d in range(3):
             blown = 0.0
             for k in range(winds.shape[1]):
-                blown += winds[rows[n], k, d]
+                blown += winds[n, k, d]
             wind[n, d] = share * blown
             slip[n, d] = seen[n, d] - wind[n, d] - velocity[n, d]
             square += slip[n, d] * slip[n, d]
@@ -54,35 +54,33 @@ def promise(drag, inverse_inertia, other, velocity, wind, step, resistance, targ
 
 
 @threaded
-def other_force(rows, memory, velocity, inertia, last_step, force):
+def other_force(memory, velocity, inertia, last_step, force):
     """Mean over the step before of all forces but drag (N, 3) [N]; none where nothing moves a particle."""
-    for n in prange(len(rows)):
+    for n in prange(len(memory)):
         for d in range(3):
-            gained = inertia[n] * (velocity[n, d] - memory[rows[n], d]) if math.isfinite(inertia[n]) else 0.0
-            force[n, d] = (gained - memory[rows[n], 3 + d]) / last_step
+            gained = inertia[n] * (velocity[n, d] - memory[n, d]) if math.isfinite(inertia[n]) else 0.0
+            force[n, d] = (gained - memory[n, 3 + d]) / last_step
 
 
 @threaded
-def press(volume, rows, before, between, now, force):
+def press(volume, before, between, now, force):
     """Force (N, 3) [N] of the pressure gradients [Pa/m] seen from the last three places, by the weights of their
-    voidage; those from the two places before are known by rows."""
+    voidage."""
     for n in prange(len(volume)):
-        k = rows[n]
         for d in range(3):
-            force[n, d] = -volume[n] * (0.25 * before[k, d] + 0.5 * between[k, d] + 0.25 * now[n, d])
+            force[n, d] = -volume[n] * (0.25 * before[n, d] + 0.5 * between[n, d] + 0.25 * now[n, d])
 
 
 @threaded
 def settle(
-    rows, seen, resistance, target, pressure, explicit, volume, mass, density, gravity, velocity, slip, step,
+    seen, resistance, target, pressure, explicit, volume, mass, density, gravity, velocity, slip, step,
     memory, drag, applied, force,
 ):  # fmt: skip
     """What the fluid has done to every particle becomes the force on it, and is remembered.
 
     seen  W and W u_d of the cells around each (N, 6)
     """
-    for n in prange(len(rows)):
-        k = rows[n]
+    for n in prange(len(memory)):
         for d in range(3):
             drag[n, d] = resistance[n] * (seen[n, 3 + d] - seen[n, d] * target[n, d])
             now = (
@@ -91,8 +89,8 @@ def settle(
                 + (mass[n] - density * volume[n]) * gravity[d]  # weight and buoyancy
                 + explicit[n, d]
             )
-            memory[k, d] = velocity[n, d]
-            memory[k, 3 + d] = step * drag[n, d]
-            memory[k, 6 + d] = slip[n, d] + velocity[n, d]
+            memory[n, d] = velocity[n, d]
+            memory[n, 3 + d] = step * drag[n, d]
+            memory[n, 6 + d] = slip[n, d] + velocity[n, d]
             force[n, d] += now - applied[n, d]  # the sum of forces at hand changes by as much
             applied[n, d] = now

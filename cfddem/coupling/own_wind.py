@@ -53,7 +53,6 @@ class OwnWind:
     def advance(
         self,
         place: Placement,
-        rows: np.ndarray,
         winds: Array,
         drag: Array,
         slip: Array,
@@ -64,15 +63,14 @@ class OwnWind:
     ) -> None:
         """Let the own winds grow and fade over a step [s] in which the particles have pushed the fluid.
 
-        rows       by which a particle's winds are known
-        winds      (n, MODES, 3) [m/s], changed in place
+        winds      (N, MODES, 3) [m/s], changed in place
         drag       on the particles; the fluid felt its opposite (N, 3) [N]
         slip       u - v, without the own wind (N, 3) [m/s]
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         viscosity  of the fluid around each (N,), positive [Pa s]
         """
         _build_up(
-            place.position, *self._cell, rows, drag, slip, screening, *self._tables[1:], density, viscosity, step, winds
+            place.position, *self._cell, drag, slip, screening, *self._tables[1:], density, viscosity, step, winds
         )  # fmt: skip
 
 
@@ -114,12 +112,12 @@ def _steady(moving, slowest, wave_number, shares):
 
 @threaded
 def _build_up(
-    position, origin, inverse, linear, rows, drag, slip, screening, flow, rates, start, slowest, moving, density,
+    position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
     viscosity, step, winds,
 ):  # fmt: skip
     """Exact relaxation of every wind towards what a steady force would make of it."""
     modes = rates.shape[1]
-    for n in prange(len(rows)):
+    for n in prange(len(position)):
         diffusivity = viscosity[n] / density
         shares = _shares(n, position, origin, inverse, linear)
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
@@ -138,4 +136,4 @@ def _build_up(
                 fading = diffusivity * (rates[d, k] + blown)
                 left = math.exp(-step * (fading + screening[n]))
                 steady *= fading / (fading + screening[n])
-                winds[rows[n], k, d] = steady + left * (winds[rows[n], k, d] - steady)
+                winds[n, k, d] = steady + left * (winds[n, k, d] - steady)

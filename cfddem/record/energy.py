@@ -143,7 +143,7 @@ class EnergyLedger:
         sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
         sums["pressure_from_fluid"] -= done.solids
 
-        drag = self.exchange.drag_impulse[bodies.id] / offer.step
+        drag = self.exchange.drag_impulse / offer.step
         spreading = self.exchange.spreading
         weight = spreading.gather(offer.place.footprint, spreading.smooth(np.moveaxis(fluid.drag_exchange()[0], -1, 0)))
         acting = offer.target + drag / np.maximum(weight * offer.resistance[:, None], 1e-300)
