@@ -137,8 +137,9 @@ class Simulation:
             fluid = self.fluid.largest_step(COURANT)
             limits[fluid.clock] = fluid.step
             limits["inlet Courant"] = COURANT * min(self.fluid.grid.spacing) / max(self.case.bed.inlet_speed, 1e-300)
-            speed = np.abs(self.particles.bodies.velocity).max(axis=0, initial=0.0) / np.array(self.fluid.grid.spacing)
-            limits["particle Courant"] = COURANT / max(float(speed.max()), 1e-300)
+            along = zip(self.particles.bodies.velocity.T, self.fluid.grid.spacing)
+            crossing = max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in along)
+            limits["particle Courant"] = COURANT / max(crossing, 1e-300)
         self.binding = min(limits, key=limits.__getitem__)
         largest = limits[self.binding]
         left = until - self.time

@@ -8,6 +8,9 @@ import numpy as np
 
 from cfddem.kernels import inline, kernel, prange, threaded
 
+FOUR = 4
+"""Numbers of a cell that are gathered at once."""
+
 
 @inline
 def cell_and_share(coordinate, linear):
@@ -35,6 +38,22 @@ def footprints(position, radius, offsets, linear, origin, inverse, home, cells, 
                 weights[n, 8 * s + corner] = share * (c if up else 1.0 - c) * across
 
 
+@kernel
+def sort_into_slabs(position, origin, inverse, thickness, order, start):
+    """Rows of particles by slab of so many layers of cells, and where each slab begins."""
+    slabs = len(start) - 1
+    slab = np.empty(len(position), np.int64)
+    for n in range(len(position)):
+        slab[n] = min(max(math.floor((position[n, 2] - origin) * inverse) // thickness, 0), slabs - 1)
+        start[slab[n] + 1] += 1
+    for each in range(slabs):
+        start[each + 1] += start[each]
+    free = start[:-1].copy()
+    for n in range(len(position)):
+        order[free[slab[n]]] = n
+        free[slab[n]] += 1
+
+
 @threaded
 def deposit(order, start, values, cells, weights, fields):
     """Slabs of even number together, then odd ones, then a last one that would touch the first round a period."""
@@ -59,16 +78,27 @@ def _spread(n, values, cells, weights, fields):
 
 @threaded
 def gather(cells, weights, field, values):
-    """Every particle takes from its cells, with the weights of `_spread`: field (cells, m) gives values (N, m)."""
+    """Every particle takes from its cells, with the weights of `_spread`: field (cells, M) gives values (N, m).
+
+    M is m or more, and a multiple of FOUR: so many numbers of a cell are taken at once.
+    """
+    wanted = values.shape[1]
     for n in prange(len(values)):
-        for m in range(values.shape[1]):
-            total = 0.0
-            for s in range(0, cells.shape[1], 8):
-                c, w = cells[n, s : s + 8], weights[n, s : s + 8]
-                low = (w[0] * field[c[0], m] + w[1] * field[c[1], m]) + (w[2] * field[c[2], m] + w[3] * field[c[3], m])
-                high = (w[4] * field[c[4], m] + w[5] * field[c[5], m]) + (w[6] * field[c[6], m] + w[7] * field[c[7], m])
-                total += low + high
-            values[n, m] = total
+        for first in range(0, field.shape[1], FOUR):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for s in range(cells.shape[1]):
+                here, weight = field[cells[n, s], first : first + FOUR], weights[n, s]
+                a += weight * here[0]
+                b += weight * here[1]
+                c += weight * here[2]
+                d += weight * here[3]
+            values[n, first] = a
+            if first + 1 < wanted:
+                values[n, first + 1] = b
+            if first + 2 < wanted:
+                values[n, first + 2] = c
+            if first + 3 < wanted:
+                values[n, first + 3] = d
 
 
 @threaded

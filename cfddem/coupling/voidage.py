@@ -89,11 +89,8 @@ class Spreading:
 
     def place(self, position: Array, radius: Array) -> Placement:
         """Where particles stand among the cells."""
-        layers = np.floor((position[:, 2] - self._origin[2]) * self._inverse[2])
-        slabs = max(self.grid.cells[2] // SLAB, 1)
-        slab = np.clip(layers // SLAB, 0, slabs - 1).astype(np.uint16)  # short numbers are sorted fastest
-        order = np.argsort(slab, kind="stable")
-        start = np.concatenate(([0], np.cumsum(np.bincount(slab, minlength=slabs))))
+        order, start = np.empty(len(position), np.int64), np.zeros(max(self.grid.cells[2] // SLAB, 1) + 1, np.int64)
+        loops.sort_into_slabs(position, self._origin[2], self._inverse[2], SLAB, order, start)
         volume = (4.0 / 3.0) * math.pi * radius**3
         return Placement(position.copy(), radius, volume, order, start, self.footprint(position, radius))
 
@@ -114,8 +111,11 @@ class Spreading:
 
     def gather(self, footprint: Footprint, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle: (N, m). The adjoint of `deposit`."""
-        values = np.empty((len(footprint.cells), len(fields)))
-        loops.gather(*footprint, np.ascontiguousarray(fields.reshape(len(fields), -1).T), values)
+        count = len(fields)
+        values = np.empty((len(footprint.cells), count))
+        by_cell = np.zeros((math.prod(self.grid.cells), -(-count // loops.FOUR) * loops.FOUR))
+        by_cell[:, :count] = fields.reshape(count, -1).T
+        loops.gather(*footprint, by_cell, values)
         return values
 
     def smooth(self, fields: Array) -> Array:

@@ -23,7 +23,7 @@ from cfddem.particles.pair_loops import (
     wet_pairs_threaded,
 )
 from cfddem.particles.pairs import ENTRY, geometry
-from cfddem.particles.surfaces import TURN, advance_walls, portion, touched
+from cfddem.particles.surfaces import TURN, advance_walls, portion, touched, touched_distance
 from cfddem.particles.vectors import at, dot, minus, plus, put, times
 
 
@@ -46,6 +46,16 @@ def wall_meeting(k, bodies, edges, walls, shift):
         minus(at(bodies.spin, i), at(walls.spin, walls.wall[edges.second[k]])),
         2.5 * bodies.inverse_mass[i] / radius**2,
     )
+
+
+@inline
+def forget(k, edges, laws, rolling):
+    """A contact has ended, or has not begun."""
+    put(edges.spring, k, NOTHING)
+    if rolling:
+        put(edges.roll, k, NOTHING)
+    if laws.cohesion:
+        edges.minimum_gap[k] = 0.0  # it lasts beyond geometric touch only where it has been
 
 
 @inline
@@ -225,11 +235,14 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
             for edge in range(pairs, number):
                 k = np.uint64(edge)
                 part = portion(edges, k)
-                if part == 0.0:
+                apart = not touched_distance(edges, k) - bodies.radius[edges.first[k]] < edges.minimum_gap[k]
+                if part == 0.0 or apart:
                     put(edges.force, k, NOTHING)
                     put(edges.couple, k, NOTHING)
                     if rolling:
                         put(edges.moment, k, NOTHING)
+                    if part != 0.0:
+                        forget(k, edges, laws, rolling)
                     continue
                 meeting = wall_meeting(k, bodies, edges, walls, shift)
                 which = np.uint64(bodies.material[edges.first[k]]) * kinds + np.uint64(walls.material[edges.second[k]])
