@@ -87,6 +87,26 @@ def test_a_box_of_colliding_spheres_accounts_for_its_energy(asked: dict) -> None
     assert (counted["rolling"] > 0.0) == ("laws" in asked and asked["laws"].rolling > 0)
 
 
+def test_every_encounter_says_what_it_lost_and_to_what() -> None:
+    """Oblique, wet and rough: the sum over the row is the energy of motion that the pair has lost."""
+    radius, speed = 1e-3, 0.5
+    places = np.array([[0.0, 0.0, 0.0], [3.0 * radius, 0.8 * radius, 0.0]])
+    velocity = np.array([[0.0, 0.0, 0.0], [-speed, 0.0, 0.0]])
+    pair = bodies(places, radius, 2500.0, velocity=velocity, viscosity=5e-3)
+    run = ParticleSolver(pair, pair_table([ROUGH]), laws=Laws(film=True), record=True, energies=True)
+    assert run.collisions is not None and run.energies is not None
+    before, step = of_spheres(pair), run.recommended_step(speed)
+    run.advance(step, int(4.0 * radius / speed / step))
+    (row,) = run.collisions.table
+    counted = dict(zip(CHANNELS, run.energies.totals))
+    assert row["lost_to_contact"] == pytest.approx(counted["contact_damping"], rel=1e-9)
+    assert row["lost_to_friction"] == pytest.approx(counted["friction"], rel=1e-9)
+    assert row["lost_to_film"] == pytest.approx(counted["film"], rel=0.01)
+    lost = sum(row[f"lost_to_{channel}"] for channel in ("film", "contact", "friction"))
+    assert lost - counted["stiffening"] == pytest.approx(before - of_spheres(pair), rel=0.01)
+    assert min(row["lost_to_film"], row["lost_to_contact"], row["lost_to_friction"]) > 0.01 * lost
+
+
 def test_the_count_changes_no_bit_and_hangs_on_no_thread() -> None:
     """On one thread, and on all; counted, and not."""
     found = []

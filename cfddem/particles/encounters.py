@@ -6,7 +6,7 @@ import numpy as np
 
 from cfddem.kernels import inline
 from cfddem.particles.forces import pair_mass_and_radius, pair_row, pair_viscosity, relative_velocity
-from cfddem.particles.pairs import ENTRY, geometry
+from cfddem.particles.pairs import CLOSEST, ENTRY, LOST, geometry
 from cfddem.particles.surfaces import portion
 from cfddem.particles.vectors import across, at, dot, times
 from closures.friction import dry_or_lubricated
@@ -30,6 +30,9 @@ ENCOUNTER = np.dtype(
         ("restitution", "f8"),  # normal speed out over in [-]
         ("restitution_tangential", "f8"),  # tangential speed out over in; NaN for a head-on meeting [-]
         ("closest_gap", "f8"),  # smallest gap that the pair came to; below h_min the solids met [m]
+        ("lost_to_film", "f8"),  # energy, NaN where energies are not counted [J]
+        ("lost_to_contact", "f8"),  # energy, by the dashpot of the solids; likewise [J]
+        ("lost_to_friction", "f8"),  # energy, by sliding; likewise [J]
         ("weight", "f8"),  # how many encounters the row stands for: 1 unless the record is sampled [-]
     ],
     align=True,
@@ -40,15 +43,15 @@ ENCOUNTER = np.dtype(
 def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
     """Note the begin of an encounter, or write a row at its end; returns the number of rows.
 
-    Of the begin an edge keeps five numbers: time, normal speed, tangential velocity; and the closest gap since then.
+    What an edge keeps meanwhile stands in `Edges.entry`.
     """
     separation, distance, gap = geometry(k, bodies, edges, shift)
     reduced_radius, inverse_mass = pair_mass_and_radius(k, bodies, edges)
     reach = laws.cutoff_ratio * reduced_radius if laws.film else 0.0
     entry = ENTRY * k
     known = not np.isnan(edges.entry[entry])
-    if known and gap < edges.entry[entry + 5]:
-        edges.entry[entry + 5] = gap
+    if known and gap < edges.entry[entry + CLOSEST]:
+        edges.entry[entry + CLOSEST] = gap
     if known == (gap <= reach) or portion(edges, k) == 0.0:
         return count
     normal = times(1.0 / distance, separation)
@@ -57,7 +60,9 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
     if not known:
         edges.entry[entry], edges.entry[entry + 1] = time, normal_speed
         edges.entry[entry + 2], edges.entry[entry + 3], edges.entry[entry + 4] = tangential
-        edges.entry[entry + 5] = gap
+        edges.entry[entry + CLOSEST] = gap
+        for channel in range(3):
+            edges.entry[entry + LOST + channel] = np.nan
         return count
 
     row, materials = rows[count], pair_row(k, bodies, edges, walls, table)
@@ -84,6 +89,8 @@ def observe(k, bodies, edges, walls, shift, table, laws, time, rows, count):
     row.restitution = normal_speed / speed
     sideways = dot(before, before)
     row.restitution_tangential = dot(tangential, before) / sideways if sideways > 0.0 else np.nan
-    row.closest_gap, row.weight = edges.entry[entry + 5], 1.0
+    row.lost_to_film, row.lost_to_contact = edges.entry[entry + LOST], edges.entry[entry + LOST + 1]
+    row.lost_to_friction = edges.entry[entry + LOST + 2]
+    row.closest_gap, row.weight = edges.entry[entry + CLOSEST], 1.0
     edges.entry[entry] = np.nan
     return count + 1

@@ -15,7 +15,7 @@ import numpy as np
 from cfddem.errors import InputError
 from cfddem.kernels import CHUNKS, inline, prange, threaded
 from cfddem.particles.forces import LINEAR, NOTHING, RESCALED, VERLET, pair_mass_and_radius, pair_row
-from cfddem.particles.pairs import geometry
+from cfddem.particles.pairs import ENTRY, LOST, geometry
 from cfddem.particles.state import kinetic_energy
 from cfddem.particles.surfaces import SURFACE, portion, touched
 from cfddem.particles.vectors import across, at, cross, dot, flat, minus, plus, put, times
@@ -163,6 +163,15 @@ def _ways(bodies, count, gravity, free, step, before, after):
 
 
 @inline
+def _note(k, edges, channel, lost):
+    """Add what edge k has lost to its encounter, where one is recorded."""
+    if len(edges.entry) > 0 and not np.isnan(edges.entry[ENTRY * k]):
+        column = ENTRY * k + LOST + channel
+        before = edges.entry[column]
+        edges.entry[column] = lost if np.isnan(before) else before + lost
+
+
+@inline
 def _film_works(k, bodies, edges, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
     i, j = edges.first[k], edges.second[k]
@@ -251,7 +260,9 @@ def _contact_works(k, gap, separation, distance, bodies, edges, walls, count, ta
     pulled = dot(force, way) + dot(at(edges.couple, k), turn) - pressed * approach
 
     totals[WALLS] += dot(force, by_wall)
-    totals[DAMPING] += (elastic - pressed) * approach - pulled - tangential * dot(spring, slid)
+    damped = (elastic - pressed) * approach - pulled - tangential * dot(spring, slid)
+    totals[DAMPING] += damped
+    _note(k, edges, 1, damped)
     if laws.rolling:
         totals[ROLLING] -= dot(at(edges.moment, k), about)
     square, rate = dot(spring, spring), tangential * dot(spring, slip)
@@ -261,7 +272,9 @@ def _contact_works(k, gap, separation, distance, bodies, edges, walls, count, ta
         taken = 0.25 * (softer + tangential) * (square - kept)
         totals[STIFFENING] += 0.5 * (tangential * square - softer * was) - taken
         if _slides(k, bodies, edges, walls, table, laws, pressed, minus(force, times(pressed, normal))):
-            totals[FRICTION] += 0.5 * step * (count.power[k] + rate) - taken
+            rubbed = 0.5 * step * (count.power[k] + rate) - taken
+            totals[FRICTION] += rubbed
+            _note(k, edges, 2, rubbed)
     count.spring[k] = square
     count.stiffness[k] = tangential
     count.power[k] = rate
@@ -279,6 +292,7 @@ def _work(bodies, edges, walls, count, shift, table, laws, step, before, after):
             if laws.film and step > 0.0:
                 lost, by_wall = _film_works(k, bodies, edges, count, step)
                 totals[FILM] += lost
+                _note(k, edges, 0, lost)
                 totals[WALLS] += by_wall
             if near <= k < pairs:
                 continue

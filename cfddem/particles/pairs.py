@@ -39,15 +39,16 @@ class Edges(NamedTuple):
     resistance: np.ndarray  # (n,) of the film, without lever; 0 out of its reach [kg/s]
     impulse: np.ndarray  # (n, 3) of the film in this step, on the first body [N s]
     hard: np.ndarray  # (n,) bool, where the film changes so much in this step that its equation is solved with care
-    entry: np.ndarray  # (n, 6) begin of the encounter and closest gap, NaN outside one; (0, 6) where none are recorded
+    entry: np.ndarray  # (n, 9) of the encounter, NaN outside one: see `ENTRY`; (0, 9) where none are recorded
     touch: np.ndarray  # (particle-wall edges, 18) how sphere and wall stand: columns in `surfaces`
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
     incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
     outside: np.ndarray  # (n,) int64, how often laws of one's own were asked outside of their range; else (0,)
 
 
-ENTRY = 6
-"""Columns of `Edges.entry`."""
+ENTRY, CLOSEST, LOST = 9, 5, 6
+"""Columns of `Edges.entry`: time, normal speed and tangential velocity at the begin; the closest gap since; energy lost
+to film, dashpot and friction since, NaN where energies are not counted."""
 
 HOME = 13
 """Image of a pair that does not reach across a periodic border: 9 (x + 1) + 3 (y + 1) + (z + 1), in boxes."""
@@ -191,10 +192,9 @@ def remember(old, new, old_row, new_row):
                     new.accounted_gap[k] = old.accounted_gap[before]
                     new.resistance[k] = old.resistance[before]
                 if len(new.entry) > 0:
-                    for column in (0, 1, 5):
-                        new.entry[k, column] = old.entry[before, column]
-                    for column in range(2, 5):
-                        new.entry[k, column] = sign * old.entry[before, column]
+                    for column in range(ENTRY):
+                        turned = sign if 2 <= column < CLOSEST else 1.0  # a velocity of the first body
+                        new.entry[k, column] = turned * old.entry[before, column]
 
 
 def gaps(edges: Edges, bodies: Bodies, walls: Walls, box: np.ndarray) -> np.ndarray:

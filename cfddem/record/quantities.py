@@ -55,6 +55,9 @@ KNOWN = {
     "restitution": Quantity("1", "normal speed after over before"),
     "restitution_tangential": Quantity("1", "tangential speed after over before"),
     "closest_gap": Quantity("m", "smallest gap that the pair came to; below the smallest gap of the film solids met"),
+    "lost_to_film": Quantity("J", "energy that the film took; not a number where the run counts no energies"),
+    "lost_to_contact": Quantity("J", "energy that the dashpot of the contact took"),
+    "lost_to_friction": Quantity("J", "energy that sliding took"),
     "weight": Quantity("1", "number of encounters that the row stands for"),
 }
 
