@@ -139,7 +139,7 @@ def films(curves: Curves) -> list[Row]:
     gains = [
         (step, max(0.0, float(np.max(run.energy[1:] / run.energy[:-1])) - 1.0), 0.0) for step, run in alone.items()
     ]
-    crowd = checks.shear(0.5, 10_000)
+    crowd, under_lid = checks.shear(0.5, 10_000), checks.shear(0.6, 20_000, press=20.0)
     curves["shear"] = {"energy": (crowd.energy, "J")}
     return [
         worst("films alone: rise of kinetic energy, to 20 film times", [p for p in gains if p[0] < 2e-7], 0.0),
@@ -147,6 +147,8 @@ def films(curves: Curves) -> list[Row]:
         worst("films alone: change of momentum", [(s, run.momentum, 0.0) for s, run in alone.items()], 1e-13),
         Row("sheared at 0.5 in 1 Pa s: smallest gap over h_min", crowd.smallest_gap, 1.0, 1.0),
         Row("sheared at 0.5 in 1 Pa s: fastest over plate", crowd.speed),
+        Row("settling and sheared at 0.6 under a lid: smallest gap over h_min", under_lid.smallest_gap, 1.0, 1.0),
+        Row("settling and sheared at 0.6 under a lid: fastest", 0.02 * under_lid.speed, unit="m/s"),
     ]
 
 
