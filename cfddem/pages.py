@@ -85,7 +85,7 @@ def page(law: Law) -> list[str]:
 
 
 def listing() -> list[str]:
-    """The shelf: all laws by kind, a line each, at most 100 columns wide."""
+    """The shelf: all laws by kind, a line each and one more for what it was fitted to, at most 100 columns wide."""
     out: list[str] = []
     for kind, those in sorted(laws().items()):
         out += ["", kind.replace("_", " ")]
@@ -93,6 +93,10 @@ def listing() -> list[str]:
             sentence = plain_words(summary(law)["sentence"])
             out.append(textwrap.shorten(f"{law.name:.<36} {sentence}", WIDTH - 2, placeholder=" ..."))
             out[-1] = "  " + re.sub(r"\.{2,}(?= )", lambda dots: " " * len(dots[0]), out[-1], count=1)
+            if law.ranges:
+                out += textwrap.wrap(
+                    f"for {law.fitted_for}", WIDTH, initial_indent=" " * 39, subsequent_indent=" " * 43
+                )
     return out[1:]
 
 

@@ -348,6 +348,7 @@ def test_the_page_of_every_law_can_be_read(tmp_path: Path) -> None:
     shelf = [law for kind in pages.laws().values() for law in kind.values()]
     assert len(shelf) > 60
     listed = call("explain").out
+    assert "for voidage 0.4 to 1, reynolds 0 to 1000\n" in listed
     for law in shelf:
         text = "\n".join(pages.page(law))
         assert f"  {law.name}" in listed
