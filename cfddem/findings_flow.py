@@ -56,7 +56,10 @@ def of_the_flow(case: Case, bed: Bed) -> Iterator[Finding]:
             "red", "fluid.viscosity", "0 Pa s: drag laws need a viscous fluid", 'set it, or laws.drag = "none"'
         )
     within = case.fluid.viscosity_at(np.linspace(0.0, min(bed.height, case.column.height), 50))
-    if not case.fluid.viscosity / LAYERED < within.min() <= within.max() < LAYERED * case.fluid.viscosity:
+    if (
+        case.fluid.viscosity_profile
+        and not case.fluid.viscosity / LAYERED < within.min() <= within.max() < LAYERED * case.fluid.viscosity
+    ):
         yield Finding(
             "amber", "fluid.viscosity", f"estimates take {case.fluid.viscosity:.3g} Pa s; by viscosity_profile it is "
             f"{within.min():.3g} to {within.max():.3g} Pa s in the bed",

@@ -23,10 +23,15 @@ def is_new() -> bool:
     return not any(cache_folder().rglob("momentum.transport*.nbi"))
 
 
+def _cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @contextmanager
 def rehearsal(case: Case) -> Iterator[None]:
     """Rehearse beside the preparation of a run in a fluid, where there is a core to spare."""
-    if case.fluid is None or (os.cpu_count() or 1) == 1 or not is_new():
+    if case.fluid is None or _cores() == 1 or not is_new():
         yield
         return
     beside = subprocess.Popen(

@@ -40,6 +40,11 @@ def test_a_case_of_the_gallery_that_is_amber_says_why() -> None:
         assert "`cfddem check` is amber" in gallery()[name].read_text()
 
 
+def test_a_fluid_without_viscosity_is_not_in_layers() -> None:
+    still = made(fluid__viscosity=0.0, laws__drag="none", laws__lubrication="none")
+    assert "fluid.viscosity" not in [each.key for each in still.findings]
+
+
 def test_a_sphere_larger_than_the_column_is_all_that_is_said() -> None:
     assert [each.key for each in made(bed__diameter=3.087).findings] == ["bed.diameter"]
 

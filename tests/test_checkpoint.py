@@ -132,7 +132,15 @@ def test_one_of_a_newer_format_is_refused_not_passed_over(tmp_path, monkeypatch)
     with monkeypatch.context() as later:
         later.setattr(checkpoint, "FORMAT", 9)
         write(tmp_path, state(1))
-    with pytest.raises(InputError, match=r"00000001\.h5: format = 9: must be at most 1; .*newer cfddem"):
+    with pytest.raises(InputError, match=r"00000001\.h5: format = 9: must be at most 2; .*newer cfddem"):
+        newest(tmp_path)
+
+
+def test_one_of_an_earlier_format_is_refused_with_what_to_do(tmp_path, monkeypatch):
+    with monkeypatch.context() as earlier:
+        earlier.setattr(checkpoint, "FORMAT", 1)
+        write(tmp_path, state(0))
+    with pytest.raises(InputError, match=r"format = 1: must be at least 2; .*earlier cfddem; run .*case\.toml anew"):
         newest(tmp_path)
 
 

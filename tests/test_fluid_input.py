@@ -104,6 +104,18 @@ def test_a_flow_that_runs_away_stops_and_names_its_place():
     assert "\n" not in str(failure.value)
 
 
+def test_solid_cells_take_the_viscosity_of_the_fluid_beside_them():
+    """What is given for solid cells does not matter; a point beside the wall of a pipe sees the fluid's."""
+    grid = Grid.of_size((0.8, 0.8, 0.2), 0.1, solid=outside_cylinder((0.4, 0.4, 0.0), 0.4))
+    field = np.where(grid.open, 2.0 + 0.0 * grid.centres()[2], np.nan)
+    fluid = FluidSolver(grid, density=1.0, viscosity=field)
+    assert fluid.viscosity_at(np.array([[0.4, 0.4, 0.1], [0.4, 0.79, 0.1], [0.14, 0.14, 0.1]])).tolist() == [2.0] * 3
+    with pytest.raises(InputError, match="positive everywhere, or zero everywhere"):
+        fluid.set_viscosity(np.where(grid.centres()[2] < 0.1, 1.0, 0.0) + 0.0 * field)
+    with pytest.raises(InputError, match="a number, or one of every cell"):
+        fluid.set_viscosity("thick")
+
+
 def test_sides_left_out_are_walls_or_planes_of_symmetry():
     """No-slip, but free-slip where the box is one cell thick."""
     fluid = FluidSolver(Grid((8, 1, 8), (0.1,) * 3), density=1.0, viscosity=0.1)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -31,17 +31,31 @@ def test_a_machine_that_has_run_a_fluid_is_not_new(monkeypatch: pytest.MonkeyPat
     assert rehearsal.is_new()
 
 
-def test_the_other_process_takes_the_case_and_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_other_process_rehearses_the_case_it_reads() -> None:
+    case = Case.from_toml(gallery()["liquid-bed"])
+    done = subprocess.run(
+        [sys.executable, "-m", "cfddem.rehearsal"], input=case.to_toml().encode(), capture_output=True
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_the_other_process_is_given_the_case_and_stopped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """It lives as long as what it stands beside, and its own end disturbs nobody."""
     started, start = [], subprocess.Popen
+    stand_in = "import pathlib, sys, time; pathlib.Path(sys.argv[1]).write_text(sys.stdin.read()); time.sleep(60)"
 
     def watched(words: list[str], **more: object) -> subprocess.Popen[bytes]:
-        started.append(start([sys.executable, "-c", "import sys, time; sys.stdin.read(); time.sleep(60)"], **more))
+        assert words == [sys.executable, "-m", "cfddem.rehearsal"]
+        started.append(start([sys.executable, "-c", stand_in, str(tmp_path / "case.toml")], **more))
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", watched)
     monkeypatch.setattr(rehearsal, "is_new", lambda: True)
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    with rehearsal.rehearsal(Case.from_toml(gallery()["liquid-bed"])):
+    monkeypatch.setattr(rehearsal, "_cores", lambda: 2)
+    case = Case.from_toml(gallery()["liquid-bed"])
+    with rehearsal.rehearsal(case):
         assert started[0].poll() is None
+        while not (tmp_path / "case.toml").exists() or not (tmp_path / "case.toml").read_text():
+            time.sleep(0.05)
     assert started[0].poll() is not None
+    assert Case.from_toml(tmp_path / "case.toml") == case

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.coupling import exchange_loops as loops
+from cfddem.coupling.clocks import COURANT
 from cfddem.coupling.drag_loop import DragLoop
 from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import OwnWind
@@ -36,6 +37,9 @@ from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Bodies
 from closures.law import Law
+
+NO_CHANGE = 1e-6
+"""Two steps of the fluid that differ by less than this part are one."""
 
 SETTLES = 0.01
 """By which part of its distance to the step in use the usual step of the fluid moves in every step."""
@@ -211,9 +215,13 @@ class Exchange:
         by h less the usual step h_u, both intervals are h. Otherwise particles would displace the fluid at h_l/h
         of their rate, a shock of pressure in a liquid. The usual step follows slowly.
         """
-        usual = min(self._usual_step or step, 2.0 * step)  # nobody is seen further off than he flies in a step
+        along = zip(bodies.velocity.T, self.fluid.grid.spacing)
+        crossing = max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in along)
+        usual = min(self._usual_step or step, step + COURANT / max(crossing, 1e-300))  # nobody is seen cells away
         self._usual_step = usual + SETTLES * (step - usual)
-        return bodies.position + (step - usual) * bodies.velocity
+        if abs(step - usual) < NO_CHANGE * step:
+            return bodies.position
+        return self.spreading.wrapped(bodies.position + (step - usual) * bodies.velocity)
 
     def _aside(self, bodies: Bodies, place: Placement, slip: Array) -> Array:
         """Lift and viscous stress on every particle (N, 3) [N]."""
@@ -242,7 +250,9 @@ class Exchange:
         """
         if self.added_mass == 0.0 or self._last_step == 0.0:
             return np.zeros_like(slip), np.zeros_like(slip)
-        swept = self._added(bodies) * (slip + bodies.velocity - self._memory[:, 6:]) / self._last_step
+        before = self._memory[:, 6:]
+        gained = np.where(np.isnan(before), 0.0, slip + bodies.velocity - before)  # newcomers have met nothing before
+        swept = self._added(bodies) * gained / self._last_step
         return swept, self.under_way(bodies) / step - swept
 
     def _returned(self, place: Placement, force: Array) -> Array | None:
@@ -326,7 +336,7 @@ class Exchange:
         row = row[bodies.id]
         fresh = row < 0
         self._id, self._memory, self._winds = bodies.id.copy(), _taken(self._memory, row), _taken(self._winds, row)
-        self._memory[fresh, :3] = bodies.velocity[fresh]
+        self._memory[fresh, :3], self._memory[fresh, 6:] = bodies.velocity[fresh], np.nan
         self._trail = [Footprint(*(_taken(each, row) for each in footprint)) for footprint in self._trail]
         here = self.spreading.footprint(bodies.position[fresh], bodies.radius[fresh])
         for footprint in self._trail:

@@ -94,6 +94,12 @@ class Spreading:
         volume = (4.0 / 3.0) * math.pi * radius**3
         return Placement(position.copy(), radius, volume, order, start, self.footprint(position, radius))
 
+    def wrapped(self, position: Array) -> Array:
+        """Places (N, 3) [m] brought back into the grid along periodic directions."""
+        size = np.array(self.grid.size)
+        inside: Array = position - self._periodic * size * np.floor((position - self._origin) / size)
+        return inside
+
     def footprint(self, position: Array, radius: Array) -> Footprint:
         """Cells and weights of particles at places (N, 3) [m]."""
         shape = len(position), 8 * len(self._offsets)

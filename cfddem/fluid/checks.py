@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from cfddem.errors import InputError, RunFailed
 from cfddem.fluid.boundaries import Boundaries
@@ -28,16 +29,26 @@ def checked_voidage(grid: Grid, voidage: Array | float) -> Array:
 
 
 def checked_viscosity(grid: Grid, viscosity: Array | float) -> Array:
-    """The viscosity (nz, ny, nx), if it is positive everywhere or zero everywhere."""
-    given = np.asarray(viscosity, dtype=float)
+    """The viscosity (nz, ny, nx), if it is positive everywhere or zero everywhere; in solid cells that of the nearest
+    open one."""
+    try:
+        given = np.asarray(viscosity, dtype=float)
+    except (TypeError, ValueError) as refusal:
+        raise InputError("fluid.viscosity", str(viscosity), "a number, or one of every cell, in Pa s") from refusal
     if given.shape not in ((), grid.shape):
         raise InputError("fluid.viscosity", given.shape, f"a number, or of shape (nz, ny, nx) = {grid.shape}")
-    if not (np.isfinite(given).all() and given.min() >= 0.0):
-        bad = float(given[~(given >= 0.0) | np.isinf(given)].flat[0])
+    everywhere = np.broadcast_to(given, grid.shape)
+    asked = everywhere[grid.open]
+    if not (np.isfinite(asked).all() and asked.min() >= 0.0):
+        bad = float(asked[~(asked >= 0.0) | np.isinf(asked)].flat[0])
         raise InputError("fluid.viscosity", bad, "zero or positive, in Pa s")
-    if given.min() == 0.0 < given.max():
+    if asked.min() == 0.0 < asked.max():
         raise InputError("fluid.viscosity", 0.0, "positive everywhere, or zero everywhere")
-    return np.broadcast_to(given, grid.shape)
+    if grid.solid is None or given.shape == ():
+        return everywhere
+    nearest = distance_transform_edt(~grid.open, sampling=grid.spacing[::-1], return_indices=True)[1]
+    filled: Array = everywhere[tuple(nearest)]
+    return filled
 
 
 def checked_field(name: str, field: Array, shape: tuple[int, ...], negative: bool = True) -> Array:

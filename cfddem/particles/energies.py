@@ -166,9 +166,11 @@ def _ways(bodies, count, gravity, free, step, before, after):
 def _note(k, edges, channel, lost):
     """Add what edge k has lost to its encounter, where one is recorded."""
     if len(edges.entry) > 0 and not np.isnan(edges.entry[ENTRY * k]):
-        column = ENTRY * k + LOST + channel
-        before = edges.entry[column]
-        edges.entry[column] = lost if np.isnan(before) else before + lost
+        begin = ENTRY * k + LOST
+        if np.isnan(edges.entry[begin]):
+            for each in range(3):
+                edges.entry[begin + each] = 0.0
+        edges.entry[begin + channel] += lost
 
 
 @inline

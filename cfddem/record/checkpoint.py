@@ -19,7 +19,7 @@ import numpy as np
 from cfddem.errors import InputError, RunFailed
 from cfddem.record.files import cannot, hdf5_in_memory, write_whole
 
-FORMAT = 1
+FORMAT = 2
 """Of a checkpoint; a reader refuses a newer one."""
 
 KEPT = 2
@@ -69,7 +69,7 @@ def newest(folder: Path) -> dict[str, Any]:
 
     folder   of the run
     returns  what was given to `write`, with the same bits
-    errors   InputError where there is none, or one of a newer format; RunFailed where all are damaged
+    errors   InputError where there is none, or one of another format; RunFailed where all are damaged
     """
     home = Path(folder) / "checkpoint"
     found = _files(home)
@@ -80,6 +80,7 @@ def newest(folder: Path) -> dict[str, Any]:
     for path in found:
         fault = _fault(path)
         if fault is None:
+            _refuse_older(path)
             return _get_all(path)
         _log.warning("%s: %s; the checkpoint before it is used", path, fault)
     raise RunFailed(
@@ -110,6 +111,15 @@ def _fault(path: Path) -> str | None:
             f"{path}: format", int(number), f"at most {FORMAT}", "it was written by a newer cfddem; update this one"
         )
     return None
+
+
+def _refuse_older(path: Path) -> None:
+    """What an earlier cfddem has written lacks what this one goes on from."""
+    words = path.read_bytes()[:_HEAD].decode("ascii", "replace")
+    number = int(words.removeprefix(_WORDS.split("{")[0]).split(",")[0])
+    if number < FORMAT:
+        remedy = f"it was written by an earlier cfddem; run {path.parent.parent}/case.toml anew into another folder"
+        raise InputError(f"{path}: format", number, f"at least {FORMAT}", remedy)
 
 
 def _words(number: int, content: memoryview) -> str:
