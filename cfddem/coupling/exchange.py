@@ -215,12 +215,13 @@ class Exchange:
         by h less the usual step h_u, both intervals are h. Otherwise particles would displace the fluid at h_l/h
         of their rate, a shock of pressure in a liquid. The usual step follows slowly.
         """
-        along = zip(bodies.velocity.T, self.fluid.grid.spacing)
-        crossing = max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in along)
-        usual = min(self._usual_step or step, step + COURANT / max(crossing, 1e-300))  # nobody is seen cells away
-        self._usual_step = usual + SETTLES * (step - usual)
+        usual = self._usual_step = self._usual_step or step
         if abs(step - usual) < NO_CHANGE * step:
             return bodies.position
+        along = zip(bodies.velocity.T, self.fluid.grid.spacing)
+        crossing = max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in along)
+        usual = min(usual, step + COURANT / max(crossing, 1e-300))  # nobody is seen cells away
+        self._usual_step = usual + SETTLES * (step - usual)
         return self.spreading.wrapped(bodies.position + (step - usual) * bodies.velocity)
 
     def _aside(self, bodies: Bodies, place: Placement, slip: Array) -> Array:
