@@ -403,3 +403,8 @@ def test_python_on_the_front_page_runs() -> None:
             timeout=120,
         )
         assert done.returncode == 0, done.stderr
+
+
+def test_the_module_is_the_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "cfddem", "explain", "wen-yu"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("wen_yu, drag")
