@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.assembly import assemble
 from cfddem.case import Case
-from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS
+from cfddem.coupling.clocks import COURANT, MOST_SUBSTEPS, crossing_rate
 from cfddem.errors import RunFailed
 from cfddem.particles.clocks import check_step
 from cfddem.particles.state import Bodies
@@ -137,8 +137,7 @@ class Simulation:
             fluid = self.fluid.largest_step(COURANT)
             limits[fluid.clock] = fluid.step
             limits["inlet Courant"] = COURANT * min(self.fluid.grid.spacing) / max(self.case.bed.inlet_speed, 1e-300)
-            along = zip(self.particles.bodies.velocity.T, self.fluid.grid.spacing)
-            crossing = max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in along)
+            crossing = crossing_rate(self.particles.bodies.velocity, self.fluid.grid.spacing)
             limits["particle Courant"] = COURANT / max(crossing, 1e-300)
         self.binding = min(limits, key=limits.__getitem__)
         largest = limits[self.binding]

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.coupling import exchange_loops as loops
-from cfddem.coupling.clocks import COURANT
+from cfddem.coupling.clocks import COURANT, crossing_rate
 from cfddem.coupling.drag_loop import DragLoop
 from cfddem.coupling.lift import lift_force, vorticity
 from cfddem.coupling.own_wind import OwnWind
@@ -218,8 +218,7 @@ class Exchange:
         usual = self._usual_step = self._usual_step or step
         if abs(step - usual) < NO_CHANGE * step:
             return bodies.position
-        along = zip(bodies.velocity.T, self.fluid.grid.spacing)
-        crossing = max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in along)
+        crossing = crossing_rate(bodies.velocity, self.fluid.grid.spacing)
         usual = min(usual, step + COURANT / max(crossing, 1e-300))  # nobody is seen cells away
         self._usual_step = usual + SETTLES * (step - usual)
         return self.spreading.wrapped(bodies.position + (step - usual) * bodies.velocity)
