@@ -19,7 +19,7 @@ def crossing_rate(velocity: np.ndarray, spacing: Sequence[float]) -> float:
     velocity  of the particles (N, 3) [m/s]
     spacing   edges of a cell [m]
 
-    >>> crossing_rate(np.array([[0.1, 0.0, -0.4], [0.0, 0.3, 0.0]]), (0.1, 0.1, 0.2))
+    >>> crossing_rate(np.array([[0.5, 0.0, -0.5], [0.0, 1.5, 0.0]]), (0.5, 0.5, 0.25))
     3.0
     """
     return max(float(np.abs(speed).max(initial=0.0)) / length for speed, length in zip(velocity.T, spacing))
