@@ -116,14 +116,18 @@ def drift(i, bodies, free, step, origin):
     return dot(moved, moved)
 
 
-def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step, steps, origin, reach, time, log):
+def _march(
+    bodies, edges, walls, walled, filmed, explicit, recorded, shift, table, laws, free, gravity, step, steps,
+    origin, reach, time, log,
+):  # fmt: skip
     """Find the forces at the present places, then advance by up to `steps` steps.
 
     With `steps` = 0 nothing moves. With `steps` > 0 the forces at hand are taken as they are, and the march
     stops early when a particle has moved by `reach` from `origin`, or when `log`, the record of encounters
     ended since `time`, could overflow. Returns the number of steps made, the largest displacement squared
-    (NaN if a position is no number) and the number of rows written. Where `walled` is None there are no walls,
-    and nothing about them is compiled.
+    (NaN if a position is no number) and the number of rows written. Where `walled`, `filmed`, `explicit` or
+    `recorded` is None, there are no walls, no films, none as forces of plain Verlet, or no record, and nothing
+    about them is compiled.
     """
     farthest = np.zeros(CHUNKS)
     largest = 0.0
@@ -141,9 +145,9 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
         if moving:
             for i in prange(count):
                 kick(i, bodies, step)
-            if drifting:
+            if filmed is not None:
                 squeeze_pairs(
-                    pairs,
+                    pairs if drifting else 0,
                     edges.first,
                     edges.second,
                     edges.image,
@@ -161,7 +165,7 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                     laws,
                     step,
                 )
-                for k in prange(number):
+                for k in prange(number if drifting else 0):
                     if k >= pairs or edges.hard[k]:
                         squeeze(k, bodies, edges, walls, shift, table, laws, step)
             for chunk in prange(CHUNKS):
@@ -181,9 +185,9 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                     hand_over(edges, walls)
         if walled is not None:
             meet_walls(bodies, edges, walls, free, laws.cutoff_ratio if films else 0.0)
-        if films:
+        if filmed is not None:
             wet_pairs(
-                near,
+                near if films else pairs,
                 pairs,
                 edges.first,
                 edges.second,
@@ -201,7 +205,7 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                 kinds,
                 laws,
             )
-            for k in range(pairs, number):
+            for k in range(pairs if films else number, number):
                 wet(k, bodies, edges, walls, shift, table, laws)
         meet_pairs(
             near,
@@ -259,8 +263,8 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
                 put(edges.force, k, times(part, push))
                 put(edges.couple, k, times(part, turn))
                 put(edges.spring, k, memory)
-        if films and not drifting:
-            for k in prange(number):
+        if explicit is not None:
+            for k in prange(number if films and not drifting else 0):
                 film = film_force(k, bodies, edges, walls, shift, table, laws)
                 put(edges.force, k, plus(at(edges.force, k), film))
         for i in prange(count):
@@ -270,8 +274,9 @@ def _march(bodies, edges, walls, walled, shift, table, laws, free, gravity, step
         for chunk in range(CHUNKS):
             if not farthest[chunk] <= largest:
                 largest = farthest[chunk]
-        for k in range(len(edges.entry) // ENTRY):
-            noted = observe(k, bodies, edges, walls, shift, table, laws, time + done * step, log, noted)
+        if recorded is not None:
+            for k in range(len(edges.entry) // ENTRY):
+                noted = observe(k, bodies, edges, walls, shift, table, laws, time + done * step, log, noted)
         full = len(log) - noted < len(edges.entry) // ENTRY
         if done >= steps or full or not largest < reach * reach:
             return done, largest, noted

@@ -14,7 +14,7 @@ from cfddem.particles.bridges import Bridges
 from cfddem.particles.clocks import Clocks, check_step, clocks
 from cfddem.particles.encounters import ENCOUNTER
 from cfddem.particles.energies import Energies
-from cfddem.particles.forces import Laws
+from cfddem.particles.forces import VERLET, Laws
 from cfddem.particles.guard import guard
 from cfddem.particles.meshes import meet_walls
 from cfddem.particles.motion import march, march_threaded
@@ -257,23 +257,20 @@ class ParticleSolver:
             self.energies.restore(state["energies"])
 
     def _march(self, step: float, steps: int) -> tuple[int, float, int]:
-        record = self.collisions
-        large = self._many
+        record, large = self.collisions, self._many
+        films, verlet = bool(self.laws.film), self.laws.integrator == VERLET
+
+        def compiled(there: bool) -> bool | None:
+            """Many particles run in a loop compiled for what there is, few in one for all that may be."""
+            return True if there or not large else None
+
+        laws = self._loop_laws.without_the_absent() if large else self._loop_laws
+        log = _NO_ROWS if record is None else record.room(len(self.edges.first))
         return (march_threaded if large else march)(  # type: ignore[no-any-return]
-            *self._views[:3],
-            self._walled,
-            self._views[3],
-            self.table,
-            self._loop_laws.without_the_absent() if large else self._loop_laws,
-            self.free,
-            self.gravity,
-            step,
-            steps,
-            self._origin.reshape(-1),
-            0.5 * self.skin,
-            self.time,
-            _NO_ROWS if record is None else record.room(len(self.edges.first)),
-        )
+            *self._views[:3], self._walled, compiled(films), compiled(films and verlet), compiled(record is not None),
+            self._views[3], self.table, laws, self.free, self.gravity, step, steps, self._origin.reshape(-1),
+            0.5 * self.skin, self.time, log,
+        )  # fmt: skip
 
     def _take_list(self, edges: Edges) -> None:
         """Use a list from here on: the places it was made at, and the arrays as loops take them."""
