@@ -18,6 +18,7 @@ from cfddem.gallery import gallery
 def test_one_species_two_and_a_jet_can_be_rehearsed(name: str) -> None:
     """A rehearsal that fails says nothing; here it would."""
     rehearsal.rehearse(Case.from_toml(gallery()[name]))
+    assert not rehearsal.is_new()
 
 
 def test_a_machine_that_has_run_a_fluid_is_not_new(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
