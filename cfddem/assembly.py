@@ -67,7 +67,7 @@ def flow_of(case: Case, spheres: Bodies) -> tuple[FluidSolver, Exchange]:
         grid,
         boundaries_of(case),
         density=case.fluid.density,
-        viscosity=np.broadcast_to(case.fluid.viscosity_at(grid.centres()[2]), grid.shape),
+        viscosity=case.fluid.viscosity_at(grid.centres()[2]),
         gravity=case.laws.gravity,
         model=case.laws.model,
         convection=case.laws.convection,

@@ -1,6 +1,6 @@
 """The loops of the fluid, compiled in another process while a new machine compiles those of the particles.
 
-Compiled loops are kept, so that this helps the first run of all. It is a rehearsal: one step of the case's fluid
+Compiled loops are kept, so that this helps the first run of all. It is a rehearsal: two steps of the case's fluid
 around two of its spheres, whose outcome nobody looks at. What does not get ready here is compiled where it is needed.
 """
 
@@ -19,7 +19,7 @@ from closures.compiled import cache_folder
 
 
 def is_new() -> bool:
-    """Has no fluid been run yet by these sources on this machine?"""
+    """Has no fluid been run yet by these sources on this machine? One of its loops stands for all."""
     return not any(cache_folder().rglob("momentum.transport*.nbi"))
 
 
@@ -50,7 +50,7 @@ def rehearsal(case: Case) -> Iterator[None]:
 
 
 def rehearse(case: Case) -> None:
-    """One step of a case's fluid around two spheres in the middle of the column."""
+    """Two steps of a case's fluid around two spheres in the middle of the column; the first knows of none before it."""
     from cfddem.assembly import flow_of
     from cfddem.particles.state import bodies
 
@@ -60,7 +60,7 @@ def rehearse(case: Case) -> None:
     spheres = bodies(places, radius, case.solid_density)
     fluid, exchange = flow_of(case, spheres)
     for _ in range(2):
-        step = min(fluid.largest_step().step, 1e-6)
+        step = min(fluid.largest_step().step, 1e-6)  # at rest nothing limits it
         offer = exchange.offer(spheres, step)
         fluid.step(step, *offer.fields)
         exchange.answer(spheres, offer, np.array(case.laws.gravity))

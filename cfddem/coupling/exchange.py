@@ -328,7 +328,10 @@ class Exchange:
         return force
 
     def _follow(self, bodies: Bodies) -> None:
-        """Bring what is remembered into the order of the particles now; of newcomers, that they were as they are."""
+        """Bring what is remembered into the order of the particles now; newcomers were as they are.
+
+        What they met before is not known: NaN.
+        """
         if np.array_equal(bodies.id, self._id):
             return
         row = np.full(int(max(bodies.id.max(initial=-1), self._id.max(initial=-1))) + 1, -1)

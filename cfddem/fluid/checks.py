@@ -32,19 +32,17 @@ def checked_viscosity(grid: Grid, viscosity: Array | float) -> Array:
     """The viscosity (nz, ny, nx), if it is positive everywhere or zero everywhere; in solid cells that of the nearest
     open one."""
     try:
-        given = np.asarray(viscosity, dtype=float)
+        everywhere = np.broadcast_to(np.asarray(viscosity, dtype=float), grid.shape)
     except (TypeError, ValueError) as refusal:
-        raise InputError("fluid.viscosity", str(viscosity), "a number, or one of every cell, in Pa s") from refusal
-    if given.shape not in ((), grid.shape):
-        raise InputError("fluid.viscosity", given.shape, f"a number, or of shape (nz, ny, nx) = {grid.shape}")
-    everywhere = np.broadcast_to(given, grid.shape)
+        limit = f"a number, or one of every cell, (nz, ny, nx) = {grid.shape}, in Pa s"
+        raise InputError("fluid.viscosity", np.shape(viscosity) or str(viscosity), limit) from refusal
     asked = everywhere[grid.open]
     if not (np.isfinite(asked).all() and asked.min() >= 0.0):
         bad = float(asked[~(asked >= 0.0) | np.isinf(asked)].flat[0])
         raise InputError("fluid.viscosity", bad, "zero or positive, in Pa s")
     if asked.min() == 0.0 < asked.max():
         raise InputError("fluid.viscosity", 0.0, "positive everywhere, or zero everywhere")
-    if grid.solid is None or given.shape == ():
+    if grid.solid is None:
         return everywhere
     nearest = distance_transform_edt(~grid.open, sampling=grid.spacing[::-1], return_indices=True)[1]
     filled: Array = everywhere[tuple(nearest)]

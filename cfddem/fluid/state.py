@@ -93,7 +93,7 @@ class FluidState:
 
     @property
     def viscosity(self) -> Array:
-        """mu of every cell, without what is below the grid (nz, ny, nx) [Pa s], a view; see `set_viscosity`."""
+        """mu of every cell, without the sub-grid viscosity (nz, ny, nx) [Pa s], a view; see `set_viscosity`."""
         return self.grid.inner(self._viscosity)
 
     @property

@@ -164,7 +164,7 @@ def _ways(bodies, count, gravity, free, step, before, after):
 
 @inline
 def _note(k, edges, channel, lost):
-    """Add what edge k has lost to its encounter, where one is recorded."""
+    """Add what edge k has lost to its encounter, where one is recorded; its columns are the first three channels."""
     if len(edges.entry) > 0 and not np.isnan(edges.entry[ENTRY * k]):
         begin = ENTRY * k + LOST
         if np.isnan(edges.entry[begin]):
@@ -264,7 +264,7 @@ def _contact_works(k, gap, separation, distance, bodies, edges, walls, count, ta
     totals[WALLS] += dot(force, by_wall)
     damped = (elastic - pressed) * approach - pulled - tangential * dot(spring, slid)
     totals[DAMPING] += damped
-    _note(k, edges, 1, damped)
+    _note(k, edges, DAMPING, damped)
     if laws.rolling:
         totals[ROLLING] -= dot(at(edges.moment, k), about)
     square, rate = dot(spring, spring), tangential * dot(spring, slip)
@@ -276,7 +276,7 @@ def _contact_works(k, gap, separation, distance, bodies, edges, walls, count, ta
         if _slides(k, bodies, edges, walls, table, laws, pressed, minus(force, times(pressed, normal))):
             rubbed = 0.5 * step * (count.power[k] + rate) - taken
             totals[FRICTION] += rubbed
-            _note(k, edges, 2, rubbed)
+            _note(k, edges, FRICTION, rubbed)
     count.spring[k] = square
     count.stiffness[k] = tangential
     count.power[k] = rate
@@ -294,7 +294,7 @@ def _work(bodies, edges, walls, count, shift, table, laws, step, before, after):
             if laws.film and step > 0.0:
                 lost, by_wall = _film_works(k, bodies, edges, count, step)
                 totals[FILM] += lost
-                _note(k, edges, 0, lost)
+                _note(k, edges, FILM, lost)
                 totals[WALLS] += by_wall
             if near <= k < pairs:
                 continue

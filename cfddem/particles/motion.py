@@ -145,9 +145,9 @@ def _march(
         if moving:
             for i in prange(count):
                 kick(i, bodies, step)
-            if filmed is not None:
+            if filmed is not None and drifting:
                 squeeze_pairs(
-                    pairs if drifting else 0,
+                    pairs,
                     edges.first,
                     edges.second,
                     edges.image,
@@ -165,7 +165,7 @@ def _march(
                     laws,
                     step,
                 )
-                for k in prange(number if drifting else 0):
+                for k in prange(number):
                     if k >= pairs or edges.hard[k]:
                         squeeze(k, bodies, edges, walls, shift, table, laws, step)
             for chunk in prange(CHUNKS):
@@ -185,9 +185,9 @@ def _march(
                     hand_over(edges, walls)
         if walled is not None:
             meet_walls(bodies, edges, walls, free, laws.cutoff_ratio if films else 0.0)
-        if filmed is not None:
+        if filmed is not None and films:
             wet_pairs(
-                near if films else pairs,
+                near,
                 pairs,
                 edges.first,
                 edges.second,
@@ -205,7 +205,7 @@ def _march(
                 kinds,
                 laws,
             )
-            for k in range(pairs if films else number, number):
+            for k in range(pairs, number):
                 wet(k, bodies, edges, walls, shift, table, laws)
         meet_pairs(
             near,
@@ -263,8 +263,8 @@ def _march(
                 put(edges.force, k, times(part, push))
                 put(edges.couple, k, times(part, turn))
                 put(edges.spring, k, memory)
-        if explicit is not None:
-            for k in prange(number if films and not drifting else 0):
+        if explicit is not None and films and not drifting:
+            for k in prange(number):
                 film = film_force(k, bodies, edges, walls, shift, table, laws)
                 put(edges.force, k, plus(at(edges.force, k), film))
         for i in prange(count):

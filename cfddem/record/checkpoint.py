@@ -20,7 +20,7 @@ from cfddem.errors import InputError, RunFailed
 from cfddem.record.files import cannot, hdf5_in_memory, write_whole
 
 FORMAT = 2
-"""Of a checkpoint; a reader refuses a newer one."""
+"""Of a checkpoint; a reader refuses any other."""
 
 KEPT = 2
 
@@ -80,7 +80,7 @@ def newest(folder: Path) -> dict[str, Any]:
     for path in found:
         fault = _fault(path)
         if fault is None:
-            _refuse_older(path)
+            _refuse_another_format(path)
             return _get_all(path)
         _log.warning("%s: %s; the checkpoint before it is used", path, fault)
     raise RunFailed(
@@ -94,29 +94,31 @@ def _files(home: Path) -> list[Path]:
 
 
 def _fault(path: Path) -> str | None:
-    """What is wrong with a checkpoint, or None.
-
-    errors  InputError for one that a newer cfddem has written: it is not damaged, and an older one is no substitute
-    """
+    """What is wrong with a checkpoint, or None."""
     try:
         content = path.read_bytes()
     except OSError as refusal:
         return (refusal.strerror or str(refusal)).lower()
     words = content[:_HEAD].rstrip(b"\0").decode("ascii", "replace")
-    number = words.removeprefix(_WORDS.split("{")[0]).split(",")[0]
+    number = _format(words)
     if not number.isdecimal() or words != _words(int(number), memoryview(content)):
         return "is damaged, its checksum does not hold"
-    if int(number) > FORMAT:
-        raise InputError(
-            f"{path}: format", int(number), f"at most {FORMAT}", "it was written by a newer cfddem; update this one"
-        )
     return None
 
 
-def _refuse_older(path: Path) -> None:
-    """What an earlier cfddem has written lacks what this one goes on from."""
-    words = path.read_bytes()[:_HEAD].decode("ascii", "replace")
-    number = int(words.removeprefix(_WORDS.split("{")[0]).split(",")[0])
+def _format(words: str) -> str:
+    """The format that the words at the head of a checkpoint name."""
+    return words.removeprefix(_WORDS.split("{")[0]).split(",")[0]
+
+
+def _refuse_another_format(path: Path) -> None:
+    """Such a checkpoint is not damaged, so that the one before it is no substitute."""
+    with path.open("rb") as file:
+        number = int(_format(file.read(_HEAD).decode("ascii", "replace")))
+    if number > FORMAT:
+        raise InputError(
+            f"{path}: format", number, f"at most {FORMAT}", "it was written by a newer cfddem; update this one"
+        )
     if number < FORMAT:
         remedy = f"it was written by an earlier cfddem; run {path.parent.parent}/case.toml anew into another folder"
         raise InputError(f"{path}: format", number, f"at least {FORMAT}", remedy)
