@@ -1,4 +1,4 @@
-"""Spheres in a fluid, with the thin film between them."""
+"""CFD-DEM of spheres in a fluid, with lubrication films between close spheres."""
 
 from __future__ import annotations
 
@@ -7,37 +7,40 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-_HOME = {
-    "Box": "cfddem.particles.walls",
-    "BridgeLaws": "cfddem.particles.bridge_loops",
-    "Bridges": "cfddem.particles.bridges",
-    "Case": "cfddem.case",
-    "CfddemError": "cfddem.errors",
-    "Cone": "cfddem.particles.walls",
-    "Cylinder": "cfddem.particles.walls",
-    "Fluid": "cfddem.materials",
+_MODULES = {
+    "Box": "cfddem.particles.walls.shapes",
+    "BridgeLaws": "cfddem.particles.interactions.bridge_loops",
+    "Bridges": "cfddem.particles.interactions.bridge",
+    "Case": "cfddem.case.schema",
+    "CfddemError": "cfddem.backend.errors",
+    "Cone": "cfddem.particles.walls.shapes",
+    "Cylinder": "cfddem.particles.walls.shapes",
+    "Field": "cfddem.data.fields",
+    "Fluid": "cfddem.case.materials",
     "FluidSolver": "cfddem.fluid.solver",
     "Grid": "cfddem.fluid.grid",
-    "Laws": "cfddem.particles.forces",
-    "Material": "cfddem.materials",
-    "Mesh": "cfddem.particles.walls",
+    "Laws": "cfddem.particles.interactions.laws",
+    "Material": "cfddem.case.materials",
+    "Mesh": "cfddem.particles.walls.shapes",
     "ParticleSolver": "cfddem.particles.solver",
-    "Plane": "cfddem.particles.walls",
-    "Simulation": "cfddem.simulation",
-    "bodies": "cfddem.particles.state",
-    "open_run": "cfddem.record.reading",
-    "pair_table": "cfddem.materials",
-    "pour": "cfddem.particles.pouring",
+    "Plane": "cfddem.particles.walls.shapes",
+    "Run": "cfddem.run.runner",
+    "Simulation": "cfddem.run.simulation",
+    "make_particles": "cfddem.particles.state",
+    "measure": "cfddem.run.history",
+    "open_run": "cfddem.io.reading",
+    "pair_table": "cfddem.particles.material_pairs",
+    "pour": "cfddem.particles.initial.pouring",
 }
-__all__ = ["__version__", *sorted(_HOME)]
+__all__ = ["__version__", *sorted(_MODULES)]
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name when it is first asked for, so that `import cfddem` costs nothing."""
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
+    """Import a public name when it is first used, so that `import cfddem` takes no time."""
+    if name in _MODULES:
+        return getattr(import_module(_MODULES[name]), name)
     raise AttributeError(f"module 'cfddem' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return sorted([*globals(), *_MODULES])

@@ -1,6 +1,6 @@
-"""`python -m cfddem`: the command line, where its script is not on the path."""
+"""`python -m cfddem`: the command line, for environments without the `cfddem` script on the path."""
 
-from cfddem.cli import main
+from cfddem.cli.app import main
 
 if __name__ == "__main__":
     main()

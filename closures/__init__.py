@@ -1,7 +1,7 @@
-"""Physics as scalar functions: numbers in, number out.
+"""Physical laws as scalar functions: numbers in, number out.
 
-Each file is a chapter, each function one equation that can be read beside its paper. A law is a plain
-Python function; compiled loops call the same function by its name.
+Each file covers one subject. Each function is one equation from one source. A law is a plain Python function;
+compiled loops call the same function by its name.
 
 >>> from closures import lubrication
 >>> round(lubrication.film_strength(1e-3, 3.175e-3) * 1e7, 2)   # N m^-1 s * m
@@ -9,6 +9,6 @@ Python function; compiled loops call the same function by its name.
 """
 
 from closures.check import check
-from closures.law import SHELF, Law, law, page
+from closures.registry import REGISTRY, Law, law, law_of
 
-__all__ = ["SHELF", "Law", "check", "law", "page"]
+__all__ = ["REGISTRY", "Law", "check", "law", "law_of"]

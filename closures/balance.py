@@ -1,7 +1,7 @@
-"""Streams that carry spheres: where the weight of a sphere in the fluid and its drag, by any drag law, are in balance.
+"""Balance of buoyant weight and drag: terminal velocity, minimum fluidisation and bed expansion for any drag law.
 
-The balance of a sphere in a bed is 18 Re F(Re, eps) / eps = Ar, with the total force F_d / eps. A drag law is passed as
-a function of Reynolds number and voidage; these are solutions, not laws, and compiled loops do not call them.
+In a bed the balance is 18 Re F(Re, eps) / eps = Ar, since the total fluid force is F_d / eps. The drag law is an
+argument, a function of Reynolds number and voidage. Compiled loops do not call these functions.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ Drag = Callable[[float, float], float]
 
 
 def reynolds_in_balance(archimedes: float, voidage: float, drag: Drag) -> float:
-    r"""Reynolds number of the superficial stream that carries spheres at a given voidage.
+    r"""Reynolds number of the flow that fluidises a bed of given voidage.
 
     .. math:: 18\,Re\,F(Re,\varepsilon)/\varepsilon = Ar
 
     archimedes  Ar, >= 0 [-]
-    voidage     eps; 1 for a sphere alone, that of the packed bed for the onset of fluidisation [-]
-    drag        F(reynolds, voidage), which must make Re F rise with Re
+    voidage     eps; 1 for an isolated sphere, that of the packed bed for minimum fluidisation [-]
+    drag        F(reynolds, voidage); Re F must increase with Re
     returns     Re on the superficial velocity [-], to 1e-12 relative
 
     >>> from closures.drag import ergun
@@ -42,15 +42,15 @@ def reynolds_in_balance(archimedes: float, voidage: float, drag: Drag) -> float:
 
 
 def voidage_in_balance(archimedes: float, reynolds: float, drag: Drag, packed_voidage: float = 0.4) -> float:
-    r"""Voidage to which a superficial stream expands a bed of spheres.
+    r"""Voidage to which a flow expands a bed.
 
     .. math:: 18\,Re\,F(Re,\varepsilon)/\varepsilon = Ar
 
     archimedes      Ar, > 0 [-]
     reynolds        Re on the superficial velocity [-]
-    drag            F(reynolds, voidage), which must make F / eps fall with eps
-    packed_voidage  eps of the bed at rest [-]
-    returns         eps [-]; packed_voidage where the stream does not carry the bed, 1 where it carries a sphere alone
+    drag            F(reynolds, voidage); F / eps must decrease with eps
+    packed_voidage  eps of the packed bed [-]
+    returns         eps [-]; packed_voidage below minimum fluidisation, 1 above the terminal velocity
 
     >>> from closures.drag import wen_yu
     >>> round(voidage_in_balance(1.0, 0.5**4.65 / 18.0, wen_yu), 3)     # creeping: eps^4.65 = 18 Re/Ar
@@ -70,7 +70,7 @@ def voidage_in_balance(archimedes: float, reynolds: float, drag: Drag, packed_vo
 def terminal_velocity(
     diameter: float, density: float, fluid_density: float, viscosity: float, drag: Drag, gravity: float = 9.81
 ) -> float:
-    """Speed at which a sphere alone falls, or rises, by any drag law.
+    """Terminal velocity of an isolated sphere for any drag law.
 
     diameter       d [m]
     density        rho_p, of the sphere [kg/m3]
@@ -78,7 +78,7 @@ def terminal_velocity(
     viscosity      eta, dynamic [Pa s]
     drag           F(reynolds, voidage)
     gravity        g [m/s2]
-    returns        u_t, >= 0 [m/s]
+    returns        u_t, >= 0, falling or rising [m/s]
 
     >>> from closures.drag_single import brown_lawler
     >>> round(terminal_velocity(0.5e-3, 2554.9, 998.0, 8.882e-4, brown_lawler), 4)   # Mordant & Pinton: 0.0741 m/s
@@ -96,29 +96,30 @@ def speed_after(
     viscosity: float,
     drag: Drag,
     gravity: float = 9.81,
+    *,
     added_mass: float = 0.0,
 ) -> float:
-    r"""Speed of a sphere alone that falls, or rises, some time later, by its equation of motion with any drag law.
+    r"""Speed of an isolated falling or rising sphere after a given time, from its equation of motion.
 
     .. math:: (\rho_p + C_m\rho_f)V\dot v = |\rho_p - \rho_f|Vg - 3\pi\eta d\,F(Re)\,v
 
-    time           t, until then [s]
-    speed          v now, in the direction in which it falls or rises [m/s]
+    time           t [s]
+    speed          v at the start, in the direction in which the sphere falls or rises [m/s]
     diameter       d [m]
     density        rho_p, of the sphere [kg/m3]
     fluid_density  rho_f [kg/m3]
     viscosity      eta, dynamic [Pa s]
     drag           F(reynolds, voidage)
     gravity        g [m/s2]
-    added_mass     C_m; 0.5 for a sphere alone [-]
-    returns        v then [m/s], to 1e-9 relative
+    added_mass     C_m; 0.5 for an isolated sphere [-]
+    returns        v after the time t, to 1e-9 relative [m/s]
 
     >>> from closures.drag_single import stokes
-    >>> relaxation = 2500 * 1e-8 / 18e-3              # of a sphere of 0.1 mm in water, by Stokes: u_t (1 - 1/e)
+    >>> relaxation = 2500 * 1e-8 / 18e-3              # 0.1 mm in water, Stokes drag: u_t (1 - 1/e)
     >>> round(speed_after(relaxation, 0.0, 1e-4, 2500.0, 1000.0, 1e-3, stokes) / 8.175e-3, 6)
     0.632121
     """
-    from scipy.integrate import solve_ivp  # here, because whoever only reads laws need not wait for scipy
+    from scipy.integrate import solve_ivp  # imported here: importing the laws alone does not load scipy
 
     inertia = (density + added_mass * fluid_density) / 6.0
     weight = abs(density - fluid_density) / 6.0 * gravity
@@ -141,7 +142,7 @@ def fluidising_velocity(
     drag: Drag,
     gravity: float = 9.81,
 ) -> float:
-    """Superficial velocity that carries a bed of given voidage, by any drag law: minimum fluidisation if packed.
+    """Superficial velocity that fluidises a bed of given voidage; at the packed voidage, minimum fluidisation.
 
     diameter       d [m]
     density        rho_p, of the spheres [kg/m3]
@@ -166,20 +167,22 @@ def inversion_velocity(
     densities: tuple[float, float],
     fluid_density: float,
 ) -> float:
-    r"""Superficial velocity at which two species of a liquid bed change places, by the bulk densities of their layers.
+    r"""Superficial velocity at which two species of a liquid-fluidised bed change places (layer inversion).
 
     .. math:: (1-\varepsilon_1)(\rho_1-\rho_f) = (1-\varepsilon_2)(\rho_2-\rho_f),\qquad
               \varepsilon_i = (U/u_i)^{1/n_i}
 
-    terminal_velocities  u, of each species, at voidage 1 [m/s]
-    exponents            n, of the expansion of each alone by Richardson and Zaki [-]
-    densities            rho, of the solids [kg/m3]
+    terminal_velocities  u_i, of each species, at voidage 1 [m/s]
+    exponents            n_i, Richardson-Zaki exponent of each species alone [-]
+    densities            rho_i, of the solids [kg/m3]
     fluid_density        rho_f [kg/m3]
-    returns              U, below both terminal velocities [m/s]; nan where the same species is below at all of them
+    returns              U, below both terminal velocities [m/s]; NaN if one species is the lower one at all of them
 
-    The layer of the larger bulk density lies below; the two change places where it is the same. Holds where both layers
-    are looser than packed. Epstein & LeClair, Chem. Eng. Sci. 40 (1985) 1517, after Moritomi et al., ibid. 37 (1982)
-    1751, who saw it.
+    The layer of larger bulk density lies below; the layers change places where their bulk densities are equal.
+
+    Range: both layers looser than packed.
+
+    Epstein & LeClair, Chem. Eng. Sci. 40 (1985) 1517; observed by Moritomi et al., Chem. Eng. Sci. 37 (1982) 1751.
 
     >>> round(inversion_velocity((1.0, 4.0), (1.0, 1.0), (3000.0, 2000.0), 1000.0), 4)     # 2 (1 - U) = 1 - U/4
     0.5714
@@ -197,7 +200,7 @@ def inversion_velocity(
 
 
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:
-    from scipy.optimize import brentq  # here, because whoever only reads laws need not wait for scipy
+    from scipy.optimize import brentq  # imported here: importing the laws alone does not load scipy
 
     if low == high:
         return low

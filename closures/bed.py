@@ -1,15 +1,15 @@
-"""Beds of spheres in a stream: pressure gradient, onset of fluidisation, terminal velocity, expansion."""
+"""Packed and fluidised beds: pressure gradient, minimum fluidisation, terminal velocity, expansion."""
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law("bed", "Ergun, Chem. Eng. Prog. 48 (1952) 89", voidage=(0.36, 0.8))
 def ergun_gradient(velocity: float, diameter: float, density: float, viscosity: float, voidage: float) -> float:
-    r"""Pressure gradient of a packed bed by Ergun.
+    r"""Pressure gradient of a packed bed (Ergun).
 
     .. math:: \frac{\Delta p}{L} = 150\frac{(1-\varepsilon)^2\eta U}{\varepsilon^3d^2}
               + 1.75\frac{(1-\varepsilon)\rho U^2}{\varepsilon^3d}
@@ -19,7 +19,9 @@ def ergun_gradient(velocity: float, diameter: float, density: float, viscosity: 
     density    rho, of the fluid [kg/m3]
     viscosity  eta, dynamic [Pa s]
     voidage    eps [-]
-    returns    dp/L, without hydrostatic head [Pa/m]
+    returns    dp/L, without the hydrostatic part [Pa/m]
+
+    Range: 0.36 < eps < 0.8.
 
     >>> round(ergun_gradient(0.02, 1e-3, 10.0, 1.5e-3, 0.451335) * 15.6e-3, 1)
     230.5
@@ -28,15 +30,17 @@ def ergun_gradient(velocity: float, diameter: float, density: float, viscosity: 
     return scale * (150.0 * (1.0 - voidage) * viscosity / diameter + 1.75 * density * velocity)
 
 
-@law("bed", "Ergun (1952), balanced against the buoyant weight of the bed", voidage=(0.36, 0.8))
+@law("bed", "Ergun (1952), set equal to the buoyant weight of the bed", voidage=(0.36, 0.8))
 def fluidisation_reynolds_ergun(archimedes: float, voidage: float) -> float:
-    r"""Reynolds number at which the drag of Ergun carries a bed of known voidage.
+    r"""Reynolds number of minimum fluidisation for a known voidage (Ergun).
 
     .. math:: \frac{1.75}{\varepsilon^3}Re^2 + \frac{150(1-\varepsilon)}{\varepsilon^3}Re = Ar
 
     archimedes  Ar, >= 0 [-]
-    voidage     eps, of the bed at its onset [-]
+    voidage     eps, at minimum fluidisation [-]
     returns     Re_mf = rho u_mf d / eta [-]
+
+    Range: 0.36 < eps < 0.8.
 
     >>> round(fluidisation_reynolds_ergun(1900 / 0.125, 0.5), 2)      # 1.75 Re^2 + 75 Re = 1900
     17.88
@@ -48,7 +52,7 @@ def fluidisation_reynolds_ergun(archimedes: float, voidage: float) -> float:
 
 @law("bed", "Wen & Yu, AIChE J. 12 (1966) 610, doi:10.1002/aic.690120343")
 def fluidisation_reynolds_wen_yu(archimedes: float) -> float:
-    r"""Reynolds number of minimum fluidisation where the voidage is not known.
+    r"""Reynolds number of minimum fluidisation for an unknown voidage (Wen and Yu).
 
     .. math:: Re_{mf} = \sqrt{33.7^2 + 0.0408 Ar} - 33.7
 
@@ -66,12 +70,14 @@ def fluidisation_reynolds_wen_yu(archimedes: float) -> float:
 
 @law("bed", "Abraham, Phys. Fluids 13 (1970) 2194, solved for Re in the balance Ar = 18 Re F")
 def terminal_reynolds_abraham(archimedes: float) -> float:
-    r"""Reynolds number of a sphere that falls at its terminal velocity with Abraham's drag.
+    r"""Terminal Reynolds number of a sphere with Abraham's drag law.
 
     .. math:: \sqrt{Re}\,(1 + \sqrt{Re}/9.06) = \sqrt{Ar/18}
 
     archimedes  Ar, >= 0 [-]
     returns     Re_t [-]
+
+    Range: Re_t < 5000, that of the drag law.
 
     >>> round(terminal_reynolds_abraham(49.14**2), 1)      # Mordant & Pinton (2000), 0.5 mm glass: measured 41
     44.5
@@ -83,14 +89,14 @@ def terminal_reynolds_abraham(archimedes: float) -> float:
 
 @law("bed", "Brown & Lawler, J. Environ. Eng. 129 (2003) 222, solved for Re in the balance Ar = 18 Re F")
 def terminal_reynolds_brown_lawler(archimedes: float) -> float:
-    r"""Reynolds number of a sphere that falls at its terminal velocity with Brown and Lawler's drag.
+    r"""Terminal Reynolds number of a sphere with the drag law of Brown and Lawler.
 
     .. math:: Ar = 18 Re + 2.7 Re^{1.681} + \frac{0.30525\,Re^3}{Re + 8710}
 
     archimedes  Ar, >= 0 [-]
     returns     Re_t [-]
 
-    Newton's method from above, where the balance is convex; 1e-12 relative.
+    Range: Re_t < 2e5, that of the drag law. Solved by Newton's method from above, to 1e-12 relative.
 
     >>> round(terminal_reynolds_brown_lawler(49.14**2), 1)      # Mordant & Pinton (2000), 0.5 mm glass: measured 41
     44.7
@@ -105,16 +111,16 @@ def terminal_reynolds_brown_lawler(archimedes: float) -> float:
 
 @law("bed", "Richardson & Zaki, Trans. Inst. Chem. Eng. 32 (1954) 35")
 def exponent_richardson_zaki(reynolds: float, wall_ratio: float) -> float:
-    r"""Exponent n of the expansion of a bed by Richardson and Zaki.
+    r"""Richardson-Zaki exponent n of bed expansion.
 
     .. math:: n = 4.65 + 19.5\tfrac dD,\ (4.35 + 17.5\tfrac dD)Re^{-0.03},\ (4.45 + 18\tfrac dD)Re^{-0.1},\
               4.45 Re^{-0.1},\ 2.39
 
-    reynolds    Re_t, of the terminal velocity; the pieces meet at 0.2, 1, 200, 500 [-]
-    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    reynolds    Re_t, at the terminal velocity; the pieces meet at 0.2, 1, 200 and 500 [-]
+    wall_ratio  d/D, sphere over column diameter; 0 for a wide column [-]
     returns     n [-]
 
-    Range: any; the pieces do not meet exactly, by up to 2.3 % in a wide column.
+    Range: any. The pieces do not meet exactly: n jumps by up to 2.3 % in a wide column.
 
     >>> exponent_richardson_zaki(0.1, 0.0), exponent_richardson_zaki(1000.0, 0.0)
     (4.65, 2.39)
@@ -132,12 +138,14 @@ def exponent_richardson_zaki(reynolds: float, wall_ratio: float) -> float:
 
 @law("bed", "Garside & Al-Dibouni, Ind. Eng. Chem. Process Des. Dev. 16 (1977) 206", reynolds=(1e-3, 3e4))
 def exponent_garside(reynolds: float) -> float:
-    r"""Exponent n of the expansion of a bed by Garside and Al-Dibouni.
+    r"""Exponent n of bed expansion (Garside and Al-Dibouni).
 
     .. math:: \frac{5.1-n}{n-2.7} = 0.1 Re^{0.9}
 
-    reynolds  Re_t, of the terminal velocity [-]
+    reynolds  Re_t, at the terminal velocity [-]
     returns   n [-]
+
+    Range: 1e-3 < Re_t < 3e4.
 
     >>> round(exponent_garside(10.0 ** (1 / 0.9)), 6)      # halfway between 5.1 and 2.7
     3.9
@@ -148,15 +156,15 @@ def exponent_garside(reynolds: float) -> float:
 
 @law("bed", "Khan & Richardson, Chem. Eng. Commun. 78 (1989) 111")
 def exponent_khan_richardson(archimedes: float, wall_ratio: float) -> float:
-    r"""Exponent n of the expansion of a bed by Khan and Richardson, with its wall factor.
+    r"""Exponent n of bed expansion with a wall correction (Khan and Richardson).
 
     .. math:: \frac{4.8-n}{n-2.4} = 0.043 Ar^{0.57}\,[1 - 1.24(d/D)^{0.27}]
 
     archimedes  Ar [-]
-    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    wall_ratio  d/D, sphere over column diameter; 0 for a wide column [-]
     returns     n [-]
 
-    Range: d/D < 0.45; the wall factor is not below 0 outside.
+    Range: d/D < 0.45; above it the wall correction is limited to 0.
 
     >>> round(exponent_khan_richardson(0.0, 0.0), 6)
     4.8
@@ -168,7 +176,7 @@ def exponent_khan_richardson(archimedes: float, wall_ratio: float) -> float:
 
 @law("bed", "Richardson & Zaki, Trans. Inst. Chem. Eng. 32 (1954) 35")
 def expanded_voidage(velocity: float, terminal_velocity: float, exponent: float) -> float:
-    r"""Voidage of a liquid bed at a superficial velocity.
+    r"""Voidage of a liquid-fluidised bed (Richardson and Zaki).
 
     .. math:: \varepsilon = (U/u_t)^{1/n}
 
@@ -177,7 +185,7 @@ def expanded_voidage(velocity: float, terminal_velocity: float, exponent: float)
     exponent           n [-]
     returns            eps [-]; at most 1
 
-    Range: between fluidisation and eps = 0.95.
+    Range: from minimum fluidisation to eps = 0.95.
 
     >>> expanded_voidage(0.25, 1.0, 2.0)
     0.5
@@ -187,14 +195,14 @@ def expanded_voidage(velocity: float, terminal_velocity: float, exponent: float)
 
 @law("bed", "Richardson & Zaki, Trans. Inst. Chem. Eng. 32 (1954) 35", wall_ratio=(0.0, 0.1))
 def wall_factor_richardson_zaki(wall_ratio: float) -> float:
-    r"""Velocity at which a bed in a column would reach voidage 1, over the terminal velocity, by Richardson and Zaki.
+    r"""Extrapolated bed velocity at voidage 1 over the terminal velocity (Richardson and Zaki).
 
     .. math:: u_i/u_t = 10^{-d/D}
 
-    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
+    wall_ratio  d/D, sphere over column diameter; 0 for a wide column [-]
     returns     u_i/u_t [-]
 
-    For fluidisation; in sedimentation u_i = u_t.
+    Range: fluidisation, d/D < 0.1. In sedimentation u_i = u_t.
 
     >>> wall_factor_richardson_zaki(0.0), round(wall_factor_richardson_zaki(0.05), 3)
     (1.0, 0.891)
@@ -206,12 +214,14 @@ def wall_factor_richardson_zaki(wall_ratio: float) -> float:
     "bed", "Khan & Richardson, Chem. Eng. Commun. 78 (1989) 111, doi:10.1080/00986448908940189", wall_ratio=(1e-3, 0.2)
 )
 def wall_factor_khan_richardson(wall_ratio: float) -> float:
-    r"""Velocity at which a bed in a column would reach voidage 1, over the terminal velocity, by Khan and Richardson.
+    r"""Extrapolated bed velocity at voidage 1 over the terminal velocity (Khan and Richardson).
 
     .. math:: u_i/u_t = 1 - 1.15\,(d/D)^{0.6}
 
-    wall_ratio  d/D, sphere to column; 0 where the column is wide [-]
-    returns     u_i/u_t [-]; not below 0
+    wall_ratio  d/D, sphere over column diameter; 0 for a wide column [-]
+    returns     u_i/u_t, >= 0 [-]
+
+    Range: 0.001 < d/D < 0.2.
 
     >>> wall_factor_khan_richardson(0.0), round(wall_factor_khan_richardson(0.05), 3)
     (1.0, 0.809)
@@ -223,12 +233,14 @@ def wall_factor_khan_richardson(wall_ratio: float) -> float:
     "bed", "Khan & Richardson, Chem. Eng. Commun. 62 (1987) 135, doi:10.1080/00986448708912056", archimedes=(1.0, 1e10)
 )
 def terminal_reynolds_khan_richardson(archimedes: float) -> float:
-    r"""Reynolds number of a sphere that falls at its terminal velocity, by Khan and Richardson.
+    r"""Terminal Reynolds number of a sphere (Khan and Richardson).
 
     .. math:: Re_t = (2.33\,Ar^{0.018} - 1.53\,Ar^{-0.016})^{13.3}
 
     archimedes  Ar, > 0 [-]
     returns     Re_t [-]; 0 below Ar = 4e-6, where the bracket is negative
+
+    Range: 1 < Ar < 1e10.
 
     >>> round(terminal_reynolds_khan_richardson(49.14**2), 1)      # Mordant & Pinton (2000), 0.5 mm glass: measured 41
     44.4

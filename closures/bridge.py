@@ -1,25 +1,27 @@
-r"""Films of finite extent: the liquid that coats two bodies and joins them in a bridge when they come close.
+r"""Bridges between two coated particles: viscous resistance and capillary force of films of finite thickness.
 
-A film begins to act at the gap d at which the liquid on both surfaces touches, and its resistance falls to
-nothing there, because the bridge is small against the pressure field of an immersed pair.
+A bridge forms at the gap d at which the two liquid films touch. Its resistance is zero there, because the bridge is
+small compared with the pressure field of an immersed pair, and approaches that of the immersed pair as the gap closes.
 """
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law("bridge", "Kantak & Davis, Powder Technol. 168 (2006) 42; Punch et al., AIChE J. 69 (2023) e17989, eq. (7)")
 def static_share(gap: float, film: float) -> float:
-    r"""Share of the immersed pair's resistance in a bridge that the displaced liquid does not swell.
+    r"""Resistance of a static bridge over that of an immersed pair; the displaced liquid does not widen the bridge.
 
     .. math:: (1 - h/d)^2
 
     gap      h, surface to surface [m]
-    film     d, thickness of the liquid on both bodies together [m]
+    film     d, thickness of the liquid on both particles together [m]
     returns  share of A/h [-]; 0 for h > d
+
+    Range: h > 0, d << R*.
 
     >>> static_share(0.5, 1.0), static_share(2.0, 1.0)
     (0.25, 0.0)
@@ -29,13 +31,15 @@ def static_share(gap: float, film: float) -> float:
 
 @law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis, Phys. Fluids 35 (2023) 103328, eq. (3)")
 def deforming_share(gap: float, film: float) -> float:
-    r"""Share of the immersed pair's resistance in a bridge that swells with the liquid squeezed out.
+    r"""Resistance of a deforming bridge over that of an immersed pair; the displaced liquid widens the bridge.
 
     .. math:: \left(1 - \frac{h}{2d-h}\right)^2
 
     gap      h, surface to surface [m]
-    film     d, thickness of the liquid on both bodies together [m]
+    film     d, thickness of the liquid on both particles together [m]
     returns  share of A/h [-]; 0 for h > d
+
+    Range: h > 0, d << R*.
 
     >>> round(deforming_share(0.5, 1.0) * 9, 12), deforming_share(2.0, 1.0)
     (4.0, 0.0)
@@ -45,13 +49,15 @@ def deforming_share(gap: float, film: float) -> float:
 
 @law("bridge", "integral of Punch et al. (2023), eq. (7), over the gap")
 def static_potential(gap: float, film: float) -> float:
-    r"""Potential of a static bridge: its impulse between two gaps is -A times the difference.
+    r"""Potential of a static bridge; its impulse between two gaps is -A times the difference of L.
 
     .. math:: L = \ln\frac hd + 2\left(1 - \frac hd\right) - \tfrac12\left(1 - \frac{h^2}{d^2}\right)
 
     gap      h, > 0 [m]
     film     d [m]
-    returns  L [-]; 0 from h = d on
+    returns  L [-]; 0 for h >= d
+
+    Range: h > 0, d << R*.
 
     >>> round(static_potential(0.2, 1.0), 4)
     -0.4894
@@ -62,15 +68,17 @@ def static_potential(gap: float, film: float) -> float:
 
 @law("bridge", "integral of Davis (2023), eq. (3), over the gap; cf. eq. (42)")
 def deforming_potential(gap: float, film: float) -> float:
-    r"""Potential of a deforming bridge: its impulse between two gaps is -A times the difference.
+    r"""Potential of a deforming bridge; its impulse between two gaps is -A times the difference of L.
 
     .. math:: L = \ln x + 3\ln(2-x) + \frac{2}{2-x} - 2,\qquad x = h/d
 
     gap      h, > 0 [m]
     film     d [m]
-    returns  L [-]; 0 from h = d on
+    returns  L [-]; 0 for h >= d
 
-    >>> round(deforming_potential(0.05, 1.0), 4)        # h_min of a twentieth of the film
+    Range: h > 0, d << R*.
+
+    >>> round(deforming_potential(0.05, 1.0), 4)        # h_min = d/20
     -1.9666
     """
     share = min(gap / film, 1.0)
@@ -79,7 +87,7 @@ def deforming_potential(gap: float, film: float) -> float:
 
 @law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis (2023), eq. (4)")
 def davis_tangential(viscosity: float, reduced_radius: float, gap: float, film: float) -> float:
-    r"""Resistance of a bridge to the sliding of two surfaces, from the shear stress over its extent.
+    r"""Resistance of a bridge to sliding, from the shear stress over the area of the bridge.
 
     .. math:: c_t = 2\pi\eta R^*\ln\frac{2d-h}{h}
 
@@ -89,6 +97,8 @@ def davis_tangential(viscosity: float, reduced_radius: float, gap: float, film: 
     film            d [m]
     returns         c_t, force per relative speed of the surfaces [kg/s]; 0 for h > d
 
+    Range: h > 0, d << R*.
+
     >>> round(davis_tangential(1.0, 1.0, 0.5, 1.0) / (2 * math.pi), 4)
     1.0986
     """
@@ -97,7 +107,7 @@ def davis_tangential(viscosity: float, reduced_radius: float, gap: float, film: 
 
 @law("bridge", "Nase et al., Powder Technol. 116 (2001) 214; Goldman, Cox & Brenner, Chem. Eng. Sci. 22 (1967) 637")
 def nase_tangential(viscosity: float, reduced_radius: float, gap: float, film: float) -> float:
-    r"""Resistance to sliding of two immersed surfaces, used between wet spheres up to where the films part.
+    r"""Resistance to sliding of two immersed surfaces, applied to coated spheres up to the gap d.
 
     .. math:: c_t = 6\pi\eta R^*\left(\tfrac{8}{15}\ln\frac{R^*}{h} + 0.9588\right)
 
@@ -105,9 +115,9 @@ def nase_tangential(viscosity: float, reduced_radius: float, gap: float, film: f
     reduced_radius  R* [m]
     gap             h, > 0 [m]
     film            d [m]
-    returns         c_t, force per relative speed of the surfaces [kg/s]; 0 for h > d, where it jumps
+    returns         c_t, force per relative speed of the surfaces [kg/s]; drops to 0 for h > d
 
-    Range: gap << R*; derived for a sphere beside a plane in a liquid without end.
+    Range: h << R*; derived for a sphere near a plane in an unbounded liquid.
 
     >>> round(nase_tangential(1.0, 1.0, 0.01, 0.1) / (6 * math.pi), 4)
     3.4149
@@ -119,14 +129,16 @@ def nase_tangential(viscosity: float, reduced_radius: float, gap: float, film: f
 
 @law("bridge", "Punch et al., AIChE J. 69 (2023) e17989, eq. (12)")
 def zero_cut(resistance: float, gap: float, minimum_gap: float) -> float:
-    r"""Resistance of a film that carries nothing once the solids have met.
+    r"""Resistance of a film that carries no load below the minimum gap.
 
     .. math:: c\ (h \ge h_{min}),\qquad 0\ (h < h_{min})
 
-    resistance   c, of the film at this gap [kg/s]
+    resistance   c, of the film at the gap h [kg/s]
     gap          h [m]
     minimum_gap  h_min [m]
     returns      resistance, the same unit [kg/s]
+
+    Range: any.
 
     >>> zero_cut(2.0, 0.1, 0.2), zero_cut(2.0, 0.3, 0.2)
     (0.0, 2.0)
@@ -136,13 +148,15 @@ def zero_cut(resistance: float, gap: float, minimum_gap: float) -> float:
 
 @law("bridge", "Punch et al., AIChE J. 69 (2023) e17989, eq. (13)")
 def constant_cut(gap: float, minimum_gap: float) -> float:
-    r"""Gap at which a film is evaluated that keeps the resistance of the minimum gap below it.
+    r"""Gap at which to evaluate a film whose resistance stays constant below the minimum gap.
 
     .. math:: \max(h, h_{min})
 
     gap          h [m]
     minimum_gap  h_min [m]
     returns      gap [m]
+
+    Range: any.
 
     >>> constant_cut(-0.1, 0.2), constant_cut(0.3, 0.2)
     (0.2, 0.3)
@@ -152,7 +166,7 @@ def constant_cut(gap: float, minimum_gap: float) -> float:
 
 @law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis (2023), eq. (3)")
 def constant_capillary(surface_tension: float, reduced_radius: float) -> float:
-    r"""Capillary pull of a thin bridge of a wetting liquid between two spheres, the same at every gap.
+    r"""Capillary force of a thin bridge of wetting liquid between two spheres, independent of the gap.
 
     .. math:: F_c = 8\pi\sigma R^*
 
@@ -160,7 +174,9 @@ def constant_capillary(surface_tension: float, reduced_radius: float) -> float:
     reduced_radius   R* [m]
     returns          F_c, attractive [N]
 
-    >>> round(constant_capillary(0.0205, 6.35e-3) * 1e3, 2)     # silicone oil between inch spheres
+    Range: thin films, d << R*, of a wetting liquid.
+
+    >>> round(constant_capillary(0.0205, 6.35e-3) * 1e3, 2)     # silicone oil, spheres of 25.4 mm
     3.27
     """
     return 8.0 * math.pi * surface_tension * reduced_radius

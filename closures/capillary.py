@@ -1,28 +1,30 @@
-r"""Liquid bridges: the pull of surface tension, the liquid in a bridge, and the length at which it breaks.
+r"""Liquid bridges: capillary force, liquid volume and rupture length.
 
-Angles: phi, the half-filling angle, seen from the centre of the sphere between its lowest point and the line where
-the liquid ends on it; theta, the contact angle of the liquid. A pull is positive where the bodies attract each other.
+phi is the half-filling angle: at the centre of the sphere, from its lowest point to the contact line. theta is the
+contact angle of the liquid. Attractive forces are positive.
 """
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 _TOROID = "Kralchevsky & Nagayama (2001) in Buck et al., Chem. Eng. Sci. (2018)"
 
 
 @law("capillary", f"{_TOROID}, eq. (35)")
 def meridional_radius(contact_line_height: float, half_filling_angle: float, contact_angle: float) -> float:
-    r"""Radius of the arc that a bridge between a sphere and a liquid surface shows from the side.
+    r"""Meridional radius of a toroidal bridge between a sphere and a liquid surface.
 
     .. math:: r_m = \frac{z}{1+\cos(\varphi+\theta)},\qquad z = y - R\cos\varphi - \delta_l
 
-    contact_line_height  z, height of the line where the liquid ends on the sphere, above the liquid surface [m]
+    contact_line_height  z, height of the contact line above the liquid surface [m]
     half_filling_angle   phi [rad]
     contact_angle        theta [rad]
-    returns              r_m [m]; at or below 0, where the line lies in the layer, there is no toroid
+    returns              r_m [m]; <= 0 if the contact line lies inside the layer, where there is no toroid
+
+    Range: phi + theta < 180 degrees.
 
     >>> round(meridional_radius(1.6e-4, math.radians(35), math.radians(15)) * 1e6, 1)
     97.4
@@ -34,7 +36,7 @@ def meridional_radius(contact_line_height: float, half_filling_angle: float, con
 def azimuthal_radius(
     contact_line_radius: float, meridional_radius: float, half_filling_angle: float, contact_angle: float
 ) -> float:
-    r"""Radius of the neck of a toroid bridge.
+    r"""Azimuthal (neck) radius of a toroidal bridge.
 
     .. math:: r_a = r_c + r_m[\sin(\varphi+\theta)-1]\ (\varphi+\theta<90^\circ),\qquad r_c\ \text{otherwise}
 
@@ -43,6 +45,8 @@ def azimuthal_radius(
     half_filling_angle   phi [rad]
     contact_angle        theta [rad]
     returns              r_a [m]
+
+    Range: phi + theta < 180 degrees.
 
     >>> azimuthal_radius(5e-4, 1e-4, math.radians(80), math.radians(15))
     0.0005
@@ -62,7 +66,7 @@ def toroid_pull(
     half_filling_angle: float,
     contact_angle: float,
 ) -> float:
-    r"""Pull of a toroid bridge on a sphere: surface tension along the contact line, and suction inside it.
+    r"""Capillary force of a toroidal bridge on a sphere: surface tension on the contact line plus capillary pressure.
 
     .. math:: F = 2\pi\sigma r_c\sin(\varphi+\theta) + \pi r_c^2\,\sigma\left(\frac1{r_m}-\frac1{r_a}\right)
 
@@ -72,9 +76,9 @@ def toroid_pull(
     azimuthal_radius     r_a, from :func:`azimuthal_radius`, > 0 [m]
     half_filling_angle   phi [rad]
     contact_angle        theta [rad]
-    returns              pull towards the liquid [N]
+    returns              F, towards the liquid [N]
 
-    A bridge whose two radii are equal does not suck:
+    Range: r_m > 0 and r_a > 0. With equal radii the capillary pressure is zero:
 
     >>> round(toroid_pull(0.0728, 5e-4, 1e-4, 1e-4, math.radians(35), math.radians(15)) * 1e6, 1)
     175.2
@@ -93,12 +97,12 @@ def toroid_volume(
     half_filling_angle: float,
     contact_angle: float,
 ) -> float:
-    r"""Liquid in a toroid bridge between a sphere and a liquid surface.
+    r"""Liquid volume of a toroidal bridge between a sphere and a liquid surface.
 
     .. math:: V_b = V_1 - V_2 - V_3 - V_4
 
-    V_1 is the cylinder of the bridge's largest radius r_a + r_m and height z, V_2 the sector of the arc and V_3 the
-    triangle above it turned about the axis, V_4 the cap of the sphere:
+    V_1 is the cylinder of radius r_a + r_m and height z; V_2 and V_3 are the solids of revolution of the sector of the
+    arc and of the triangle above it; V_4 is the cap of the sphere:
 
     .. math:: V_2 = \pi r_m^2\chi\left[r_a+r_m-\frac{4r_m\sin^2(\chi/2)}{3\chi}\right],\quad
               V_3 = \pi r_m^2\sin\beta\cos\beta\left[r_c+\tfrac23r_m\sin\beta\right],\quad
@@ -112,8 +116,8 @@ def toroid_volume(
     contact_angle        theta [rad]
     returns              V_b [m3]
 
-    The liquid between a hemisphere that touches the surface and the cylinder around it, where phi is 90 degrees and
-    the arc a point, is that cylinder less half a sphere:
+    Range: r_m >= 0. With phi = 90 degrees and r_m = 0, the volume is that of the cylinder around a hemisphere less the
+    hemisphere:
 
     >>> volume = toroid_volume(1.0, 0.0, 1.0, 1.0, 0.5 * math.pi, 0.0)
     >>> round(volume / (math.pi - 2.0 / 3.0 * math.pi), 12)
@@ -135,7 +139,7 @@ def toroid_volume(
 
 @law("capillary", "Lian, Thornton & Adams (1993); Pitois, Moucheront & Chateau, Eur. Phys. J. B 23 (2001) 79")
 def rupture_length(capillary_number: float, contact_angle: float, volume: float) -> float:
-    r"""Length at which a bridge breaks, longer when it is stretched fast.
+    r"""Rupture length of a bridge; it increases with the speed of separation.
 
     .. math:: l = \left(1+\tfrac{\theta}2\right)\left(1+\sqrt{Ca}\right)V^{1/3}
 
@@ -143,6 +147,8 @@ def rupture_length(capillary_number: float, contact_angle: float, volume: float)
     contact_angle     theta [rad]
     volume            V, of the liquid in the bridge, >= 0 [m3]
     returns           l [m]
+
+    Range: any.
 
     >>> round(rupture_length(0.0, 0.0, 1e-9), 9), round(rupture_length(0.25, 0.0, 1e-9), 9)
     (0.001, 0.0015)
@@ -154,7 +160,7 @@ def rupture_length(capillary_number: float, contact_angle: float, volume: float)
 def pendular_pull(
     surface_tension: float, contact_angle: float, reduced_radius: float, volume: float, gap: float
 ) -> float:
-    r"""Pull of a small bridge of constant volume between two spheres, or a sphere and a wall.
+    r"""Capillary force of a small bridge of constant volume between two spheres, or a sphere and a wall.
 
     .. math:: F = 4\pi R^*\sigma\cos\theta\left[1-\left(1+\frac{V}{\pi R^*h^2}\right)^{-1/2}\right]
 
@@ -162,10 +168,10 @@ def pendular_pull(
     contact_angle    theta [rad]
     reduced_radius   R* [m]
     volume           V, of the liquid in the bridge, > 0 [m3]
-    gap              h; spheres that overlap count as touching [m]
-    returns          pull towards each other [N]
+    gap              h; negative values count as 0 [m]
+    returns          F, attractive [N]
 
-    Range: V/R*^3 small against 1.
+    Range: V << R*^3; too high for larger volumes.
 
     >>> round(pendular_pull(0.073, 0.0, 0.25e-3, 1e-12, 0.0) * 1e6, 1)       # 2 pi R sigma of two spheres of 0.5 mm
     229.3
@@ -176,11 +182,11 @@ def pendular_pull(
     return 4.0 * math.pi * reduced_radius * surface_tension * math.cos(contact_angle) * share
 
 
-@law("capillary", "integral of the pull of a pendular bridge over the gap")
+@law("capillary", "integral of the force of a pendular bridge over the gap")
 def pendular_energy(
     surface_tension: float, contact_angle: float, reduced_radius: float, volume: float, gap: float
 ) -> float:
-    r"""Work that a pendular bridge does on two bodies while they close in from a gap to contact.
+    r"""Work of a pendular bridge on two particles that approach from a gap to contact.
 
     .. math:: W = 4\pi R^*\sigma\cos\theta\left[h + \ell - \sqrt{h^2+\ell^2}\right],\qquad \ell^2 = \frac{V}{\pi R^*}
 
@@ -191,26 +197,28 @@ def pendular_energy(
     gap              h, >= 0 [m]
     returns          W [J]
 
-    Two bodies that part must bring up this work, up to the length at which the bridge breaks.
+    Range: V << R*^3. Separating the particles up to the rupture length takes the same work.
 
     >>> pendular_energy(0.073, 0.0, 0.25e-3, 1e-12, 0.0)
     0.0
     """
     reach = math.sqrt(volume / (math.pi * reduced_radius))
-    # (h + l) - sqrt(h^2 + l^2), without the difference of near numbers
+    # (h + l) - sqrt(h^2 + l^2), written without cancellation
     way = 2.0 * gap * reach / (gap + reach + math.sqrt(gap * gap + reach * reach))
     return 4.0 * math.pi * reduced_radius * surface_tension * math.cos(contact_angle) * way
 
 
-@law("capillary", "Shi & McCarthy, Powder Technol. 184 (2008) 64: the cap in the other sphere's shadow")
+@law("capillary", "Shi & McCarthy, Powder Technol. 184 (2008) 64: spherical cap in the shadow of the other sphere")
 def liquid_share(radius: float, other_radius: float) -> float:
-    r"""Share of a sphere's liquid that flows into a bridge with another sphere.
+    r"""Fraction of the liquid on a sphere that flows into a bridge with another sphere.
 
     .. math:: \frac{V_i}{L_i} = \tfrac12\left(1-\sqrt{1-\frac{R_j^2}{(R_i+R_j)^2}}\right)
 
     radius        R_i [m]
     other_radius  R_j, > 0 [m]
     returns       V_i/L_i [-]
+
+    Range: any.
 
     >>> round(liquid_share(1.0, 1.0), 4)
     0.067

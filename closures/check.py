@@ -1,4 +1,4 @@
-"""What must be true of a law of its kind: limits, signs and continuity, for the laws here and for a user's own."""
+"""Checks of a law: finite values, limits, monotonicity and continuity expected of its kind."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable, Iterator
 
 from closures.drag import ergun
-from closures.law import Law, page
 from closures.lubrication import film_strength
+from closures.registry import Law, law_of
 
 Curve = Callable[[float], float]
 
@@ -32,25 +32,27 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "cutoff_gap": (1e-5, 1e-2),
     "poisson": (0.1, 0.45),
 }
-"""Where an argument is tried if its law states no range; SI units. Others between 0.001 and 1."""
+"""Range in which an argument is sampled if the law states none; SI units. Other arguments: 0.001 to 1."""
 
 JUMP = 0.005
-"""A law that changes by more than this at one point has a jump there."""
+"""Relative change at one point above which a law is reported as discontinuous."""
 
 
 def check(law: Callable[..., float]) -> list[str]:
-    """Complaints about a law: what its kind must fulfil and it does not; empty where all is well.
+    """Check a law against the requirements of its kind.
 
     law      a function decorated with @closures.law(...)
-    returns  sentences that say what was found, and where
+    returns  one message per violated requirement, with the place; empty if all hold
 
-    Every law must give finite numbers in its range, and the same ones when compiled. Drag must be finite at rest, tend
-    to Stokes drag within 5 %, rise with velocity and crowding, not jump by more than 0.5 %, and be between 0.3 and 2
-    times Ergun's in a creeping dense bed. A minimum gap must be positive and not fall with viscosity, speed or
-    roughness. The resistance of a film must not be negative, rise with the gap, or fall with viscosity or radius, and
-    be between a third of Brenner's and three times as much where spheres nearly touch. Added mass must start at 1/2
-    and not fall with crowding. Restitution must stay between 0 and 1 and not fall with the Stokes number. Shear lift
-    must vanish with the shear.
+    every        finite in the stated range; the same value compiled and interpreted
+    drag         finite at rest; Stokes drag within 5 % for an isolated sphere; increasing with solid fraction; force
+                 increasing with velocity; no jump above 0.5 %; 0.3 to 2 times Ergun in a creeping dense bed
+    minimum_gap  positive; not decreasing with viscosity, speed or roughness
+    lubrication  not negative; not increasing with the gap; not decreasing with viscosity or radius; 1/3 to 3 times
+                 Brenner's law near contact
+    added_mass   1/2 for an isolated sphere; not decreasing with solid fraction
+    restitution  between 0 and 1; not decreasing with the Stokes number
+    lift         shear lift is zero without shear
 
     >>> from closures.drag import di_felice, gidaspow
     >>> check(di_felice)
@@ -58,21 +60,21 @@ def check(law: Callable[..., float]) -> list[str]:
     >>> print(*check(gidaspow))
     jumps by -73 % at voidage = 0.8 (reynolds = 1e+03)
     """
-    card = page(law)
-    complaints = list(_finite(card))
-    if not complaints:
-        complaints = [*_compiled_alike(card), *KINDS.get(card.kind, _nothing_more)(card)]
-    return complaints
+    entry = law_of(law)
+    found = list(_finite(entry))
+    if not found:
+        found = [*_same_compiled(entry), *REQUIREMENTS.get(entry.kind, _none)(entry)]
+    return found
 
 
-def _arguments(card: Law) -> list[str]:
-    return list(inspect.signature(card.function).parameters)
+def _arguments(entry: Law) -> list[str]:
+    return list(inspect.signature(entry.function).parameters)
 
 
-def samples(card: Law, name: str, count: int) -> list[float]:
-    """Values of an argument over its range, evenly spaced in decades where the range spans more than two."""
+def samples(entry: Law, name: str, count: int) -> list[float]:
+    """Values of an argument over its range; logarithmic spacing if the range spans more than two decades."""
     usual_low, usual_high = PLAUSIBLE.get(name.removesuffix("_i").removesuffix("_j"), (1e-3, 1.0))
-    low, high = card.ranges.get(name, (usual_low, usual_high))
+    low, high = entry.ranges.get(name, (usual_low, usual_high))
     low = low if low > 0.0 else min(usual_low, 0.01 * high)
     high = high if math.isfinite(high) else max(usual_high, 100.0 * low)
     shares = [k / (count - 1) for k in range(count)]
@@ -85,12 +87,12 @@ def _shown(stated: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.3g}" for name, value in stated.items())
 
 
-def _finite(card: Law) -> Iterator[str]:
-    names = _arguments(card)
-    for values in itertools.product(*(samples(card, name, 4) for name in names)):
+def _finite(entry: Law) -> Iterator[str]:
+    names = _arguments(entry)
+    for values in itertools.product(*(samples(entry, name, 4) for name in names)):
         stated = dict(zip(names, values))
         try:
-            value = card.function(**stated)
+            value = entry.function(**stated)
         except (ArithmeticError, ValueError) as failure:
             yield f"fails ({failure}) at {_shown(stated)}"
             return
@@ -99,27 +101,27 @@ def _finite(card: Law) -> Iterator[str]:
             return
 
 
-def _compiled_alike(card: Law) -> Iterator[str]:
-    import closures.compiled  # noqa: F401  says where compiled code is kept, before the compiler is loaded
+def _same_compiled(entry: Law) -> Iterator[str]:
+    import closures.compiled  # noqa: F401  sets the cache folder before numba is imported
 
     from numba import njit  # isort: skip
 
-    names = _arguments(card)
-    compiled = njit(error_model="numpy")(card.function)
-    for values in zip(*(samples(card, name, 5) for name in names)):
+    names = _arguments(entry)
+    compiled = njit(error_model="numpy")(entry.function)
+    for values in zip(*(samples(entry, name, 5) for name in names)):
         try:
             value = compiled(*values)
-        except Exception as refusal:  # whatever stops the compiler, errors of its own or others, is the complaint
-            yield f"cannot be compiled: {' '.join(str(refusal).split())[:200]}"
+        except Exception as failure:  # numba raises many types of error, not only its own
+            yield f"cannot be compiled: {' '.join(str(failure).split())[:200]}"
             return
-        plain = card.function(*values)
+        plain = entry.function(*values)
         if not math.isclose(value, plain, rel_tol=1e-12):
             yield f"is {plain:.6g}, but {value:.6g} when compiled, at {_shown(dict(zip(names, values)))}"
             return
 
 
-def _falls(values: list[float], curve: Curve) -> float | None:
-    """The value at which a curve that must not fall does."""
+def _first_decrease(values: list[float], curve: Curve) -> float | None:
+    """The first value at which a curve decreases, or None."""
     heights = [curve(value) for value in values]
     for value, before, after in zip(values[1:], heights, heights[1:]):
         if after < before - 1e-9 * abs(before):
@@ -128,7 +130,7 @@ def _falls(values: list[float], curve: Curve) -> float | None:
 
 
 def _largest_jump(values: list[float], curve: Curve) -> tuple[float, float]:
-    """Where a curve jumps most, and by what share; a steep piece is halved until it is a jump or none."""
+    """Position and relative size of the largest jump; bisection separates jumps from steep slopes."""
     place, largest = values[0], 0.0
     for left, right in itertools.pairwise(values):
         for _ in range(50):
@@ -142,27 +144,27 @@ def _largest_jump(values: list[float], curve: Curve) -> tuple[float, float]:
     return place, largest
 
 
-def _drag(card: Law) -> Iterator[str]:
-    if not {"reynolds", "voidage"} <= set(_arguments(card)):
+def _drag(entry: Law) -> Iterator[str]:
+    if not {"reynolds", "voidage"} <= set(_arguments(entry)):
         yield "is not a drag law: it must take reynolds and voidage"
         return
-    sizes = dict.fromkeys(set(_arguments(card)) - {"reynolds", "voidage"}, 1.0)
-    numbers, voidages = samples(card, "reynolds", 401), samples(card, "voidage", 401)
+    sizes = dict.fromkeys(set(_arguments(entry)) - {"reynolds", "voidage"}, 1.0)
+    numbers, voidages = samples(entry, "reynolds", 401), samples(entry, "voidage", 401)
 
     def factor(reynolds: float, voidage: float) -> float:
-        return card.function(reynolds=reynolds, voidage=voidage, **sizes)
+        return entry.function(reynolds=reynolds, voidage=voidage, **sizes)
 
     try:
-        alone = factor(0.0, voidages[-1])
+        isolated = factor(0.0, voidages[-1])
     except (ArithmeticError, ValueError) as failure:
-        yield f"fails ({failure}) at reynolds = 0: a particle may rest in its fluid"
+        yield f"fails ({failure}) at reynolds = 0; the slip velocity of a particle can be zero"
         return
     lowest = min(factor(reynolds, voidage) for reynolds in numbers[::20] for voidage in voidages[::20])
     if lowest <= 0.0:
-        yield f"is {lowest:.3g} somewhere in its range: drag must be positive"
+        yield f"is {lowest:.3g} in its range; drag must be positive"
         return
-    if voidages[-1] == 1.0 and not sizes and abs(alone - 1.0) > 0.05:
-        yield f"tends to {alone:.3g} and not to 1, Stokes drag, for a slow sphere alone"
+    if voidages[-1] == 1.0 and not sizes and abs(isolated - 1.0) > 0.05:
+        yield f"tends to {isolated:.3g} for a slow isolated sphere; Stokes drag is 1"
 
     yield from _creeping_bed(voidages, lambda voidage: factor(numbers[0], voidage))
 
@@ -175,35 +177,35 @@ def _drag(card: Law) -> Iterator[str]:
     def force(voidage: float) -> Curve:
         return lambda reynolds: reynolds * factor(reynolds, voidage)
 
-    def crowded(reynolds: float) -> Curve:
+    def at_solid_fraction(reynolds: float) -> Curve:
         return lambda solids: factor(reynolds, 1.0 - solids)
 
     solids = [1.0 - voidage for voidage in reversed(voidages)]
     some_voidages, some_numbers = voidages[::80], numbers[::80]
-    yield from _first_fall("force falls with", "reynolds", numbers, "voidage", some_voidages, force)
-    yield from _first_fall("falls with", "solid_fraction", solids, "reynolds", some_numbers, crowded)
+    yield from _not_monotone("force decreases with", "reynolds", numbers, "voidage", some_voidages, force)
+    yield from _not_monotone("decreases with", "solid_fraction", solids, "reynolds", some_numbers, at_solid_fraction)
     yield from _worst_jump("reynolds", numbers, "voidage", some_voidages, at_voidage)
     yield from _worst_jump("voidage", voidages, "reynolds", some_numbers, at_reynolds)
 
 
 def _creeping_bed(voidages: list[float], factor: Curve) -> Iterator[str]:
-    """A dense bed is near Ergun; two and a half times as much is the mark of a law of the total force."""
+    """Compare a dense bed with Ergun's law; a law of the total force gives about 2.5 times as much."""
     dense = max(voidages[0], 0.45)
     if dense > 0.6 or factor(dense) == factor(voidages[-1]):
         return
     share = factor(dense) / ergun(0.0, dense)
     if not 0.3 < share < 2.0:
         yield (
-            f"is {share:.2g} times Ergun's in a creeping bed of voidage {dense:.2g}: F is of the force without the "
-            "pressure gradient, voidage times the total, over 3 pi eta d U with the superficial slip U"
+            f"is {share:.2g} times Ergun's law in creeping flow at voidage {dense:.2g}; F = F_d / (3 pi eta d U): "
+            "F_d excludes the pressure gradient (voidage times the total force) and U is the superficial slip"
         )
 
 
-def _first_fall(
+def _not_monotone(
     what: str, name: str, values: list[float], other: str, others: list[float], curve_at: Callable[[float], Curve]
 ) -> Iterator[str]:
     for fixed in others:
-        place = _falls(values, curve_at(fixed))
+        place = _first_decrease(values, curve_at(fixed))
         if place is not None:
             yield f"{what} {name} at {name} = {place:.3g} ({other} = {fixed:.3g})"
             return
@@ -218,85 +220,85 @@ def _worst_jump(
         yield f"jumps by {100.0 * size:.2g} % at {name} = {place:.3g} ({other} = {fixed:.3g})"
 
 
-def _other_kind(
+def _bounded_and_rising(
     limits: tuple[float, float], rising: tuple[str, ...], takes: frozenset[str] = frozenset()
 ) -> Callable[[Law], Iterator[str]]:
-    """Rules of a kind: limits of the value, and arguments with which it must not fall; for laws that take these."""
+    """Check the limits of the value and the arguments with which it must not decrease; skip laws without `takes`."""
 
-    def rules(card: Law) -> Iterator[str]:
-        names = _arguments(card)
+    def rules(entry: Law) -> Iterator[str]:
+        names = _arguments(entry)
         if not takes <= set(names):
             return
-        middle = {name: samples(card, name, 3)[1] for name in names}
+        middle = {name: samples(entry, name, 3)[1] for name in names}
         for name in names:
-            values = samples(card, name, 101)
+            values = samples(entry, name, 101)
 
             def curve(value: float, name: str = name) -> float:
-                return card.function(**{**middle, name: value})
+                return entry.function(**{**middle, name: value})
 
             for value in values:
                 if not limits[0] <= curve(value) <= limits[1]:
                     yield f"is {curve(value):.3g}, outside {limits[0]:.3g} to {limits[1]:.3g}, at {name} = {value:.3g}"
                     break
-            place = _falls(values, curve) if name.startswith(rising) else None
+            place = _first_decrease(values, curve) if name.startswith(rising) else None
             if place is not None:
-                yield f"falls with {name} at {name} = {place:.3g}"
+                yield f"decreases with {name} at {name} = {place:.3g}"
 
     return rules
 
 
-def _film(card: Law) -> Iterator[str]:
-    """Rules of a film's resistance; other laws of its kind, parts of one, have none."""
-    names = _arguments(card)
+def _film(entry: Law) -> Iterator[str]:
+    """Check a film resistance; laws of this kind without these arguments are skipped."""
+    names = _arguments(entry)
     if not {"gap", "viscosity", "reduced_radius"} <= set(names):
         return
-    middle = {name: samples(card, name, 3)[1] for name in names}
+    middle = {name: samples(entry, name, 3)[1] for name in names}
 
     def curve_of(name: str) -> Curve:
-        return lambda value: card.function(**{**middle, name: value})
+        return lambda value: entry.function(**{**middle, name: value})
 
-    gaps = samples(card, "gap", 101)
-    falling = _falls(gaps, lambda gap: -curve_of("gap")(gap))
+    gaps = samples(entry, "gap", 101)
+    falling = _first_decrease(gaps, lambda gap: -curve_of("gap")(gap))
     if falling is not None:
-        yield f"rises with gap at gap = {falling:.3g}"
-    yield from _other_kind((0.0, math.inf), ("viscosity", "reduced_radius"))(card)
+        yield f"increases with gap at gap = {falling:.3g}"
+    yield from _bounded_and_rising((0.0, math.inf), ("viscosity", "reduced_radius"))(entry)
     near = {**middle, "gap": gaps[0]}
-    share = card.function(**near) * near["gap"] / film_strength(near["viscosity"], near["reduced_radius"])
+    share = entry.function(**near) * near["gap"] / film_strength(near["viscosity"], near["reduced_radius"])
     if not 1.0 / 3.0 <= share <= 3.0:
         yield (
-            f"is {share:.2g} times Brenner's, 6 pi eta R*^2/h, at gap = {gaps[0]:.3g}: it is a force per rate of the "
-            "gap, and R* = R_i R_j/(R_i + R_j)"
+            f"is {share:.2g} times Brenner's law, 6 pi eta R*^2/h, at gap = {gaps[0]:.3g}; the law must return force "
+            "over rate of the gap, with R* = R_i R_j/(R_i + R_j)"
         )
 
 
-def _added_mass(card: Law) -> Iterator[str]:
-    alone = card.function(1.0)
-    if not math.isclose(alone, 0.5):
-        yield f"is {alone:.3g} and not 1/2 for a sphere alone"
-    place = _falls([0.01 * k for k in range(60)], lambda solids: card.function(1.0 - solids))
+def _added_mass(entry: Law) -> Iterator[str]:
+    isolated = entry.function(1.0)
+    if not math.isclose(isolated, 0.5):
+        yield f"is {isolated:.3g} for an isolated sphere; it must be 1/2"
+    place = _first_decrease([0.01 * k for k in range(60)], lambda solids: entry.function(1.0 - solids))
     if place is not None:
-        yield f"falls with crowding at voidage = {1.0 - place:.3g}"
+        yield f"decreases with solid fraction at voidage = {1.0 - place:.3g}"
 
 
-def _lift(card: Law) -> Iterator[str]:
-    names = _arguments(card)
+def _lift(entry: Law) -> Iterator[str]:
+    names = _arguments(entry)
     if "shear_reynolds" not in names:
         return
-    rest = {name: samples(card, name, 3)[1] for name in names} | {"shear_reynolds": 0.0}
-    if card.function(**rest) != 0.0:
-        yield f"is {card.function(**rest):.3g} without shear"
+    rest = {name: samples(entry, name, 3)[1] for name in names} | {"shear_reynolds": 0.0}
+    if entry.function(**rest) != 0.0:
+        yield f"is {entry.function(**rest):.3g} without shear; it must be 0"
 
 
-def _nothing_more(_: Law) -> Iterator[str]:
+def _none(_: Law) -> Iterator[str]:
     return iter(())
 
 
-KINDS: dict[str, Callable[[Law], Iterator[str]]] = {
+REQUIREMENTS: dict[str, Callable[[Law], Iterator[str]]] = {
     "drag": _drag,
-    "minimum_gap": _other_kind((5e-324, math.inf), ("viscosity", "approach_speed", "roughness")),
+    "minimum_gap": _bounded_and_rising((5e-324, math.inf), ("viscosity", "approach_speed", "roughness")),
     "lubrication": _film,
-    "restitution": _other_kind((0.0, 1.0), ("stokes",), takes=frozenset({"stokes", "restitution"})),
+    "restitution": _bounded_and_rising((0.0, 1.0), ("stokes",), takes=frozenset({"stokes", "restitution"})),
     "added_mass": _added_mass,
     "lift": _lift,
 }
-"""What a kind must fulfil beyond finite numbers."""
+"""Requirements of each kind beyond finite values."""

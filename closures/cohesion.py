@@ -1,10 +1,10 @@
-"""What pulls two dry solids together: adhesion of their surfaces in contact, and van der Waals forces across a gap."""
+"""Adhesion of dry solids: the contact of Johnson, Kendall and Roberts (JKR), and van der Waals forces across a gap."""
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law(
@@ -12,13 +12,15 @@ from closures.law import law
     "Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301; Johnson, Contact Mechanics (1985) eq. (5.49)",
 )
 def jkr_pull_off(work_of_adhesion: float, reduced_radius: float) -> float:
-    r"""Largest pull that an adhesive contact of two spheres stands.
+    r"""Pull-off force of an adhesive contact of two spheres (JKR).
 
     .. math:: F_c = \tfrac32\pi\,w\,R^*
 
-    work_of_adhesion  w, to part unit area of contact; twice the surface energy between like solids [J/m2]
+    work_of_adhesion  w, per area of contact; twice the surface energy for like solids [J/m2]
     reduced_radius    R* [m]
-    returns           F_c, whatever the stiffness [N]
+    returns           F_c, independent of the stiffness [N]
+
+    Range: short-range adhesion of soft solids (large Tabor parameter).
 
     >>> round(jkr_pull_off(2.0, 1.0) / math.pi, 12)
     3.0
@@ -28,14 +30,16 @@ def jkr_pull_off(work_of_adhesion: float, reduced_radius: float) -> float:
 
 @law("cohesion", "from Johnson, Kendall & Roberts (1971); Thornton & Ning, Powder Technol. 99 (1998) 154")
 def jkr_stretch(work_of_adhesion: float, reduced_radius: float, reduced_modulus: float) -> float:
-    r"""How far two adhesive spheres can be pulled apart before their contact breaks.
+    r"""Separation at which an adhesive contact of two spheres breaks (JKR).
 
     .. math:: \delta_c = \tfrac34\left(\frac{\pi^2 w^2 R^*}{E^{*2}}\right)^{1/3}
 
     work_of_adhesion  w [J/m2]
     reduced_radius    R* [m]
     reduced_modulus   E* [Pa]
-    returns           delta_c, beyond geometric touch [m]
+    returns           delta_c, beyond geometric contact [m]
+
+    Range: short-range adhesion of soft solids (large Tabor parameter).
 
     >>> round(jkr_stretch(8.0 / math.pi, 1.0, 1.0), 12)
     3.0
@@ -45,20 +49,20 @@ def jkr_stretch(work_of_adhesion: float, reduced_radius: float, reduced_modulus:
 
 @law(
     "cohesion",
-    "Johnson, Kendall & Roberts (1971), solved for the radius by Ferrari's way, as a quartic whose cubic is short",
+    "Johnson, Kendall & Roberts (1971), solved for the radius as a quartic by Ferrari's method",
 )
 def jkr_contact_radius(overlap: float, work_of_adhesion: float, reduced_radius: float, reduced_modulus: float) -> float:
-    r"""Radius of the contact of two adhesive spheres as a function of their overlap.
+    r"""Contact radius of two adhesive spheres as a function of the overlap (JKR).
 
     .. math:: \delta = \frac{a^2}{R^*} - \sqrt{\frac{2\pi w a}{E^*}}
 
-    overlap           delta; negative where the contact is stretched, down to -delta_c [m]
+    overlap           delta; negative for a stretched contact, down to -delta_c [m]
     work_of_adhesion  w, > 0 [J/m2]
     reduced_radius    R* [m]
     reduced_modulus   E* [Pa]
     returns           a, of the stable branch [m]
 
-    Range: overlap at least minus :func:`jkr_stretch`; below that the radius at which the contact breaks.
+    Range: overlap >= -delta_c, from :func:`jkr_stretch`; below it the contact radius at rupture is returned.
 
     >>> a = jkr_contact_radius(0.3, 0.1, 1.0, 2.0)
     >>> round(a**2 - math.sqrt(2.0 * math.pi * 0.1 * a / 2.0), 12)
@@ -66,7 +70,7 @@ def jkr_contact_radius(overlap: float, work_of_adhesion: float, reduced_radius: 
     """
     pull = math.pi * work_of_adhesion * reduced_radius**2 / reduced_modulus
     unit = (0.5 * pull * pull) ** (1.0 / 3.0)
-    # the resolvent m^3 - 2 R delta m^2 - pull^2/2 = 0 in units of `unit`; Newton from above, so the steps only fall
+    # resolvent m^3 - 2 R delta m^2 - pull^2/2 = 0 in units of `unit`, by Newton's method from above
     ratio = 2.0 * reduced_radius * overlap / unit
     root = max(ratio, 0.0) + 1.0
     for _ in range(12):
@@ -78,7 +82,7 @@ def jkr_contact_radius(overlap: float, work_of_adhesion: float, reduced_radius: 
 
 @law("cohesion", "Johnson, Kendall & Roberts (1971); Johnson, Contact Mechanics (1985) eq. (5.47)")
 def jkr_force(contact_radius: float, work_of_adhesion: float, reduced_radius: float, reduced_modulus: float) -> float:
-    r"""Normal force of two adhesive spheres.
+    r"""Normal force of an adhesive contact of two spheres (JKR).
 
     .. math:: F = \frac{4E^*a^3}{3R^*} - \sqrt{8\pi w E^* a^3}
 
@@ -86,9 +90,9 @@ def jkr_force(contact_radius: float, work_of_adhesion: float, reduced_radius: fl
     work_of_adhesion  w [J/m2]
     reduced_radius    R* [m]
     reduced_modulus   E* [Pa]
-    returns           F, repulsive where positive [N]
+    returns           F, repulsive if positive [N]
 
-    At touch two spheres pull with 8/9 of the largest pull.
+    Range: short-range adhesion of soft solids (large Tabor parameter). At zero overlap F is -8/9 of the pull-off force:
 
     >>> a = jkr_contact_radius(0.0, 0.1, 1.0, 2.0)
     >>> round(jkr_force(a, 0.1, 1.0, 2.0) / jkr_pull_off(0.1, 1.0), 9)
@@ -103,7 +107,7 @@ def jkr_force(contact_radius: float, work_of_adhesion: float, reduced_radius: fl
 def jkr_sticking_speed(
     reduced_mass: float, work_of_adhesion: float, reduced_radius: float, reduced_modulus: float
 ) -> float:
-    r"""Speed of approach below which two elastic adhesive spheres stick.
+    r"""Approach speed below which two elastic adhesive spheres stick (JKR).
 
     .. math:: v_s = \sqrt{\frac{14.18}{m^*}}\left(\frac{w^5R^{*4}}{E^{*2}}\right)^{1/6}
 
@@ -113,7 +117,8 @@ def jkr_sticking_speed(
     reduced_modulus   E* [Pa]
     returns           v_s [m/s]
 
-    The contact begins at touch and ends at -delta_c; the work of the pull between the two is lost.
+    Range: no other dissipation. The contact forms at zero overlap and breaks at -delta_c; the work done between is
+    lost.
 
     >>> round(jkr_sticking_speed(14.18, 1.0, 1.0, 1.0), 12)
     1.0
@@ -124,17 +129,17 @@ def jkr_sticking_speed(
 
 @law("cohesion", "Hamaker, Physica 4 (1937) 1058; Israelachvili, Intermolecular and Surface Forces (2011) ch. 13")
 def van_der_waals(gap: float, hamaker: float, reduced_radius: float, minimum_separation: float) -> float:
-    r"""Van der Waals attraction of two spheres across a gap.
+    r"""Van der Waals force of two spheres across a gap.
 
     .. math:: F = \frac{A\,R^*}{6\,\max(h, h_0)^2}
 
     gap                 h [m]
-    hamaker             A, Hamaker's constant of the two solids and what is between them [J]
+    hamaker             A, Hamaker constant of the two solids and the medium between them [J]
     reduced_radius      R* [m]
-    minimum_separation  h_0, at which atoms touch; about 0.165 nm [m]
+    minimum_separation  h_0, atomic contact; about 0.165 nm [m]
     returns             F, attractive [N]
 
-    Range: gaps far below R* and below about 10 nm, from where on the force is retarded.
+    Range: h << R* and below about 10 nm; too high at larger gaps, where retardation weakens the force.
 
     >>> van_der_waals(0.5, 6.0, 2.0, 1.0), van_der_waals(2.0, 6.0, 2.0, 1.0)
     (2.0, 0.5)

@@ -9,26 +9,54 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from closures.law import SHELF
+from closures.registry import REGISTRY
+
+_IMPORTS = re.compile(
+    r"^(?:from|import) ((?:cfddem|closures|scenarios)[\w.]*)(?: import ([\w ,]+|\([^)]*\)))?", re.MULTILINE
+)
+_COMPILES = re.compile(
+    r"^from (?:cfddem\.backend\.compile import .*(?:either|inline|part|serial|threaded)|numba import)|^import numba",
+    re.MULTILINE,
+)
 
 
 def source_key() -> str:
-    """Hash of every Python source that compiled code may come from."""
-    digest = hashlib.sha256()
+    """Hash of every Python source that compiled code may come from.
+
+    These are the laws, the files that compile loops, and what these files import. Other files can change without
+    compiling anything anew.
+    """
+    sources = {}
     for package in ("cfddem", "closures", "scenarios"):
         spec = find_spec(package)
         for folder in (spec.submodule_search_locations or []) if spec else []:
-            for source in sorted(Path(folder).rglob("*.py")):
-                digest.update(str(source.relative_to(folder)).encode())
-                digest.update(source.read_bytes())
+            for path in Path(folder).rglob("*.py"):
+                name = ".".join((package, *path.relative_to(folder).with_suffix("").parts)).removesuffix(".__init__")
+                sources[name] = path.read_text(encoding="utf-8")
+    digest = hashlib.sha256()
+    for name in sorted(_compiled_from(sources)):
+        digest.update(f"{name}\n{sources[name]}".encode())
     return digest.hexdigest()[:12]
+
+
+def _compiled_from(sources: Mapping[str, str]) -> set[str]:
+    """Names of the modules that compiled code may come from, among all modules and their texts."""
+    todo = [name for name, text in sources.items() if name.startswith("closures") or _COMPILES.search(text)]
+    found = set(todo)
+    while todo:
+        for module, names in _IMPORTS.findall(sources[todo.pop()]):
+            imported = {module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))} & sources.keys()
+            todo += imported - found
+            found |= imported
+    return found
 
 
 def _writable(folder: Path) -> bool:
@@ -73,15 +101,24 @@ _OPTIONS: Any = {
 }
 
 
+_EXPOSED: set[Callable[..., float]] = set()
+
+
 def expose(function: Callable[..., float]) -> None:
     """Let compiled loops call this plain function by its name."""
+    _EXPOSED.add(function)
     overload(function, strict=False, jit_options=_OPTIONS)(lambda *_, **__: function)
+
+
+def is_exposed(function: Callable[..., Any]) -> bool:
+    """Whether compiled loops can call this plain function by its name."""
+    return function in _EXPOSED
 
 
 _point_compiler_at(cache_folder())
 
 from numba.extending import overload  # noqa: E402  the cache folder must be known first
 
-for _laws in SHELF.values():
-    for _card in _laws.values():
-        expose(_card.function)
+for _laws in REGISTRY.values():
+    for _law in _laws.values():
+        expose(_law.function)

@@ -1,32 +1,32 @@
-r"""The flow that a particle itself makes where it is looked for, when its force is spread over a kernel."""
+r"""Flow that a particle causes at its own position when its force is distributed by a kernel."""
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law("disturbance", "Oseen's equation with a Gaussian force, integrated over wave numbers")
 def oseen_share(reynolds: float) -> float:
-    r"""What is left of the creeping mobility where the force moves through the fluid.
+    r"""Self-induced velocity of a moving force over its value in creeping flow.
 
     .. math:: \Psi = \frac{3}{\sqrt\pi}\int_0^1 (1-\mu^2)\left[\frac{\sqrt\pi}{2} - \frac{\pi}{2} R\mu\,
               e^{R^2\mu^2}\mathrm{erfc}(R\mu)\right]d\mu,\qquad R = \rho U s/\eta
 
-    reynolds  R, on the width of the kernel [-]
-    returns   Psi, from 1 at rest to 4/(3 R) far above 1 [-]
+    reynolds  R, with the width s of the kernel as length [-]
+    returns   Psi [-]; 1 at rest, 4/(3 R) for R >> 1
 
-    The integral is known: with E = exp(R^2) erfc(R) and G = (E - 1 + 2R/sqrt(pi))/(2 R^2),
-    the second part is G/R^2 + 2/(3 sqrt(pi) R) - 1/(2 R^2).
+    With E = exp(R^2) erfc(R) and G = (E - 1 + 2R/sqrt(pi))/(2 R^2), the integral of the second term is
+    G/R^2 + 2/(3 sqrt(pi) R) - 1/(2 R^2).
 
-    Range: disturbances that are small against U, as those of kernels wider than the sphere are.
+    Range: disturbances small compared with U, which holds for kernels wider than the sphere.
 
     >>> round(oseen_share(0.0), 12), round(oseen_share(1.0), 4)
     (1.0, 0.5903)
     """
     if reynolds < 0.05:
-        # the closed form loses digits; series of its integrand
+        # series of the integrand: the closed form loses digits here
         second = 0.25 - 4.0 * reynolds / (15.0 * math.sqrt(math.pi)) + reynolds * reynolds / 12.0
     else:
         if reynolds < 20.0:
@@ -40,18 +40,18 @@ def oseen_share(reynolds: float) -> float:
 
 
 @law("disturbance", "fitted to the Oseen share of a Gaussian kernel, R = 0.03 ... 100")
-def left_behind(reynolds: float) -> float:
-    r"""Rate at which a moving particle leaves its own wind, over nu/s^2.
+def wake_decay(reynolds: float) -> float:
+    r"""Decay rate of the self-induced velocity as the particle moves away from its wake, over nu/s^2.
 
     .. math:: b = \frac{3}{8}\,\frac{R^2}{R + 2.6},\qquad R = \rho U s/\eta
 
-    reynolds  R, on the width of the kernel [-]
+    reynolds  R, with the width s of the kernel as length [-]
     returns   b [-]
 
-    Range: any. With winds that build up at the rates y_k of a creeping kernel and fade at y_k + b, the steady sum is
-    near the Oseen share; what is left is scaled away. Far above R = 1, b is 3/8 R.
+    Range: any; b = 3/8 R for R >> 1. Modes that build up at the rates y_k of the creeping kernel and decay at y_k + b
+    have a steady sum close to :func:`oseen_share`; a scale factor removes the remaining difference.
 
-    >>> round(left_behind(1.0), 4)
+    >>> round(wake_decay(1.0), 4)
     0.1042
     """
     return 0.375 * reynolds * reynolds / (reynolds + 2.6)

@@ -1,27 +1,28 @@
-"""Drag factors fitted to simulations that resolve the flow between the spheres; normal form as in drag.py."""
+"""Drag factors fitted to particle-resolved simulations; normal form as in drag.py."""
 
 from __future__ import annotations
 
 import math
 
 from closures.drag_single import dallavalle, schiller_naumann
-from closures.law import law
+from closures.registry import law
 
 
 @law("drag", "Hill, Koch & Ladd, J. Fluid Mech. 448 (2001) 213 and 243; Koch & Hill (2001)", voidage=(0.36, 1.0))
 def koch_hill(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of Hill, Koch and Ladd, in the linear form for moderate Re.
+    r"""Drag factor of Hill, Koch and Ladd, linear form for moderate Re.
 
     .. math:: F = \varepsilon\,(F_0 + \tfrac12 F_3 Re),\quad F_3 = 0.0673 + 0.212\phi + 0.0232/\varepsilon^5
 
-    reynolds  Re, on the superficial slip and the diameter (Hill's own is on the radius, hence 1/2) [-]
+    reynolds  Re, on the superficial slip and the diameter (the source uses the radius, hence 1/2) [-]
     voidage   eps = 1 - phi [-]
     returns   F [-]
 
     F_0 = (1 + 3 sqrt(phi/2) + 135/64 phi ln phi + 16.14 phi) / (1 + 0.681 phi - 8.48 phi^2 + 8.16 phi^3) up to
-    phi = 0.4 and 10 phi/eps^3 above; it rises by 1 % there. F_0 is of the total force, hence the eps in front.
+    phi = 0.4 and 10 phi/eps^3 above, where it is 1 % higher. F_0 refers to the total force, hence the leading eps.
     Coefficients as in CFDEMcoupling; MFIX has 17.14 and a blend after Benyahia et al. (2006).
-    Range: phi < 0.64; the low-Re branch of single spheres is not included.
+
+    Range: phi < 0.64; the low-Re branch of isolated spheres is not included.
 
     >>> round(koch_hill(0.0, 0.5), 3)      # 10 phi / eps^2
     20.0
@@ -40,15 +41,15 @@ def koch_hill(reynolds: float, voidage: float) -> float:
 
 @law("drag", "van der Hoef, Beetstra & Kuipers, J. Fluid Mech. 528 (2005) 233", voidage=(0.4, 1.0), reynolds=(0.0, 0.1))
 def van_der_hoef(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of equal spheres in creeping flow by van der Hoef, Beetstra and Kuipers.
+    r"""Drag factor of van der Hoef, Beetstra and Kuipers for equal spheres in creeping flow.
 
     .. math:: F = \frac{10\phi}{\varepsilon^2} + \varepsilon^2(1+1.5\sqrt\phi)
 
-    reynolds  Re; does not matter [-]
+    reynolds  Re, not used [-]
     voidage   eps = 1 - phi [-]
     returns   F [-]
 
-    Range: Re -> 0, phi < 0.6. Published in this normal form.
+    Range: Re < 0.1, phi < 0.6; too low above. Published in this normal form.
 
     >>> round(van_der_hoef(0.0, 0.6), 2)
     11.81
@@ -118,18 +119,19 @@ def tang(reynolds: float, voidage: float) -> float:
     diameter_ratio=(0.25, 4.0),
 )
 def beetstra_polydisperse(reynolds: float, voidage: float, diameter_ratio: float) -> float:
-    r"""Drag factor of Beetstra, van der Hoef and Kuipers for a sphere among others of unequal size.
+    r"""Drag factor of Beetstra, van der Hoef and Kuipers for a sphere in a mixture of sizes.
 
     .. math:: F_i = (y_i + 0.064\,y_i^3)\,F(Re_i/y_i,\varepsilon),\qquad y_i = d_i/\langle d\rangle
 
-    reynolds        Re_i, on the superficial slip and the sphere's own diameter [-]
+    reynolds        Re_i, on the superficial slip and the diameter of the sphere [-]
     voidage         eps [-]
-    diameter_ratio  y, diameter over the Sauter mean of all spheres around, > 0 [-]
-    returns         F_i, over the Stokes drag of the sphere itself [-]
+    diameter_ratio  y_i, diameter of the sphere over the local Sauter mean, > 0 [-]
+    returns         F_i, over the Stokes drag of the sphere [-]
 
-    Range: as beetstra, which is F. The published factor of the total force, eps y + (1 - eps) y^2 + 0.064 eps y^3,
-    contains the share (1 - eps) y^2 of the pressure gradient and falls to this one without it, as in CFDEMcoupling;
-    MFIX leaves out the cubic term. Equal spheres, y = 1, get 6.4 % more than from beetstra: use that one for them.
+    Range: that of :func:`beetstra`, which is F. The published factor of the total force, eps y + (1 - eps) y^2 + 0.064
+    eps y^3, includes the term (1 - eps) y^2 of the pressure gradient; without it this factor remains, as in
+    CFDEMcoupling. MFIX omits the cubic term. For equal spheres (y = 1) F is 6.4 % above :func:`beetstra`; use beetstra
+    for them.
 
     >>> round(beetstra_polydisperse(0.0, 0.6, 1.0) / beetstra(0.0, 0.6), 9)
     1.064
@@ -155,10 +157,12 @@ def tenneti(reynolds: float, voidage: float) -> float:
     voidage   eps = 1 - phi [-]
     returns   F [-]
 
-    F_1 is that of schiller_naumann. The published sum is of the total force, hence the eps in front, as in waLBerla.
+    F_1 is :func:`closures.drag_single.schiller_naumann`. The published sum is the total force, hence the leading eps,
+    as in waLBerla.
+
     Range: 0.01 < Re < 300, 0.1 < phi < 0.5.
 
-    >>> round(tenneti(0.0, 0.6) / 0.6, 2)      # total force, phi = 0.4: Hill, Koch & Ladd have 18.5
+    >>> round(tenneti(0.0, 0.6) / 0.6, 2)      # total force, phi = 0.4; Hill, Koch & Ladd: 18.5
     18.12
     """
     solids = max(1.0 - voidage, 0.0)
@@ -178,7 +182,7 @@ def tenneti(reynolds: float, voidage: float) -> float:
     reynolds=(0.01, 3e3),
 )
 def rong(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of Rong, Dong and Yu: the form of Di Felice with a power fitted to packed beds of equal spheres.
+    r"""Drag factor of Rong, Dong and Yu: the form of Di Felice with an exponent fitted to packed beds of equal spheres.
 
     .. math:: F = F_{Dallavalle}\,\varepsilon^{-\chi},\quad
               \chi = 2.65(\varepsilon+1) - (5.3 - 3.5\varepsilon)\varepsilon^2\exp[-(1.5-\log_{10}Re)^2/2]
@@ -187,9 +191,10 @@ def rong(reynolds: float, voidage: float) -> float:
     voidage   eps [-]
     returns   F [-]; 0.96 at Re = 0, eps = 1
 
-    Range: 0.37 < eps < 1. Towards eps = 1 the power is 5.3 in creeping flow; exponent as in PhasicFlow.
+    Range: 0.37 < eps < 1, 0.01 < Re < 3000. The exponent tends to 5.3 for eps = 1 in creeping flow; coefficients as in
+    PhasicFlow.
 
-    >>> round(rong(0.0, 0.4), 2), round(150 * 0.6 / (18 * 0.16), 2)      # beside Ergun
+    >>> round(rong(0.0, 0.4), 2), round(150 * 0.6 / (18 * 0.16), 2)      # compared with Ergun
     (28.75, 31.25)
     """
     distance = 1.5 - math.log10(max(reynolds, 1e-12))

@@ -1,20 +1,20 @@
-r"""Drag of one sphere far from others, as the factor F over Stokes drag.
+r"""Drag of an isolated sphere, as the factor F over Stokes drag.
 
 .. math:: F_d = 3\pi\eta d\,U\,F(Re),\qquad F = C_D\,Re/24
 
-Every law takes the voidage too, so that it can stand where a law of a dense bed stands, and does not use it.
+Every law takes the voidage as well, without using it, so that it can replace a drag law of a bed.
 """
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law("drag", "Stokes, Trans. Camb. Phil. Soc. 9 (1851) 8", reynolds=(0.0, 0.1))
 def stokes(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a creeping sphere.
+    r"""Drag factor of a sphere in creeping flow (Stokes).
 
     .. math:: F = 1
 
@@ -22,7 +22,7 @@ def stokes(reynolds: float, voidage: float) -> float:
     voidage   eps, not used [-]
     returns   F [-]
 
-    Range: Re < 0.1, above it the drag is too low.
+    Range: Re < 0.1; too low above.
 
     >>> stokes(0.01, 1.0)
     1.0
@@ -32,7 +32,7 @@ def stokes(reynolds: float, voidage: float) -> float:
 
 @law("drag", "Schiller & Naumann, Z. Ver. Dtsch. Ing. 77 (1933) 318; 0.44 above Re = 1000", reynolds=(0.0, 2e5))
 def schiller_naumann(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a sphere up to the crisis of drag, by Schiller and Naumann.
+    r"""Drag factor of a sphere up to the drag crisis (Schiller and Naumann).
 
     .. math:: F = 1 + 0.15\,Re^{0.687}\ (Re\le1000),\qquad 0.44\,Re/24\ (Re>1000)
 
@@ -52,7 +52,7 @@ def schiller_naumann(reynolds: float, voidage: float) -> float:
 
 @law("drag", "Dallavalle, Micromeritics (1948)", reynolds=(0.01, 3e3))
 def dallavalle(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a sphere by Dallavalle, the single sphere of Di Felice.
+    r"""Drag factor of a sphere (Dallavalle); the isolated sphere of Di Felice's law.
 
     .. math:: F = (4.8 + 0.63\sqrt{Re})^2/24
 
@@ -60,7 +60,8 @@ def dallavalle(reynolds: float, voidage: float) -> float:
     voidage   eps, not used [-]
     returns   F [-]; 0.96 at Re = 0, 4 % below Stokes as published
 
-    Range: Re < 3000; 14 % above the standard curve at Re = 100, 30 % at 1000. From C_D = (0.63 + 4.8/sqrt(Re))^2.
+    Range: 0.01 < Re < 3000; 14 % above the standard drag curve at Re = 100, 30 % at 1000. From C_D = (0.63 +
+    4.8/sqrt(Re))^2.
 
     >>> round(24 / 100 * dallavalle(100.0, 1.0), 4)
     1.2321
@@ -71,7 +72,7 @@ def dallavalle(reynolds: float, voidage: float) -> float:
 
 @law("drag", "Abraham, Phys. Fluids 13 (1970) 2194, doi:10.1063/1.1693218", reynolds=(0.0, 5e3))
 def abraham(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a sphere by Abraham, from the thickness of its boundary layer.
+    r"""Drag factor of a sphere from its boundary-layer thickness (Abraham).
 
     .. math:: F = (1 + \sqrt{Re}/9.06)^2
 
@@ -90,7 +91,7 @@ def abraham(reynolds: float, voidage: float) -> float:
 
 @law("drag", "Brown & Lawler, J. Environ. Eng. 129 (2003) 222", reynolds=(0.0, 2e5))
 def brown_lawler(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a sphere by Brown and Lawler, fitted to experiments freed of wall effects.
+    r"""Drag factor of a sphere, fitted to experiments corrected for wall effects (Brown and Lawler).
 
     .. math:: F = 1 + 0.15\,Re^{0.681} + \frac{0.407\,Re^2}{24\,(Re + 8710)}
 
@@ -108,7 +109,7 @@ def brown_lawler(reynolds: float, voidage: float) -> float:
 
 @law("drag", "Clift, Grace & Weber, Bubbles, Drops, and Particles (1978), table 5.2", reynolds=(0.0, 1e6))
 def clift(reynolds: float, voidage: float) -> float:
-    r"""Drag factor of a sphere on the standard drag curve of Clift, Grace and Weber, through the crisis of drag.
+    r"""Drag factor of a sphere on the standard drag curve, including the drag crisis (Clift, Grace and Weber).
 
     .. math:: F = 1 + 0.1315\,Re^{0.82 - 0.05 w}\ (Re<20),\qquad 1 + 0.1935\,Re^{0.6305}\ (Re<260),\qquad
               C_D = 10^{P(w)}\ (Re<3.38\cdot10^5),\qquad w = \log_{10}Re,\quad F = C_D Re/24
@@ -117,12 +118,12 @@ def clift(reynolds: float, voidage: float) -> float:
     voidage   eps, not used [-]
     returns   F [-]
 
-    Range: Re < 1e6. The pieces meet within 0.8 % but for the crisis, Re = 4e5, where C_D drops by 21 %. P(w) is
-    1.6435 - 1.1242 w + 0.1558 w^2 below Re = 1500, then -2.4571 + 2.5558 w - 0.9295 w^2 + 0.1049 w^3 below 12 000,
-    -1.9181 + 0.6370 w - 0.0636 w^2 below 44 000, -4.3390 + 1.5809 w - 0.1546 w^2 below 338 000; in the crisis
-    C_D = 29.78 - 5.3 w below 4e5, 0.1 w - 0.49 below 1e6 and 0.19 - 8e4/Re above.
+    Range: Re < 1e6. The pieces meet within 0.8 %, except at Re = 4e5 in the drag crisis, where C_D drops by 21 %. P(w)
+    is 1.6435 - 1.1242 w + 0.1558 w^2 below Re = 1500, then -2.4571 + 2.5558 w - 0.9295 w^2 + 0.1049 w^3 below 12 000,
+    -1.9181 + 0.6370 w - 0.0636 w^2 below 44 000, -4.3390 + 1.5809 w - 0.1546 w^2 below 338 000; in the drag crisis C_D
+    = 29.78 - 5.3 w below 4e5, 0.1 w - 0.49 below 1e6 and 0.19 - 8e4/Re above.
 
-    >>> round(24 / 200 * clift(200.0, 1.0), 4)      # C_D at Re = 200, as the library `fluids` has it
+    >>> round(24 / 200 * clift(200.0, 1.0), 4)      # C_D at Re = 200, equal to the library `fluids`
     0.7756
     """
     if reynolds < 0.01:

@@ -1,27 +1,27 @@
-r"""A sphere in a liquid layer on a wall: drag of its wetted part, and the film that resists sliding and spin.
+r"""A sphere in a liquid layer on a wall: drag on the wetted part, lubrication forces and torques along the wall.
 
-Along the wall, spin is positive where it moves the lowest point of the sphere the same way as the speed.
+Spin is positive if it moves the lowest point of the sphere in the direction of the velocity.
 """
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 _ALONG = "Goldman, Cox & Brenner, Chem. Eng. Sci. 22 (1967) 637"
 
 
 @law("layer", "White, Viscous Fluid Flow; in Buck et al. (2018), eq. (25)", reynolds=(0.0, 2e5))
 def white(reynolds: float) -> float:
-    r"""Drag factor of a sphere over Stokes drag, by White.
+    r"""Drag factor of a sphere over Stokes drag (White).
 
     .. math:: F = 1 + \frac{Re}{4(1+\sqrt{Re})} + \frac{Re}{60}
 
     reynolds  Re = rho v D / eta; in a layer D = 2 R sin(phi) is the width of the wetted part [-]
     returns   F [-]
 
-    From C_D = 24/Re + 6/(1 + sqrt(Re)) + 0.4.
+    Range: Re < 2e5. From C_D = 24/Re + 6/(1 + sqrt(Re)) + 0.4.
 
     >>> round(24 / 100 * white(100.0), 3), round(24 / 100 + 6 / 11 + 0.4, 3)
     (1.185, 1.185)
@@ -31,7 +31,7 @@ def white(reynolds: float) -> float:
 
 @law("layer", f"{_ALONG}, translation")
 def sliding_force(gap_ratio: float) -> float:
-    r"""Force against sliding along a near wall, over 6 pi eta R v_t.
+    r"""Force on a sphere that slides along a nearby wall, over 6 pi eta R v_t.
 
     .. math:: \tfrac{8}{15}\ln(R/h) + 0.9588
 
@@ -40,7 +40,7 @@ def sliding_force(gap_ratio: float) -> float:
 
     Range: h/R below about 0.1.
 
-    >>> round(sliding_force(0.003202), 3)       # exact 4.0223 by the same authors
+    >>> round(sliding_force(0.003202), 3)       # exact solution of the same authors: 4.0223
     4.022
     """
     return 0.9588 - 8.0 / 15.0 * math.log(gap_ratio)
@@ -48,14 +48,14 @@ def sliding_force(gap_ratio: float) -> float:
 
 @law("layer", f"{_ALONG}, rotation")
 def spin_force(gap_ratio: float) -> float:
-    r"""Force along a near wall that spin causes, over 6 pi eta R (omega R).
+    r"""Force on a sphere that spins near a wall, over 6 pi eta R (omega R).
 
     .. math:: \tfrac{2}{15}\ln(R/h) - 0.2526
 
     gap_ratio  h/R, > 0 [-]
     returns    factor [-]
 
-    Range: h/R below about 0.1. Buck et al. (2018), eq. (29), print + 0.2526.
+    Range: h/R below about 0.1. Buck et al. (2018), eq. (29), have + 0.2526.
 
     >>> round(spin_force(0.003202), 3)
     0.513
@@ -65,14 +65,14 @@ def spin_force(gap_ratio: float) -> float:
 
 @law("layer", f"{_ALONG}, translation")
 def sliding_torque(gap_ratio: float) -> float:
-    r"""Torque that sliding along a near wall causes, over 8 pi eta R^2 v_t.
+    r"""Torque on a sphere that slides along a nearby wall, over 8 pi eta R^2 v_t.
 
     .. math:: \tfrac{1}{10}\ln(R/h) - 0.1895
 
     gap_ratio  h/R, > 0 [-]
-    returns    factor [-]; three quarters of :func:`spin_force`, as reciprocity asks
+    returns    factor [-]; 3/4 of :func:`spin_force`, by reciprocity
 
-    Range: h/R below about 0.1. Buck et al. (2018), eq. (30), print + 0.1895.
+    Range: h/R below about 0.1. Buck et al. (2018), eq. (30), have + 0.1895.
 
     >>> round(sliding_torque(0.003202), 3)
     0.385
@@ -82,7 +82,7 @@ def sliding_torque(gap_ratio: float) -> float:
 
 @law("layer", f"{_ALONG}, rotation")
 def spin_torque(gap_ratio: float) -> float:
-    r"""Torque against spin at a near wall, over 8 pi eta R^2 (omega R).
+    r"""Torque on a sphere that spins near a wall, over 8 pi eta R^2 (omega R).
 
     .. math:: \tfrac{2}{5}\ln(R/h) + 0.3817
 

@@ -1,15 +1,15 @@
-r"""The film between two bodies as a resistance c(h): a force -c u against the rate u = dh/dt of the gap.
+r"""Lubrication film between two particles as a resistance c(h): a force -c u, with u = dh/dt the rate of the gap.
 
-Because c depends on the gap alone, the impulse of a film is a difference of potentials,
-:math:`\int -c\,u\,dt = -A\,[L(h_1) - L(h_0)]`, whatever the path and the time in between. Integrators that
-use the potential have no stability limit from the film, however stiff.
+Since c depends on the gap alone, the impulse of a film is a difference of potentials,
+:math:`\int -c\,u\,dt = -A\,[L(h_1) - L(h_0)]`, for any path between the two gaps. An integrator that uses the potential
+has no stability limit from the film.
 """
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law("lubrication", "Brenner, Chem. Eng. Sci. 16 (1961) 242; Nijssen et al. (2023), eq. (1)")
@@ -19,8 +19,10 @@ def film_strength(viscosity: float, reduced_radius: float) -> float:
     .. math:: A = 6\pi\eta R^{*2}
 
     viscosity       eta, dynamic [Pa s]
-    reduced_radius  R*; the radius itself against a wall [m]
+    reduced_radius  R*; the radius of the sphere against a wall [m]
     returns         A [N s]
+
+    Range: h << R*; used up to h = R*.
 
     >>> round(film_strength(1e-3, 3.175e-3) * 1e7, 2)
     1.9
@@ -30,15 +32,17 @@ def film_strength(viscosity: float, reduced_radius: float) -> float:
 
 @law("lubrication", "Nijssen et al., Powder Technol. (2023), eqs (8) and (9), doi:10.1016/j.powtec.2022.118017")
 def film_resistance(strength: float, gap: float, minimum_gap: float, cutoff_gap: float) -> float:
-    r"""Resistance of the film, the lever of the lubricated contact included.
+    r"""Resistance of the film, including the load sharing below the minimum gap.
 
     .. math:: c = \frac{A}{h}\ (h_{min}<h\le h_{co}),\qquad c = \frac{h}{h_{min}}\frac{A}{h_{min}}\ (0<h\le h_{min})
 
     strength     A, from :func:`film_strength` [N s]
     gap          h, surface to surface, positive apart [m]
     minimum_gap  h_min [m]
-    cutoff_gap   h_co, reach of the film [m]
+    cutoff_gap   h_co, gap at which the film begins [m]
     returns      c, force per rate of the gap [kg/s]; 0 for h <= 0 and h > h_co
+
+    Range: any.
 
     >>> [film_resistance(2.0, gap, 0.125, 1.0) for gap in (0.5, 0.0625, 1.5)]
     [4.0, 8.0, 0.0]
@@ -52,7 +56,7 @@ def film_resistance(strength: float, gap: float, minimum_gap: float, cutoff_gap:
 
 @law("lubrication", "integral of Nijssen et al. (2023), eqs (8) and (9), over the gap")
 def film_potential(gap: float, minimum_gap: float, cutoff_gap: float) -> float:
-    r"""Potential L of the film: the impulse of the film between two gaps is -A times the difference of L.
+    r"""Potential L of the film; the impulse of the film between two gaps is -A times the difference of L.
 
     .. math:: L = \ln\frac{\min(h,h_{co})}{h_{min}} + \tfrac12\ (h>h_{min}),\quad
               \frac{h^2}{2h_{min}^2}\ (0<h\le h_{min}),\quad 0\ (h\le 0)
@@ -61,6 +65,8 @@ def film_potential(gap: float, minimum_gap: float, cutoff_gap: float) -> float:
     minimum_gap  h_min, > 0 [m]
     cutoff_gap   h_co, > h_min [m]
     returns      L [-]
+
+    Range: any.
 
     >>> film_potential(1.0, 1.0, 10.0), film_potential(-1.0, 1.0, 10.0)
     (0.5, 0.0)
@@ -74,7 +80,7 @@ def film_potential(gap: float, minimum_gap: float, cutoff_gap: float) -> float:
 
 @law("lubrication", "difference of the film's potential; series of the inverse hyperbolic tangent")
 def short_film_potential(gap: float, end_gap: float, minimum_gap: float) -> float:
-    r"""Change of the film's potential between two near gaps on one side of h_min, without branch or logarithm.
+    r"""Change of the film potential between two nearby gaps on one side of h_min, without branch or logarithm.
 
     .. math:: L(h_1) - L(h) = 2\left(t + \tfrac13 t^3 + \tfrac15 t^5 + \dots\right),\ t = \frac{h_1-h}{h_1+h}
               \quad(h>h_{min});\qquad \frac{\max(h_1,0)^2 - \max(h,0)^2}{2h_{min}^2}\quad(h\le h_{min})
@@ -82,7 +88,9 @@ def short_film_potential(gap: float, end_gap: float, minimum_gap: float) -> floa
     gap          h [m]
     end_gap      h_1, on the same side of h_min [m]
     minimum_gap  h_min, > 0 [m]
-    returns      L(h_1) - L(h), to 1e-16 where the gaps differ by less than a tenth or lie below h_min [-]
+    returns      L(h_1) - L(h) [-]
+
+    Range: gaps that differ by less than a tenth, or lie below h_min; error below 1e-16 there.
 
     >>> abs(short_film_potential(1.0, 1.1, 0.1) - math.log(1.1)) < 1e-16
     True
@@ -99,15 +107,17 @@ def short_film_potential(gap: float, end_gap: float, minimum_gap: float) -> floa
 
 @law("lubrication", "difference of the film's potential; its series where the gap changes by less than a tenth")
 def film_potential_change(gap: float, change: float, minimum_gap: float, cutoff_gap: float) -> float:
-    r"""Change of the film's potential, L(h + x) - L(h), without the logarithm where the change is small.
+    r"""Change of the film potential, L(h + x) - L(h); small changes are computed without the logarithm.
 
     .. math:: L(h + x) - L(h)
 
     gap          h [m]
-    change       x, of the gap [m]
+    change       x, change of the gap [m]
     minimum_gap  h_min, > 0 [m]
     cutoff_gap   h_co, > h_min [m]
     returns      L(h + x) - L(h) [-]
+
+    Range: any.
 
     >>> exact = film_potential(1.05, 0.1, 2.0) - film_potential(1.0, 0.1, 2.0)
     >>> abs(film_potential_change(1.0, 0.05, 0.1, 2.0) - exact) < 1e-15
@@ -120,7 +130,7 @@ def film_potential_change(gap: float, change: float, minimum_gap: float, cutoff_
     return film_potential(end, minimum_gap, cutoff_gap) - film_potential(gap, minimum_gap, cutoff_gap)
 
 
-@law("lubrication", "implicit in the end gap; monotone, so one root and no limit on the step")
+@law("lubrication", "implicit equation in the end gap, solved by Newton's method with bisection")
 def speed_after_film(
     speed: float,
     gap: float,
@@ -130,20 +140,21 @@ def speed_after_film(
     minimum_gap: float,
     cutoff_gap: float,
 ) -> float:
-    r"""Rate of the gap after a step in which only the film acts, solved for the gap at the step's end.
+    r"""Rate of the gap after a step in which only the film acts; implicit in the gap at the end of the step.
 
     .. math:: u_1 + B\,L(h + u_1\Delta t) = u_0 + B\,L(h_a)
 
     speed              u_0, rate of the gap before, positive apart [m/s]
     gap                h, at the start of the step [m]
-    accounted_gap      h_a, gap up to which the film's impulse has been given already; h for a first step [m]
+    accounted_gap      h_a, gap up to which the impulse of the film has already been applied; h for a first step [m]
     step               dt [s]
     strength_per_mass  B = A/m* [m/s]
     minimum_gap        h_min [m]
     cutoff_gap         h_co [m]
     returns            u_1 [m/s]
 
-    In the film zone the speed is linear in ln h: u = -v0 + B ln(h_co/h), and a slow pair stops at h_co exp(-St).
+    Range: any step; the equation is monotone and has one root. For h > h_min the speed is linear in ln h,
+    u = -v0 + B ln(h_co/h), and a slow pair stops at h_co exp(-St).
 
     >>> stop = 1.0 + 1e9 * speed_after_film(-1.0, 1.0, 1.0, 1e9, 0.5, 1e-6, 1.0)      # St = v0/B = 2
     >>> round(stop / math.exp(-2.0), 6)
@@ -152,7 +163,7 @@ def speed_after_film(
     total = speed + strength_per_mass * film_potential_change(gap, accounted_gap - gap, minimum_gap, cutoff_gap)
     guess = total / (1.0 + step * film_resistance(strength_per_mass, gap, minimum_gap, cutoff_gap))
     if abs(step * guess) < 1e-7 * gap:
-        return guess  # the resistance has not changed by more than rounding
+        return guess  # the change of the resistance is below rounding
     low, high = -math.inf, math.inf
     for _ in range(100):
         potential = film_potential_change(gap, step * guess, minimum_gap, cutoff_gap)
@@ -166,7 +177,7 @@ def speed_after_film(
         end = gap + step * guess
         following = guess - excess / (1.0 + step * film_resistance(strength_per_mass, end, minimum_gap, cutoff_gap))
         if not low < following < high:
-            # the potential lies between 0 and its value at the cut-off gap, which brackets the root
+            # the potential lies between 0 and its value at the cut-off gap; this brackets the root
             reach = strength_per_mass * film_potential_change(gap, cutoff_gap - gap, minimum_gap, cutoff_gap)
             depth = strength_per_mass * film_potential_change(gap, -gap, minimum_gap, cutoff_gap)
             following = 0.5 * (max(low, total - reach) + min(high, total - depth))
@@ -176,7 +187,7 @@ def speed_after_film(
     return guess
 
 
-@law("lubrication", "Newton's method on the implicit equation of the film's step; series of its potential")
+@law("lubrication", "same equation as speed_after_film, by two Newton steps with the series of the potential")
 def speed_after_short_step(
     speed: float,
     gap: float,
@@ -186,25 +197,27 @@ def speed_after_short_step(
     minimum_gap: float,
     cutoff_gap: float,
 ) -> float:
-    r"""The same rate where the gap hardly changes, without branch or logarithm; NaN where it changes more.
+    r"""Rate of the gap after a step with a small change of the gap, without branch or logarithm; NaN otherwise.
 
     .. math:: u_1 + B\,L(h + u_1\Delta t) = u_0 + B\,L(h_a)
 
     speed              u_0, rate of the gap before, positive apart [m/s]
     gap                h, at the start of the step [m]
-    accounted_gap      h_a, gap up to which the film's impulse has been given already; h for a first step [m]
+    accounted_gap      h_a, gap up to which the impulse of the film has already been applied; h for a first step [m]
     step               dt [s]
     strength_per_mass  B = A/m* [m/s]
     minimum_gap        h_min [m]
     cutoff_gap         h_co [m]
-    returns            u_1, to 1e-14; NaN where the gap changes by more than a tenth in the film, or leaves the film
-                       or the zone below h_min [m/s]
+    returns            u_1, to 1e-14 relative; NaN outside the range [m/s]
+
+    Range: the gap changes by less than a tenth within the film, or stays below h_min. Outside, use
+    :func:`speed_after_film`.
 
     >>> fast, safe = (f(-1.0, 1.0, 1.001, 0.03, 0.5, 1e-6, 2.0) for f in (speed_after_short_step, speed_after_film))
     >>> abs(fast - safe) < 1e-15, speed_after_short_step(-1.0, 1.0, 1.0, 0.5, 0.5, 1e-6, 2.0)
     (True, nan)
     """
-    # the slope of the potential is 1/h in the film and h/h_min^2 below it: upper/lower of both
+    # slope of the potential: 1/h in the film, h/h_min^2 below h_min; stored as upper/lower
     inside = gap > minimum_gap
     square_gap = minimum_gap * minimum_gap
     weight = step * strength_per_mass
@@ -218,7 +231,7 @@ def speed_after_short_step(
         lower, upper = (end, 1.0) if inside else (square_gap, max(end, 0.0))
         last = excess * lower / (lower + weight * upper)
         guess -= last
-    # the last correction shows how far it was from the root, and so how near it is now
+    # the last Newton correction bounds the remaining error
     end = gap + step * guess
     low, high = min(gap, end, accounted_gap), max(gap, end, accounted_gap)
     shortly = (low > minimum_gap and high < cutoff_gap and high - low <= 0.1 * low) if inside else high <= minimum_gap

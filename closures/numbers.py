@@ -1,10 +1,10 @@
-"""Dimensionless numbers, each defined once."""
+"""Dimensionless numbers."""
 
 from __future__ import annotations
 
 import math
 
-from closures.law import law
+from closures.registry import law
 
 
 @law(
@@ -12,17 +12,17 @@ from closures.law import law
     "Yang & Hunt, Phys. Fluids 18 (2006) 121506, doi:10.1063/1.2396925; Nijssen et al. (2023) eq. (2)",
 )
 def stokes(reduced_mass: float, speed: float, viscosity: float, reduced_radius: float) -> float:
-    r"""Stokes number of two bodies that meet in a fluid: their inertia against the film between them.
+    r"""Stokes number of a collision in a fluid: inertia of the particles over viscous resistance of the film.
 
     .. math:: St = \frac{m^* v}{6\pi\eta R^{*2}}
 
-    reduced_mass    m*, reduced mass of the two bodies; the mass itself against a wall [kg]
+    reduced_mass    m*; the mass of the particle against a wall [kg]
     speed           v, relative speed [m/s]
     viscosity       eta, dynamic [Pa s]
-    reduced_radius  R*, reduced radius; the radius itself against a wall [m]
+    reduced_radius  R*; the radius of the particle against a wall [m]
     returns         St [-]
 
-    Range: any. Against a fixed wall this is rho_p d v / (9 eta).
+    Range: any. Against a fixed wall St = rho_p d v / (9 eta).
 
     >>> mass = math.pi / 6 * 6e-3**3 * 7800        # Gondret's steel sphere in silicone oil: St = 27
     >>> round(stokes(mass, 0.518, 965 * 1.036e-4, 3e-3))
@@ -33,7 +33,7 @@ def stokes(reduced_mass: float, speed: float, viscosity: float, reduced_radius: 
 
 @law("number", "Crowe et al., Multiphase Flows with Droplets and Particles (2011) ch. 4")
 def reynolds(density: float, speed: float, diameter: float, viscosity: float) -> float:
-    r"""Reynolds number of a sphere in a stream.
+    r"""Reynolds number of a sphere in a flow.
 
     .. math:: Re = \rho U d / \eta
 
@@ -43,6 +43,8 @@ def reynolds(density: float, speed: float, diameter: float, viscosity: float) ->
     viscosity  eta, dynamic [Pa s]
     returns    Re [-]
 
+    Range: any.
+
     >>> round(reynolds(965.0, 0.518, 6e-3, 965 * 1.036e-4))     # Gondret et al. (2002): Re = 30
     30
     """
@@ -51,7 +53,7 @@ def reynolds(density: float, speed: float, diameter: float, viscosity: float) ->
 
 @law("number", "Crowe et al., Multiphase Flows with Droplets and Particles (2011) ch. 4")
 def archimedes(diameter: float, density: float, fluid_density: float, viscosity: float, gravity: float) -> float:
-    r"""Archimedes number: the weight of a submerged sphere against the viscosity that holds it back.
+    r"""Archimedes number: buoyant weight of a sphere over viscous resistance.
 
     .. math:: Ar = \frac{g\,\rho_f(\rho_p-\rho_f)d^3}{\eta^2}
 
@@ -60,7 +62,9 @@ def archimedes(diameter: float, density: float, fluid_density: float, viscosity:
     fluid_density  rho_f [kg/m3]
     viscosity      eta, dynamic [Pa s]
     gravity        g [m/s2]
-    returns        Ar [-]; negative for a sphere that floats
+    returns        Ar [-]; negative if the sphere is lighter than the fluid
+
+    Range: any.
 
     >>> round(archimedes(1e-3, 2500.0, 1000.0, 1e-3, 9.81))
     14715
@@ -68,9 +72,9 @@ def archimedes(diameter: float, density: float, fluid_density: float, viscosity:
     return gravity * fluid_density * (density - fluid_density) * diameter**3 / viscosity**2
 
 
-@law("number", "Davis, Phys. Fluids 35 (2023), table I (the sphere radius stands in the numerator)")
+@law("number", "Davis, Phys. Fluids 35 (2023), table I (there with the sphere radius in the numerator)")
 def capillary(viscosity: float, speed: float, surface_tension: float) -> float:
-    r"""Capillary number: viscous stress against surface tension.
+    r"""Capillary number: viscous stress over capillary stress.
 
     .. math:: Ca = \eta v / \sigma
 
@@ -78,6 +82,8 @@ def capillary(viscosity: float, speed: float, surface_tension: float) -> float:
     speed            v [m/s]
     surface_tension  sigma [N/m]
     returns          Ca [-]
+
+    Range: any.
 
     >>> capillary(1e-3, 0.072, 0.072)
     0.001

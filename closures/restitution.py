@@ -1,30 +1,30 @@
-"""Closed-form restitution of wet and immersed collisions, for plots and checks."""
+"""Restitution of wet and immersed collisions in closed form; for comparison, not used by the solver."""
 
 from __future__ import annotations
 
 import math
 
 from closures.bridge import deforming_potential
-from closures.law import law
+from closures.registry import law
 
 
 @law(
     "restitution",
-    "integral of Nijssen et al. (2023), eq. (9), with the lever zone's half; cf. Davis, Serayssol & Hinch (1986)",
+    "integral of Nijssen et al. (2023), eq. (9), the 1/2 from below h_min; cf. Davis, Serayssol & Hinch (1986)",
     stokes=(0.0, math.inf),
 )
 def immersed(stokes: float, restitution: float, cutoff_gap: float, minimum_gap: float) -> float:
-    r"""Restitution of two immersed spheres whose contact is deep against the minimum gap.
+    r"""Restitution of two immersed spheres whose overlap is large compared with the minimum gap.
 
     .. math:: e = e_{dry} - \frac{1+e_{dry}}{St}\left[\ln\frac{h_{co}}{h_{min}} + \tfrac12\right]
 
-    stokes       St, of the approach at h_co [-]
+    stokes       St, of the approach speed at h_co [-]
     restitution  e_dry [-]
     cutoff_gap   h_co [m]
     minimum_gap  h_min [m]
-    returns      e at h = h_co outbound [-]; 0 where the pair does not come back to h_co
+    returns      e, with the rebound speed at h_co [-]; 0 if the pair does not separate to h_co
 
-    Range: within 5e-4 of the full model where the largest overlap exceeds 15 h_min, 1.2e-2 where it equals h_min.
+    Range: within 5e-4 of the full model if the largest overlap exceeds 15 h_min, within 1.2e-2 if it equals h_min.
 
     >>> round(immersed(100.0, 0.97, 3.175e-3, 796e-9), 3)        # Delrin in water
     0.797
@@ -33,9 +33,9 @@ def immersed(stokes: float, restitution: float, cutoff_gap: float, minimum_gap: 
     return max(0.0, restitution - (1.0 + restitution) / stokes * lost)
 
 
-@law("restitution", "root of the closed form of immersed collisions")
+@law("restitution", "root of the closed form for immersed collisions")
 def critical_stokes(restitution: float, cutoff_gap: float, minimum_gap: float) -> float:
-    r"""Stokes number above which an immersed pair separates again.
+    r"""Stokes number above which an immersed pair rebounds.
 
     .. math:: St_c = \frac{1+e_{dry}}{e_{dry}}\left[\ln\frac{h_{co}}{h_{min}} + \tfrac12\right]
 
@@ -43,6 +43,8 @@ def critical_stokes(restitution: float, cutoff_gap: float, minimum_gap: float) -
     cutoff_gap   h_co [m]
     minimum_gap  h_min [m]
     returns      St_c [-]
+
+    Range: that of :func:`immersed`.
 
     >>> round(critical_stokes(0.97, 3.175e-3, 796e-9), 1)        # Delrin
     17.9
@@ -52,13 +54,15 @@ def critical_stokes(restitution: float, cutoff_gap: float, minimum_gap: float) -
 
 @law("restitution", "film zone of Nijssen et al. (2023), eq. (8), integrated")
 def stop_gap(stokes: float, cutoff_gap: float) -> float:
-    r"""Gap at which the film has stopped a slow pair, where that is above the minimum gap.
+    r"""Gap at which the film stops a slow pair.
 
     .. math:: h_{stop} = h_{co}\,e^{-St}
 
-    stokes      St, of the approach at h_co [-]
+    stokes      St, of the approach speed at h_co [-]
     cutoff_gap  h_co [m]
     returns     h_stop [m]
+
+    Range: h_stop > h_min.
 
     >>> round(stop_gap(5.0, 1.0), 5)
     0.00674
@@ -72,15 +76,15 @@ def stop_gap(stokes: float, cutoff_gap: float) -> float:
     stokes=(1.0, 1e5),
 )
 def legendre(stokes: float, restitution: float) -> float:
-    r"""Fitted restitution of solid spheres and drops that bounce off a wall in a fluid.
+    r"""Restitution of solid spheres and drops against a wall in a fluid, fitted to experiments.
 
     .. math:: e = e_{dry}\,\exp(-35/St^*),\qquad St^* = \frac{(\rho_p + \rho_f/2)\,U d}{9\eta}
 
-    stokes       St*, Stokes number with the added mass in it [-]
+    stokes       St*, Stokes number with added mass [-]
     restitution  e_dry [-]
     returns      e [-]
 
-    Range: experiments scatter by 0.1 to 0.2 about it between St* = 20 and 200.
+    Range: 1 < St* < 1e5; experiments scatter by 0.1 to 0.2 between St* = 20 and 200.
 
     >>> round(legendre(100.0, 1.0), 3)
     0.705
@@ -90,13 +94,15 @@ def legendre(stokes: float, restitution: float) -> float:
 
 @law("restitution", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis, Phys. Fluids 35 (2023), eq. (42)")
 def davis_sitison_critical_stokes(restitution: float, film_share: float) -> float:
-    r"""Stokes number above which two coated spheres that meet head-on separate again.
+    r"""Stokes number above which two coated spheres rebound from a head-on collision.
 
     .. math:: St_s = \frac{1+e_{dry}}{e_{dry}}\left[\ln\frac1x - 3\ln(2-x) + 2 - \frac{2}{2-x}\right]
 
     restitution  e_dry [-]
-    film_share   x = h_min/d, minimum gap over the film of both bodies, 0 < x <= 1 [-]
+    film_share   x = h_min/d, minimum gap over the film thickness of both particles, 0 < x <= 1 [-]
     returns      St_s [-]
+
+    Range: deforming films, 0 < x <= 1.
 
     >>> round(davis_sitison_critical_stokes(1.0, 0.05), 3)
     3.933
@@ -106,14 +112,16 @@ def davis_sitison_critical_stokes(restitution: float, film_share: float) -> floa
 
 @law("restitution", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis, Phys. Fluids 35 (2023), eq. (41)")
 def davis_sitison(stokes: float, restitution: float, film_share: float) -> float:
-    r"""Restitution of two coated spheres that meet head-on and turn back as hard spheres at the minimum gap.
+    r"""Restitution of two coated spheres in a head-on collision, with a hard-sphere rebound at the minimum gap.
 
     .. math:: e = e_{dry}\,(1 - St_s/St)\quad(St > St_s),\qquad 0\quad(St \le St_s)
 
-    stokes       St, of the approach where the films meet [-]
+    stokes       St, of the approach speed where the films touch [-]
     restitution  e_dry [-]
     film_share   x = h_min/d [-]
-    returns      e, where the films part [-]
+    returns      e, with the rebound speed where the films separate [-]
+
+    Range: deforming films, 0 < x <= 1.
 
     >>> round(davis_sitison(10.0, 1.0, 0.05), 4)
     0.6067
@@ -128,24 +136,25 @@ def davis_sitison(stokes: float, restitution: float, film_share: float) -> float
     film_ratio=(0.05, 0.143),
 )
 def singh(stokes: float, film_ratio: float) -> float:
-    r"""Restitution of a glass bead of e_dry = 0.98 that falls on a liquid film on a plate, where inertia matters.
+    r"""Restitution of a glass bead (e_dry = 0.98) on a plate with a liquid film, at high Stokes numbers.
 
     .. math:: e = \min\left(e^{-1.76}\,St^{0.17}\gamma^{-0.16},\ e^{-0.90}\,St^{0.01}\gamma^{-0.22}\right)
 
     stokes      St = rho_p D v / (9 eta) [-]
-    film_ratio  gamma, thickness of the film over the diameter of the bead [-]
+    film_ratio  gamma, film thickness over diameter of the bead [-]
     returns     e [-]
 
-    Range: fitted to St 34 to 3440 and gamma 0.05 to 0.143. Outside it knows no limit: it never sticks at low St, and
-    exceeds the dry 0.98 for gamma below 0.025; ``page(singh).outside(stokes=..., film_ratio=...)`` tells.
+    Range: fitted to 34 < St < 3440 and 0.05 < gamma < 0.143. Outside, the fit is wrong: it never gives e = 0 at low St
+    and exceeds 0.98 for gamma < 0.025. ``law_of(singh).outside(stokes=..., film_ratio=...)`` lists arguments out of
+    range.
 
-    The two planes with their own prefactors meet without a jump; the rounded 0.17 and 0.4 of the paper's eq. (24) would
-    leave one of 0.6 %.
+    With these prefactors the two branches meet without a jump; the rounded 0.17 and 0.4 of the paper's eq. (24) leave a
+    jump of 0.6 %.
 
     >>> round(singh(200.0, 0.1), 3), round(singh(2000.0, 0.1), 3)
     (0.612, 0.728)
-    >>> from closures.law import page
-    >>> page(singh).outside(stokes=10.0, film_ratio=0.1)
+    >>> from closures.registry import law_of
+    >>> law_of(singh).outside(stokes=10.0, film_ratio=0.1)
     ['stokes']
     """
     slow = math.exp(-1.76) * stokes**0.17 * film_ratio**-0.16

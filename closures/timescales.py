@@ -1,11 +1,11 @@
-"""The clocks of a run: how fast each piece of physics moves."""
+"""Time scales of contacts, films, drag and flow; they limit the time step."""
 
 from __future__ import annotations
 
 import math
 
 from closures.contact import hertz_largest_overlap
-from closures.law import law
+from closures.registry import law
 
 
 @law("timescale", "Johnson, Contact Mechanics (1985) eq. (11.24)")
@@ -17,9 +17,11 @@ def hertz_time(reduced_mass: float, stiffness: float, speed: float) -> float:
     reduced_mass  m* [kg]
     stiffness     k = 4/3 E* sqrt(R*) [N/m^1.5]
     speed         v, normal approach speed, > 0 [m/s]
-    returns       t_H [s]; it grows as v^(-1/5) towards rest
+    returns       t_H [s]; increases as v^(-1/5) for slow impacts
 
-    Two glass spheres of 10 mm radius at 20 m/s stay together for 40.338 us (Chung & Ooi 2011, test 1).
+    Range: overlap << R*, elastic solids.
+
+    Two glass spheres of 10 mm radius at 20 m/s are in contact for 40.338 us (Chung & Ooi 2011, test 1).
 
     >>> from closures.contact import hertz_stiffness, reduced_modulus
     >>> k = hertz_stiffness(reduced_modulus(48e9, 0.2, 48e9, 0.2), 5e-3)
@@ -34,7 +36,7 @@ def hertz_time(reduced_mass: float, stiffness: float, speed: float) -> float:
     "linear stability of velocity Verlet, step < 2/omega, for the tangent stiffness of Hertz' law",
 )
 def overlap_period(reduced_mass: float, stiffness: float, overlap: float) -> float:
-    r"""Inverse angular frequency of a Hertz contact about a given overlap.
+    r"""Inverse angular frequency of a Hertz contact at a given overlap.
 
     .. math:: 1/\omega = \sqrt{m^*/(\tfrac32 k\sqrt\delta)}
 
@@ -42,6 +44,8 @@ def overlap_period(reduced_mass: float, stiffness: float, overlap: float) -> flo
     stiffness     k [N/m^1.5]
     overlap       delta, > 0 [m]
     returns       1/omega [s]
+
+    Range: any.
 
     >>> round(overlap_period(1.5, 1.0, 1.0), 3)
     1.0
@@ -51,7 +55,7 @@ def overlap_period(reduced_mass: float, stiffness: float, overlap: float) -> flo
 
 @law("timescale", "inverse rate of Nijssen et al. (2023), eq. (8), at the minimum gap")
 def film_time(reduced_mass: float, strength: float, gap: float) -> float:
-    r"""Time in which a film brings two bodies to rest at a given gap.
+    r"""Relaxation time of a pair in its film at a given gap.
 
     .. math:: t_f = m^* h / A
 
@@ -60,15 +64,17 @@ def film_time(reduced_mass: float, strength: float, gap: float) -> float:
     gap           h [m]
     returns       t_f [s]
 
+    Range: h >= h_min.
+
     >>> film_time(1.0, 2.0, 4.0)
     2.0
     """
     return reduced_mass * gap / strength
 
 
-@law("timescale", "balance of the sphere's inertia and its drag in the normal form of closures.drag")
+@law("timescale", "inertia of a sphere over its drag in the normal form of closures.drag")
 def drag_time(diameter: float, density: float, viscosity: float, voidage: float, drag_factor: float) -> float:
-    r"""Time in which drag takes up the slip of a sphere.
+    r"""Relaxation time of a sphere by drag.
 
     .. math:: \tau = \frac{\rho_p d^2}{18\eta\varepsilon F}
 
@@ -79,6 +85,8 @@ def drag_time(diameter: float, density: float, viscosity: float, voidage: float,
     drag_factor  F, over Stokes drag on the superficial slip [-]
     returns      tau [s]
 
+    Range: any.
+
     >>> round(drag_time(1e-3, 1800.0, 1e-3, 1.0, 1.0), 9)
     0.1
     """
@@ -87,13 +95,15 @@ def drag_time(diameter: float, density: float, viscosity: float, voidage: float,
 
 @law("timescale", "Courant, Friedrichs & Lewy, Math. Ann. 100 (1928) 32")
 def courant_time(cell: float, speed: float) -> float:
-    r"""Time in which a stream crosses a cell; the step over it is the Courant number.
+    r"""Time in which the flow crosses a cell; the time step over it is the Courant number.
 
     .. math:: t_C = \Delta x / u
 
     cell     dx, width of the cell [m]
     speed    u, > 0 [m/s]
     returns  t_C [s]
+
+    Range: any.
 
     >>> courant_time(0.5, 2.0)
     0.25

@@ -10,7 +10,7 @@ import pytest
 @pytest.fixture(autouse=True, scope="session")
 def one_thread() -> Iterator[None]:
     """Run threaded loops on one thread."""
-    from cfddem.kernels import use_threads
+    from cfddem.backend.compile import use_threads
 
     before = use_threads(None)
     use_threads(1)

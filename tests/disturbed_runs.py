@@ -1,6 +1,7 @@
-"""A tiny coupled run, killed again and again at random instants, and what must be the same at its end.
+"""A tiny coupled run that is killed repeatedly at random instants, and comparisons of its end.
 
-`python tests/disturbed_runs.py 100` kills it a hundred times; a quarter of an hour, most of it starting processes.
+`python tests/disturbed_runs.py 100` kills it a hundred times, which takes a quarter of an hour, mostly to start
+processes.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from cfddem import open_run
-from cfddem.case import Case
-from cfddem.record import checkpoint
-from cfddem.run import Run
+from cfddem.case.schema import Case
+from cfddem.io import checkpoint
+from cfddem.run.runner import Run
 
 TINY = """
 title = "Glass beads that sink in water"
@@ -48,13 +49,13 @@ until = 0.024
 every = 0.004
 history_every = 0.001
 reference_speed = 0.1
-collisions = true
+record_collisions = true
 """
-"""Films are there from the start, contacts after a few milliseconds; a second of wall time."""
+"""It has films from the start and contacts after a few milliseconds, and takes a second."""
 
 
 def same_state(left: Path, right: Path) -> None:
-    """The last checkpoints hold the same bits: particles, pairs, walls, fluid, exchange and encounters."""
+    """The last checkpoints are equal bit for bit."""
 
     def compare(one: dict, other: dict, where: str) -> None:
         assert one.keys() == other.keys(), where
@@ -70,7 +71,7 @@ def same_state(left: Path, right: Path) -> None:
 
 
 def same_record(left: Path, right: Path) -> None:
-    """Snapshots, history and encounters are the same, value by value."""
+    """Snapshots, history and collisions are equal, value by value."""
     one, other = open_run(left), open_run(right)
     assert one.times.tolist() == other.times.tolist() and one.steps.tolist() == other.steps.tolist()
     for place in range(len(one.times)):
@@ -86,16 +87,16 @@ def same_record(left: Path, right: Path) -> None:
 
 
 def long_enough(kills: int) -> str:
-    """The case, made so long that it can be killed so often and still gets on."""
+    """The case with an end late enough for so many kills."""
     return TINY.replace("until = 0.024", f"until = {0.012 * kills:g}").replace("every = 0.004", "every = 0.002", 1)
 
 
 def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
-    """Kill a run at random instants, every other time while it loads, and let it go on; at last to its end.
+    """Kill a run at random instants, every other time while it loads, resume it after each, and at last let it finish.
 
-    Every folder that a kill leaves opens, and lacks nothing up to its last snapshot.
+    After every kill the folder can be opened and is complete up to its last snapshot.
 
-    returns  how often it was hit before its end
+    returns  number of kills before the run finished
     """
     run, instants, hits = folder / "run", random.Random(seed), 0
     (folder / "case.toml").write_text(long_enough(kills))
@@ -127,15 +128,15 @@ def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
 
 
 def _started(folder: Path) -> subprocess.Popen[str]:
-    """The run, begun or gone on with, in a process of its own."""
+    """Start or resume the run in a separate process."""
     begun = (folder / "run" / "run.json").exists()
     words = ["resume", "run"] if begun else ["run", "case.toml", "-o", "run"]
-    command = [sys.executable, "-m", "cfddem.cli", *words]
+    command = [sys.executable, "-m", "cfddem", *words]
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
 def _snapshots(run: Path) -> int:
-    """Number of the last snapshot that is there; a resumed run first drops what is later than its checkpoint."""
+    """Number of the last snapshot; a resumed run first drops snapshots after its checkpoint."""
     return max((int(each.stem) for each in (run / "data").glob("[0-9]*.h5")), default=-1)
 
 
@@ -148,4 +149,4 @@ if __name__ == "__main__":
         Run.begin(Case.from_text(long_enough(count)), whole).go()
         same_state(disturbed / "run", whole)
         same_record(disturbed / "run", whole)
-        print(f"killed {hit} times; its end is the same to the last bit")
+        print(f"killed {hit} times; the end is equal bit for bit")

@@ -1,4 +1,4 @@
-"""Cases that tests take apart: beads in water, as a user would write them, and a mixture."""
+"""Case texts for tests: beads in water as a user would write them, and a mixture."""
 
 TEXT = """# Alumina beads fluidised by water: a slice of the bed of Ferreira et al., Powder Technol. 426 (2023) 118652.
 # The experiment: 72 400 beads in a column of 100 mm; here 2 000 of them between frictionless sides.
@@ -10,8 +10,8 @@ viscosity = 8.354e-4           # Pa s
 
 [material.alumina]
 density = 3585.9               # kg/m3
-youngs_modulus = 3.0e11        # Pa, of the real solid: the film feels it
-contact_modulus = 1.0e7        # Pa, softened, so that larger steps are stable
+youngs_modulus = 3.0e11        # Pa, of the real solid; films use it
+contact_modulus = 1.0e7        # Pa, softer contacts allow larger time steps
 poisson = 0.3
 restitution = 0.9
 friction = 0.1
@@ -35,10 +35,10 @@ drag = "di_felice"
 lubrication = "nijssen"
 
 [run]
-until = 3.0                    # s; 20 s for means within a per cent
+until = 3.0                    # s; 20 s for averages within one per cent
 every = 0.05                   # s
 average_from = 1.5             # s
-reference_speed = 0.1          # m/s, fastest collisions
+reference_speed = 0.1          # m/s, highest collision speed
 """
 
 MIXTURE = """

@@ -1,4 +1,4 @@
-"""Pairs of bodies for the tests of contacts: one at a time, or many far apart in one run."""
+"""Pairs of particles for the tests of contacts: one at a time, or many far apart in one run."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import Laws
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import Bodies, bodies
-from cfddem.particles.walls import Plane
+from cfddem.particles.state import Particles, make_particles
+from cfddem.particles.walls.shapes import Plane
 from closures import contact, timescales
 
 DATA = Path(__file__).parents[1] / "scenarios" / "data"
@@ -57,7 +58,7 @@ class Pair:
 
     @property
     def masses(self) -> tuple[float, float]:
-        """Of both bodies [kg]; the wall's is infinite."""
+        """Of both particles [kg]; the wall's is infinite."""
         first, second = (m.density * 4.0 / 3.0 * np.pi * r**3 for m, r in zip(self.materials, self.radii))
         return first, np.inf if self.wall else second
 
@@ -86,7 +87,7 @@ class Pair:
         first, second = self.masses
         velocity = np.array([self.approach, self.slide, 0.0])
         if self.wall:
-            made = bodies(
+            made = make_particles(
                 [[-self.radii[0] - self.gap, 0.0, 0.0]],
                 self.radii[0],
                 self.materials[0].density,
@@ -96,7 +97,7 @@ class Pair:
             )
             planes = [Plane(normal=(-1.0, 0.0, 0.0), material=1)]
         else:
-            made = bodies(
+            made = make_particles(
                 [[-self.radii[0] - self.gap, 0.0, 0.0], [self.radii[1], 0.0, 0.0]],
                 self.radii,
                 [m.density for m in self.materials],
@@ -112,28 +113,28 @@ class Pair:
 
 def relative_velocity(run: ParticleSolver) -> np.ndarray:
     """Velocity of the first body against the second or the wall [m/s]."""
-    velocity = run.bodies.velocity
+    velocity = run.particles.velocity
     return velocity[0] - velocity[1] if len(velocity) > 1 else velocity[0]
 
 
 def normal_speed(run: ParticleSolver) -> float:
     """Rate of the gap [m/s]."""
-    if run.bodies.count == 1:
-        return float(-run.bodies.velocity[0, 0])
-    apart = run.bodies.position[0] - run.bodies.position[1]
+    if run.particles.count == 1:
+        return float(-run.particles.velocity[0, 0])
+    apart = run.particles.position[0] - run.particles.position[1]
     return float(relative_velocity(run) @ apart / np.linalg.norm(apart))
 
 
 def until_apart(run: ParticleSolver, step: float, chunk: int = 10) -> ParticleSolver:
-    """Advance until the bodies have separated after their contact."""
+    """Advance until the particles have separated after their contact."""
     for _ in range(2000):
         run.advance(step, chunk)
         if run.gap[0] > 0.0 and normal_speed(run) > 0.0:
             return run
-    raise AssertionError("the bodies do not separate")
+    raise AssertionError("the particles do not separate")
 
 
-def kinetic_energy(made: Bodies) -> np.ndarray:
+def kinetic_energy(made: Particles) -> np.ndarray:
     """Of motion and spin, of each body [J]."""
     inertia = 0.4 * made.mass * made.radius**2
     return 0.5 * made.mass * np.sum(made.velocity**2, axis=1) + 0.5 * inertia * np.sum(made.spin**2, axis=1)

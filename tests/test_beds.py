@@ -1,4 +1,4 @@
-"""Beds: what is read from their runs has known answers on made-up ones; short runs obey published laws."""
+"""Beds: evaluation of made-up runs with known results; short runs against published laws."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cfddem.card import card
-from cfddem.case import Case
-from cfddem.expected import bed_of
-from cfddem.fluid.division import cell_counts
-from cfddem.gallery import gallery
-from cfddem.history import measure
-from cfddem.mixture import sinking
-from cfddem.record.bubbles import BubbleProfile
-from cfddem.record.series import block_average
-from cfddem.report import buoyant_weight
-from cfddem.simulation import Simulation
+from cfddem.analysis.bed_laws import buoyant_weight
+from cfddem.analysis.bubbles import BubbleProfile
+from cfddem.analysis.series import block_average
+from cfddem.case.gallery import gallery
+from cfddem.case.schema import Case
+from cfddem.fluid.cell_counts import cell_counts
+from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.mixture import net_downward_forces
+from cfddem.preflight.summary import preflight
+from cfddem.run import history
+from cfddem.run.simulation import Simulation
 from closures.balance import fluidising_velocity
 from closures.bed import expanded_voidage, exponent_richardson_zaki, terminal_reynolds_brown_lawler
 from closures.drag import ergun
 from closures.numbers import archimedes
-from scenarios.beds_validation import growing
-from scenarios.defluidisation import Layers, in_layers, onsets
-from scenarios.gas_bed import mueller, standard_bed, van_wachem
-from scenarios.refinement import Bed, Means, compared, gas, liquid, variants
-from scenarios.sedimentation import Settling, exponent, in_periodic_box
-from scenarios.segregation import VELOCITIES, balance, mixture, separation, thresholds
-from scenarios.spouted_bed import bed as spout
-from scenarios.spouted_bed import profiles
+from scenarios.beds.defluidisation.study import Layers, in_layers, onsets
+from scenarios.beds.gas_bed import mueller, standard_bed, van_wachem
+from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_box
+from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
+from scenarios.beds.spouted_bed import bed as spout
+from scenarios.beds.spouted_bed import profiles
+from scenarios.validation.beds import growing
+from scenarios.validation.refinement import Means, RefinementBed, compared, gas, liquid, variants
 
 
 @pytest.mark.parametrize(
     "name", ["gas-bed", "gas-bed-flat", "defluidisation", "sedimentation", "segregation", "spouted-bed"]
 )
 def test_no_bed_of_the_gallery_is_refused(name: str) -> None:
-    assert card(Case.from_toml(gallery()[name])).colour != "red"
+    assert preflight(Case.from_toml(gallery()[name])).status != "error"
 
 
 def test_weights_of_measured_beds() -> None:
@@ -88,7 +88,7 @@ def test_onset_of_an_exact_bed_is_the_balance() -> None:
         assert onset.velocity == pytest.approx(balance, rel=1e-6)
 
 
-def test_layers_of_a_bed_carry_what_the_law_says_of_each() -> None:
+def test_drag_of_a_layered_bed_is_the_sum_over_its_layers() -> None:
     """At one Reynolds number, the pull on two layers is the sum of both: each grain at its own voidage."""
     loose, dense = 0.5, 0.4
     together = in_layers(ergun, np.array([dense, loose, 1.0]))
@@ -104,13 +104,13 @@ def test_both_sides_of_the_threshold_are_run() -> None:
         assert 1.2 * slow < threshold < fast / 1.15
 
 
-def test_drag_of_equal_spheres_foretells_the_wrong_species() -> None:
+def test_the_drag_law_of_equal_spheres_predicts_the_wrong_species() -> None:
     """Without the mean size around, large light pellets sink already in the slow stream, against the published law."""
     slow = VELOCITIES[0]
     equal = mixture(slow).with_(**{"laws.drag": "beetstra"})
     assert slow < min(thresholds(equal).values())
-    assert sinking(mixture(slow), slow, bed_of(mixture(slow)).voidage)["pellets"] < -0.02
-    assert sinking(equal, slow, bed_of(equal).voidage)["pellets"] > 0.02
+    assert net_downward_forces(mixture(slow), slow, estimate_bed(mixture(slow)).voidage)["pellets"] < -0.02
+    assert net_downward_forces(equal, slow, estimate_bed(equal).voidage)["pellets"] > 0.02
 
 
 def test_layers_of_equal_bulk_density_change_places() -> None:
@@ -165,7 +165,7 @@ def test_species_sink_on_the_side_of_the_published_threshold(velocity: float, ab
     """Equal bulk densities of the layers at 0.082 to 0.088 m/s (Epstein & LeClair, Chem. Eng. Sci. 40, 1517)."""
     simulation = Simulation(mixture(velocity))
     simulation.until(2.0)
-    row = measure(simulation)
+    row = history.row(simulation)
     below = next(name for name in simulation.case.species if name != above)
     assert row[f"mean_height_{above}"] - row[f"mean_height_{below}"] > 0.05 * row["bed_height"]
 
@@ -179,14 +179,14 @@ def test_hindered_settling_follows_richardson_and_zaki() -> None:
 
 
 @pytest.mark.parametrize("bed", [liquid(), gas()], ids=["liquid", "gas"])
-def test_refinement_changes_numbers_only(bed: Bed) -> None:
+def test_refinement_changes_numbers_only(bed: RefinementBed) -> None:
     """Cells, step and contact modulus change, one cell across stays one, and the kernel keeps its width."""
     for changes, _ in variants(bed.case).values():
         changed = bed.case.with_(**changes)
-        assert set(changes) <= {"column.cell", "run.step"} | {
+        assert set(changes) <= {"column.cell", "run.particle_step"} | {
             f"material.{name}.contact_modulus" for name in changed.material
         }
-        assert changed.laws.smoothing == bed.case.laws.smoothing
+        assert changed.laws.kernel_width == bed.case.laws.kernel_width
         counts = cell_counts(changed.column.size, changed.column.cell)
         before = cell_counts(bed.case.column.size, bed.case.column.cell)
         finer = "column.cell" in changes

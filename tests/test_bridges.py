@@ -7,14 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.kernels import use_threads
-from cfddem.materials import Material, pair_table
-from cfddem.particles.bridge_loops import DAVIS, DEFORMING, EVEN, NASE, STATIC, BridgeLaws
-from cfddem.particles.bridges import Bridges
-from cfddem.particles.packing import random_packing
+from cfddem.backend.compile import use_threads
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
+from cfddem.particles.initial.packing import random_packing
+from cfddem.particles.interactions.bridge import Bridges
+from cfddem.particles.interactions.bridge_loops import DAVIS, DEFORMING, EVEN, NASE, STATIC, BridgeLaws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import Bodies, bodies, kinetic_energy
+from cfddem.particles.state import Particles, kinetic_energy, make_particles, particles_in
 from closures import bridge, capillary, contact, lubrication
 
 RADIUS, FILM, TENSION, ANGLE = 0.5e-3, 25e-6, 0.07, 0.26
@@ -23,7 +24,9 @@ LIQUID = 2.0 * capillary.liquid_share(RADIUS, RADIUS) * 4.0 / 3.0 * math.pi * ((
 """In a bridge of two spheres whose films were untouched."""
 
 
-def bridged(spheres: Bodies, laws: BridgeLaws, film: float = FILM, **options: object) -> tuple[ParticleSolver, Bridges]:
+def bridged(
+    spheres: Particles, laws: BridgeLaws, film: float = FILM, **options: object
+) -> tuple[ParticleSolver, Bridges]:
     """A run of dry spheres with liquid on them."""
     bridges = Bridges(spheres, film, laws)
     return ParticleSolver(spheres, pair_table([GRAIN]), bridges=bridges, **options), bridges  # type: ignore[arg-type]
@@ -36,7 +39,9 @@ def pair(
     reach = 2.0 * RADIUS + gap
     places = np.array([[0.0, 0.0, 0.0], [reach if box is None else box - reach, 0.0, 0.0]])
     sign = 1.0 if box is None else -1.0
-    spheres = bodies(places, RADIUS, GRAIN.density, velocity=[[0.5 * sign * speed, 0, 0], [-0.5 * sign * speed, 0, 0]])  # type: ignore[arg-type]
+    spheres = make_particles(
+        places, RADIUS, GRAIN.density, velocity=[[0.5 * sign * speed, 0, 0], [-0.5 * sign * speed, 0, 0]]
+    )  # type: ignore[arg-type]
     given = BridgeLaws(**({"surface_tension": TENSION, "contact_angle": ANGLE} | laws))  # type: ignore[arg-type]
     return bridged(spheres, given, box=(box, box, box), skin=2.0 * RADIUS)
 
@@ -46,8 +51,8 @@ def pair(
 def test_a_bridge_takes_the_work_between_where_it_forms_and_where_it_breaks(speed: float, box: float | None) -> None:
     """Elastic dry spheres lose W(rupture) - W(formation), Pitois et al.'s pull integrated over the gap."""
     run, bridges = pair(speed, box=box)
-    before, formed_at, broke_at = kinetic_energy(run.bodies), math.nan, math.nan
-    step = 0.25 * run.clocks(speed).recommended
+    before, formed_at, broke_at = kinetic_energy(run.particles), math.nan, math.nan
+    step = 0.25 * run.time_scales(speed).recommended
     for _ in range(100_000):
         run.advance(step)
         if bridges.count:
@@ -60,13 +65,13 @@ def test_a_bridge_takes_the_work_between_where_it_forms_and_where_it_breaks(spee
     assert (bridges.formed, bridges.broken) == (1, 1)
     assert 0.9 * FILM < 0.5 * formed_at <= FILM
     assert broke_at == pytest.approx(capillary.rupture_length(0.0, ANGLE, LIQUID), rel=0.05)
-    assert before - kinetic_energy(run.bodies) == pytest.approx(work[1] - work[0], rel=0.02)
+    assert before - kinetic_energy(run.particles) == pytest.approx(work[1] - work[0], rel=0.02)
 
 
 def test_the_pull_is_the_law_at_every_gap_and_nothing_else() -> None:
     """No pull before the films overlap, the law's own jump where they do, and none after the bridge has broken."""
     run, bridges = pair(0.0)
-    made = run.bodies
+    made = run.particles
     longest = capillary.rupture_length(0.0, ANGLE, LIQUID)
     gaps = [*np.linspace(3.0, 2.0001, 5) * FILM, *np.linspace(1.9999, -0.1, 20) * FILM]
     gaps += [*np.linspace(0.0, 0.9999 * longest, 40), *np.linspace(1.0001, 1.5, 5) * longest]
@@ -74,7 +79,7 @@ def test_the_pull_is_the_law_at_every_gap_and_nothing_else() -> None:
     for gap in gaps:
         made.position[1, 0] = made.position[0, 0] + 2.0 * RADIUS + gap
         made.velocity[:] = 0.0
-        bridges.update(run.edges, run.box)
+        bridges.update(run.views[1], run.box)
         bridges.kick(run.box, 1e-9, backwards=False)
         joined = gap < longest if joined else gap < 2.0 * FILM
         expected = capillary.pendular_pull(TENSION, ANGLE, 0.5 * RADIUS, LIQUID, gap) if joined else 0.0
@@ -88,7 +93,7 @@ def test_the_pull_is_the_law_at_every_gap_and_nothing_else() -> None:
 def test_resistances_are_those_of_the_laws(film: int, tangential: int) -> None:
     """Rates of the velocities along and across over a time that is short for both; and the spin that goes with it."""
     run, bridges = pair(0.0, FILM, viscosity=2.0, film=film, tangential=tangential, pull=EVEN)
-    made, span, reduced = run.bodies, 1e-12, 0.5 * RADIUS
+    made, span, reduced = run.particles, 1e-12, 0.5 * RADIUS
     made.velocity[:] = [[0.2, 0.3, 0.0], [0.0, 0.0, 0.0]]
     bridges.kick(run.box, span, backwards=False)
     share = (bridge.static_share, bridge.deforming_share)[film](FILM, 2.0 * FILM)
@@ -106,11 +111,11 @@ def test_resistances_are_those_of_the_laws(film: int, tangential: int) -> None:
 def test_below_the_minimum_gap_a_film_is_cut(cut: int) -> None:
     """To nothing, or to what it is at h_min."""
     run, bridges = pair(0.0, 0.1 * FILM, viscosity=2.0, film=DEFORMING, cut=cut, pull=-1, minimum_gap=0.5 * FILM)
-    run.bodies.velocity[0] = [0.2, 0.0, 0.0]
+    run.particles.velocity[0] = [0.2, 0.0, 0.0]
     bridges.kick(run.box, 1e-12, backwards=False)
     share = bridge.deforming_share(0.5 * FILM, 2.0 * FILM)
     expected = cut * 0.2 * lubrication.film_strength(2.0, 0.5 * RADIUS) * share / (0.5 * FILM)
-    assert run.bodies.velocity[1, 0] / (1e-12 * run.bodies.inverse_mass[1]) == pytest.approx(expected, rel=1e-5)
+    assert run.particles.velocity[1, 0] / (1e-12 * run.particles.inverse_mass[1]) == pytest.approx(expected, rel=1e-5)
 
 
 def test_slow_wet_spheres_stay_together_and_fast_ones_part() -> None:
@@ -120,7 +125,7 @@ def test_slow_wet_spheres_stay_together_and_fast_ones_part() -> None:
     critical = math.sqrt(4.0 * (work[0] - work[1]) / (GRAIN.density * 4.0 / 3.0 * math.pi * RADIUS**3))
     for ratio, broken in ((0.95, 0), (1.05, 1)):
         run, bridges = pair(ratio * critical, every=4)
-        step = run.clocks(critical).recommended
+        step = run.time_scales(critical).recommended
         for _ in range(int(4e-2 / step / 4)):
             run.advance(step, 4)
             if bridges.broken:
@@ -141,8 +146,8 @@ def test_liquid_is_kept_and_shared() -> None:
     total = bridges.liquid
     assert bridges.count == 1
     assert bridges.film == pytest.approx(np.full(2, FILM * (1.0 - capillary.liquid_share(1.0, 1.0))), rel=0.01)
-    run.bodies.position[1, 0] += 10.0 * RADIUS
-    bridges.update(run.edges, run.box)
+    run.particles.position[1, 0] += 10.0 * RADIUS
+    bridges.update(run.views[1], run.box)
     assert bridges.count == 0
     assert bridges.film == pytest.approx(np.full(2, FILM), rel=1e-12)
     assert bridges.liquid == pytest.approx(total, rel=1e-15)
@@ -150,7 +155,7 @@ def test_liquid_is_kept_and_shared() -> None:
 
 def test_agglomerates_are_what_bridges_join() -> None:
     places = np.array([[0, 0, 0], [1.02, 0, 0], [2.04, 0, 0], [5, 0, 0], [5, 1.02, 0], [9, 9, 9]]) * 2.0 * RADIUS
-    _, bridges = bridged(bodies(places, RADIUS, 2500.0), BridgeLaws(), skin=RADIUS)
+    _, bridges = bridged(make_particles(places, RADIUS, 2500.0), BridgeLaws(), skin=RADIUS)
     named = bridges.agglomerates
     assert sorted(np.bincount(named)) == [1, 2, 3]
     assert named[0] == named[1] == named[2]
@@ -170,14 +175,14 @@ def swarm(
     size = RADIUS * draw.uniform(0.8, 1.2, count)
     places, box = random_packing(2.0 * (size + 0.3 * FILM), 0.45, 1)
     velocity = draw.normal(0.0, speed, places.shape)
-    spheres = bodies(places, size, GRAIN.density, velocity=velocity, spin=draw.normal(0.0, 50.0, places.shape))
+    spheres = make_particles(places, size, GRAIN.density, velocity=velocity, spin=draw.normal(0.0, 50.0, places.shape))
     return bridged(spheres, laws, box=tuple(box), **options)
 
 
 def test_bridges_keep_momenta_and_never_speed_up() -> None:
     """Stiff films: 5 Pa s would need steps of nanoseconds as forces. Angular momentum in open space."""
     run, bridges = swarm(300)
-    made = run.bodies
+    made = run.particles
     assert bridges.count > 200
     momentum, energy = (made.mass[:, None] * made.velocity).sum(axis=0), kinetic_energy(made)
     scale = (made.mass[:, None] * np.abs(made.velocity)).sum()
@@ -191,7 +196,9 @@ def test_bridges_keep_momenta_and_never_speed_up() -> None:
 
     draw = np.random.default_rng(3)
     places = 2.02 * RADIUS * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0.1]])
-    spheres = bodies(places, RADIUS, 2500.0, velocity=draw.normal(0, 0.1, (4, 3)), spin=draw.normal(0, 50.0, (4, 3)))
+    spheres = make_particles(
+        places, RADIUS, 2500.0, velocity=draw.normal(0, 0.1, (4, 3)), spin=draw.normal(0, 50.0, (4, 3))
+    )
     run, bridges = bridged(spheres, SYRUP, skin=RADIUS)
 
     def turning() -> np.ndarray:
@@ -204,8 +211,8 @@ def test_bridges_keep_momenta_and_never_speed_up() -> None:
 
 
 def by_id(run: ParticleSolver) -> np.ndarray:
-    order = np.argsort(run.bodies.id)
-    return np.concatenate([run.bodies.position[order], run.bodies.velocity[order], run.bodies.spin[order]])
+    order = np.argsort(run.particles.id)
+    return np.concatenate([run.particles.position[order], run.particles.velocity[order], run.particles.spin[order]])
 
 
 THIN = BridgeLaws(viscosity=0.05, surface_tension=TENSION, film=DEFORMING, tangential=DAVIS, minimum_gap=1e-6, every=4)
@@ -237,7 +244,7 @@ def test_the_same_bits_on_one_thread_and_on_two() -> None:
 def test_the_same_bits_from_a_checkpoint() -> None:
     run, bridges = after(160)
     kept = run.checkpoint()
-    same = Bodies(**{name: each.copy() for name, each in kept["bodies"].items()})
+    same = particles_in(kept["particles"])
     again, others = bridged(same, THIN, box=tuple(run.box), sort_every=1, skin=2e-5)
     again.restore(kept)
     for each in (run, again):
@@ -255,17 +262,23 @@ def test_the_order_of_particles_does_not_matter_to_bridges() -> None:
 
 
 def test_spheres_come_and_go() -> None:
-    """Bridges of what is taken out break; newcomers are dry until they are given liquid."""
+    """Bridges of removed spheres break and give them half of the liquid; inserted spheres bring theirs, or are dry."""
     places = np.array([[0, 0, 0], [1.02, 0, 0], [2.04, 0, 0]]) * 2.0 * RADIUS
-    run, bridges = bridged(bodies(places, RADIUS, 2500.0), BridgeLaws(surface_tension=TENSION), skin=RADIUS)
+    run, bridges = bridged(make_particles(places, RADIUS, 2500.0), BridgeLaws(surface_tension=TENSION), skin=RADIUS)
     liquid = bridges.liquid
     assert bridges.count == 2
-    run.remove(np.array([True, False, False]))
+    with pytest.raises(InputError, match="fewer than all 3"):
+        run.remove(np.ones(3, bool))
+    assert (bridges.count, bridges.broken, bridges.liquid) == (2, 0, liquid)
+    gone = run.remove(np.array([True, False, False]))
     assert (bridges.count, bridges.broken) == (1, 1)
-    new = run.insert(bodies([[0, 0, 0]], RADIUS, 2500.0))
-    assert bridges.free_liquid[new] == 0.0
+    assert bridges.liquid + gone.liquid.sum() == pytest.approx(liquid, rel=1e-14)
+    new = run.insert(make_particles([[0, 0, 0]], RADIUS, 2500.0))
+    assert run.particles.liquid[run.particles.id == new[0]] == 0.0
     run.advance(1e-7)
     assert bridges.count == 2  # the film of its neighbour is enough
+    gone.position[:] = [[0, 10.0 * RADIUS, 0]]
+    run.insert(gone)
     assert bridges.liquid == pytest.approx(liquid, rel=1e-14)
     assert set(bridges.joined.first) | set(bridges.joined.second) == {1, 2, int(new[0])}
 
@@ -279,4 +292,4 @@ def test_an_impossible_liquid_is_refused_by_name(given: dict[str, float], said: 
     with pytest.raises(InputError, match=said):
         pair(0.0, **given)
     with pytest.raises(InputError, match="film of particle 0"):
-        bridged(bodies([[0, 0, 0]], RADIUS, 2500.0), BridgeLaws(), film=-1.0)
+        bridged(make_particles([[0, 0, 0]], RADIUS, 2500.0), BridgeLaws(), film=-1.0)

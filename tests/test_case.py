@@ -1,4 +1,4 @@
-"""Case files: what is written is what is read, and whatever is written wrongly is said at once, by line."""
+"""Case files: written and read again they are equal; every input error is reported with its line."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from example_case import MIXTURE, TEXT
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cfddem.card import card
-from cfddem.case import Case
-from cfddem.case_text import DEEPEST_KEY, LONGEST_FILE
-from cfddem.errors import InputError
-from cfddem.gallery import gallery, overrides
-from cfddem.mistakes import MOST, Mistakes
+from cfddem.backend.errors import InputError
+from cfddem.case.gallery import gallery, overrides
+from cfddem.case.input_errors import MOST, InputErrors, sections_of
+from cfddem.case.renamed import KEYS
+from cfddem.case.schema import Case
+from cfddem.case.toml_text import DEEPEST_KEY, LONGEST_FILE
+from cfddem.preflight.summary import preflight
 
 GALLERY = gallery()
 LONGEST_LINE = 600
@@ -35,7 +36,7 @@ def refused(text: str, given: dict[str, Any] | None = None) -> InputError:
 
 
 @pytest.mark.parametrize("name", GALLERY)
-def test_a_case_written_and_read_again_is_the_same(name: str) -> None:
+def test_a_case_written_and_read_again_is_equal(name: str) -> None:
     case = Case.from_toml(GALLERY[name])
     assert Case.from_text(case.to_toml()) == case
     changed = case.with_(**{"run.until": 0.125, "bed.seed": 7})
@@ -43,22 +44,22 @@ def test_a_case_written_and_read_again_is_the_same(name: str) -> None:
     assert Case.from_text(changed.to_toml()) == changed
 
 
-def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
+def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
     text = TEXT.replace("viscosity = 8.354e-4", 'viscosity = "thick"').replace("count = 2000", "cuont = 2000")
     text = text.replace('drag = "di_felice"', 'drag = "di_felce"').replace("until = 3.0 ", "")
     refusal = refused(text, {"column.width": -1})
-    assert isinstance(refusal, Mistakes)
-    told = str(refusal).splitlines()
-    assert len(told) == len(refusal.each) == 5
+    assert isinstance(refusal, InputErrors)
+    reported = str(refusal).splitlines()
+    assert len(reported) == len(refusal.each) == 5
     lines = {
         name: 1 + next(k for k, line in enumerate(text.split("\n")) if name in line) for name in ("thick", "cuont")
     }
-    assert f"bed.toml:{lines['thick']}: fluid.viscosity = 'thick': must be a number" in told[0]
-    assert "--set column.width = -1: must be above 0" in told[1]
-    assert f"bed.toml:{lines['cuont']}: bed.cuont = 2000: must be one of " in told[2]
-    assert "did you mean 'count'" in told[2]
-    assert "laws.drag = 'di_felce'" in told[3] and "did you mean 'di_felice'" in told[3]
-    assert "run.until: must be given" in told[4]
+    assert f"bed.toml:{lines['thick']}: fluid.viscosity = 'thick': must be a number" in reported[0]
+    assert "--set column.width = -1: must be above 0" in reported[1]
+    assert f"bed.toml:{lines['cuont']}: bed.cuont = 2000: must be one of " in reported[2]
+    assert "did you mean 'count'" in reported[2]
+    assert "laws.drag = 'di_felce'" in reported[3] and "did you mean 'di_felice'" in reported[3]
+    assert "run.until: must be given" in reported[4]
 
 
 @pytest.mark.parametrize(
@@ -74,7 +75,10 @@ def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
         ),
         ({"column.sides": "freeslip"}, "did you mean 'free_slip'"),
         ({"fluid.viscosity_profile": [[0.1, 1e-3], [0.0, 2e-3]]}, "fluid.viscosity_profile = [0.1, 0.0]: must be"),
-        ({"fluid.viscosity_profile": [[0.0, 1e-3], [0.1, 0.0]]}, "fluid.viscosity_profile = 0.0: must be of positive"),
+        (
+            {"fluid.viscosity_profile": [[0.0, 1e-3], [0.1, 0.0]]},
+            "fluid.viscosity_profile = 0.0: must be above 0 everywhere",
+        ),
         ({"bed.inlet_velocity": -0.1}, "bed.inlet_velocity = -0.1: must be at least 0"),
         ({"bed.inlet_velocity": [[0, 0.1], [1, -0.2]]}, "bed.inlet_velocity = -0.2: must be at least 0"),
         ({"bed.diametr": 1e-3}, "must be one of diameter and 15 more (did you mean 'diameter'?)"),
@@ -92,15 +96,41 @@ def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
         ({"bed.diameter.mean": 1e-3}, "must be inside a table; diameter is a value"),
         ({"laws.gravity": 9.81}, "laws.gravity = 9.81: must be a list"),
         ({"run": 3.0}, "run = 3.0: must be a table"),
-        ({"bed.seed": True}, "bed.seed = True: must be anything but true or false"),
+        ({"bed.seed": True}, "bed.seed = True: must be something other than true or false"),
         ({"title": "two\nlines"}, "title = 'two\\nlines': must be one line"),
     ],
     ids=str,
 )
-def test_a_mistake_is_told_with_key_value_and_limit(given: dict[str, Any], said: str) -> None:
-    told = str(refused(TEXT, given))
-    assert said in told
-    assert "\n" not in told
+def test_an_input_error_names_key_value_and_limit(given: dict[str, Any], said: str) -> None:
+    message = str(refused(TEXT, given))
+    assert said in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("drag =", "own_wind = true\ndrag =", "laws.own_wind: must be written as laws.self_disturbance_correction;"),
+        ("seed = 1", 'start = "at"', "bed.start = 'at': must be written as 'placed'; the value has been renamed"),
+        ("every = 0.05", "step = 1e-5", "run.step: must be written as run.particle_step; the key has been renamed"),
+    ],
+    ids=["own_wind", "at", "step"],
+)
+def test_a_renamed_key_or_value_is_refused_in_one_line_with_the_new_one(old: str, new: str, message: str) -> None:
+    text = TEXT.replace(old, new)
+    line = 1 + next(k for k, each in enumerate(text.split("\n")) if each.startswith(new.split("\n")[0]))
+    assert str(refused(text)).startswith(f"bed.toml:{line}: {message}")
+
+
+def test_every_renamed_key_leads_to_a_valid_one() -> None:
+    for old, new in KEYS.items():
+        table, name = new.split(".")
+        section = sections_of(Case.model_fields[table])[0]
+        assert name in section.model_fields and old.split(".")[1] not in section.model_fields
+        with pytest.raises(InputError, match=f"must be written as {new}; the key has been renamed"):
+            Case.from_text(TEXT, "bed.toml", {old: 1.0})
+    with pytest.raises(InputError, match="written as self_disturbance_correction"):
+        overrides(["own_wind=true"])
 
 
 @pytest.mark.parametrize(
@@ -110,17 +140,17 @@ def test_a_mistake_is_told_with_key_value_and_limit(given: dict[str, Any], said:
         (b"a = 1\nb = \n", ":2: must be valid TOML"),
         (b"a = 1\na = 2\n", "must be valid TOML; Cannot overwrite a value"),
         (b"x = '" + b"x" * LONGEST_FILE + b"'", "must be at most 500 kB"),
-        (b"x = " + b"[" * 100_000, "must be a case, whose lists and tables lie a few levels deep"),
+        (b"x = " + b"[" * 100_000, "must be a case with lists and tables nested a few levels deep"),
         (
             b"\n" + b".".join([b"a"] * 20_000) + b" = 1",
-            f":2: must be a case, whose keys have at most {DEEPEST_KEY}",
+            f":2: must be a case with fewer than {DEEPEST_KEY} dots in a key",
         ),
         (b"x = " + b"9" * 5000, "must be valid TOML; Exceeds the limit"),
         (b"", "must be given"),
     ],
     ids=range(8),
 )
-def test_what_is_no_case_file_is_told_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
+def test_a_file_that_is_no_case_is_refused_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "bed.toml"
     path.write_bytes(content)
     with pytest.raises(InputError) as refusal:
@@ -129,19 +159,19 @@ def test_what_is_no_case_file_is_told_in_short_lines(tmp_path: Path, content: by
     assert max(map(len, str(refusal.value).splitlines())) < LONGEST_LINE
 
 
-def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+def test_an_unreadable_file_is_refused(tmp_path: Path) -> None:
     for path in (tmp_path / "none.toml", tmp_path):
         with pytest.raises(InputError, match="a readable TOML file"):
             Case.from_toml(path)
 
 
-def test_a_file_of_other_editors_is_read(tmp_path: Path) -> None:
+def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path: Path) -> None:
     path = tmp_path / "bed.toml"
     path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
     assert Case.from_toml(path) == Case.from_text(TEXT)
 
 
-def test_short_keys_are_found_in_their_table() -> None:
+def test_a_key_without_its_table_is_completed() -> None:
     assert overrides(["seed=3", "viscosity=2e-3", "bed.count=5", "title=a bed"]) == {
         "bed.seed": 3,
         "fluid.viscosity": 2e-3,
@@ -154,11 +184,11 @@ def test_short_keys_are_found_in_their_table() -> None:
         overrides(["height=3"])
 
 
-def test_an_installed_package_may_offer_a_drag_law(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_installed_package_can_provide_a_drag_law(monkeypatch: pytest.MonkeyPatch) -> None:
     from types import SimpleNamespace
 
-    from closures import shelf
-    from closures.law import law
+    from closures import registry
+    from closures.registry import law
 
     def load() -> None:
         law("drag", "of a test", reynolds=(0.0, 1.0))(offered_drag)
@@ -170,25 +200,25 @@ def test_an_installed_package_may_offer_a_drag_law(monkeypatch: pytest.MonkeyPat
         raise ImportError("no such file")
 
     points = [SimpleNamespace(name="good", load=load), SimpleNamespace(name="bad", load=broken)]
-    monkeypatch.setattr(shelf, "entry_points", lambda group: points if group == "cfddem.closures" else [])
-    shelf.fill_from_packages.cache_clear()
+    monkeypatch.setattr(registry, "entry_points", lambda group: points if group == "cfddem.closures" else [])
+    registry.load_package_laws.cache_clear()
     try:
         case = Case.from_text(TEXT, "bed.toml", {"laws.drag": "offered_drag"})
         assert case.laws.drag_law is not None and case.laws.drag_law.reference == "of a test"
-        assert shelf.fill_from_packages() == {"bad": "ImportError: no such file"}
+        assert registry.load_package_laws() == {"bad": "ImportError: no such file"}
     finally:
-        shelf.SHELF["drag"].pop("offered_drag", None)
-        shelf.fill_from_packages.cache_clear()
+        registry.REGISTRY["drag"].pop("offered_drag", None)
+        registry.load_package_laws.cache_clear()
 
 
-def test_the_schema_for_editors_knows_every_key() -> None:
+def test_the_json_schema_holds_every_key() -> None:
     schema = Case.model_json_schema()
     for name, section in (("Bed", "bed"), ("Column", "column"), ("CaseLaws", "laws"), ("CaseRun", "run")):
         assert set(tomllib.loads(TEXT)[section]) <= set(schema["$defs"][name]["properties"])
         assert schema["$defs"][name]["additionalProperties"] is False
 
 
-# ---------------------------------------------------------------- files that nobody would write
+# ---------------------------------------------------------------- random files
 
 odd_values = st.one_of(
     st.floats(),
@@ -203,7 +233,7 @@ odd_values = st.one_of(
     st.just("x" * 5000),
     st.just([[0.02, 0.02, 0.1]] * 300),
     st.sampled_from(
-        ["poured", "suspended", "at", "packed", "cylinder", "periodic", "closed", "flow", "linear", "none"]
+        ["poured", "suspended", "placed", "packed", "cylinder", "periodic", "closed", "flow", "linear", "none"]
     ),
 )
 
@@ -223,7 +253,7 @@ ENDINGS = [
 
 @st.composite
 def mutated_files(draw: st.DrawFn) -> bytes:
-    """A case file with a few things wrong: values, keys, text, bytes."""
+    """A case file with a few random changes of values, keys, text and bytes."""
     values = copy.deepcopy(tomllib.loads(draw(st.sampled_from([TEXT, MIXTURE]))))
     tables = [values, *(each for each in values.values() if isinstance(each, dict)), *values["material"].values()]
     tables += values["bed"].get("species", {}).values()
@@ -255,21 +285,21 @@ def mutated_files(draw: st.DrawFn) -> bytes:
 
 
 def examine(content: bytes) -> None:
-    """A file is a case with a card, or it is refused in lines of the documented form; soon, and nothing is written."""
+    """A file is a valid case, or is refused in lines of the documented form; quickly, and nothing is written."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bed.toml"
         path.write_bytes(content)
         begun = time.process_time()
         try:
-            made = card(Case.from_toml(path))
+            made = preflight(Case.from_toml(path))
         except InputError as refusal:
             lines = str(refusal).splitlines()
             assert 1 <= len(lines) <= MOST + 3
             for line in lines:
                 assert len(line) <= LONGEST_LINE
-                assert ": must be " in line or line.endswith("more mistakes")
+                assert ": must be " in line or line.endswith("more input errors")
         else:
-            assert made.colour in ("green", "amber", "red")
+            assert made.status in ("ok", "warning", "error")
             assert max(map(len, made.lines())) <= 100
         assert time.process_time() - begun < SECONDS
         assert [each.name for each in Path(folder).iterdir()] == ["bed.toml"]
@@ -280,7 +310,7 @@ UNHURRIED: dict[str, Any] = {"deadline": None, "suppress_health_check": list(Hea
 
 @settings(max_examples=200, **UNHURRIED)
 @given(mutated_files())
-def test_a_mutated_file_is_a_case_or_a_few_lines_of_complaint(content: bytes) -> None:
+def test_a_mutated_file_is_a_case_or_a_few_lines_of_errors(content: bytes) -> None:
     examine(content)
 
 

@@ -1,4 +1,4 @@
-"""Checkpoints: the same bits, two kept, a damaged one named and passed over."""
+"""Checkpoints: bit for bit, two kept, damaged ones skipped with a warning."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError, RunFailed
-from cfddem.particles.encounters import ENCOUNTER
-from cfddem.record import checkpoint
-from cfddem.record.checkpoint import newest, write
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io import checkpoint
+from cfddem.io.checkpoint import newest, write
+from cfddem.particles.collision_events import COLLISION
 
 ODD = np.array([np.nan, -np.nan, -0.0, np.inf, 5e-324, 1.0 + 2.0**-52, -1e308])
 
@@ -38,12 +38,12 @@ def state(number: int = 0) -> dict:
             "sliding": np.array([True, False]),
             "scalar": np.float64(1 / 3),
         },
-        "rows": np.zeros(3, ENCOUNTER),
+        "rows": np.zeros(3, COLLISION),
     }
 
 
 def same(left: object, right: object) -> bool:
-    """Equal in type and in every bit, also where it is no number."""
+    """Equal in type and in every bit, NaN included."""
     if isinstance(left, dict):
         return isinstance(right, dict) and [*left] == [*right] and all(same(left[k], right[k]) for k in left)
     if isinstance(left, np.ndarray | np.generic):
@@ -62,12 +62,12 @@ def damage(path: Path, place: int) -> None:
     path.write_bytes(content)
 
 
-def test_a_state_comes_back_with_the_same_bits(tmp_path):
+def test_a_state_is_restored_bit_for_bit(tmp_path):
     write(tmp_path, state())
     assert same(state(), newest(tmp_path))
 
 
-def test_a_generator_goes_on_where_it_was(tmp_path):
+def test_a_random_generator_continues(tmp_path):
     generator = np.random.default_rng(5)
     generator.random(11)
     write(tmp_path, {"random": generator.bit_generator.state})
@@ -86,7 +86,7 @@ def test_two_are_kept_and_h5py_opens_them(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["flipped", "truncated", "emptied", "head"])
-def test_a_damaged_checkpoint_is_named_and_the_one_before_it_used(tmp_path, caplog, how):
+def test_a_damaged_checkpoint_is_reported_and_the_previous_one_used(tmp_path, caplog, how):
     for number in range(2):
         path = write(tmp_path, state(number))
     content = path.read_bytes()
@@ -98,8 +98,8 @@ def test_a_damaged_checkpoint_is_named_and_the_one_before_it_used(tmp_path, capl
     assert "00000001.h5" in caplog.text and "checksum" in caplog.text and len(caplog.records) == 1
 
 
-def test_every_flipped_bit_is_found(tmp_path):
-    """Single bits over the whole file, in steps: head, numbers, structure."""
+def test_every_flipped_bit_is_detected(tmp_path):
+    """Single bits throughout the file: head, numbers, structure."""
     write(tmp_path, state(0))
     path = write(tmp_path, state(1))
     size = path.stat().st_size
@@ -110,7 +110,7 @@ def test_every_flipped_bit_is_found(tmp_path):
     assert newest(tmp_path)["steps"] == 2**70 + 1
 
 
-def test_a_damaged_one_does_not_take_the_place_of_a_whole_one(tmp_path):
+def test_a_damaged_checkpoint_does_not_replace_a_good_one(tmp_path):
     for number in range(2):
         path = write(tmp_path, state(number))
     damage(path, 2000)
@@ -118,34 +118,34 @@ def test_a_damaged_one_does_not_take_the_place_of_a_whole_one(tmp_path):
     assert [each.name for each in sorted((tmp_path / "checkpoint").iterdir())] == ["00000000.h5", "00000002.h5"]
 
 
-def test_without_a_whole_one_the_line_says_what_to_do(tmp_path):
-    with pytest.raises(InputError, match="run the case from its start"):
+def test_without_a_good_checkpoint_the_error_names_the_remedy(tmp_path):
+    with pytest.raises(InputError, match="run the case again"):
         newest(tmp_path)
     for number in range(2):
         damage(write(tmp_path, state(number)), 3000)
-    with pytest.raises(RunFailed, match=r"no checkpoint is whole \(1 damaged\)"):  # the first was not kept
+    with pytest.raises(RunFailed, match=r"all checkpoints are damaged \(1\)"):  # the first was not kept
         newest(tmp_path)
 
 
-def test_one_of_a_newer_format_is_refused_not_passed_over(tmp_path, monkeypatch):
+def test_a_checkpoint_of_a_newer_format_is_refused_and_not_skipped(tmp_path, monkeypatch):
     write(tmp_path, state(0))
     with monkeypatch.context() as later:
         later.setattr(checkpoint, "FORMAT", 9)
         write(tmp_path, state(1))
-    with pytest.raises(InputError, match=r"00000001\.h5: format = 9: must be at most 2; .*newer cfddem"):
+    with pytest.raises(InputError, match=r"00000001\.h5: format = 9: must be 3; .*newer version"):
         newest(tmp_path)
 
 
-def test_one_of_an_earlier_format_is_refused_with_what_to_do(tmp_path, monkeypatch):
+def test_a_checkpoint_of_an_earlier_format_is_refused_with_a_remedy(tmp_path, monkeypatch):
     with monkeypatch.context() as earlier:
         earlier.setattr(checkpoint, "FORMAT", 1)
         write(tmp_path, state(0))
-    with pytest.raises(InputError, match=r"format = 1: must be at least 2; .*earlier cfddem; run .*case\.toml anew"):
+    with pytest.raises(InputError, match=r"format = 1: must be 3; .*earlier version; run .*case\.toml again"):
         newest(tmp_path)
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {1, 2}, np.array(["text"])])
-def test_what_cannot_be_kept_is_named(tmp_path, value):
+def test_a_value_that_cannot_be_stored_is_named(tmp_path, value):
     with pytest.raises(InputError, match=r"state\.pair\.thing"):
         write(tmp_path, {"pair": {"thing": value}})
     assert not list((tmp_path / "checkpoint").iterdir())

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from impacts import Pair, kinetic_energy, normal_speed
 
-from cfddem.errors import InputError
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import JKR, Laws
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from closures.cohesion import jkr_contact_radius, jkr_force, jkr_pull_off, jkr_sticking_speed, jkr_stretch
 
 DUST = Material(density=2500, youngs_modulus=1e8, poisson=0.3, restitution=1.0, surface_energy=0.02)
 RADIUS = 50e-6
-LAWS = Laws(cohesion=JKR)
+LAWS = Laws(cohesion="jkr")
 
 
 def scales(material: Material = DUST) -> tuple[float, float, float]:
@@ -81,7 +82,7 @@ def test_contact_stands_the_pull_of_the_law(part: float, holds: bool) -> None:
     step = 0.002 * Pair((material, material), (RADIUS, RADIUS), 1e-3).hertz_time
     pull = part * jkr_pull_off(w, radius)
     for share in np.linspace(0.0, 1.0, 200):
-        run.bodies.applied[:, 0] = share * pull * np.array([-1.0, 1.0])
+        run.particles.applied[:, 0] = share * pull * np.array([-1.0, 1.0])
         run.advance(step, 40)
     run.advance(step, 20_000)
     together = len(run.gap) > 0 and run.gap[0] < jkr_stretch(w, radius, modulus)
@@ -93,7 +94,7 @@ def test_adhesive_pair_keeps_its_momentum() -> None:
     rough = DUST.model_copy(update={"friction": 0.4})
     pair = Pair((rough, rough), (RADIUS, 2.0 * RADIUS), 0.05, slide=0.03, spin=((0.0, 30.0, 200.0), (10.0, 0.0, 0.0)))
     run = pair.simulation(LAWS)
-    made = run.bodies
+    made = run.particles
     inertia = 0.4 * made.mass * made.radius**2
 
     def angular() -> np.ndarray:
@@ -111,4 +112,4 @@ def test_adhesive_pair_keeps_its_momentum() -> None:
 def test_cohesion_with_films_is_refused() -> None:
     """Adhesion is that of dry solids."""
     with pytest.raises(InputError, match="cohesion"):
-        Pair((DUST, DUST), (RADIUS, RADIUS), 0.1).simulation(Laws(film=True, cohesion=JKR))
+        Pair((DUST, DUST), (RADIUS, RADIUS), 0.1).simulation(Laws(film=True, cohesion="jkr"))

@@ -1,61 +1,22 @@
-"""The command line: what it says when it is asked wrongly, and that every documented example runs."""
+"""The command line: wrong input ends in one clear line, and every documented example runs."""
 
 from __future__ import annotations
 
 import io
 import json
-import os
 import re
 import shlex
-import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr
 from importlib.util import find_spec
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from command_line import HOME, WIDTH, call, cfddem, commands
 from example_case import TEXT
 
-from cfddem.case import Case
-from cfddem.cli import app, main
-
-HOUSE = Path(__file__).parents[1]
-WIDTH = 100
-
-
-class Done(NamedTuple):
-    """What a command has said, and how it ended."""
-
-    code: int
-    out: str
-    err: str
-
-
-def call(*words: str) -> Done:
-    """Run a command in this process, in a terminal of 100 columns."""
-    out, err, code = io.StringIO(), io.StringIO(), 0
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(sys, "argv", ["cfddem", *words])
-        patch.setenv("COLUMNS", str(WIDTH))
-        try:
-            main()
-        except SystemExit as end:
-            code = int(end.code or 0)
-    return Done(code, out.getvalue(), err.getvalue())
-
-
-def cfddem(*words: str, folder: Path | None = None, seconds: float = 120) -> subprocess.CompletedProcess[str]:
-    """Run a command in a process of its own, in a terminal of 100 columns."""
-    environment = os.environ | {"COLUMNS": str(WIDTH), "NUMBA_NUM_THREADS": "1", "PYTHONPATH": str(HOUSE)}
-    return subprocess.run(
-        [sys.executable, "-m", "cfddem.cli", *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=seconds,
-    )
+from cfddem.case.schema import Case
+from cfddem.cli.app import main
 
 
 @pytest.mark.parametrize(
@@ -79,13 +40,14 @@ def cfddem(*words: str, folder: Path | None = None, seconds: float = 120) -> sub
         ("collid --stokes 30", ["collid"]),
         ("check liquid-bed --set roughness=1e-6", ["roughness", "material.NAME.roughness"]),
         ("check liquid-bed --set inlet_velocity=-0.1", ["bed.inlet_velocity = -0.1", "at least 0"]),
-        ("explain di_felice --plot nowhere/a.png", ["output = 'nowhere/a.png'", "make nowhere first"]),
-        ("view . --movie nowhere/a.gif", ["output = 'nowhere/a.gif'", "make nowhere first"]),
+        ("check liquid-bed --set own_wind=false", ["own_wind", "self_disturbance_correction", "renamed"]),
+        ("explain di_felice --plot nowhere/a.png", ["output = 'nowhere/a.png'", "create nowhere first"]),
+        ("view . --movie nowhere/a.gif", ["output = 'nowhere/a.gif'", "create nowhere first"]),
         ("validate binary-colision", ["target", "binary-colision", "did you mean 'binary-collision'"]),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_mistake_ends_in_one_line_and_exit_code_2(words: str, said: list[str]) -> None:
+def test_wrong_input_ends_in_one_line_and_exit_code_2(words: str, said: list[str]) -> None:
     done = call(*words.split())
     assert done.code == 2, done.err
     assert done.out == ""
@@ -107,9 +69,9 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(words: str, said: list[str])
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_material_that_cannot_be_is_refused_in_one_line(values: dict[str, float], said: str) -> None:
-    from cfddem.errors import InputError
-    from cfddem.materials import Material
+def test_an_impossible_material_is_refused_in_one_line(values: dict[str, float], said: str) -> None:
+    from cfddem.backend.errors import InputError
+    from cfddem.case.materials import Material
 
     good = {"density": 2500.0, "youngs_modulus": 60e9, "poisson": 0.23, "restitution": 0.9}
     with pytest.raises(InputError) as refusal:
@@ -118,7 +80,7 @@ def test_a_material_that_cannot_be_is_refused_in_one_line(values: dict[str, floa
     assert "\n" not in str(refusal.value)
 
 
-def test_a_long_mistake_is_broken_between_words_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_error_is_wrapped_between_words_on_a_terminal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
             return True
@@ -128,9 +90,9 @@ def test_a_long_mistake_is_broken_between_words_on_a_terminal(tmp_path: Path, mo
     monkeypatch.setenv("COLUMNS", "120")
     with redirect_stderr(Terminal()) as seen, pytest.raises(SystemExit):
         main()
-    told = seen.getvalue().splitlines()
-    assert len(told) > 1 and max(map(len, told)) <= WIDTH
-    assert " ".join(line.strip() for line in told) == call(*sys.argv[1:]).err.strip()
+    reported = seen.getvalue().splitlines()
+    assert len(reported) > 1 and max(map(len, reported)) <= WIDTH
+    assert " ".join(line.strip() for line in reported) == call(*sys.argv[1:]).err.strip()
 
 
 def test_json_can_be_parsed_and_holds_the_whole_result() -> None:
@@ -142,7 +104,7 @@ def test_json_can_be_parsed_and_holds_the_whole_result() -> None:
     assert result["outcome"] == "rebound"
 
 
-def test_a_dry_collision_is_said_to_be_dry() -> None:
+def test_a_collision_without_viscosity_is_dry() -> None:
     result = json.loads(call("collide", "--viscosity", "0", "--velocity", "0.1", "--json").out)
     assert (result["mechanism"], result["stokes"]) == ("dry", None)
 
@@ -150,7 +112,7 @@ def test_a_dry_collision_is_said_to_be_dry() -> None:
 # ---------------------------------------------------------------- every documented command, as it stands
 
 ORDER = ("new", "check", "run", "resume", "report", "view", "export", "sweep")
-"""Later ones look at what earlier ones have written."""
+"""Later commands read what earlier ones have written."""
 
 
 def quick(line: str) -> bool:
@@ -159,15 +121,10 @@ def quick(line: str) -> bool:
     return verb not in ("validate", "bench") and (verb not in ("run", "sweep") or "until=" in line)
 
 
-def commands() -> list[str]:
-    """Names of all commands."""
-    return sorted(name for name in app if not name.startswith("-"))
-
-
 def documented() -> list[str]:
     """Command lines in the help of every command, on the front page and in the gallery."""
     helps = [call(name, "--help").out for name in commands()]
-    pages = [page.read_text() for page in (HOUSE / "README.md", HOUSE / "scenarios" / "README.md")]
+    pages = [page.read_text() for page in (HOME / "README.md", HOME / "scenarios" / "README.md")]
     found = re.findall(
         r"(?:^|Example: +|`|/)(cfddem [a-z][^`\n]*?)(?= *(?:`|$|│))", "\n".join([*helps, *pages]), re.MULTILINE
     )
@@ -183,7 +140,7 @@ def test_every_command_has_an_example() -> None:
 
 
 def test_documented_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfddem.view.rendering import why_not
+    from cfddem.plotting.rendering import why_not
 
     monkeypatch.chdir(tmp_path)
     examples = [each for each in documented() if quick(each)]
@@ -212,11 +169,11 @@ def test_help_fits_a_narrow_terminal() -> None:
         assert done.code == 0
         assert max(map(len, done.out.splitlines())) <= WIDTH, words
         assert "\x1b" not in done.out
-    assert "Exit codes: 0 all is well" in call("--help").out
+    assert "Exit codes: 0 success" in call("--help").out
     assert re.fullmatch(r"\d+\.\d+\.\d+\n", call("--version").out)
 
 
-# ---------------------------------------------------------------- cases, from the door to the report
+# ---------------------------------------------------------------- cases
 
 TINY = ("--set", "start=suspended", "--set", "bed.count=50", "--set", "run.until=0.01", "--set", "run.every=0.005")
 
@@ -228,21 +185,34 @@ def test_a_new_case_is_checked_run_and_reported(tmp_path: Path, monkeypatch: pyt
     before = (tmp_path / "liquid_bed.toml").read_bytes()
     again = call("new", "liquid-bed")
     assert (again.code, again.err.count("\n")) == (2, 1)
-    assert "not there yet" in again.err and (tmp_path / "liquid_bed.toml").read_bytes() == before
+    assert "does not exist yet" in again.err and (tmp_path / "liquid_bed.toml").read_bytes() == before
     checked = call("check")
-    assert checked.code == 0 and checked.out.splitlines()[-1].startswith("green")
+    assert checked.code == 0 and checked.out.splitlines()[-1].startswith("ok: ")
     assert [path.name for path in tmp_path.iterdir()] == ["liquid_bed.toml"], "check writes nothing"
     done = call("run", *TINY, "-o", "bed")
     assert done.code == 0, done.err
     assert "pressure drop" in done.out and "particles lost" in done.out
     taken = call("run", *TINY, "-o", "bed")
-    assert taken.code == 2 and "holds no run yet" in taken.err
+    assert taken.code == 2 and "continue that run with" in taken.err
     assert call("resume", "bed", "--until", "0.015").code == 0
     result = json.loads(call("report", "--json").out)
     assert (result["status"], result["window"][1]) == ("finished", pytest.approx(0.015))
 
 
-def test_a_case_tells_all_its_mistakes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("command", ["report", "view", "resume", "export"])
+def test_a_run_folder_of_an_earlier_version_is_refused_in_one_line(command: str, tmp_path: Path) -> None:
+    folder = tmp_path / "bed"
+    folder.mkdir()
+    (folder / "run.json").write_text('{"format": 1}')
+    (folder / "case.toml").write_text(TEXT)
+    done = call(command, str(folder))
+    assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
+    assert "run.json: format = 1: must be 2; " in done.err
+    assert "earlier version" in done.err and "case.toml again" in done.err
+    assert sorted(path.name for path in folder.iterdir()) == ["case.toml", "run.json"]
+
+
+def test_all_input_errors_of_a_case_are_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "liquid_bed.toml"
     path.write_text(TEXT.replace("count = 2000", 'cuont = "many"').replace("until = 3.0", "until = -3.0"))
@@ -251,37 +221,47 @@ def test_a_case_tells_all_its_mistakes(tmp_path: Path, monkeypatch: pytest.Monke
         assert done.code == 2 and "did you mean 'restitution'" not in done.err
         done = call(command, "--set", "sides=sticky")
         assert done.code == 2
-        told = done.err.splitlines()
-        assert len(told) == 3 and all(line.startswith("cfddem: ") for line in told)
-        assert any("liquid_bed.toml:27: bed.cuont" in line and "did you mean 'count'" in line for line in told)
-        assert any("run.until = -3.0: must be above 0" in line for line in told)
-        assert any("--set column.sides = 'sticky'" in line for line in told)
+        reported = done.err.splitlines()
+        assert len(reported) == 3 and all(line.startswith("cfddem: ") for line in reported)
+        assert any("liquid_bed.toml:27: bed.cuont" in line and "did you mean 'count'" in line for line in reported)
+        assert any("run.until = -3.0: must be above 0" in line for line in reported)
+        assert any("--set column.sides = 'sticky'" in line for line in reported)
     assert [each.name for each in tmp_path.iterdir()] == ["liquid_bed.toml"]
 
 
-def test_the_colour_of_the_card_is_the_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_status_of_the_check_sets_the_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    amber, red = ("--set", "inlet_velocity=0.03"), ("--set", "inlet_velocity=0.7")
-    assert [call("check", "liquid-bed", *given).code for given in ((), amber, (*amber, "--strict"), red)] == [
-        0,
-        0,
-        1,
-        2,
-    ]
-    refused = call("run", "liquid-bed", *red)
+    low, high = ("--set", "inlet_velocity=0.03"), ("--set", "inlet_velocity=0.7")
+    codes = [call("check", "liquid-bed", *given).code for given in ((), low, (*low, "--strict"), high)]
+    assert codes == [0, 0, 1, 2]
+    refused = call("run", "liquid-bed", *high)
     assert refused.code == 2 and "above the terminal velocity" in refused.err
     assert list(tmp_path.iterdir()) == []
-    assert json.loads(call("check", "liquid-bed", *red, "--json").out)["colour"] == "red"
+    assert json.loads(call("check", "liquid-bed", *high, "--json").out)["status"] == "error"
 
 
 def test_the_schema_is_json() -> None:
     assert json.loads(call("new", "--schema").out)["properties"]["bed"]
 
 
+def test_the_status_is_coloured_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cfddem.cli.printing import with_colour
+
+    lines = ["warning: bed.count: too many", "  a warning: inside a line"]
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert list(with_colour(lines)) == lines
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    assert list(with_colour(lines)) == ["\x1b[33mwarning\x1b[0m: bed.count: too many", lines[1]]
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert list(with_colour(lines)) == lines
+
+
 # ---------------------------------------------------------------- sweeps
 
 
-def test_a_sweep_keeps_what_runs_lists_what_fails_and_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sweep_keeps_finished_runs_lists_failed_ones_and_continues(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     line = ("sweep", "liquid-bed", "--over", "inlet_velocity=0.1,0.7", "--over", "seed=1..2", *TINY, "-o", "many")
     done = call(*line)
@@ -301,8 +281,8 @@ def test_a_sweep_keeps_what_runs_lists_what_fails_and_goes_on(tmp_path: Path, mo
     assert "a folder of the same case" in other.err
 
 
-def test_a_sweep_that_is_stopped_begins_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfddem import sweep
+def test_a_stopped_sweep_begins_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from cfddem.run import sweep
 
     def one(case: Case, values: dict[str, int], folder: Path, alone: bool) -> sweep.Outcome:
         status = "stopped" if values["bed.seed"] == 2 else "failed"
@@ -324,12 +304,12 @@ def test_a_sweep_that_is_stopped_begins_no_further_run(tmp_path: Path, monkeypat
         (["seed=1..200000"], "at most 10000 runs"),
         (["seeed=1"], "did you mean 'seed'"),
         (["seed=1,2", "bed.seed=3"], "given once"),
-        (["seed=1,1"], "another name for every run"),
+        (["seed=1,1"], "a different name for every run"),
         (["diameter=-1,0.001"], "bed.diameter = -1: must be above 0"),
     ],
     ids=lambda value: value[0] if isinstance(value, list) else "",
 )
-def test_a_wrong_sweep_is_told_before_anything_runs(
+def test_a_wrong_sweep_is_refused_before_anything_runs(
     over: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -337,74 +317,3 @@ def test_a_wrong_sweep_is_told_before_anything_runs(
     assert (done.code, done.err.count("\n")) == (2, 1)
     assert said in done.err
     assert list(tmp_path.iterdir()) == []
-
-
-# ---------------------------------------------------------------- laws and machine
-
-
-def test_the_page_of_every_law_can_be_read(tmp_path: Path) -> None:
-    from cfddem import pages
-
-    shelf = [law for kind in pages.laws().values() for law in kind.values()]
-    assert len(shelf) > 60
-    listed = call("explain").out
-    assert "for voidage 0.4 to 1, reynolds 0 to 1000\n" in listed
-    for law in shelf:
-        text = "\n".join(pages.page(law))
-        assert f"  {law.name}" in listed
-        assert max(map(len, text.splitlines())) <= WIDTH
-        assert not re.search(r"\\|frac|varepsilon|:func:|``", text), text
-        assert " ".join(law.reference.split()[:2]) in text
-    done = call("explain", "di_felice", "--plot", str(tmp_path / "law.png"))
-    assert "fitted for voidage from 0.4 to 1" in done.out
-    assert (tmp_path / "law.png").stat().st_size > 10_000
-    assert json.loads(call("explain", "wen-yu", "--json").out)["kind"] == "drag"
-    unknown = call("explain", "di_felic")
-    assert unknown.code == 2 and "di_felice" in unknown.err
-
-
-def test_the_doctor_names_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    answers = {each["name"]: each for each in json.loads(call("doctor", "--quick", "--json").out)}
-    assert {"cfddem", "python", "packages", "threads", "compiled loops", "folder"} <= set(answers)
-    assert "numba" in answers["packages"]["text"]
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_the_self_test_closes_its_ledger() -> None:
-    from cfddem.doctor import _self_test
-
-    answer = _self_test()
-    assert answer.fine, answer.text
-
-
-def test_what_is_piped_is_plain() -> None:
-    for words in (["--help"], ["check", "liquid-bed"], ["explain"]):
-        done = cfddem(*words)
-        assert done.returncode == 0
-        assert "\x1b" not in done.stdout + done.stderr
-        assert max(map(len, done.stdout.splitlines())) <= WIDTH
-
-
-def test_completion_can_be_installed(tmp_path: Path) -> None:
-    script = app.generate_completion(shell="bash")
-    assert all(name in script for name in commands())
-
-
-def test_python_on_the_front_page_runs() -> None:
-    blocks = re.findall(r"```python\n(.*?)```", (HOUSE / "README.md").read_text(), re.DOTALL)
-    assert blocks
-    for block in blocks:
-        done = subprocess.run(
-            [sys.executable, "-c", block],
-            env=os.environ | {"PYTHONPATH": str(HOUSE), "NUMBA_NUM_THREADS": "1"},
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-        assert done.returncode == 0, done.stderr
-
-
-def test_the_module_is_the_command() -> None:
-    done = subprocess.run([sys.executable, "-m", "cfddem", "explain", "wen-yu"], capture_output=True, text=True)
-    assert done.returncode == 0 and done.stdout.startswith("wen_yu, drag")

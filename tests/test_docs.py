@@ -1,7 +1,8 @@
-"""The pages of the documentation: everything that a reader may copy runs as it stands, and links lead somewhere."""
+"""The documentation: all commands and Python blocks run as they stand, and all links and names exist."""
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import shlex
@@ -14,21 +15,20 @@ from typing import Any, NamedTuple
 
 import pytest
 
-HOUSE = Path(__file__).parents[1]
-DOCS = HOUSE / "docs"
-PAGES = sorted([*DOCS.rglob("*.md"), *(HOUSE / "scenarios").glob("*.md")])
-NAMES = [str(page.relative_to(HOUSE)) for page in PAGES]
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted([*DOCS.rglob("*.md"), *(ROOT / "scenarios").rglob("README.md")])
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>[^\n]*?) -->\n)?```(?P<kind>python|sh)\n(?P<text>.*?)^```$", re.M | re.S)
-"""A block that can be run. The mark before it says `not run`, `slow`, `exits N`, or `needs LIBRARY`."""
+"""A block that can be run. The comment before it is `not run`, `slow`, `exits N`, or `needs LIBRARY`."""
 
-
-QUICK = ("binary_collision", "wet_pair", "wet_wall")
-"""Pages of the gallery that take seconds; the others run whole beds, or maps."""
+QUICK = ("immersed_pair", "wet_pair", "wet_wall")
+"""Scenarios whose pages take seconds; the others run whole beds, or maps."""
 
 
 class Block(NamedTuple):
-    """A piece of a page that a reader may copy."""
+    """A block of commands or Python on a page."""
 
     kind: str  # python or sh
     text: str
@@ -37,15 +37,15 @@ class Block(NamedTuple):
 
 
 def blocks(page: Path) -> Iterator[Block]:
-    """The blocks of a page that are to be run, in their order."""
+    """The blocks of a page that are to be run, in order."""
     text = page.read_text()
     for found in BLOCK.finditer(text):
         if found["mark"] != "not run":
             yield Block(found["kind"], found["text"], found["mark"] or "", text.count("\n", 0, found.start("text")))
 
 
-def go_through(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-    """Do what a page says, from its first block to its last."""
+def run_page(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    """Run the blocks of a page, from the first to the last."""
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {"__name__": "page"}
     for block in blocks(page):
@@ -56,19 +56,19 @@ def go_through(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: 
             continue
         for command in block.text.splitlines():
             words = shlex.split(command, comments=True)
-            assert words[:1] == ["cfddem"], f"{page.name}:{block.line}: {command} is run by no test"
+            assert words[:1] == ["cfddem"], f"{page.name}:{block.line}: {command} is not tested"
             wanted = int(block.mark.removeprefix("exits ")) if block.mark.startswith("exits") else 0
-            assert ends_with(words, monkeypatch) == wanted, f"{page.name}:{block.line}: {command}"
+            assert exit_code(words, monkeypatch) == wanted, f"{page.name}:{block.line}: {command}"
 
 
 def lacks(block: Block) -> bool:
-    """Whether a block needs a library of an extra that is not installed here."""
+    """Whether a block needs an optional library that is not installed."""
     return block.mark.startswith("needs") and importlib.util.find_spec(block.mark.removeprefix("needs ")) is None
 
 
-def ends_with(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
+def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     """Exit code of a command line."""
-    from cfddem.cli import main
+    from cfddem.cli.app import main
 
     monkeypatch.setattr(sys, "argv", words)
     try:
@@ -79,12 +79,12 @@ def ends_with(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
 
 
 def is_long(page: Path) -> bool:
-    """Whether a page takes longer than a plain test may."""
-    return page.parent.name == "scenarios" and page.stem not in QUICK
+    """Whether a page takes too long for a test that is not marked slow."""
+    return "scenarios" in page.parts and page.parent.name not in QUICK
 
 
 def pages_with(mark: str | None) -> list[Any]:
-    """The pages that hold something to run; with a mark, those where a block carries it."""
+    """The pages with blocks to run; with a mark, those with a block that has it."""
     return [
         pytest.param(page, id=name, marks=[pytest.mark.slow] if is_long(page) else [])
         for page, name in zip(PAGES, NAMES)
@@ -93,22 +93,22 @@ def pages_with(mark: str | None) -> list[Any]:
 
 
 @pytest.mark.parametrize("page", pages_with(None))
-def test_what_a_page_says_to_do_can_be_done(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Commands and Python of a page, in one empty folder, but for those that take minutes."""
-    go_through(page, False, monkeypatch, tmp_path)
+def test_commands_and_python_of_a_page_run(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """All blocks of a page in one empty folder, except those that take minutes."""
+    run_page(page, False, monkeypatch, tmp_path)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", pages_with("slow"))
-def test_pages_that_take_minutes(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    go_through(page, True, monkeypatch, tmp_path)
+def test_slow_commands_and_python_of_a_page_run(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    run_page(page, True, monkeypatch, tmp_path)
 
 
-# ---------------------------------------------------------------- names, links, and what is made from the sources
+# ---------------------------------------------------------------- names, links, and generated pages
 
 
 def tool(name: str) -> Any:
-    """A module of docs/tools, which is no package."""
+    """A module of docs/tools, which is not a package."""
     found = importlib.util.spec_from_file_location(name, DOCS / "tools" / f"{name}.py")
     assert found is not None and found.loader is not None
     module = importlib.util.module_from_spec(found)
@@ -117,31 +117,31 @@ def tool(name: str) -> Any:
 
 
 @cache
-def made_pages() -> set[str]:
-    """Addresses of the pages that are made when the site is built, without making them."""
+def generated_pages() -> set[str]:
+    """Addresses of the pages that are generated when the site is built."""
     pages = tool("pages")
     reference = {pages.page_of(module) for room in pages.ROOMS for module in pages.modules(room)}
-    others = {f"reference/{name}.md" for name in ("index", "case", "commands", "shelf")}
+    others = {f"reference/{name}.md" for name in ("index", "case", "commands", "laws")}
     return reference | others | {address for address, _ in pages.gallery()} | {"changes.md"}
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
-def test_links_lead_to_pages_and_pictures(page: Path) -> None:
-    made = made_pages()
+def test_links_exist(page: Path) -> None:
+    generated = generated_pages()
     for target in re.findall(r"\]\((?!https?:)([^)#\s]+)", page.read_text()):
         place = (page.parent / target).resolve()
-        assert place.exists() or str(place.relative_to(DOCS)) in made, target
+        assert place.exists() or str(place.relative_to(DOCS)) in generated, target
 
 
 @pytest.mark.parametrize("page", sorted(DOCS.rglob("*.md")), ids=lambda page: page.stem)
-def test_functions_that_pages_name_are_there(page: Path) -> None:
-    """`[words][closures.drag.di_felice]` leads to the function's place in the reference."""
+def test_functions_named_on_pages_exist(page: Path) -> None:
+    """`[words][closures.drag.di_felice]` links to the function in the reference."""
     for name in re.findall(r"\]\[((?:closures|cfddem|scenarios)\.[\w.]+)\]", page.read_text()):
         words = name.split(".")
         module = next(
             ".".join(words[:count])
             for count in range(len(words) - 1, 0, -1)
-            if HOUSE.joinpath(*words[:count]).with_suffix(".py").exists()
+            if ROOT.joinpath(*words[:count]).with_suffix(".py").exists()
         )
         found: Any = importlib.import_module(module)
         for word in words[module.count(".") + 1 :]:
@@ -149,27 +149,93 @@ def test_functions_that_pages_name_are_there(page: Path) -> None:
         assert found.__doc__, name
 
 
-def test_pages_in_the_navigation_are_there() -> None:
-    listed = re.findall(r"([\w/-]+\.md)", (HOUSE / "mkdocs.yml").read_text())
-    made = made_pages()
+@pytest.mark.parametrize(
+    "page",
+    [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "scenarios").rglob("README.md"))],
+    ids=lambda page: str(page.relative_to(ROOT)),
+)
+def test_links_in_the_repository_exist(page: Path) -> None:
+    for target in re.findall(r"(?:\]\(|src=\")(?!https?:)([^)#\s\"]+)", page.read_text()):
+        assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_displayed_equations_are_paragraphs(page: Path) -> None:
+    """Inside a paragraph `$$ ... $$` would be shown as text."""
+    for paragraph in re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL).split("\n\n"):
+        if "$$" in paragraph:
+            assert re.fullmatch(r"\$\$[^$]*\$\$", paragraph.strip()), paragraph
+
+
+PLACE = re.compile(r"`([\w/]+(?:\.py|/))`(?:: ((?:`[\w.]+`(?:, )?)+))?")
+"""A file or folder, and names that are defined in it."""
+
+
+def places_on_the_map() -> list[tuple[str, str, list[str]]]:
+    """Question, file and names of each row of the table in docs/architecture.md."""
+    section = (DOCS / "architecture.md").read_text().split("## Where to find\n")[1].split("\n## ")[0]
+    rows = [row.split(" | ") for row in section.splitlines() if row.startswith("| ") and "`" in row]
+    return [
+        (question.strip("| "), path, re.findall(r"[\w.]+", names))
+        for question, answer in rows
+        for path, names in PLACE.findall(answer)
+    ]
+
+
+def defined_names(path: Path) -> set[str]:
+    """Functions, classes, methods and constants of a module."""
+    names: set[str] = set()
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        if isinstance(node, ast.ClassDef):
+            names |= {f"{node.name}.{each.name}" for each in node.body if isinstance(each, ast.FunctionDef)}
+        if isinstance(node, ast.Assign):
+            names |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            names.add(node.target.id)
+    return names
+
+
+def test_places_on_the_map_exist() -> None:
+    """Each answer of the table names an existing file, and names that are defined in it."""
+    places = places_on_the_map()
+    assert len({question for question, _, _ in places}) >= 20
+    for question, path, names in places:
+        assert (ROOT / path).exists(), f"{question} {path}"
+        if names:
+            assert set(names) <= defined_names(ROOT / path), f"{question} {path}: {names}"
+
+
+def test_files_named_in_the_architecture_exist() -> None:
+    for path in re.findall(
+        r"`((?:cfddem|closures|scenarios|tests|docs)/[\w/.]+)`", (DOCS / "architecture.md").read_text()
+    ):
+        assert (ROOT / path).exists() or "NAME" in path, path
+
+
+def test_all_pages_are_in_the_navigation() -> None:
+    listed = re.findall(r"([\w/-]+\.md)", (ROOT / "mkdocs.yml").read_text())
+    generated = generated_pages()
     assert len(listed) > 10
-    assert all((DOCS / each).exists() or each in made for each in listed)
+    assert all((DOCS / each).exists() or each in generated for each in listed)
     written = {str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md")}
     assert written <= set(listed)
 
 
 def test_every_key_of_a_case_is_in_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfddem.bed import Bed, Part
-    from cfddem.case import CaseLaws, CaseRun, Column
+    from cfddem.case.bed import Bed, MixtureSpecies
+    from cfddem.case.laws import CaseLaws
+    from cfddem.case.schema import CaseRun, Column
 
     monkeypatch.syspath_prepend(str(DOCS / "tools"))
     pytest.importorskip("griffe")
     page = tool("pages").case_keys()
-    for part in (Column, Bed, Part, CaseLaws, CaseRun):
+    for part in (Column, Bed, MixtureSpecies, CaseLaws, CaseRun):
         assert all(f"| `{key}` |" in page for key in part.model_fields)
 
 
-def test_docstrings_become_markdown() -> None:
+def test_docstrings_are_converted_to_markdown() -> None:
     pytest.importorskip("griffe")
     marked = tool("docstrings").to_markdown(
         "Sum.\n\n.. math:: a =\n    b + c\n\nfirst  a* [m]\nreturns  |a|\n         in all\n\n>>> 1 + 1\n2"
@@ -182,12 +248,12 @@ def test_docstrings_become_markdown() -> None:
     ]
 
 
-def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+def test_site_builds_without_warnings(tmp_path: Path) -> None:
     """`mkdocs build --strict`, where the extra `docs` is installed."""
     pytest.importorskip("mkdocs")
     built = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)],
-        cwd=HOUSE,
+        cwd=ROOT,
         capture_output=True,
         text=True,
         timeout=300,

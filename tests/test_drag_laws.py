@@ -1,4 +1,4 @@
-"""Drag, bed, lift and added-mass laws: their limits, their switches, and published numbers."""
+"""Drag, bed, lift and added-mass laws: limits, transitions and published values."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from closures import SHELF, added_mass, balance, bed, check, drag, drag_resolved, drag_single, law, lift
+from closures import REGISTRY, added_mass, balance, bed, check, drag, drag_resolved, drag_single, law, lift
 from closures.drag import ergun
 
 DATA = Path(__file__).parents[1] / "scenarios" / "data"
@@ -22,23 +22,23 @@ DALLAVALLE: list[Drag] = [drag_single.dallavalle, drag.di_felice, drag_resolved.
 
 
 @pytest.mark.parametrize("law", SINGLE + BEDS)
-def test_a_slow_sphere_alone_feels_stokes_drag(law: Drag) -> None:
+def test_isolated_spheres_have_stokes_drag_at_low_reynolds_numbers(law: Drag) -> None:
     assert law(1e-9, 1.0) == pytest.approx(1.0, abs=1e-4)
     assert law(0.0, 1.0) == 1.0
 
 
 @pytest.mark.parametrize("law", DALLAVALLE)
-def test_laws_on_dallavalle_are_four_percent_below_stokes(law: Drag) -> None:
+def test_laws_based_on_dallavalle_are_four_percent_below_stokes(law: Drag) -> None:
     assert law(0.0, 1.0) == pytest.approx(0.96)
 
 
 @pytest.mark.parametrize("law", [drag.gidaspow, drag.gidaspow_smooth])
 @pytest.mark.parametrize("reynolds", [1e-3, 1e4])
-def test_gidaspow_is_ergun_in_dense_beds(law: Drag, reynolds: float) -> None:
+def test_gidaspow_equals_ergun_in_dense_beds(law: Drag, reynolds: float) -> None:
     assert law(reynolds, 0.42) == pytest.approx(ergun(reynolds, 0.42), rel=5e-3)
 
 
-def test_the_smooth_switch_of_gidaspow_is_one_hundredth_wide() -> None:
+def test_width_of_the_smooth_transition_of_gidaspow() -> None:
     """Half of each law at eps = 0.8; at 0.81 a share of 1/2 + arctan(2.625)/pi of Wen & Yu."""
     for voidage, share in [(0.8, 0.5), (0.81, 0.8840), (0.79, 0.1160)]:
         mixture = share * drag.wen_yu(10.0, voidage) + (1.0 - share) * ergun(10.0, voidage)
@@ -46,13 +46,13 @@ def test_the_smooth_switch_of_gidaspow_is_one_hundredth_wide() -> None:
 
 
 @pytest.mark.parametrize("law", [drag_resolved.koch_hill, drag_resolved.beetstra, drag_resolved.tenneti])
-def test_creeping_dense_beds_lie_near_ergun(law: Drag) -> None:
-    """Carman's constant of the simulations is 180 against Ergun's 150: up to 30 %."""
+def test_creeping_dense_beds_are_within_30_percent_of_ergun(law: Drag) -> None:
+    """Simulations give a Carman constant of 180, Ergun's is 150."""
     assert law(0.0, 0.4) == pytest.approx(ergun(0.0, 0.4), rel=0.3)
 
 
 @pytest.mark.parametrize("law", [*SINGLE, *BEDS, *DALLAVALLE[:2], ergun, drag.gidaspow])
-def test_drag_rises_with_reynolds_number_and_crowding(law: Drag) -> None:
+def test_drag_increases_with_reynolds_number_and_solid_fraction(law: Drag) -> None:
     for voidage in (0.45, 0.6, 0.75, 0.9):
         values = [law(reynolds, voidage) for reynolds in np.geomspace(1e-3, 300.0, 60)]
         assert (np.diff(values) >= -1e-12).all(), voidage
@@ -61,7 +61,7 @@ def test_drag_rises_with_reynolds_number_and_crowding(law: Drag) -> None:
         assert (np.diff(values) >= -1e-12).all(), reynolds
 
 
-def test_published_jumps_have_their_published_size() -> None:
+def test_size_of_published_jumps() -> None:
     def jump(low: float, high: float) -> float:
         return high / low - 1.0
 
@@ -86,7 +86,7 @@ def test_ergun_pressure_drop_of_the_packed_bed() -> None:
     ("law", "limit"), [(bed.terminal_reynolds_abraham, 0.08), (bed.terminal_reynolds_brown_lawler, 0.08)]
 )
 def test_terminal_velocity_of_mordants_glass_bead(law: Callable[[float], float], limit: float) -> None:
-    """Both laws are 7 % fast against the experiment; the datum is good to about 3 %."""
+    """Both laws are 7 % above the experiment, whose error is about 3 %."""
     viscosity, galileo, speed = 8.9e-7, 49.14, 0.0741
     assert law(galileo**2) * viscosity / 0.5e-3 == pytest.approx(speed, rel=limit)
 
@@ -110,14 +110,14 @@ def test_minimum_fluidisation_balances_weight_and_drag() -> None:
     ("law", "limit"),
     [(drag_single.schiller_naumann, 0.08), (drag_single.brown_lawler, 0.06), (drag_single.abraham, 0.10)],
 )
-def test_single_spheres_lie_on_the_standard_drag_curve(law: Drag, limit: float) -> None:
+def test_isolated_spheres_against_the_standard_drag_curve(law: Drag, limit: float) -> None:
     """Up to Re = 1000, against the curve of Clift, Grace & Weber (1978)."""
     for reynolds in np.geomspace(0.01, 1000.0, 100):
         assert law(reynolds, 1.0) == pytest.approx(drag_single.clift(reynolds, 1.0), rel=limit)
 
 
-def test_standard_drag_curve_of_the_book() -> None:
-    """Numbers of the library `fluids`, and the bottom of the crisis, C_D = 0.07."""
+def test_standard_drag_curve_of_clift() -> None:
+    """Values of the library `fluids`, and the minimum in the drag crisis, C_D = 0.07."""
     assert 24.0 / 200.0 * drag_single.clift(200.0, 1.0) == pytest.approx(0.7756342422322543, rel=1e-12)
     assert 24.0 / 4e5 * drag_single.clift(4e5, 1.0) == pytest.approx(0.0702, abs=1e-4)
     assert 24.0 / 2e6 * drag_single.clift(2e6, 1.0) == pytest.approx(0.15)
@@ -131,14 +131,14 @@ def test_standard_drag_curve_of_the_book() -> None:
 def test_independent_simulations_agree_in_creeping_flow(law: Drag) -> None:
     """Lattice Boltzmann (Hill, van der Hoef) and immersed boundary (Tenneti): 10 % for 0.1 < phi < 0.5.
 
-    A law of the total force taken for one without the pressure gradient would be 25 to 100 % off.
+    A law of the total force, used as one without the pressure gradient, would differ by 25 to 100 %.
     """
     for voidage in np.linspace(0.5, 0.9, 9):
         assert law(0.0, voidage) == pytest.approx(drag_resolved.van_der_hoef(0.0, voidage), rel=0.10)
 
 
 def test_polydisperse_drag_has_the_published_total_force() -> None:
-    """Force and share of the pressure gradient add up to eps y + (1 - eps) y^2 + 0.064 eps y^3, over eps, times F."""
+    """Drag plus pressure gradient equals (eps y + (1 - eps) y^2 + 0.064 eps y^3) / eps times F."""
     voidage, diameters, numbers = 0.55, np.array([1.0, 1.7]), np.array([3.0, 1.0])
     mean = (numbers * diameters**3).sum() / (numbers * diameters**2).sum()
     ratios = diameters / mean
@@ -153,7 +153,7 @@ def test_polydisperse_drag_has_the_published_total_force() -> None:
     assert (numbers * diameters * linear).sum() == pytest.approx((numbers * diameters * ratios).sum() * factor)
 
 
-def test_a_laws_own_reynolds_number_is_that_of_the_mean_sphere() -> None:
+def test_polydisperse_drag_uses_the_reynolds_number_of_the_mean_sphere() -> None:
     same = drag_resolved.beetstra_polydisperse(20.0, 0.6, 2.0) / (2.0 + 0.064 * 8.0)
     assert same == pytest.approx(drag_resolved.beetstra(10.0, 0.6), rel=1e-14)
 
@@ -193,7 +193,7 @@ def test_minimum_fluidisation_of_the_netl_challenge() -> None:
 
 
 @pytest.mark.parametrize("number", [1e-2, 1.0, 1e2, 1e3, 1e4, 1e5, 1e6])
-def test_beds_of_di_felice_expand_as_richardson_and_zaki(number: float) -> None:
+def test_beds_of_di_felice_expand_like_richardson_and_zaki(number: float) -> None:
     """Within 0.025 of the voidage, from its own terminal velocity."""
     alone = balance.reynolds_in_balance(number, 1.0, drag.di_felice)
     power = bed.exponent_richardson_zaki(bed.terminal_reynolds_brown_lawler(number), 0.0)
@@ -203,12 +203,12 @@ def test_beds_of_di_felice_expand_as_richardson_and_zaki(number: float) -> None:
 
 
 @pytest.mark.parametrize(("law", "power"), [(drag.wen_yu, 4.65), (drag.di_felice, 4.70)])
-def test_creeping_beds_expand_with_the_power_of_the_law(law: Drag, power: float) -> None:
+def test_exponent_of_creeping_beds(law: Drag, power: float) -> None:
     ratio = balance.reynolds_in_balance(1e-9, 0.6, law) / balance.reynolds_in_balance(1e-9, 1.0, law)
     assert math.log(ratio) / math.log(0.6) == pytest.approx(power, abs=1e-3)
 
 
-def test_exponents_of_expansion_have_their_limits() -> None:
+def test_limits_of_the_expansion_exponents() -> None:
     assert bed.exponent_garside(0.0) == pytest.approx(5.1)
     assert bed.exponent_garside(1e9) == pytest.approx(2.7, abs=1e-3)
     assert bed.exponent_khan_richardson(1e14, 0.0) == pytest.approx(2.4, abs=1e-3)
@@ -220,8 +220,8 @@ def test_exponents_of_expansion_have_their_limits() -> None:
         assert (np.diff(values) < 0.0).all()
 
 
-def test_shear_lift_has_its_limits() -> None:
-    """Saffman's 1.615 in creeping flow; Mei's factor 0.3314 sqrt(beta) far above it; nothing without shear."""
+def test_limits_of_shear_lift() -> None:
+    """Saffman's 1.615 in creeping flow; Mei's factor 0.3314 sqrt(beta) far above it; zero without shear."""
     scale = 3.0 * math.pi / 1.615
     assert lift.saffman_mei(1e-8, 1e-12) * scale / 1e-6 == pytest.approx(1.0, rel=1e-6)
     assert lift.saffman_mei(0.0, 1e-4) * scale / 1e-2 == pytest.approx(1.0, rel=1e-6)
@@ -230,7 +230,7 @@ def test_shear_lift_has_its_limits() -> None:
     assert lift.saffman_mei(10.0, 0.0) == 0.0
 
 
-def test_spin_lift_and_torque_have_their_limits() -> None:
+def test_limits_of_spin_lift_and_torque() -> None:
     assert lift.magnus(0.0) == 1.0
     assert lift.magnus(1.0 + 1e-12) == pytest.approx(1.0, rel=1e-9)
     assert lift.magnus(1e3) == pytest.approx(0.2, abs=0.001)
@@ -240,67 +240,67 @@ def test_spin_lift_and_torque_have_their_limits() -> None:
     assert lift.torque(1000.0) == pytest.approx((12.9 / math.sqrt(1000.0) + 0.1284) / (0.064 * math.pi), rel=1e-12)
 
 
-def test_added_mass_is_one_half_for_a_sphere_alone() -> None:
+def test_added_mass_of_an_isolated_sphere_is_one_half() -> None:
     assert added_mass.constant(0.3) == added_mass.constant(1.0) == added_mass.zuber(1.0) == 0.5
     for solids in (0.01, 0.001):  # 1/2 (1 + 3 phi) in a dilute suspension
         assert added_mass.zuber(1.0 - solids) == pytest.approx(0.5 * (1.0 + 3.0 * solids), abs=2.0 * solids**2)
 
 
 KNOWN = {
-    "clift": ["force falls with reynolds at reynolds = 3.5", "jumps by -21 % at reynolds = 4e+05"],  # drag crisis
+    "clift": ["force decreases with reynolds at reynolds = 3.5", "jumps by -21 % at reynolds = 4e+05"],  # drag crisis
     "gidaspow": ["jumps by -73 % at voidage = 0.8"],
     "koch_hill": ["jumps by -1 % at voidage = 0.6"],
 }
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, card in SHELF["drag"].items() if "closures" in card.function.__module__]
+    "name", [name for name, entry in REGISTRY["drag"].items() if "closures" in entry.function.__module__]
 )
 def test_drag_laws_pass_the_check_of_their_kind(name: str) -> None:
-    """But for the jumps and the fall that were published."""
-    complaints = check(SHELF["drag"][name].function)
-    assert len(complaints) == len(KNOWN.get(name, []))
-    for found, expected in zip(complaints, KNOWN.get(name, [])):
+    """Except for the jumps and the decrease of the published laws."""
+    problems = check(REGISTRY["drag"][name].function)
+    assert len(problems) == len(KNOWN.get(name, []))
+    for found, expected in zip(problems, KNOWN.get(name, [])):
         assert found.startswith(expected)
 
 
-def of_ones_own(kind: str, function: Callable[..., float], **ranges: tuple[float, float]) -> list[str]:
-    """The complaints about a law that a user has just written."""
-    function.__name__ = "of_ones_own"
+def check_new(kind: str, function: Callable[..., float], **ranges: tuple[float, float]) -> list[str]:
+    """Problems that the check finds in a new law."""
+    function.__name__ = "check_new"
     try:
-        return check(law(kind, "a user's notebook", **ranges)(function))
+        return check(law(kind, "test", **ranges)(function))
     finally:
-        del SHELF[kind]["of_ones_own"]
+        del REGISTRY[kind]["check_new"]
 
 
-def test_a_users_own_law_is_checked() -> None:
+def test_check_finds_errors_of_user_drag_laws() -> None:
     ranges = {"reynolds": (0.01, 300.0), "voidage": (0.5, 0.9)}
-    assert of_ones_own("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-2.7, **ranges) == []
-    assert of_ones_own("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-3.7) == []
+    assert check_new("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-2.7, **ranges) == []
+    assert check_new("drag", lambda reynolds, voidage: (1.0 + 0.15 * reynolds**0.687) * voidage**-3.7) == []
     wrong: list[tuple[Drag, str]] = [
-        (lambda reynolds, voidage: 1.15 + 0.15 * reynolds**0.687, "tends to 1.15 and not to 1"),
-        (lambda reynolds, voidage: 24.0 / reynolds, "at reynolds = 0: a particle may rest"),
-        (lambda reynolds, voidage: voidage**2.7, "falls with solid_fraction"),
-        (lambda reynolds, voidage: 1.0 / (1.0 + reynolds * reynolds), "force falls with reynolds"),
+        (lambda reynolds, voidage: 1.15 + 0.15 * reynolds**0.687, "tends to 1.15 for a slow isolated sphere"),
+        (lambda reynolds, voidage: 24.0 / reynolds, "at reynolds = 0; the slip velocity"),
+        (lambda reynolds, voidage: voidage**2.7, "decreases with solid_fraction"),
+        (lambda reynolds, voidage: 1.0 / (1.0 + reynolds * reynolds), "force decreases with reynolds"),
         (lambda reynolds, voidage: 1.0 if voidage > 0.7 else 1.1, "jumps by -9.1 % at voidage = 0.7"),
         (lambda reynolds, voidage: voidage - 1.0, "drag must be positive"),
         (lambda reynolds, voidage: drag_resolved.tenneti(reynolds, voidage) / voidage, "is 2.5 times Ergun's"),
     ]
-    for function, complaint in wrong:
-        found = of_ones_own("drag", function)
-        assert any(complaint in line for line in found), (complaint, found)
-    assert "must take" in of_ones_own("drag", lambda speed: 1.0)[0]
-    assert "inf" in of_ones_own("drag", lambda reynolds, voidage: math.inf)[0]
-    assert "compiled" in of_ones_own("drag", lambda reynolds, voidage: float(str(1.0)))[0]
+    for function, problem in wrong:
+        found = check_new("drag", function)
+        assert any(problem in line for line in found), (problem, found)
+    assert "must take" in check_new("drag", lambda speed: 1.0)[0]
+    assert "inf" in check_new("drag", lambda reynolds, voidage: math.inf)[0]
+    assert "compiled" in check_new("drag", lambda reynolds, voidage: float(str(1.0)))[0]
 
 
-def test_other_kinds_have_rules_of_their_own() -> None:
-    assert "outside" in of_ones_own("minimum_gap", lambda roughness: -roughness)[0]
-    assert "falls with approach_speed" in of_ones_own("minimum_gap", lambda approach_speed: 2.0 - approach_speed)[0]
-    assert "outside" in of_ones_own("restitution", lambda stokes, restitution: restitution + 0.01 * stokes)[0]
-    assert "not 1/2" in of_ones_own("added_mass", lambda voidage: 1.0 / voidage)[0]
-    assert "without shear" in of_ones_own("lift", lambda reynolds, shear_reynolds: 1.0 + shear_reynolds)[0]
-    with pytest.raises(KeyError, match="is no law"):
+def test_check_finds_errors_of_other_kinds() -> None:
+    assert "outside" in check_new("minimum_gap", lambda roughness: -roughness)[0]
+    assert "decreases with approach_speed" in check_new("minimum_gap", lambda approach_speed: 2.0 - approach_speed)[0]
+    assert "outside" in check_new("restitution", lambda stokes, restitution: restitution + 0.01 * stokes)[0]
+    assert "must be 1/2" in check_new("added_mass", lambda voidage: 1.0 / voidage)[0]
+    assert "without shear" in check_new("lift", lambda reynolds, shear_reynolds: 1.0 + shear_reynolds)[0]
+    with pytest.raises(KeyError, match="is not a registered law"):
         check(lambda reynolds, voidage: 1.0)
 
 
@@ -334,14 +334,14 @@ AS_OTHERS: list[tuple[Drag, float, float, float]] = [
 
 
 @pytest.mark.parametrize(("law", "reynolds", "voidage", "factor"), AS_OTHERS)
-def test_drag_is_what_other_codes_compute(law: Drag, reynolds: float, voidage: float, factor: float) -> None:
-    """The formulas of public codes, brought to the normal form and evaluated apart from ours."""
+def test_drag_equals_that_of_other_codes(law: Drag, reynolds: float, voidage: float, factor: float) -> None:
+    """Formulas of public codes, converted to the normal form and evaluated independently."""
     assert law(reynolds, voidage) == pytest.approx(factor, rel=1e-6)
 
 
 @pytest.mark.parametrize(
     ("reynolds", "shear_reynolds", "factor"), [(1.0, 0.5, 0.1115476), (20.0, 4.0, 0.07743626), (80.0, 16.0, 0.1015869)]
 )
-def test_shear_lift_is_what_openfoam_computes(reynolds: float, shear_reynolds: float, factor: float) -> None:
-    """SaffmanMeiLiftForce, brought to the lift over Stokes drag."""
+def test_shear_lift_equals_that_of_openfoam(reynolds: float, shear_reynolds: float, factor: float) -> None:
+    """SaffmanMeiLiftForce, converted to lift over Stokes drag."""
     assert lift.saffman_mei(reynolds, shear_reynolds) == pytest.approx(factor, rel=1e-6)

@@ -9,21 +9,22 @@ import pytest
 from disturbed_runs import TINY
 
 from cfddem import open_run
-from cfddem.case import Case
-from cfddem.errors import InputError
-from cfddem.fluid.energies import face_volumes, kinetic_energy, works
-from cfddem.kernels import use_threads
-from cfddem.materials import Material, pair_table
-from cfddem.particles.energies import CHANNELS
-from cfddem.particles.forces import CONSTANT_TORQUE, JKR, RESCALED, VERLET, Laws
-from cfddem.particles.packing import lattice
+from cfddem.analysis.report import report
+from cfddem.analysis.report_text import lines
+from cfddem.backend.compile import use_threads
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
+from cfddem.case.schema import Case
+from cfddem.particles.initial.packing import lattice
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
 from cfddem.particles.state import kinetic_energy as of_spheres
-from cfddem.particles.walls import Plane
-from cfddem.report import energy_lines, lines, report
-from cfddem.run import Run
-from cfddem.simulation import Simulation
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Plane
+from cfddem.particles.work import CHANNELS
+from cfddem.run.runner import Run
+from cfddem.run.simulation import Simulation
 from closures.contact import hertz_force, spring_energy
 
 ROUGH = Material(
@@ -38,7 +39,7 @@ def box(
     """Spheres that fly, spin and collide in a box whose lid slides."""
     random, size = np.random.default_rng(2), 0.012
     places = lattice(2e-3, ((0.0, 0.0, 0.0), (size, size, size)), spacing=1.2, seed=1)[:count]
-    spheres = bodies(
+    spheres = make_particles(
         places, 1e-3, 2500.0, velocity=random.normal(0.0, 0.3, (count, 3)), spin=random.normal(0.0, 300.0, (count, 3)),
         viscosity=viscosity,
     )  # fmt: skip
@@ -68,8 +69,8 @@ def unexplained(run: ParticleSolver, steps: int) -> tuple[float, dict[str, float
     [
         {},
         {"gravity": 9.81, "lid": 0.5},
-        {"laws": Laws(spring=RESCALED)},
-        {"laws": Laws(rolling=CONSTANT_TORQUE)},
+        {"laws": Laws(spring="rescaled")},
+        {"laws": Laws(rolling="constant_torque")},
         {"viscosity": 1e-3},
         {"viscosity": 1e-2, "gravity": 9.81, "lid": 0.5},
     ],
@@ -80,11 +81,11 @@ def test_a_box_of_colliding_spheres_accounts_for_its_energy(asked: dict) -> None
     run = box(**asked)
     left, counted = unexplained(run, 4000)
     assert abs(left) < 0.01, counted
-    assert counted["contact_damping"] > 0.05 * of_spheres(run.bodies)
+    assert counted["contact_damping"] > 0.05 * of_spheres(run.particles)
     assert counted["friction"] > 0.0
     assert (counted["film"] > 0.0) == ("viscosity" in asked)
     assert (counted["walls"] != 0.0) == ("lid" in asked)
-    assert (counted["rolling"] > 0.0) == ("laws" in asked and asked["laws"].rolling > 0)
+    assert (counted["rolling"] > 0.0) == ("laws" in asked and asked["laws"].rolling != "none")
 
 
 def test_every_encounter_says_what_it_lost_and_to_what() -> None:
@@ -92,7 +93,7 @@ def test_every_encounter_says_what_it_lost_and_to_what() -> None:
     radius, speed = 1e-3, 0.5
     places = np.array([[0.0, 0.0, 0.0], [3.0 * radius, 0.8 * radius, 0.0]])
     velocity = np.array([[0.0, 0.0, 0.0], [-speed, 0.0, 0.0]])
-    pair = bodies(places, radius, 2500.0, velocity=velocity, viscosity=5e-3)
+    pair = make_particles(places, radius, 2500.0, velocity=velocity, viscosity=5e-3)
     run = ParticleSolver(pair, pair_table([ROUGH]), laws=Laws(film=True), record=True, energies=True)
     assert run.collisions is not None and run.energies is not None
     before, step = of_spheres(pair), run.recommended_step(speed)
@@ -117,12 +118,12 @@ def test_the_count_changes_no_bit_and_hangs_on_no_thread() -> None:
         assert run.energies is not None
         run.advance(2e-5, 300)
         use_threads(before)
-        found.append((run.energies.totals.copy(), run.bodies.velocity.copy()))
+        found.append((run.energies.totals.copy(), run.particles.velocity.copy()))
     assert np.array_equal(found[0][0], found[1][0])
     plain = box(viscosity=1e-3, count=100)
     plain.energies = None
     plain.advance(2e-5, 300)
-    assert np.array_equal(plain.bodies.velocity, found[0][1])
+    assert np.array_equal(plain.particles.velocity, found[0][1])
 
 
 def test_particles_that_are_fed_bring_their_energy() -> None:
@@ -130,7 +131,7 @@ def test_particles_that_are_fed_bring_their_energy() -> None:
     assert run.energies is not None
     run.advance(2e-5, 50)
     had = run.energies.mechanical(run)
-    gone = np.zeros(run.bodies.count, bool)
+    gone = np.zeros(run.particles.count, bool)
     gone[::3] = True
     taken = run.remove(gone)
     assert -run.energies.fed > of_spheres(taken)  # and what their springs held
@@ -138,7 +139,9 @@ def test_particles_that_are_fed_bring_their_energy() -> None:
     run.advance(2e-5, 10)
 
 
-@pytest.mark.parametrize("laws", [Laws(cohesion=JKR), Laws(film=True, integrator=VERLET)], ids=["cohesion", "verlet"])
+@pytest.mark.parametrize(
+    "laws", [Laws(cohesion="jkr"), Laws(film=True, integrator="verlet")], ids=["cohesion", "verlet"]
+)
 def test_laws_whose_energy_is_not_counted_are_refused(laws: Laws) -> None:
     with pytest.raises(InputError, match="energies: must be"):
         box(laws=laws, viscosity=1e-3 if laws.film else 0.0)
@@ -153,22 +156,21 @@ def test_the_energy_of_a_spring_is_the_integral_of_its_force(minimum_gap: float)
 
 # ---------------------------------------------------------------- with a fluid
 
-LIQUID = TINY.replace("collisions = true", "energy = true")
+LIQUID = TINY.replace("record_collisions = true", "energy_budget = true")
 assert "energy" in LIQUID
 
 
 @pytest.mark.parametrize("model", ["A", "B"])
 def test_terms_of_the_momentum_balance_add_up_to_the_kinetic_energy(model: str) -> None:
     """To round-off, in a bed that a liquid begins to lift."""
-    run = Simulation(Case.from_text(LIQUID).with_(**{"laws.model": model, "run.energy": False}))
+    run = Simulation(Case.from_text(LIQUID).with_(**{"laws.model": model, "run.energy_budget": False}))
     assert run.fluid is not None
-    volumes = face_volumes(run.fluid)
     for _ in range(5):
-        before = kinetic_energy(run.fluid, volumes)
+        before = run.fluid.kinetic_energy()
         run.step()
-        done = works(run.fluid, volumes)
+        done = run.fluid.work()
         gained = sum(done) - done.kinetic - done.held
-        assert done.kinetic == pytest.approx(kinetic_energy(run.fluid, volumes) - before, rel=1e-9)
+        assert done.kinetic == pytest.approx(run.fluid.kinetic_energy() - before, rel=1e-9)
         assert gained == pytest.approx(done.kinetic, abs=1e-9 * sum(map(abs, done)))
 
 
@@ -177,16 +179,17 @@ def test_a_liquid_bed_accounts_for_its_energy(tmp_path: Path) -> None:
     case = Case.from_text(LIQUID)
     whole = Run.begin(case, tmp_path / "whole")
     whole.go()
-    ledger = report(tmp_path / "whole")["energy"]
+    found = report(tmp_path / "whole")
+    ledger = found["energy"]
     assert abs(ledger["remainder"]) < 0.01 * ledger["put_in"], ledger
     assert ledger["inflow"] > 0.0 and ledger["drag"] > 0.3 * ledger["put_in"]
     assert ledger["film"] > 0.0 and ledger["viscous"] > 0.0
-    assert sum(part for group, _, _, part in energy_lines(ledger) if group == "lost") < 1.1
+    assert sum(each["fraction"] for each in found["energy_lines"] if each["group"] == "lost") < 1.1
     between = ledger["drag"] + ledger["drag_in_cells"] + ledger["implicit_drag"]
     assert ledger["drag_from_fluid"] - ledger["drag_to_particles"] == pytest.approx(between, rel=1e-9)
     assert ledger["pressure_from_fluid"] == pytest.approx(ledger["pressure_to_particles"], abs=0.05 * ledger["put_in"])
-    text = "\n".join(lines(report(tmp_path / "whole")))
-    assert "J put in" in text and "remainder" in text
+    text = "\n".join(lines(found))
+    assert "energy budget, of an input of" in text and "remainder" in text
 
     half = Run.begin(case.with_(**{"run.until": 0.5 * case.run.until}), tmp_path / "half")
     half.every, half.interval, half.rows_per_snapshot = whole.every, whole.interval, whole.rows_per_snapshot
@@ -212,14 +215,14 @@ def test_spin_lost_to_the_fluid_is_in_the_ledger() -> None:
     """Fast spinning beads in still water, far apart: their spin goes to the torque of the fluid, and nowhere else."""
     changes = {"laws.torque": True, "bed.inlet_velocity": 0.0, "bed.count": 20, "bed.start": "suspended"}
     run = Simulation(Case.from_text(LIQUID).with_(**changes))
-    run.particles.bodies.spin[:] = [300.0, 0.0, 100.0]
-    run.particles.refresh()
+    run.particles.spin[:] = [300.0, 0.0, 100.0]
+    run.particle_solver.refresh()
     run.energy = run._ledger()
     assert run.energy is not None
     for _ in range(10):
         run.step()
     row = run.energy.row()
-    spheres = run.particles.bodies
+    spheres = run.particles
     started = 0.2 * float((spheres.mass * spheres.radius**2).sum()) * (300.0**2 + 100.0**2)
     left = 0.2 * float((spheres.mass * spheres.radius**2 * (spheres.spin**2).sum(axis=1)).sum())
     assert row["energy_torque"] == pytest.approx(started - left, rel=0.02) and row["energy_torque"] > 0.05 * started

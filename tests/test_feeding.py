@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.materials import Material, pair_table
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
 from cfddem.particles.feeding import Feed, Outlet
-from cfddem.particles.packing import random_packing
+from cfddem.particles.initial.packing import random_packing
+from cfddem.particles.initial.tables import read_particles
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
-from cfddem.particles.tables import read_particles
-from cfddem.particles.walls import Plane
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Plane
 
 GRAIN = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.7, friction=0.3)
 DIAMETER = 1e-3
@@ -23,24 +24,24 @@ DIAMETER = 1e-3
 def packed() -> ParticleSolver:
     """A periodic packing of 200 spheres, pressed a little."""
     places, box = random_packing(np.full(200, DIAMETER), 0.6, seed=3)
-    return ParticleSolver(bodies(places, 0.502 * DIAMETER, 2500.0), pair_table([GRAIN]), box=tuple(box))
+    return ParticleSolver(make_particles(places, 0.502 * DIAMETER, 2500.0), pair_table([GRAIN]), box=tuple(box))
 
 
 def springs(run: ParticleSolver) -> dict[tuple[int, int], np.ndarray]:
     """Tangential spring of each pair by the ids of the two."""
-    one, other = (run.bodies.id[rows] for rows in (run.edges.first, run.edges.second))
+    one, other = (run.particles.id[rows] for rows in (run.edges.first, run.edges.second))
     return {(int(i), int(j)): spring for i, j, spring in zip(one, other, run.edges.spring)}
 
 
 def test_those_that_stay_remember_each_other_when_others_come_and_go() -> None:
     """Springs of the pairs that stay are the same but for rounding; ids are never given twice."""
     run = packed()
-    run.bodies.velocity[:] = np.random.default_rng(1).normal(0.0, 0.01, (200, 3))
+    run.particles.velocity[:] = np.random.default_rng(1).normal(0.0, 0.01, (200, 3))
     run.advance(run.recommended_step(0.1), 50)
     before = springs(run)
-    gone = run.remove(np.isin(run.bodies.id, [3, 199]))
+    gone = run.remove(np.isin(run.particles.id, [3, 199]))
     assert sorted(gone.id) == [3, 199]
-    assert run.bodies.count == 198
+    assert run.particles.count == 198
     after = springs(run)
     staying = {pair for pair in after if pair in before}
     held = {pair for pair, spring in before.items() if spring.any() and not {3, 199} & set(pair)}
@@ -51,7 +52,7 @@ def test_those_that_stay_remember_each_other_when_others_come_and_go() -> None:
     came = springs(run)
     assert all(came[pair] == pytest.approx(after[pair], rel=1e-9, abs=1e-18) for pair in held)
     run.advance(run.recommended_step(0.1), 50)
-    assert np.isfinite(run.bodies.position).all()
+    assert np.isfinite(run.particles.position).all()
 
 
 def test_the_last_particle_cannot_be_taken_out() -> None:
@@ -62,7 +63,7 @@ def test_the_last_particle_cannot_be_taken_out() -> None:
 
 def test_feed_brings_its_rate_and_nothing_overlaps() -> None:
     """1 000 a second for 0.05 s; none is inserted into another, and the outlet counts all that fell out."""
-    sphere = bodies([[0.0, 0.0, 0.02]], 0.5 * DIAMETER, 2500.0)
+    sphere = make_particles([[0.0, 0.0, 0.02]], 0.5 * DIAMETER, 2500.0)
     run = ParticleSolver(sphere, pair_table([GRAIN]), gravity=(0.0, 0.0, -9.81))
     feed = Feed(1000.0, (0.0, 0.0, 0.02), (3e-3, 3e-3, 0.0), lambda n: np.full(n, DIAMETER), 2500.0, seed=1)
     outlet = Outlet(low=(-np.inf, -np.inf, 0.015))
@@ -76,24 +77,24 @@ def test_feed_brings_its_rate_and_nothing_overlaps() -> None:
     assert feed.entered + len(feed.waiting) == int(1000.0 * run.time)
     assert feed.entered > 40
     assert outlet.left > 0
-    assert outlet.left + run.bodies.count == feed.entered + 1
+    assert outlet.left + run.particles.count == feed.entered + 1
     assert outlet.mass == pytest.approx(outlet.left * 2500.0 * np.pi / 6.0 * DIAMETER**3)
 
 
 def test_an_earlier_run_is_remembered_by_the_next() -> None:
-    """A sphere held by friction on a tilted wall stays where it is in a run over its bodies, if that remembers."""
+    """A sphere held by friction on a tilted wall stays where it is in a run over its particles, if that remembers."""
     down = (9.81 * 0.2, 0.0, -9.81)
 
     def run(after: ParticleSolver | None, sphere: object) -> ParticleSolver:
         return ParticleSolver(sphere, pair_table([GRAIN]), walls=[Plane()], gravity=down, after=after)  # type: ignore[arg-type]
 
-    first = run(None, bodies([[0.0, 0.0, 0.4999 * DIAMETER]], 0.5 * DIAMETER, 2500.0))
+    first = run(None, make_particles([[0.0, 0.0, 0.4999 * DIAMETER]], 0.5 * DIAMETER, 2500.0))
     first.advance(first.recommended_step(0.01), 200)
     assert first.edges.spring.any()
-    assert np.array_equal(run(first, first.bodies).edges.spring, first.edges.spring)
-    assert not run(None, first.bodies).edges.spring.any()
+    assert np.array_equal(run(first, first.particles).edges.spring, first.edges.spring)
+    assert not run(None, first.particles).edges.spring.any()
     with pytest.raises(InputError, match="after"):
-        run(first, bodies([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]], 0.5 * DIAMETER, 2500.0))
+        run(first, make_particles([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]], 0.5 * DIAMETER, 2500.0))
 
 
 def test_particles_from_files(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
-from scenarios.fluid_checks import ALL_PERIODIC, fixed_bed
+from scenarios.validation.fluid_checks import ALL_PERIODIC, fixed_bed
 
 ALL_WALLS = dict.fromkeys(SIDES, NoSlip())
 
@@ -34,7 +34,7 @@ def test_continuity_holds_in_every_cell():
     assert worst < 1e-8 * 0.4 * grid.face_area(2)
 
 
-def test_a_fluid_at_rest_is_displaced_by_moving_voidage_alone():
+def test_moving_voidage_displaces_a_fluid_at_rest():
     """No inlet, no drag: the flux that the change of voidage asks for appears in the first step, and only that."""
     grid = Grid((16, 1, 1), (0.01,) * 3)
     fluid = FluidSolver(grid, density=1000.0, viscosity=1e-3, voidage=moving_voidage(grid, 0.0))
@@ -123,7 +123,7 @@ def test_momentum_ledger_closes_in_a_closed_box():
     before, start = momentum(fluid), [fluid.face_velocity(d).copy() for d in range(3)]
     lid = (1.0, 0.5)
     fluid.step(step, None, beta, np.zeros((*grid.shape, 3)))
-    stage = [fluid.grid.inner_faces(fluid._stage[d], d).copy() for d in range(3)]
+    stage = [fluid.grid.inner_faces(fluid.fields.stage_velocity[d], d).copy() for d in range(3)]
     gained = momentum(fluid) - before
 
     def wall_force(u):
@@ -203,7 +203,7 @@ def test_models_a_and_b_give_the_single_phase_flow_in_a_uniform_voidage(voidage)
 
 
 @pytest.mark.parametrize("model", ["A", "B"])
-def test_hydrostatic_rest_stays_at_rest_at_a_steep_voidage_jump(model):
+def test_a_fluid_at_rest_stays_at_rest_at_a_voidage_jump(model):
     """Water, voidage 0.4 to 1 in one cell, particles at rest, a wrong pressure to begin with:
     below 1e-10 sqrt(g H)."""
     grid = Grid((4, 4, 32), (0.01, 0.01, 0.01))
@@ -237,7 +237,7 @@ def test_pressure_drop_of_a_fixed_bed_is_erguns(model, speed, cells):
 
 @pytest.mark.parametrize("stiffness", [1e-2, 1.0, 1e2, 1e4, 1e6])
 @pytest.mark.parametrize("model", ["A", "B"])
-def test_stiff_drag_takes_the_fluid_to_the_particle_velocity(stiffness, model):
+def test_stiff_drag_relaxes_the_fluid_to_the_particle_velocity(stiffness, model):
     """beta h/(eps rho) up to 1e6: the velocity relaxes by 1/(1 + z + z^2/2) a step and never overshoots."""
     grid = Grid((8, 8, 8), (0.01,) * 3)
     eps, rho, step = 0.5, 1.2, 1e-3
@@ -271,7 +271,7 @@ def test_stiff_drag_in_a_packed_block_is_stable():
 
 
 @pytest.mark.parametrize("model", ["A", "B"])
-def test_drag_given_to_the_fluid_is_known_to_round_off(model):
+def test_drag_impulses_of_cells_add_up_to_the_change_of_momentum(model):
     """Cell impulses add up to the change of momentum; particles moving with the fluid receive nothing."""
     rng = np.random.default_rng(7)
     grid = Grid((8, 6, 10), (0.01, 0.02, 0.01))

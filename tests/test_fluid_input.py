@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError, RunFailed
+from cfddem.backend.errors import InputError, RunFailed
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, pulse, ramp, rectangle, switch_on
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
@@ -64,7 +64,7 @@ REFUSED = {
     "two gradients": (lambda: started({"x_low": Periodic(1.0), "x_high": Periodic(2.0)}), "one pressure gradient"),
     "wall that moves out of its plane": (lambda: started({"z_low": NoSlip((0, 0, 1.0))}), "in the plane of the wall"),
     "outlet pressure": (lambda: started({"z_low": Outlet(np.inf)}), "boundaries.z_low.pressure"),
-    "NaN from an inlet function": (run_into_nan, r"boundaries.z_low.velocity: must be a number .*t = 0.002 s"),
+    "NaN from an inlet function": (run_into_nan, r"boundaries.z_low.velocity: must be finite .*t = 0.002 s"),
     "inlet function of another shape": (
         lambda: started({"z_low": Inlet(lambda x, y, z, t: np.ones(5)), "z_high": Outlet()}), "for 36 faces"),
     "density": (lambda: started(density=0.0), "fluid.density"),
@@ -77,9 +77,9 @@ REFUSED = {
     "voidage of another shape": (lambda: stepped(np.ones((6, 6, 6))), r"of shape \(nz, ny, nx\)"),
     "negative drag": (
         lambda: stepped(None, np.full(BOX.shape, -1.0)), "drag_coefficient = -1.0: must be zero or positive"),
-    "drag NaN": (lambda: stepped(None, np.full(BOX.shape, np.nan)), "drag_coefficient: must be a number everywhere"),
+    "drag NaN": (lambda: stepped(None, np.full(BOX.shape, np.nan)), "drag_coefficient: must be finite everywhere"),
     "drag momentum of another shape": (lambda: stepped(None, None, np.ones(BOX.shape)), "drag_momentum"),
-    "source NaN": (lambda: stepped(source=np.full((*BOX.shape, 3), np.nan)), "source: must be a number everywhere"),
+    "source NaN": (lambda: stepped(source=np.full((*BOX.shape, 3), np.nan)), "source: must be finite everywhere"),
     "no step": (lambda: started().step(0.0), "step = 0.0: must be a positive time"),
     "voidage of a closed box that loses fluid": (
         lambda: started().step(1e-3, np.full(BOX.shape, 0.99)), "change of voidage cancel where there is no outlet"),
@@ -95,7 +95,7 @@ def test_bad_input_is_refused_in_one_line(bad, message):
     assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 250
 
 
-def test_a_flow_that_runs_away_stops_and_names_its_place():
+def test_a_diverging_flow_stops_and_its_place_is_named():
     """A step far above the limit."""
     fluid = started({"z_low": Inlet(10.0), "z_high": Outlet()}, viscosity=1.0)
     with pytest.raises(RunFailed, match=r"fluid|pressure") as failure:
@@ -123,7 +123,7 @@ def test_sides_left_out_are_walls_or_planes_of_symmetry():
     assert kinds["x_low"] is NoSlip and kinds["y_low"] is FreeSlip
 
 
-def test_time_functions_and_regions():
+def test_time_functions_and_regions_have_their_values():
     """Step, ramp, pulse; discs and rectangles of a distributor."""
     assert [switch_on(1.0)(t) for t in (0.9, 1.0)] == [0.0, 1.0]
     assert [ramp(1.0, 3.0)(t) for t in (0.0, 2.0, 4.0)] == [0.0, 0.5, 1.0]
@@ -133,7 +133,7 @@ def test_time_functions_and_regions():
     assert rectangle((0, 0, -1), (0.2, 1, 1))(x, y, 0 * x).tolist() == [[True, False], [True, False]]
 
 
-def test_jets_of_a_distributor_carry_the_flux_given():
+def test_jets_of_a_distributor_carry_the_given_flux():
     """Two holes in a floor: the inflow is the speed times the faces they cover, whatever the voidage there."""
     jets = Inlet(2.0, where=discs([(0.015, 0.015), (0.045, 0.045)], 0.015))
     fluid = started({"z_low": [NoSlip(), jets], "z_high": Outlet()}, voidage=0.5)

@@ -55,7 +55,7 @@ def test_pressure_gradient_at_points_beside_inlet_outlet_and_mask():
     assert np.abs(gradient[:, :2]).max() < 1e-4 * 1.2e4
 
 
-def test_a_cell_field_at_points():
+def test_a_cell_field_is_interpolated_between_centres():
     """Tri-linear between centres; the nearest cell beyond the last centre."""
     grid = Grid((4, 3, 5), (0.1, 0.2, 0.1))
     fluid = FluidSolver(grid, density=1.0, viscosity=0.1)
@@ -65,7 +65,7 @@ def test_a_cell_field_at_points():
     assert fluid.cell_value_at(field, np.array([[0.0, 0.0, 0.0]]))[0] == pytest.approx(field[0, 0, 0])
 
 
-def test_a_cone_is_cut_from_the_box():
+def test_flow_through_a_cone_keeps_its_flux():
     """Volume of a frustum of masked cells within 2 %, and a flow through it keeps its flux from bottom to top."""
     grid = Grid.of_size((0.2, 0.2, 0.3), 0.01, solid=outside_cone((0.1, 0.1, 0), (0.05, 0.25), (0.03, 0.09)))
     h = 0.2

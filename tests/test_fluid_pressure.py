@@ -11,8 +11,10 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
+from cfddem.backend.communicator import SERIAL
 from cfddem.fluid.grid import Grid, outside_cylinder
-from cfddem.fluid.pressure import PressureEquation
+from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.fluid.pressure.regions import ClosedRegions
 from cfddem.fluid.solver import FluidSolver
 
 
@@ -22,7 +24,7 @@ def equation(cells, spacing=(1.0, 1.0, 1.0), periodic=(False, False, False), anc
     grid = Grid(cells, spacing)
     if solid:
         grid = grid.with_solid(outside_cylinder((cells[0] / 2, cells[1] / 2, 0), 0.45 * cells[0]))
-    system = PressureEquation(grid, None if anchored else grid.open.astype(np.int64))
+    system = PressureEquation(grid, None if anchored else ClosedRegions.numbered(grid.open.astype(np.int64), SERIAL))
     finest = system.finest
     for d, a in enumerate((finest.ax, finest.ay, finest.az)):
         a[:] = rng.uniform(0.1, 3.0, grid.shape) * grid.face_area(d) / spacing[d]
@@ -68,7 +70,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_the_pressure_equation_is_solved(case):
+def test_the_pressure_equation_agrees_with_a_direct_solver(case):
     """Against a direct sparse solve of the same equation, in at most 16 iterations for 1e-10."""
     grid, system, b = equation(**case)
     x, iterations = system.solve(b, 1e-10 * np.abs(b).max())
@@ -90,7 +92,7 @@ def test_the_pressure_equation_is_solved(case):
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_preconditioner_is_symmetric(case):
-    """a.M b = b.M a for random a, b: conjugate gradients may use it."""
+    """a.M b = b.M a for random a, b, as conjugate gradients need."""
     grid, system, _ = equation(**case)
     rng = np.random.default_rng(1)
     a, b = (rng.standard_normal(grid.shape) * grid.open for _ in range(2))
@@ -104,8 +106,8 @@ def test_the_preconditioner_is_symmetric(case):
     assert (a * cycle(a)).sum() > 0.0
 
 
-def test_iterations_do_not_grow_with_the_grid():
-    """Multigrid: as many iterations on 64^3 as on 16^3, but for two."""
+def test_pressure_iterations_are_independent_of_the_grid_size():
+    """At most two iterations more on 64^3 than on 16^3."""
     counts = []
     for n in (16, 32, 64):
         _, system, b = equation((n, n, n))
@@ -113,7 +115,7 @@ def test_iterations_do_not_grow_with_the_grid():
     assert counts[2] <= counts[0] + 2
 
 
-def test_regions_cut_off_from_each_other_are_solved_each_for_itself():
+def test_continuity_holds_in_each_of_two_separate_closed_regions():
     """Two chambers without an outlet, one of them stirred: no flow through the wall, continuity in both."""
     solid = np.zeros((8, 8, 9), dtype=bool)
     solid[:, :, 4] = True

@@ -11,7 +11,17 @@ import numpy as np
 import pytest
 from impacts import rows
 
-from scenarios.particles_checks import BALL_RADIUS, DROP_HEIGHT, drop, drop_exactly, hopper, rest, slide, slope, strike
+from scenarios.validation.particles_checks import (
+    BALL_RADIUS,
+    DROP_HEIGHT,
+    drop,
+    drop_exactly,
+    hopper,
+    rest,
+    slide,
+    slope,
+    strike,
+)
 
 
 @pytest.mark.parametrize("restitution", [0.6, 0.8, 1.0])

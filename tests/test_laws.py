@@ -1,4 +1,4 @@
-"""Every law on the shelf: its page, its two faces, and that compiled code never outlives its source."""
+"""All laws: docstrings, compiled against interpreted values, and the cache of compiled code."""
 
 from __future__ import annotations
 
@@ -17,49 +17,52 @@ import numpy as np
 import pytest
 
 import closures
-from closures.law import SHELF, Law, page
+from closures.registry import REGISTRY, Law, law_of
 
 for _module in pkgutil.iter_modules(closures.__path__):
     importlib.import_module(f"closures.{_module.name}")
 
-from numba import njit  # noqa: E402  the laws say first where compiled code is kept
+from numba import njit  # noqa: E402  after closures.compiled, which sets the cache folder
 
-HOUSE = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[1]
 PACKAGES = ("closures", "cfddem", "scenarios")
-LAWS = [card for laws in SHELF.values() for card in laws.values() if card.function.__module__.startswith("closures.")]
+LAWS = [
+    entry for laws in REGISTRY.values() for entry in laws.values() if entry.function.__module__.startswith("closures.")
+]
 IMPACT = """
-from scenarios.binary_collision import MATERIALS, collide
+from scenarios.collisions.immersed_pair import MATERIALS, collide
 print(repr(float(collide(MATERIALS["delrin"], velocity=0.1, viscosity=0.01317).restitution)))
 """
 CACHE = "from closures.compiled import cache_folder; print(cache_folder())"
 
 
-def of_each_law(test: Callable[..., None]) -> Callable[..., None]:
+def for_each_law(test: Callable[..., None]) -> Callable[..., None]:
     return pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.kind}-{law.name}")(test)
 
 
-@of_each_law
-def test_a_law_has_a_page(law: Law) -> None:
-    """A sentence, the equation, every argument with its unit, what returns, an example, and a reference."""
+@for_each_law
+def test_docstring_of_a_law_is_complete(law: Law) -> None:
+    """Sentence, equation, arguments and return value with units, range, example, and a reference."""
     text = inspect.getdoc(law.function) or ""
     sentence, _, rest = text.partition("\n")
-    assert sentence.endswith((".", ":")), "the first line is a sentence"
+    assert sentence.endswith((".", ":")), "the first line must be a sentence"
     assert ".. math::" in rest
     for argument in inspect.signature(law.function).parameters:
         assert argument in rest, f"{argument} is not described"
     returns = [line for line in text.splitlines() if line.startswith("returns")]
     assert len(returns) == 1
     described = rest[rest.index("returns") :].split("\n\n")[0]
-    assert "[" in described or "same unit" in described, "what returns has a unit"
-    assert doctest.DocTestParser().get_examples(text), "there is an example"
+    assert "[" in described or "same unit" in described, "the return value needs a unit"
+    assert "\nRange: " in text, "the valid range is missing"
+    assert doctest.DocTestParser().get_examples(text), "an example is missing"
     assert len(law.reference) > 5
-    assert page(law.function) is law
+    assert law_of(law.function) is law
     assert set(law.ranges) <= set(inspect.signature(law.function).parameters)
 
 
-@of_each_law
-def test_both_faces_of_a_law_give_the_same_number(law: Law) -> None:
-    """The plain face is the specification; the compiled one may differ by rounding, 1e-15 relative."""
+@for_each_law
+def test_compiled_law_equals_the_interpreted_law(law: Law) -> None:
+    """Within 1e-15 relative."""
     names = list(inspect.signature(law.function).parameters)
     arguments = ", ".join(names)
     scope = {"law": law.function}
@@ -73,7 +76,7 @@ def test_both_faces_of_a_law_give_the_same_number(law: Law) -> None:
 
 
 def plausible(name: str, random: np.random.Generator) -> float:
-    """A random value that an argument of this name can have."""
+    """A random value for an argument of this name."""
     if name in ("restitution", "voidage", "solid_fraction"):
         return random.uniform(0.05, 0.95)
     if name.startswith("poisson"):
@@ -85,18 +88,18 @@ def plausible(name: str, random: np.random.Generator) -> float:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """A copy of the packages that a test may change."""
+    """A copy of the packages for a test to modify."""
     for package in PACKAGES:
-        shutil.copytree(HOUSE / package, tmp_path / "house" / package, ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path / "house"
+        shutil.copytree(ROOT / package, tmp_path / "copy" / package, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path / "copy"
 
 
-def run_in(house: Path, code: str, **environment: str) -> str:
-    """What a piece of code prints when it runs on the packages in a folder."""
+def run_in(root: Path, code: str, **environment: str) -> str:
+    """Output of a piece of code, run with the packages in a folder."""
     done = subprocess.run(
         [sys.executable, "-c", code],
-        cwd=house.parent,
-        env=os.environ | {"PYTHONPATH": str(house), "NUMBA_NUM_THREADS": "1"} | environment,
+        cwd=root.parent,
+        env=os.environ | {"PYTHONPATH": str(root), "NUMBA_NUM_THREADS": "1"} | environment,
         capture_output=True,
         text=True,
         timeout=300,
@@ -105,15 +108,15 @@ def run_in(house: Path, code: str, **environment: str) -> str:
     return done.stdout
 
 
-def strengthen_films(house: Path) -> None:
-    """Change a constant of a law that compiled loops call from other files."""
-    law = house / "closures" / "lubrication.py"
+def strengthen_films(root: Path) -> None:
+    """Change a constant of a law that compiled loops of other files call."""
+    law = root / "closures" / "lubrication.py"
     source, constant = law.read_text(), "return 6.0 * math.pi * viscosity"
     assert constant in source
     law.write_text(source.replace(constant, "return 7.0 * math.pi * viscosity"))
 
 
-def test_compiled_code_is_kept_under_a_key_of_its_sources(copy: Path, tmp_path: Path) -> None:
+def test_cache_folder_depends_on_the_sources(copy: Path, tmp_path: Path) -> None:
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     before = run_in(copy, CACHE, **kept)
     assert before.startswith(str(tmp_path / "cache"))
@@ -122,15 +125,15 @@ def test_compiled_code_is_kept_under_a_key_of_its_sources(copy: Path, tmp_path: 
     assert run_in(copy, CACHE, **kept) != before
 
 
-def test_a_child_process_finds_the_compiled_code_of_its_parent(tmp_path: Path) -> None:
+def test_child_process_uses_the_cache_of_its_parent(tmp_path: Path) -> None:
     child = f"import subprocess, sys, closures.compiled; subprocess.run([sys.executable, '-c', {CACHE!r}])"
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    assert Path(run_in(HOUSE, child, **kept).strip()).parent == tmp_path / "cache"
+    assert Path(run_in(ROOT, child, **kept).strip()).parent == tmp_path / "cache"
 
 
 @pytest.mark.slow
-def test_an_edited_law_is_compiled_anew(copy: Path, tmp_path: Path) -> None:
-    """A loop does not notice by itself that a law it calls in another file has changed."""
+def test_edited_law_is_recompiled(copy: Path, tmp_path: Path) -> None:
+    """numba alone does not detect a change of a law in another file."""
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     before = float(run_in(copy, IMPACT, **kept))
     assert float(run_in(copy, IMPACT, **kept)) == before
@@ -139,8 +142,8 @@ def test_an_edited_law_is_compiled_anew(copy: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_read_only_house_without_a_home_still_runs(copy: Path, tmp_path: Path) -> None:
-    """Packages that cannot be written beside, and a cache folder that cannot be made."""
+def test_read_only_installation_without_home_folder_runs(copy: Path, tmp_path: Path) -> None:
+    """Read-only packages, and a cache folder that cannot be created."""
     (tmp_path / "no_folder").write_text("")
     before = sorted(copy.rglob("*"))
     folders = [copy, *(place for place in before if place.is_dir())]

@@ -1,4 +1,4 @@
-"""The lubrication study: its beds, how meetings are counted with and without films, and its table."""
+"""The lubrication study: its beds, the count of collisions with and without films, and its table."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cfddem.card import card
-from cfddem.report import expansion_laws
-from scenarios.lubrication_study import SEEDS, SETTINGS, VOIDAGE, Outcome, bed, folder_of, mean, meetings
-from scenarios.lubrication_study_figures import measures, profiles
-from scenarios.lubrication_study_validation import rows
+from cfddem.analysis.bed_laws import expansion_laws
+from cfddem.preflight.summary import preflight
+from scenarios.beds.lubrication_study.figures import measures, profiles
+from scenarios.beds.lubrication_study.study import SEEDS, SETTINGS, VOIDAGE, Outcome, bed, folder_of, mean, meetings
+from scenarios.beds.lubrication_study.validation import rows
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
-def test_every_bed_is_to_expand_alike(setting) -> None:
+def test_every_bed_has_the_same_expected_voidage(setting) -> None:
     case = bed(setting, 3)
     assert expansion_laws(case)["Richardson-Zaki"] == pytest.approx(VOIDAGE, rel=1e-9)
     assert case.bed.seed == 3 and case.solid.contact_modulus == setting.modulus
-    assert card(case).colour != "red"
+    assert preflight(case).status != "error"
 
 
 def test_no_two_runs_share_a_folder() -> None:
@@ -28,7 +28,7 @@ def test_no_two_runs_share_a_folder() -> None:
     assert len(folders) == len(SETTINGS) * len(SEEDS)
 
 
-def encounters(stokes: float, **columns: list[float]) -> dict[str, np.ndarray]:
+def collisions(stokes: float, **columns: list[float]) -> dict[str, np.ndarray]:
     """Rows of a record in which all solids meet."""
     count = len(columns["begin"])
     usual = {
@@ -38,9 +38,9 @@ def encounters(stokes: float, **columns: list[float]) -> dict[str, np.ndarray]:
     return usual | {name: np.array(values) for name, values in columns.items()}
 
 
-def test_touches_of_a_pair_that_never_left_are_one_meeting() -> None:
+def test_touches_of_a_pair_that_never_separated_are_one_collision() -> None:
     """At 0.01 m/s a pair comes back from a reach of 0.5 mm after 0.1 s."""
-    touches = encounters(
+    touches = collisions(
         math.inf, first=[1, 2, 1, 1, 5], second=[2, 1, 3, 2, -1], begin=[0.0, 0.05, 0.06, 0.5, 0.7],
         end=[0.01, 0.06, 0.07, 0.51, 0.71],
     )  # fmt: skip
@@ -48,8 +48,8 @@ def test_touches_of_a_pair_that_never_left_are_one_meeting() -> None:
     assert meetings(touches, 5e-5) == 4.0
 
 
-def test_with_films_meetings_are_encounters_in_which_solids_met() -> None:
-    rows = encounters(3.0, first=[1, 1, 4], second=[2, 2, 5], begin=[0.0, 0.1, 0.2], end=[0.05, 0.15, 0.3])
+def test_with_films_collisions_are_those_in_which_solids_touch() -> None:
+    rows = collisions(3.0, first=[1, 1, 4], second=[2, 2, 5], begin=[0.0, 0.1, 0.2], end=[0.05, 0.15, 0.3])
     rows["closest_gap"], rows["minimum_gap"] = np.array([1e-7, 1e-5, 0.0]), np.full(3, 1e-6)
     rows["weight"] = np.array([2.0, 2.0, 2.0])
     assert meetings(rows, 5e-4) == 4.0

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import Laws
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
-from scenarios.particles_checks import films_alone, shear
+from cfddem.particles.state import make_particles
+from scenarios.validation.particles_checks import films_alone, shear
 
 
 @pytest.mark.parametrize(
@@ -149,16 +150,19 @@ def test_stiff_film_among_seven_soft_ones_keeps_its_restitution(stokes: float) -
     leave = 0.02 * RADIUS
     exact, _ = exact_rebound(viscosity, leave)
     places, velocity = crowd_of_nine()
-    spheres = bodies(places, RADIUS, DENSITY, velocity=velocity, viscosity=viscosity)
+    spheres = make_particles(places, RADIUS, DENSITY, velocity=velocity, viscosity=viscosity)
     run = ParticleSolver(spheres, pair_table([BEAD]), laws=Laws(film=True))
-    step = run.clocks(SPEED).recommended
+    step = run.time_scales(SPEED).recommended
     before = (0.0, 0.0)
     ours = math.nan
     for _ in range(20_000):
         run.advance(step)
-        apart = run.bodies.position[0] - run.bodies.position[1]
+        apart = run.particles.position[0] - run.particles.position[1]
         distance = float(np.linalg.norm(apart))
-        now = (distance - 2.0 * RADIUS, float((run.bodies.velocity[0] - run.bodies.velocity[1]) @ apart) / distance)
+        now = (
+            distance - 2.0 * RADIUS,
+            float((run.particles.velocity[0] - run.particles.velocity[1]) @ apart) / distance,
+        )
         if now[1] > 0.0 and now[0] > leave:
             ours = float(np.interp(leave, [before[0], now[0]], [before[1], now[1]])) / SPEED
             break

@@ -1,4 +1,4 @@
-"""Beds of several species: they hold what was asked for, start where they should, and their words are checked."""
+"""Beds of several species: amounts, sizes, initial arrangement, drag, and checks of their input."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import pytest
 from example_case import MIXTURE
 
 from cfddem import open_run
-from cfddem.assembly import assemble
-from cfddem.card import card
-from cfddem.case import Case
-from cfddem.coupling.exchange import Met
-from cfddem.errors import InputError
-from cfddem.expected import bed_of
-from cfddem.mixture import sinking
-from cfddem.placement import grains_of
-from cfddem.report import buoyant_weight, report
-from cfddem.run import Run
+from cfddem.analysis.bed_laws import buoyant_weight
+from cfddem.analysis.report import report
+from cfddem.backend.errors import InputError
+from cfddem.case.particle_properties import particle_properties
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.mixture import net_downward_forces
+from cfddem.preflight.summary import preflight
+from cfddem.run.build import assemble
+from cfddem.run.runner import Run
 from closures.drag_resolved import beetstra, beetstra_polydisperse
 
 
@@ -28,7 +28,7 @@ def mixture(**given: Any) -> Case:
     return Case.from_text(MIXTURE, "bed.toml", {name.replace("__", "."): value for name, value in given.items()})
 
 
-def test_a_mixture_written_and_read_again_is_the_same() -> None:
+def test_a_mixture_written_and_read_again_is_equal() -> None:
     case = mixture()
     assert Case.from_text(case.to_toml()) == case
     coarser = case.with_(**{"bed.species.beads.diameter": 1.5e-3})
@@ -47,7 +47,7 @@ def test_the_diameter_of_a_mixture_is_its_sauter_mean() -> None:
 def test_fractions_are_of_the_volume_of_a_poured_bed() -> None:
     case = Case.from_text(MIXTURE.replace("count = 200", "fraction = 0.25").replace("count = 40", "fraction = 0.75"),
                           "bed.toml", {"bed.height": 0.012})  # fmt: skip
-    grains = grains_of(case)
+    grains = particle_properties(case)
     volumes = np.bincount(grains.species, math.pi / 6.0 * grains.diameter**3)
     assert volumes.sum() == pytest.approx(0.58 * 0.012**3, rel=0.03)
     assert volumes / volumes.sum() == pytest.approx([0.25, 0.75], abs=0.01)
@@ -76,26 +76,26 @@ def test_fractions_are_of_the_volume_of_a_poured_bed() -> None:
     ],
     ids=str,
 )
-def test_a_mistake_in_a_species_is_told_with_key_and_limit(given: dict[str, Any], said: str) -> None:
+def test_an_input_error_in_a_species_names_key_and_limit(given: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError) as refusal:
         Case.from_text(MIXTURE, "bed.toml", given)
     assert said in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
-def test_a_species_without_diameter_is_told_with_its_line() -> None:
+def test_a_species_without_diameter_is_reported_with_its_line() -> None:
     text = MIXTURE.replace("diameter = 1e-3\n", "")
     line = 1 + text.split("\n").index("[bed.species.beads]")
     with pytest.raises(InputError, match=rf"bed.toml:{line}: bed.species.beads.diameter: must be given"):
         Case.from_text(text, "bed.toml")
 
 
-def test_sizes_of_a_table_have_its_shares_of_the_volume() -> None:
+def test_sizes_from_a_table_have_the_given_volume_shares() -> None:
     sizes = [[1e-3, 0.2], [1.5e-3, 0.5], [2e-3, 0.3]]
     case = Case.from_text(
         MIXTURE.replace("diameter = 1e-3", f"sizes = {sizes}").replace("count = 200", "count = 20000")
     )
-    beads = grains_of(case).diameter[:20_000]
+    beads = particle_properties(case).diameter[:20_000]
     volumes = np.array([(beads[beads == d] ** 3).sum() for d, _ in sizes])
     assert volumes / volumes.sum() == pytest.approx([share for _, share in sizes], abs=0.015)
     sauter = 1.0 / sum(share / d for d, share in sizes)
@@ -104,36 +104,36 @@ def test_sizes_of_a_table_have_its_shares_of_the_volume() -> None:
 
 
 @pytest.mark.parametrize("distribution", ["normal", "log_normal"])
-def test_a_spread_is_the_deviation_over_the_mean(distribution: str) -> None:
-    """Tails beyond three deviations are cut off: the spread is 1.5 % less."""
+def test_the_spread_is_the_standard_deviation_over_the_mean(distribution: str) -> None:
+    """Tails beyond three standard deviations are cut off, which lowers the spread by 1.5 %."""
     given = {"count": 100_000, "spread": 0.2, "distribution": distribution}
     case = mixture(**{f"bed__species__beads__{name}": value for name, value in given.items()})
-    beads = grains_of(case).diameter[:100_000]
+    beads = particle_properties(case).diameter[:100_000]
     assert beads.mean() == pytest.approx(1e-3, rel=2e-3)
     assert beads.std() / beads.mean() == pytest.approx(0.2, rel=0.03)
     assert math.pi / 6.0 * (beads**3).mean() == pytest.approx(case.bed.species["beads"].mean_volume, rel=0.01)
-    assert (beads**3).mean() / (beads**2).mean() == pytest.approx(case.bed.species["beads"].sauter, rel=0.01)
+    assert (beads**3).mean() / (beads**2).mean() == pytest.approx(case.bed.species["beads"].sauter_diameter, rel=0.01)
 
 
-def test_where_the_stream_carries_a_mixture_the_forces_on_its_species_cancel() -> None:
+def test_net_forces_on_the_species_cancel_at_the_voidage_in_balance() -> None:
     case = mixture()
-    known = bed_of(case)
+    known = estimate_bed(case)
     assert 0.42 < known.voidage < 1.0
-    forces = sinking(case, known.inlet, known.voidage)
+    forces = net_downward_forces(case, known.inlet, known.voidage)
     excess = {name: abs(case.material_of(each).density - 1000.0) for name, each in case.species.items()}
     left = [forces[name] * excess[name] * case.volumes[name] for name in forces]
     assert abs(sum(left)) < 1e-6 * sum(map(abs, left))
     assert max(map(abs, forces.values())) > 0.01
 
 
-def test_the_card_tells_of_a_law_that_does_not_know_of_sizes() -> None:
-    assert not any(each.key == "laws.drag" for each in card(mixture()).findings)
-    told = [each for each in card(mixture(laws__drag="beetstra")).findings if each.key == "laws.drag"]
-    assert "equal spheres" in told[0].reason and "beetstra_polydisperse" in told[0].remedy
+def test_a_drag_law_for_equal_spheres_gets_a_warning_in_a_mixture() -> None:
+    assert not any(each.key == "laws.drag" for each in preflight(mixture()).issues)
+    reported = [each for each in preflight(mixture(laws__drag="beetstra")).issues if each.key == "laws.drag"]
+    assert "equal spheres" in reported[0].reason and "beetstra_polydisperse" in reported[0].remedy
 
 
-def test_a_mixture_of_one_species_is_the_bed_itself() -> None:
-    """The same particles at the same places, to the last bit."""
+def test_a_mixture_of_one_species_equals_a_bed_of_one_kind() -> None:
+    """The same particles at the same positions, to the last bit."""
     alone = Case.from_text(
         MIXTURE[: MIXTURE.index("[bed.species.beads]")]
         + 'material = "plastic"\ndiameter = 2e-3\nspread = 0.05\ncount = 40\n'
@@ -143,49 +143,51 @@ def test_a_mixture_of_one_species_is_the_bed_itself() -> None:
     )
     text = MIXTURE.replace('[bed.species.beads]\nmaterial = "glass"\ndiameter = 1e-3\ncount = 200\n', "")
     named = Case.from_text(text, "bed.toml", {"bed.start": "packed"})
-    one, other = assemble(alone).particles.bodies, assemble(named).particles.bodies
-    for left, right in zip(one, other):
-        assert np.array_equal(left, right)
+    one, other = assemble(alone).particle_solver.particles, assemble(named).particle_solver.particles
+    for name in one.fields:
+        assert np.array_equal(one[name], other[name]), name
+    assert np.array_equal(other.species, np.zeros(40))
     assert buoyant_weight(alone) == buoyant_weight(named)
 
 
 @pytest.mark.parametrize("start", ["suspended", "poured"])
-def test_layers_start_one_above_the_other(start: str) -> None:
+def test_layers_lie_one_above_the_other_at_the_start(start: str) -> None:
     case = mixture(bed__arrangement="layers", bed__start=start, fluid=None)
-    bodies = assemble(case).particles.bodies
-    species = grains_of(case).species[bodies.id]
-    height = [float(np.median(bodies.position[species == kind, 2])) for kind in (0, 1)]
+    particles = assemble(case).particle_solver.particles
+    species = particle_properties(case).species[particles.id]
+    height = [float(np.median(particles.position[species == kind, 2])) for kind in (0, 1)]
     assert height[1] > height[0] + 1.5e-3
-    assert np.array_equal(bodies.density, np.where(species == 0, 2500.0, 1500.0))
-    mixed = assemble(case.with_(**{"bed.arrangement": "mixed"})).particles.bodies
-    means = [mixed.position[grains_of(case).species[mixed.id] == kind, 2].mean() for kind in (0, 1)]
+    assert np.array_equal(particles.density, np.where(species == 0, 2500.0, 1500.0))
+    mixed = assemble(case.with_(**{"bed.arrangement": "mixed"})).particle_solver.particles
+    means = [mixed.position[particle_properties(case).species[mixed.id] == kind, 2].mean() for kind in (0, 1)]
     assert abs(means[1] - means[0]) < 0.25 * mixed.position[:, 2].max()
 
 
-def test_drag_is_asked_with_the_diameter_over_the_sauter_mean_around() -> None:
-    """Spread evenly, the mean around is that of the whole, but for chance and for the sphere itself."""
+def test_drag_uses_the_diameter_over_the_local_sauter_mean() -> None:
+    """In a homogeneous mixture the local mean equals the overall one, apart from scatter and the sphere itself."""
     case = mixture(
         column__sides="periodic", column__ends="periodic", column__height=0.012, bed__species__pellets__spread=0
     )
     parts = assemble(case.with_(**{"bed.species.beads.count": 300}))
-    bodies, exchange = parts.particles.bodies, parts.exchange
+    particles, exchange = parts.particle_solver.particles, parts.exchange
     assert exchange is not None
-    place = exchange.spreading.place(bodies.position, bodies.radius)
-    solid = exchange.spreading.solid_fraction(place)
-    ratio = exchange._diameter_ratio(bodies, place, solid)
-    sauter = (bodies.radius**3).sum() / (bodies.radius**2).sum() * 2.0
+    place = exchange.kernel.map_particles(particles.position, particles.radius)
+    solid = exchange.kernel.solid_fraction(place)
+    flow = exchange.flow.sample(particles, place, solid)
+    ratio = flow.diameter_ratio
+    sauter = (particles.radius**3).sum() / (particles.radius**2).sum() * 2.0
     for diameter in (1e-3, 2e-3):
-        assert ratio[bodies.radius == 0.5 * diameter].mean() == pytest.approx(diameter / sauter, rel=0.1)
-    reynolds, voidage, none = np.full(bodies.count, 20.0), np.full(bodies.count, 0.7), np.zeros((bodies.count, 3))
-    resistance = exchange._resistance(bodies, Met(none, none, voidage, reynolds, voidage), ratio)
-    for row in (0, bodies.count - 1):
+        assert ratio[particles.radius == 0.5 * diameter].mean() == pytest.approx(diameter / sauter, rel=0.1)
+    reynolds, voidage = np.full(particles.count, 20.0), np.full(particles.count, 0.7)
+    resistance = exchange.drag.conductance(particles, flow._replace(reynolds=reynolds, voidage=voidage))
+    for row in (0, particles.count - 1):
         factor = beetstra_polydisperse(20.0, 0.7, ratio[row])
-        stokes = 3.0 * math.pi * 1e-3 * 2.0 * bodies.radius[row]
+        stokes = 3.0 * math.pi * 1e-3 * 2.0 * particles.radius[row]
         assert resistance[row] == pytest.approx(stokes * 0.7 * factor, rel=1e-12)
         assert not math.isclose(factor, beetstra(20.0, 0.7), rel_tol=0.05)
 
 
-def test_a_run_records_species_and_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+def test_a_run_records_species_and_resumes_to_the_same_bits(tmp_path: Path) -> None:
     case = mixture()
     Run.begin(case, tmp_path / "whole").go()
     Run.begin(

@@ -7,12 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.materials import Material, pair_table
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
 from cfddem.particles import solver
-from cfddem.particles.forces import Laws
-from cfddem.particles.neighbours import wrap
-from cfddem.particles.packing import (
+from cfddem.particles.initial.packing import (
     OVERLAP_LIMIT,
     PackingFailed,
     from_table,
@@ -22,9 +20,12 @@ from cfddem.particles.packing import (
     normal,
     random_packing,
 )
-from cfddem.particles.pairs import HOME
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.neighbours import wrap
+from cfddem.particles.pair_graph import HOME
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import Bodies, bodies
+from cfddem.particles.state import Particles, make_particles
 
 
 def nearest_images(position: np.ndarray, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +142,7 @@ INF = math.inf
 GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, roughness=1e-6)
 
 
-def listed(spheres: Bodies, film: bool, skin: float, box: np.ndarray) -> ParticleSolver:
+def listed(spheres: Particles, film: bool, skin: float, box: np.ndarray) -> ParticleSolver:
     """A run over these spheres, as it begins: with its first list."""
     sides = tuple(length if np.isfinite(length) else None for length in box)
     return ParticleSolver(spheres, pair_table([GLASS]), laws=Laws(film=film), box=sides, skin=skin)  # type: ignore[arg-type]
@@ -165,7 +166,7 @@ def test_list_is_that_of_a_search_through_all_pairs(
     position = generator.uniform(0.0, 1.0, (250, 3)) * room
     position[:3] = 0.0  # corners belong to the box
     wrap(position, box_size)
-    spheres = bodies(position, radius, 1000.0)
+    spheres = make_particles(position, radius, 1000.0)
     found = listed(spheres, film > 0.0, skin, box_size).edges
     apart, shift = nearest_images(spheres.position, box_size)
     touch = radius[:, None] + radius[None]
@@ -184,7 +185,7 @@ def test_list_is_that_of_a_search_through_all_pairs(
 
 def test_box_too_small_for_one_image_of_a_pair_is_refused() -> None:
     """Below twice the reach a pair could meet itself in two images."""
-    spheres = bodies(np.full((2, 3), 0.5), 0.3, 1000.0)
+    spheres = make_particles(np.full((2, 3), 0.5), 0.3, 1000.0)
     with pytest.raises(InputError, match="box"):
         listed(spheres, False, 0.01, np.array([1.0, 1.0, 1.0]))
 
@@ -198,28 +199,28 @@ def test_memory_goes_with_the_pair_through_lists_and_sorting(film: bool, monkeyp
     monkeypatch.setattr(solver, "THREADING_PAYS", 1)
     centres, box = random_packing(mono(400, 1e-3), 0.55, seed=9)
     shuffled = centres[np.random.default_rng(1).permutation(len(centres))]
-    spheres = bodies(shuffled, 0.5e-3, 2500.0, viscosity=1e-3 if film else 0.0)
+    spheres = make_particles(shuffled, 0.5e-3, 2500.0, viscosity=1e-3 if film else 0.0)
     run = ParticleSolver(spheres, pair_table([GLASS]), laws=Laws(film=film), box=tuple(box), sort_every=1)
 
     def expected() -> tuple[np.ndarray, np.ndarray]:
-        one, other = (run.bodies.id[row].astype(float) for row in (run.edges.first, run.edges.second))
+        one, other = (run.particles.id[row].astype(float) for row in (run.edges.first, run.edges.second))
         return (one**1.5 - other**1.5)[:, None] * [1.0, -2.0, 3.0], one * other + 1.0
 
     springs, speeds = expected()
     run.edges.spring[:] = springs
     if film:
         run.edges.approach_speed[:] = speeds
-    ids = run.bodies.id.copy()
+    ids = run.particles.id.copy()
     pairs_before = set(zip(*(np.sort([ids[run.edges.first], ids[run.edges.second]], axis=0).tolist())))
-    turned = run.bodies.id[run.edges.first] > run.bodies.id[run.edges.second]
+    turned = run.particles.id[run.edges.first] > run.particles.id[run.edges.second]
     # move the corner of the box, so that the next sorting takes another order
-    run.bodies.position[:] += 0.37 * box
+    run.particles.position[:] += 0.37 * box
     run._relist()
-    assert not np.array_equal(ids, run.bodies.id)
-    turned_now = run.bodies.id[run.edges.first] > run.bodies.id[run.edges.second]
+    assert not np.array_equal(ids, run.particles.id)
+    turned_now = run.particles.id[run.edges.first] > run.particles.id[run.edges.second]
     assert turned.sum() > 0 and turned_now.sum() > 0
     springs, speeds = expected()
-    now = zip(*(np.sort([run.bodies.id[run.edges.first], run.bodies.id[run.edges.second]], axis=0).tolist()))
+    now = zip(*(np.sort([run.particles.id[run.edges.first], run.particles.id[run.edges.second]], axis=0).tolist()))
     kept = np.array([pair in pairs_before for pair in now])
     assert kept.sum() == len(pairs_before)  # the skin grew: none was dropped
     assert np.array_equal(run.edges.spring[kept], springs[kept])

@@ -1,4 +1,4 @@
-"""Pictures: what is drawn stands where it is, in its colour; formats of others hold the same numbers."""
+"""Pictures: spheres at the right place in the right colour; exported formats with the same numbers."""
 
 from __future__ import annotations
 
@@ -12,23 +12,30 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError, RunFailed
-from cfddem.record.export import export
-from cfddem.record.output import RunFolder
-from cfddem.record.reading import newest_run, open_run
-from cfddem.view import rendering
-from cfddem.view.pictures import movie, picture
-from cfddem.view.plots import history
-from cfddem.view.stage import BUBBLE, Stage, _bubbles
-from cfddem.view.window import scene, window
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io.export import export
+from cfddem.io.quantities import TIME, Quantity, of_fields
+from cfddem.io.reading import newest_run, open_run
+from cfddem.io.writer import RunFolder
+from cfddem.particles.state import PARTICLE_FIELDS
+from cfddem.plotting import rendering
+from cfddem.plotting.curves import history
+from cfddem.plotting.pictures import movie, picture
+from cfddem.plotting.stage import BUBBLE, Stage, _bubbles
+from cfddem.plotting.window import scene, window
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
+QUANTITIES = {
+    "history": {"time": TIME, "bed_height": Quantity("m", "bed height"), "pressure_drop": Quantity("Pa", "drop")},
+    "particles": of_fields(PARTICLE_FIELDS),
+    "fluid": {"voidage": Quantity("1", "voidage"), "velocity": Quantity("m/s", "velocity")},
+}
 BOUNDS = np.array([[0.0, 1.0], [0.0, 2.0], [0.0, 3.0]])
 
 
 @pytest.fixture
 def renders() -> None:
-    """Skips, with the reason, where this machine cannot render."""
+    """Skip with the reason if this machine cannot render."""
     fault = rendering.why_not()
     if fault:
         pytest.skip(fault)
@@ -36,9 +43,9 @@ def renders() -> None:
 
 @pytest.fixture(scope="module")
 def bed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bed with a bubble, half the column full, of three snapshots."""
+    """Three snapshots of a bed with a bubble that fills half the column."""
     folder = tmp_path_factory.mktemp("runs") / "bed"
-    run = RunFolder.create(folder, 'title = "small bed"\n', {}, GRID)
+    run = RunFolder.create(folder, 'title = "small bed"\n', {}, GRID, QUANTITIES)
     points = np.random.default_rng(1).random((300, 3)) * [0.1, 0.04, 0.1]
     z, y, x = np.meshgrid(*[0.01 * (np.arange(n) + 0.5) for n in (20, 4, 10)], indexing="ij")
     for k in range(3):
@@ -53,18 +60,16 @@ def bed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def drawn(position: list, radius: list, values: list, depth: int = 1) -> np.ndarray:
-    """Spheres in the box 1 x 2 x 3, a hundred pixels a metre."""
-    return rendering.spheres(
-        np.array(position, float), np.array(radius), np.array(values), BOUNDS, depth, (0.0, 1.0),
-        mpl.colormaps["viridis"], (100 if depth == 1 else 200, 300),
-    )  # fmt: skip
+    """Spheres in a box of 1 x 2 x 3 m, at a hundred pixels per metre."""
+    view = rendering.View(BOUNDS, depth, (100 if depth == 1 else 200, 300))
+    return rendering.spheres(view, np.array(position, float), np.array(radius), np.array(values), (0.0, 1.0))
 
 
 # ---------------------------------------------------------------- spheres
 
 
 @pytest.mark.parametrize("depth", [0, 1])
-def test_a_sphere_stands_where_it_is_and_is_as_large_as_it_is(renders, depth):
+def test_a_sphere_has_the_right_position_and_size(renders, depth):
     image = drawn([(0.25, 0.5, 2.5)], [0.2], [0.0], depth)
     seen = np.argwhere((image < 250).any(axis=2))
     row, column = seen.mean(axis=0)
@@ -73,8 +78,8 @@ def test_a_sphere_stands_where_it_is_and_is_as_large_as_it_is(renders, depth):
     assert len(seen) == pytest.approx(np.pi * 20.0**2, rel=0.04)
 
 
-def test_the_nearer_sphere_hides_the_other(renders):
-    """Seen along y from the front, against x from the far side."""
+def test_the_nearer_sphere_hides_the_farther_one(renders):
+    """Along y the view is from the front, along x from the far side."""
     for depth, places in ((1, [(0.5, 0.2, 1.5), (0.5, 1.8, 1.5)]), (0, [(0.9, 1.0, 1.5), (0.1, 1.0, 1.5)])):
         for first in (0, 1):
             image = drawn([places[first], places[1 - first]], [0.3, 0.3], [float(first == 1), float(first == 0)], depth)
@@ -83,7 +88,7 @@ def test_the_nearer_sphere_hides_the_other(renders):
             assert near_is_slow
 
 
-def test_colour_shows_the_value_and_nothing_is_white(renders):
+def test_the_colour_shows_the_value_and_an_empty_image_is_white(renders):
     image = drawn([(0.5, 1.0, 2.0), (0.5, 1.0, 1.0)], [0.3, 0.3], [0.0, 1.0])
     low, high = image[100, 50], image[200, 50]
     assert np.abs(low - 255.0 * np.array(mpl.colormaps["viridis"](0.0)[:3])).max() < 12
@@ -117,7 +122,7 @@ def test_a_film_as_mp4(renders, bed, tmp_path):
     assert len(frames) == 3 and frames[0].shape[1] <= 800 and np.std(frames[0]) > 10.0  # type: ignore[attr-defined]
 
 
-def test_axes_colour_bar_and_title_speak(renders, bed):
+def test_axes_colour_bars_and_title_are_labelled(renders, bed):
     stage = Stage.of(open_run(bed), [2], (), "speed", None)
     figure = stage.figure(2)
     assert figure.get_suptitle() == "small bed,  t = 0.2 s"
@@ -129,15 +134,15 @@ def test_axes_colour_bar_and_title_speak(renders, bed):
     assert figure.axes[0].get_xlim() == (0.0, 0.1) and figure.axes[0].get_ylim() == pytest.approx((0.0, top))
 
 
-def test_a_long_title_stays_within_a_narrow_picture(bed, monkeypatch):
-    monkeypatch.setattr("cfddem.view.stage._title", lambda run: "Liquid-fluidised bed of alumina beads")
+def test_a_long_title_fits_a_narrow_picture(bed, monkeypatch):
+    monkeypatch.setattr("cfddem.plotting.stage._title", lambda run: "Liquid-fluidised bed of alumina beads")
     figure = Stage.of(open_run(bed), [2], ("voidage",), "speed", None).figure(2)
     left, right = figure._suptitle.get_window_extent().intervalx
     assert 0.0 < left < right < figure.bbox.width
 
 
-def test_a_run_of_particles_alone_is_framed_by_them(renders, tmp_path):
-    run = RunFolder.create(tmp_path / "run", "", {})
+def test_a_run_without_a_grid_is_framed_by_its_particles(renders, tmp_path):
+    run = RunFolder.create(tmp_path / "run", "", {}, None, QUANTITIES)
     points = {"position": np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 3.0]]), "radius": np.array([0.1, 0.2])}
     run.write_snapshot(0.0, 0, None, points | {"velocity": np.zeros((2, 3))})
     stage = Stage.of(open_run(run.folder), [0], (), "speed", None)
@@ -147,7 +152,7 @@ def test_a_run_of_particles_alone_is_framed_by_them(renders, tmp_path):
     assert picture(run.folder, tmp_path / "two.png").exists()
 
 
-def test_the_bubble_and_the_freeboard_are_told_apart(bed):
+def test_bubbles_and_freeboard_are_distinguished(bed):
     run = open_run(bed)
     bubble, freeboard = _bubbles(run.fluid("voidage", 0), run.grid)
     assert bubble.bounds[5] < 0.07 and bubble.center == pytest.approx((0.05, 0.02, 0.04), abs=0.006)
@@ -161,7 +166,7 @@ def test_curves_of_the_history(bed, tmp_path):
         history(bed, tmp_path / "other.png", ["bed_hight"])
 
 
-def test_wrong_wishes_are_one_line(renders, bed, tmp_path):
+def test_wrong_options_give_one_line(renders, bed, tmp_path):
     with pytest.raises(InputError, match="did you mean 'bubbles'"):
         picture(bed, tmp_path / "a.png", show=("bubles",))
     with pytest.raises(InputError, match="did you mean 'radius'"):
@@ -172,11 +177,11 @@ def test_wrong_wishes_are_one_line(renders, bed, tmp_path):
         movie(bed, tmp_path / "a.avi")
 
 
-# ---------------------------------------------------------------- machines without
+# ---------------------------------------------------------------- missing graphics or packages
 
 
-def test_where_nothing_renders_the_remedy_is_named(bed, tmp_path, monkeypatch):
-    """A missing library ends a process; the probe dies in a process of its own."""
+def test_the_remedy_is_named_if_the_machine_cannot_render(bed, tmp_path, monkeypatch):
+    """A missing library kills the process; only the probe is killed."""
     monkeypatch.setattr(rendering, "_PROBE", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     monkeypatch.delenv("VTK_DEFAULT_OPENGL_WINDOW", raising=False)
     rendering.why_not.cache_clear()
@@ -188,9 +193,9 @@ def test_where_nothing_renders_the_remedy_is_named(bed, tmp_path, monkeypatch):
         rendering.why_not.cache_clear()
 
 
-def test_without_a_screen_the_window_says_so(bed, monkeypatch):
+def test_the_window_is_refused_without_a_screen(bed, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
-    with pytest.raises(RunFailed, match="no screen here"):
+    with pytest.raises(RunFailed, match="there is no screen"):
         window(bed)
 
 
@@ -203,7 +208,7 @@ def test_a_missing_package_is_named(bed, tmp_path, monkeypatch):
         movie(bed, tmp_path / "bed.mp4")
 
 
-# ---------------------------------------------------------------- formats of others
+# ---------------------------------------------------------------- export
 
 
 def test_vtu_holds_the_same_cells_and_particles(bed, tmp_path):
@@ -219,7 +224,7 @@ def test_vtu_holds_the_same_cells_and_particles(bed, tmp_path):
     assert np.array_equal(pyvista.read(files[0]).points, open_run(bed).particles(2)["position"])
 
 
-def test_csv_names_units_and_holds_the_same_numbers(bed, tmp_path):
+def test_csv_has_units_and_the_same_numbers(bed, tmp_path):
     pandas = pytest.importorskip("pandas", reason="needs `pip install 'cfddem[export]'`")
     export(bed, "csv", tmp_path / "out")
     table = pandas.read_csv(tmp_path / "out/particles-00000001.csv")
@@ -254,14 +259,14 @@ def test_an_unknown_format_or_snapshot_is_one_line(bed, tmp_path):
 
 def test_the_newest_run_is_found(bed, tmp_path):
     assert newest_run(bed.parent) == bed and newest_run(bed) == bed
-    with pytest.raises(InputError, match="none is in"):
+    with pytest.raises(InputError, match="there is none in"):
         newest_run(tmp_path)
 
 
 def test_commands_view_and_export(bed, tmp_path):
     def command(*words: str) -> subprocess.CompletedProcess:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-        line = [sys.executable, "-m", "cfddem.cli", *words]
+        line = [sys.executable, "-m", "cfddem", *words]
         return subprocess.run(line, cwd=tmp_path, env=environment, capture_output=True, text=True)
 
     assert command("view", str(bed), "--history").stdout == "bed-history.png\n"

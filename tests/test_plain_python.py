@@ -1,4 +1,4 @@
-"""The compiled pair loop against the same source run by the plain interpreter."""
+"""The compiled pair loop against the same source run by the Python interpreter."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ SYSTEM = """
 import sys
 import numpy as np
 from numba import config
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import Laws
-from cfddem.particles.packing import lattice
-from cfddem.particles.state import bodies
-from cfddem.particles.walls import Plane
+from cfddem.case.materials import Material
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.interactions.laws import CHOICES, Laws
+from cfddem.particles.initial.packing import lattice
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Plane
 from cfddem.particles.solver import ParticleSolver
 
 film, integrator, onset, spring, contact, plain, path = *(int(word) for word in sys.argv[1:7]), sys.argv[7]
+words = zip(("integrator", "friction_onset", "spring", "contact"), (integrator, onset, spring, contact))
 assert bool(config.DISABLE_JIT) == bool(plain)
 glass = Material(density=2500, youngs_modulus=1e7, poisson=0.25, restitution=0.7, friction=0.4, roughness=2e-6,
                  friction_lubricated=0.1)
@@ -29,9 +31,9 @@ draw = np.random.default_rng(2)
 places = lattice(1e-3, ((0, 0, 0), (4.0e-3, 4.0e-3, 3.0e-3)), 1.0)
 places = places + draw.uniform(-2e-5, 2e-5, places.shape)
 size = 0.5e-3 * draw.uniform(0.97, 1.03, len(places))
-spheres = bodies(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shape),
+spheres = make_particles(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shape),
                  spin=draw.normal(0, 50.0, places.shape), viscosity=0.01 * film)
-laws = Laws(film=bool(film), integrator=integrator, friction_onset=onset, spring=spring, contact=contact,
+laws = Laws(film=bool(film), **{name: CHOICES[name][number] for name, number in words},
             normal_stiffness=500.0, tangential_stiffness=300.0)
 table = pair_table([glass])
 run = ParticleSolver(spheres, table.view(np.recarray) if plain else table, walls=[Plane()], laws=laws,
@@ -44,7 +46,7 @@ np.savez(path, position=spheres.position, velocity=spheres.velocity, spin=sphere
 
 
 def state(folder: Path, plain: bool, choices: tuple[int, ...]) -> dict[str, np.ndarray]:
-    """Run the system in a process of its own and read its state."""
+    """Run the system in a separate process and read its state."""
     path = folder / f"{plain}.npz"
     words = [*map(str, choices), str(int(plain)), str(path)]
     environment = {**os.environ, "NUMBA_DISABLE_JIT": str(int(plain)), "NUMBA_NUM_THREADS": "1"}
@@ -66,8 +68,8 @@ def state(folder: Path, plain: bool, choices: tuple[int, ...]) -> dict[str, np.n
     ],
     ids=["dry", "film", "film, explicit, friction at overlap, rescaled", "linear"],
 )
-def test_compiled_loop_equals_its_plain_source(choices: tuple[int, ...], tmp_path: Path) -> None:
-    """Places, velocities, forces and springs of 48 spheres after 12 steps: within 1e-12 of the largest of each."""
+def test_compiled_loop_equals_interpreted_loop(choices: tuple[int, ...], tmp_path: Path) -> None:
+    """48 spheres, 12 steps; positions, velocities, forces and springs agree within 1e-12 of their maxima."""
     compiled, plain = (state(tmp_path, way, choices) for way in (False, True))
     for name, values in compiled.items():
         assert np.abs(values - plain[name]).max() <= 1e-12 * np.abs(values).max(), name

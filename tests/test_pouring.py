@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.materials import Material, pair_table
-from cfddem.particles.filling import loose_places
-from cfddem.particles.packing import from_table
-from cfddem.particles.pouring import AT_REST, poured_bed
-from cfddem.particles.walls import Cylinder, Plane, Wall
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
+from cfddem.particles.initial.filling import loose_places
+from cfddem.particles.initial.packing import from_table
+from cfddem.particles.initial.pouring import AT_REST, poured_bed
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
 
 GRAIN = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.7, friction=0.3)
 DIAMETER = 1e-3
@@ -43,12 +44,12 @@ def test_box_without_room_is_refused() -> None:
 def test_bed_in_a_cup_lies_still() -> None:
     """Below the stated limit without damping; the largest overlap is that of the contacts."""
     bed = poured_bed(pair_table([GRAIN]), np.full(200, DIAMETER), 2500.0, CUP, AROUND, SIZE, seed=1)
-    position = bed.bodies.position
+    position = bed.particles.position
     assert bed.energy < AT_REST
     assert 0.0 < bed.largest_overlap < 0.01
     assert (np.hypot(position[:, 0], position[:, 1]) < 3.5e-3 * (1.0 + bed.largest_overlap)).all()
-    assert np.array_equal(bed.bodies.id, np.arange(200))
-    weight = 9.81 * bed.bodies.mass.sum()
+    assert np.array_equal(bed.particles.id, np.arange(200))
+    weight = 9.81 * bed.particles.mass.sum()
     assert -bed.run.wall_force[:, 2].sum() == pytest.approx(weight, rel=1e-2)
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfddem.kernels import use_threads
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import Laws
+from cfddem.backend.compile import use_threads
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
-from cfddem.particles.walls import Plane
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Plane
 
 GLASS = Material(
     density=2500,
@@ -30,7 +31,7 @@ def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Particle
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in (12, 12, 10)), indexing="ij"), axis=-1).reshape(-1, 3)
     position = (cells + 0.5 + 0.1 * generator.uniform(-1, 1, cells.shape)) * 2.2 * RADIUS
     radius = RADIUS * generator.uniform(0.6, 1.0, len(cells))
-    grains = bodies(
+    grains = make_particles(
         position,
         radius,
         GLASS.density,
@@ -52,8 +53,8 @@ def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> Particle
 
 def by_id(run: ParticleSolver) -> dict[str, np.ndarray]:
     """State of the particles in the order of their ids."""
-    order = np.argsort(run.bodies.id)
-    return {name: getattr(run.bodies, name)[order] for name in ("position", "velocity", "spin", "force", "torque")}
+    order = np.argsort(run.particles.id)
+    return {name: getattr(run.particles, name)[order] for name in ("position", "velocity", "spin", "force", "torque")}
 
 
 @pytest.mark.parametrize(
@@ -95,4 +96,4 @@ def test_count_and_names_survive() -> None:
     """No particle is lost or named twice by sorting and listing."""
     run = rain(False)
     run.advance(2e-6, 2000)
-    assert np.array_equal(np.sort(run.bodies.id), np.arange(run.bodies.count))
+    assert np.array_equal(np.sort(run.particles.id), np.arange(run.particles.count))

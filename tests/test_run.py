@@ -1,4 +1,4 @@
-"""Coupled runs in their folders: stopped, killed and failed ones go on to the same bits, and say how they ended."""
+"""Coupled runs in their folders: stopped, killed and failed runs resume bit for bit and record how they ended."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ import numpy as np
 import pytest
 from disturbed_runs import TINY, kill_and_go_on, long_enough, same_record, same_state
 
-from cfddem import cli, open_run
-from cfddem import run as running
-from cfddem.case import Case
-from cfddem.errors import InputError, RunFailed, RunStopped
-from cfddem.kernels import use_threads
-from cfddem.progress import status_of
-from cfddem.record import checkpoint
-from cfddem.record.output import RunFolder
-from cfddem.run import Run
+from cfddem import open_run
+from cfddem.backend.compile import use_threads
+from cfddem.backend.errors import InputError, RunFailed, RunStopped
+from cfddem.case.schema import Case
+from cfddem.cli import app as cli
+from cfddem.io import checkpoint
+from cfddem.io.writer import RunFolder
+from cfddem.run import runner
+from cfddem.run.progress import Status
+from cfddem.run.runner import Run
 
 
-def begin(folder: Path, text: str = TINY, report: Callable[[Run], None] = lambda _: None) -> Run:
+def begin(folder: Path, text: str = TINY, report: Callable[[Status], None] = lambda _: None) -> Run:
     return Run.begin(Case.from_text(text), folder, text=text, report=report)
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run that nothing disturbs."""
+    """A run without interruption."""
     folder = tmp_path_factory.mktemp("undisturbed") / "run"
     begin(folder).go()
     return folder
 
 
-def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
+def test_a_run_records_history_snapshots_and_collisions(undisturbed: Path) -> None:
     seen = open_run(undisturbed)
     assert seen.status == "finished"
     assert seen.times == pytest.approx(np.arange(7) * 0.004)
@@ -50,47 +51,47 @@ def test_a_run_records_rows_snapshots_and_encounters(undisturbed: Path) -> None:
     assert min(parts.values()) > 0.0
 
 
-def test_a_run_of_another_version_is_left_as_it_is(
+def test_a_run_of_another_version_is_refused_and_left_unchanged(
     tmp_path: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = shutil.copytree(undisturbed, tmp_path / "run")
     state = checkpoint.newest(folder)
     del state["simulation"]["exchange"]["last_step"]
     monkeypatch.setattr(checkpoint, "newest", lambda _: state)
-    with pytest.raises(InputError, match=r"must be a run of this version of cfddem; .* run .*case.toml anew"):
+    with pytest.raises(InputError, match=r"must be a run of this version of cfddem; .* run .*case.toml again"):
         Run.resume(folder, until=0.03)
     assert open_run(folder).status == "finished"
 
 
-def test_a_folder_that_cannot_be_is_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cfddem.run.Simulation", lambda *_: pytest.fail("work was done"))
+def test_an_impossible_folder_is_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cfddem.run.runner.Simulation", lambda *_: pytest.fail("work was done"))
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="must be a folder that can be written to; not a directory"):
+    with pytest.raises(InputError, match="must be a writable folder; not a directory"):
         begin(tmp_path / "file" / "run")
 
 
 @pytest.mark.parametrize("rows", [6, 14])
-def test_a_stopped_run_goes_on_to_the_same_bits(
+def test_a_stopped_run_resumes_bit_for_bit(
     tmp_path: Path, undisturbed: Path, rows: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In the middle between two snapshots, with films, contacts and open encounters alive."""
-    monkeypatch.setattr(running, "SAY_EVERY", 0.0)
+    """Stopped between two snapshots, with films, contacts and open collisions."""
+    monkeypatch.setattr(runner, "REPORT_EVERY", 0.0)
 
-    def stop(run: Run) -> None:
-        if len(run.folder._history["time"]) > rows:
+    def stop(status: Status) -> None:
+        if status.row["time"] > (rows - 0.5) * 0.001:
             os.kill(os.getpid(), signal.SIGTERM)
 
     run = begin(tmp_path / "run", report=stop)
-    with pytest.raises(RunStopped, match=r"stopped by SIGTERM at t = 0\.0\d+ s; go on with: cfddem resume") as ended:
+    with pytest.raises(RunStopped, match=r"stopped by SIGTERM at t = 0\.0\d+ s; continue with: cfddem resume") as ended:
         run.go()
     assert ended.value.exit_code == 128 + signal.SIGTERM
     assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
     assert open_run(tmp_path / "run").status == "stopped"
-    edges = run.simulation.particles.edges
-    assert (edges.resistance > 0.0).any() and np.isfinite(edges.entry).any()
+    edges = run.simulation.particle_solver.edges
+    assert (edges.resistance > 0.0).any() and np.isfinite(edges.begin).any()
     assert rows < 10 or (edges.force != 0.0).any()
     said: list[str] = []
-    Run.resume(tmp_path / "run", report=lambda run: said.append(status_of(run))).go()
+    Run.resume(tmp_path / "run", report=lambda status: said.append(str(status))).go()
     assert open_run(tmp_path / "run").status == "finished"
     assert said[0].startswith("0.0") and "left" in said[0]
     same_state(tmp_path / "run", undisturbed)
@@ -98,8 +99,8 @@ def test_a_stopped_run_goes_on_to_the_same_bits(
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7])
-def test_a_stop_on_the_way_to_a_row_loses_none(tmp_path: Path, undisturbed: Path, share: float) -> None:
-    """Before and after the middle of an interval."""
+def test_a_stop_between_two_rows_loses_no_row(tmp_path: Path, undisturbed: Path, share: float) -> None:
+    """Stopped before and after the middle of an interval."""
     run = begin(tmp_path / "run", TINY.replace("history_every = 0.001", "history_every = 0.004"))
     step = run.simulation.step
 
@@ -116,7 +117,7 @@ def test_a_stop_on_the_way_to_a_row_loses_none(tmp_path: Path, undisturbed: Path
     assert open_run(tmp_path / "run").history["time"] == pytest.approx(np.arange(7) * 0.004)
 
 
-def test_a_stop_in_the_step_that_reaches_the_row_keeps_the_row(tmp_path: Path) -> None:
+def test_a_stop_in_the_step_that_reaches_a_row_keeps_the_row(tmp_path: Path) -> None:
     run = begin(tmp_path / "run")
     step = run.simulation.step
 
@@ -131,7 +132,7 @@ def test_a_stop_in_the_step_that_reaches_the_row_keeps_the_row(tmp_path: Path) -
     assert open_run(tmp_path / "run").history["time"] == pytest.approx([0.0, 0.001, 0.002, 0.003])
 
 
-def test_a_longer_run_keeps_its_intervals(tmp_path: Path) -> None:
+def test_a_resumed_run_with_a_later_end_keeps_its_intervals(tmp_path: Path) -> None:
     text = TINY.replace("until = 0.024", "until = 0.004").replace("every = 0.004", "every = 0.002")
     begin(tmp_path / "run", text).go()
     with pytest.raises(InputError, match=r"until = 0\.003: must be at least 0\.004 s"):
@@ -142,7 +143,7 @@ def test_a_longer_run_keeps_its_intervals(tmp_path: Path) -> None:
     assert seen.history["time"] == pytest.approx(np.arange(8) * 0.001)
 
 
-def test_a_run_killed_before_its_first_checkpoint_begins_anew(tmp_path: Path, undisturbed: Path) -> None:
+def test_a_run_killed_before_its_first_checkpoint_starts_again(tmp_path: Path, undisturbed: Path) -> None:
     run = begin(tmp_path / "run")
     run.folder._lock.close()
     for each in (tmp_path / "run" / "checkpoint").iterdir():
@@ -151,14 +152,14 @@ def test_a_run_killed_before_its_first_checkpoint_begins_anew(tmp_path: Path, un
     same_record(tmp_path / "run", undisturbed)
 
 
-def test_other_thread_counts_go_on_to_the_same_bits(tmp_path: Path) -> None:
-    """More than a thousand particles, whose loops are threaded: begun on one thread, gone on with on two."""
+def test_resuming_with_another_thread_count_is_bit_for_bit(tmp_path: Path) -> None:
+    """More than a thousand particles, so that loops are threaded: started on one thread, resumed on two."""
     text = TINY.replace("width = 0.012", "width = 0.018").replace("height = 0.018", "height = 0.048")
     text = text.replace("count = 160", "count = 1050").replace("until = 0.024", "until = 0.008")
     before = use_threads(None)
 
-    def stop(run: Run) -> None:
-        if len(run.folder._history["time"]) == 5:
+    def stop(status: Status) -> None:
+        if status.row["time"] > 0.0035:
             os.kill(os.getpid(), signal.SIGTERM)
 
     begin(tmp_path / "whole", text).go()
@@ -180,14 +181,14 @@ def test_other_thread_counts_go_on_to_the_same_bits(tmp_path: Path) -> None:
 
 
 def lost(run: Run) -> None:
-    run.simulation.particles.bodies.velocity[7] = (0.0, 0.0, -1e4)
+    run.simulation.particles.velocity[7] = (0.0, 0.0, -1e4)
 
 
 def no_number(run: Run) -> None:
-    run.simulation.particles.bodies.velocity[7, 1] = np.nan
+    run.simulation.particles.velocity[7, 1] = np.nan
 
 
-@pytest.mark.parametrize(("how", "said"), [(no_number, "is no number any more"), (lost, "particle 7 at")])
+@pytest.mark.parametrize(("how", "said"), [(no_number, "is NaN"), (lost, "particle 7 at")])
 def test_a_failure_leaves_the_last_good_snapshot(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -195,7 +196,7 @@ def test_a_failure_leaves_the_last_good_snapshot(
     how: Callable[[Run], None],
     said: str,
 ) -> None:
-    """From the command line: one line, exit code 3, and what was written before is whole and can be gone on with."""
+    """From the command line: one line and exit code 3; earlier data are whole and the run can be resumed."""
     (tmp_path / "case.toml").write_text(TINY)
     monkeypatch.chdir(tmp_path)
     write = Run._write_row
@@ -221,8 +222,8 @@ def test_a_failure_leaves_the_last_good_snapshot(
     assert open_run("bed").status == "finished"
 
 
-def test_an_interrupt_in_the_middle_of_a_step_is_a_stop(tmp_path: Path) -> None:
-    """As a second Ctrl-C gives it; the run goes on from the checkpoint before."""
+def test_an_interrupt_within_a_step_is_a_stop(tmp_path: Path) -> None:
+    """As after a second Ctrl-C; the run can be resumed from the previous checkpoint."""
 
     def step(_: float) -> None:
         raise KeyboardInterrupt
@@ -232,14 +233,14 @@ def test_an_interrupt_in_the_middle_of_a_step_is_a_stop(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         Run(halted, folder).go()  # type: ignore[arg-type]
     seen = open_run(tmp_path / "run")
-    assert (seen.status, seen.message) == ("stopped", "in the middle of a step")
+    assert (seen.status, seen.message) == ("stopped", "within a step")
 
 
 # ---------------------------------------------------------------- kills
 
 
 @pytest.mark.slow
-def test_ten_kills_of_a_real_run_leave_it_whole_and_its_end_the_same(tmp_path: Path) -> None:
+def test_ten_kills_of_a_real_run_leave_it_whole_and_its_end_unchanged(tmp_path: Path) -> None:
     """`python tests/disturbed_runs.py 100` does a hundred."""
     assert kill_and_go_on(tmp_path, kills=10, seed=4) >= 5
     begin(tmp_path / "whole", long_enough(10)).go()

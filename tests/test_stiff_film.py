@@ -1,4 +1,4 @@
-"""The film between two bodies: against closed forms, an independent solution, and where it is very stiff.
+"""The film between two particles: against closed forms, an independent solution, and where it is very stiff.
 
 The model: Nijssen, Ottens & Padding, Powder Technol. (2023), doi:10.1016/j.powtec.2022.118017, eqs (1) to (10), with
 the fifth root in the gap of Davis, Serayssol & Hinch, J. Fluid Mech. 163 (1986) 479. A step is 2 % of the Hertz time.
@@ -14,11 +14,12 @@ import pytest
 from impacts import STEP, Pair, kinetic_energy, normal_speed
 from scipy.integrate import solve_ivp
 
-from cfddem.materials import SMOOTHEST, Material, pair_table
-from cfddem.particles.forces import DRIFT, VERLET, Laws
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import SMOOTHEST, pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
-from cfddem.particles.walls import Plane
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Plane
 from closures import contact
 
 GLASS = Material(density=2540, youngs_modulus=60e9, poisson=0.23, restitution=0.97, friction=0.15, roughness=134e-9)
@@ -26,7 +27,7 @@ DELRIN = Material(density=1400, youngs_modulus=2.8e9, poisson=0.35, restitution=
 
 
 @dataclass
-class Encounter:
+class TypicalCollision:
     """A head-on approach at speed v0 at the reach of the film, h_co = R*, as the model prescribes it."""
 
     pair: Pair
@@ -90,7 +91,7 @@ class Encounter:
         leaving = -speed * float(solved.y[1, -1]) if solved.status == 1 else 0.0
         return max(0.0, (leaving - self.speed_scale * self.logarithm) / speed)
 
-    def simulated(self, integrator: int, fraction: float = STEP) -> float:
+    def simulated(self, integrator: str, fraction: float = STEP) -> float:
         """Restitution of the engine with one step size throughout."""
         pair = self.pair
         pair.gap = pair.reduced_radius
@@ -107,11 +108,11 @@ class Encounter:
         raise AssertionError("the encounter does not end")
 
 
-def by_stokes(material: Material, diameter: float, stokes: float, speed: float, wall: bool = False) -> Encounter:
+def by_stokes(material: Material, diameter: float, stokes: float, speed: float, wall: bool = False) -> TypicalCollision:
     """A pair of equal spheres, or a sphere and a wall of the same, whose viscosity follows from St."""
     pair = Pair((material, material), (0.5 * diameter,) * 2, speed, wall=wall)
     pair.viscosity = pair.reduced_mass * speed / (6.0 * math.pi * pair.reduced_radius**2 * stokes)
-    return Encounter(pair)
+    return TypicalCollision(pair)
 
 
 CHECKPOINTS = {
@@ -128,10 +129,10 @@ def test_immersed_restitution_at_checkpoints(name: str) -> None:
     for stokes, restitution in values.items():
         encounter = by_stokes(material, 12.7e-3, stokes, 0.1)
         assert encounter.converged() == pytest.approx(restitution, abs=1e-4), stokes
-        assert encounter.simulated(DRIFT) == pytest.approx(restitution, abs=1e-3), stokes
+        assert encounter.simulated("drift") == pytest.approx(restitution, abs=1e-3), stokes
 
 
-def random_encounter(seed: int) -> Encounter:
+def random_encounter(seed: int) -> TypicalCollision:
     """Diameter 0.2 to 13 mm, E 50 MPa to 190 GPa, rough and smooth, a pair, an unlike pair or a wall."""
     draw = np.random.default_rng(seed)
     kind = ("pair", "unlike", "wall")[seed % 3]
@@ -153,14 +154,14 @@ def random_encounter(seed: int) -> Encounter:
     pair = Pair(tuple(solids), (0.5 * diameter, 0.5 * other), 10 ** draw.uniform(-1.7, 0.0), wall=kind == "wall")
     stokes = 10 ** draw.uniform(1.2, 2.7)
     pair.viscosity = pair.reduced_mass * pair.approach / (6.0 * math.pi * pair.reduced_radius**2 * stokes)
-    return Encounter(pair)
+    return TypicalCollision(pair)
 
 
 ENCOUNTERS = [random_encounter(seed) for seed in range(30)]
 
 
 def test_sample_holds_both_mechanisms() -> None:
-    """The random encounters turn back on asperities and on the film's own pressure, deep and shallow."""
+    """The random collisions turn back on asperities and on the film's own pressure, deep and shallow."""
     assert 8 <= sum(encounter.by_film for encounter in ENCOUNTERS) <= 22
     assert min(e.depth for e in ENCOUNTERS) < 5.0 and max(e.depth for e in ENCOUNTERS) > 50.0
     assert sum(e.converged() > 0.0 for e in ENCOUNTERS) >= 20
@@ -170,14 +171,14 @@ def test_sample_holds_both_mechanisms() -> None:
 def test_lubricated_drift_is_converged(seed: int) -> None:
     """Restitution at 2 % of the Hertz time within 1e-3 of the converged solution of the same model."""
     encounter = ENCOUNTERS[seed]
-    assert encounter.simulated(DRIFT) == pytest.approx(encounter.converged(), abs=1e-3)
+    assert encounter.simulated("drift") == pytest.approx(encounter.converged(), abs=1e-3)
 
 
 @pytest.mark.parametrize("seed", [n for n, e in enumerate(ENCOUNTERS) if e.depth < 15.0 and e.film_rate < 1.0])
 def test_plain_verlet_is_near(seed: int) -> None:
     """Restitution with the film as a force within 0.012 where delta_max/h_min < 15 and lambda dt < 1."""
     encounter = ENCOUNTERS[seed]
-    assert encounter.simulated(VERLET) == pytest.approx(encounter.converged(), abs=0.012)
+    assert encounter.simulated("verlet") == pytest.approx(encounter.converged(), abs=0.012)
 
 
 @pytest.mark.parametrize("stokes", [1.0, 2.0, 4.0, 6.0])
@@ -213,7 +214,7 @@ def press(count: int, material: Material, force: float, gaps: list[float], wall:
     steps = np.array([2.0 * BEAD_RADIUS + gap for gap in gaps[1 if wall else 0 :][: count - 1]])
     position = np.zeros((count, 3))
     position[:, 0] = first + np.concatenate([[0.0], np.cumsum(steps)])
-    made = bodies(position, BEAD_RADIUS, material.density, viscosity=GLYCEROL)
+    made = make_particles(position, BEAD_RADIUS, material.density, viscosity=GLYCEROL)
     made.applied[-1, 0] = -force
     if not wall:
         made.applied[0, 0] = force
@@ -244,8 +245,8 @@ def total_energy(run: ParticleSolver) -> float:
     for k, (gap, minimum_gap) in enumerate(zip(run.gap, run.edges.minimum_gap)):
         radius = BEAD_RADIUS if k >= run.edges.between_particles else 0.5 * BEAD_RADIUS
         stored += weighted_contact_energy(gap, minimum_gap, contact.hertz_stiffness(modulus, radius))
-    force = -float(run.bodies.applied[-1, 0])
-    return float(kinetic_energy(run.bodies).sum()) + stored + force * float(run.gap.sum())
+    force = -float(run.particles.applied[-1, 0])
+    return float(kinetic_energy(run.particles).sum()) + stored + force * float(run.gap.sum())
 
 
 def bead_step(reference_speed: float, wall: bool) -> float:
@@ -317,9 +318,11 @@ def test_stiff_films_in_rows_under_a_press(row: str, roughness: float, reference
 def test_solids_without_roughness_part_from_rest() -> None:
     """A film between solids of roughness 0 ends at the size of an atom: a pair at touch, pulled apart, stays finite."""
     smooth = Material(density=2500, youngs_modulus=1e9, poisson=0.25)
-    pair = bodies([[0.0, 0.0, 0.0], [2.1e-3, 0.0, 0.0]], 1e-3, 2500, velocity=[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    pair = make_particles(
+        [[0.0, 0.0, 0.0], [2.1e-3, 0.0, 0.0]], 1e-3, 2500, velocity=[[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]]
+    )
     pair.viscosity[:] = 1e-3
     run = ParticleSolver(pair, pair_table([smooth]), laws=Laws(film=True))
     run.advance(2e-4, 5)
-    assert 0.0 < run.bodies.velocity[1, 0] < 0.1
+    assert 0.0 < run.particles.velocity[1, 0] < 0.1
     assert run.edges.minimum_gap[0] == SMOOTHEST

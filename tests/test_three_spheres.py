@@ -1,4 +1,4 @@
-"""Three wet spheres: printed numbers, the analytic law of two, a second solution, and what must hold always."""
+"""Three wet spheres: printed numbers, the analytic law of two, a second solution, and conservation laws."""
 
 from __future__ import annotations
 
@@ -8,21 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import cfddem
 from matplotlib.colors import to_hex
-from test_command_line import cfddem
 
-from cfddem.errors import InputError
+from cfddem.backend.errors import InputError
 from closures.restitution import davis_sitison
-from scenarios import three_spheres_engine as engine
-from scenarios import three_spheres_figures as figures
-from scenarios import three_spheres_validation as study
-from scenarios.three_spheres import centres, outcomes, simulate
-from scenarios.validation import Row
-from scenarios.wet_checks import cartesian
+from scenarios.collisions.three_spheres import centres, figures, outcomes, simulate_three_spheres
+from scenarios.collisions.three_spheres import events as three_sphere_events
+from scenarios.collisions.three_spheres import validation as study
+from scenarios.validation.table import Row
+from scenarios.validation.wet_checks import cartesian
 
 
 def failed(rows: list[Row]) -> list[object]:
-    return [row.card() for row in rows if row.verdict == "FAILS"]
+    return [row.as_dict() for row in rows if row.verdict == "FAILS"]
 
 
 @pytest.mark.parametrize("part", [study.printed, study.thresholds, study.two_spheres], ids=lambda part: part.__name__)
@@ -32,10 +31,12 @@ def test_published_numbers_hold(part, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_soft_spheres_of_the_particle_engine_do_the_same(friction: float) -> None:
+def test_the_particle_engine_with_soft_contacts_agrees(friction: float) -> None:
     """Cartesian coordinates, Hertz contacts, films laid over: times within 0.2 %, restitution within 0.005."""
     conditions = {"stokes": 8.0, "theta12": 45.0, "friction": friction}
-    soft, hard = engine.simulate(**conditions, until=3.2), simulate(**conditions)
+    until = 3.2 * 0.01 / math.cos(math.radians(45.0))
+    soft = simulate_three_spheres(**conditions, until=until, solver="particles")
+    hard = simulate_three_spheres(**conditions)
     assert [(e.kind, e.pair) for e in soft.events] == [(e.kind, e.pair) for e in hard.events[:3]]
     for a, b in zip(soft.events, hard.events):
         assert a.time == pytest.approx(b.time, rel=2e-3)
@@ -45,7 +46,7 @@ def test_soft_spheres_of_the_particle_engine_do_the_same(friction: float) -> Non
 @pytest.mark.parametrize("conditions", study.UNPRINTED, ids=lambda each: f"St {each['stokes']:g}")
 def test_a_second_solution_in_other_coordinates_agrees(conditions: dict[str, float]) -> None:
     """Events in the same order; times within 0.2 %, normal speeds within 0.005."""
-    ours, theirs = simulate(**conditions, until=2.0).events, cartesian(**conditions)
+    ours, theirs = simulate_three_spheres(**conditions, until=2.0).events, cartesian(**conditions)
     assert len(theirs) >= 2
     for a, (kind, pair, time, speed) in zip(ours, theirs, strict=False):
         assert (a.kind, a.pair) == (kind, pair)
@@ -54,9 +55,11 @@ def test_a_second_solution_in_other_coordinates_agrees(conditions: dict[str, flo
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.1])
-def test_endless_bouncing_does_not_depend_on_where_it_is_cut(friction: float) -> None:
+def test_results_do_not_depend_on_the_slowest_bounce(friction: float) -> None:
     """St 2: sphere 3 presses 1 and 2 together, which bounce ever faster; the partings come out the same."""
-    runs = [simulate(2.0, 45.0, friction=friction, slowest_bounce=slowest) for slowest in (1e-3, 1e-4, 1e-5)]
+    runs = [
+        simulate_three_spheres(2.0, 45.0, friction=friction, slowest_bounce=slowest) for slowest in (1e-3, 1e-4, 1e-5)
+    ]
     contacts = [run.summary()["contacts"]["12"] for run in runs]
     assert contacts[0] < contacts[1] < contacts[2]
     assert contacts[2] > 100
@@ -68,7 +71,7 @@ def test_endless_bouncing_does_not_depend_on_where_it_is_cut(friction: float) ->
 def test_solids_never_come_closer_than_the_minimum_gap() -> None:
     """Also where a capillary pull keeps all three pressed together."""
     for conditions in ({"stokes": 2.0, "theta12": 45.0}, {"stokes": 3.5, "theta12": 45.0, "capillary_number": 100.0}):
-        history = simulate(**conditions).history
+        history = simulate_three_spheres(**conditions).history
         for pair in ("12", "23", "13"):
             assert history[f"gap{pair}"].min() > 0.05 - 1e-8
 
@@ -94,15 +97,15 @@ def momentum_of_turning(history: dict[str, np.ndarray], film_ratio: float) -> np
 
 def test_angular_momentum_changes_only_by_the_arms_of_the_film() -> None:
     """Without friction and film across it is kept to 1e-9; the torque of the film acts at a R, half a gap short."""
-    turning = momentum_of_turning(simulate(8.0, 45.0, friction=0.2, until=3.0).history, 0.01)
+    turning = momentum_of_turning(simulate_three_spheres(8.0, 45.0, friction=0.2, until=3.0).history, 0.01)
     assert np.ptp(turning) / abs(turning[0]) < 1e-3
-    head_on = momentum_of_turning(simulate(8.0, 0.0, until=3.0).history, 0.01)
+    head_on = momentum_of_turning(simulate_three_spheres(8.0, 0.0, until=3.0).history, 0.01)
     assert np.abs(head_on).max() < 1e-9 * 100.0
 
 
 def test_energy_falls() -> None:
     """Films and contacts only take: the speeds squared fall from event to event."""
-    history = simulate(6.0, 30.0, friction=0.1, restitution=0.9, until=2.0).history
+    history = simulate_three_spheres(6.0, 30.0, friction=0.1, restitution=0.9, until=2.0).history
     squares = []
     for pair in ("12", "23"):
         squares.append(
@@ -123,20 +126,20 @@ def test_energy_falls() -> None:
 
 def test_the_outcomes_have_their_names() -> None:
     """FA, PA1, PA2, PA3 and FS, each where the source finds it."""
-    assert simulate(2.0, 45.0).outcome == "PA1"
-    assert simulate(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
-    assert simulate(8.0, 0.0).outcome == "PA3"
-    assert simulate(4.0, 0.0).outcome == "FA"
-    assert simulate(10.0, 45.0).outcome == "FS"
-    assert simulate(10.0, 0.0, spheres=2).outcome == "FS"
-    assert simulate(3.0, 0.0, spheres=2).outcome == "FA"
+    assert simulate_three_spheres(2.0, 45.0).outcome == "PA1"
+    assert simulate_three_spheres(2.0, 45.0, -45.0, minimum_gap=0.04).outcome == "PA2"
+    assert simulate_three_spheres(8.0, 0.0).outcome == "PA3"
+    assert simulate_three_spheres(4.0, 0.0).outcome == "FA"
+    assert simulate_three_spheres(10.0, 45.0).outcome == "FS"
+    assert simulate_three_spheres(10.0, 0.0, spheres=2).outcome == "FS"
+    assert simulate_three_spheres(3.0, 0.0, spheres=2).outcome == "FA"
 
 
 def test_a_map_equals_single_runs() -> None:
     table = outcomes([3.0, 9.0], [10.0, 50.0], friction=0.1)
     for row, angle in enumerate((10.0, 50.0)):
         for column, stokes in enumerate((3.0, 9.0)):
-            run = simulate(stokes, angle, friction=0.1)
+            run = simulate_three_spheres(stokes, angle, friction=0.1)
             assert table["outcome"][row, column] == run.outcome
             assert table["restitution12"][row, column] == run.restitution12
             assert table["restitution23"][row, column] == run.restitution23
@@ -153,7 +156,9 @@ def test_a_map_shows_each_outcome_in_its_colour(tmp_path: Path) -> None:
 
 
 def test_two_spheres_head_on_follow_the_law_to_rounding_of_the_integrator() -> None:
-    assert simulate(10.0, 0.0, spheres=2).restitution12 == pytest.approx(davis_sitison(10.0, 1.0, 0.05), abs=1e-8)
+    assert simulate_three_spheres(10.0, 0.0, spheres=2).restitution12 == pytest.approx(
+        davis_sitison(10.0, 1.0, 0.05), abs=1e-8
+    )
 
 
 @pytest.mark.parametrize(
@@ -162,9 +167,9 @@ def test_two_spheres_head_on_follow_the_law_to_rounding_of_the_integrator() -> N
      ("gap23", 0.01), ("capillary_number", 0.0), ("restitution", 1.1), ("friction", -0.1), ("spheres", 4),
      ("until", 0.0), ("theta23", 180.0)],
 )  # fmt: skip
-def test_what_cannot_be_is_refused_by_name(name: str, value: float) -> None:
+def test_invalid_arguments_are_refused_by_name(name: str, value: float) -> None:
     with pytest.raises(InputError, match=name):
-        simulate(**{"stokes": 5.0, "theta12": 30.0, name: value})  # type: ignore[arg-type]
+        simulate_three_spheres(**{"stokes": 5.0, "theta12": 30.0, name: value})  # type: ignore[arg-type]
 
 
 def test_the_command_prints_json() -> None:
@@ -172,3 +177,21 @@ def test_the_command_prints_json() -> None:
     result = json.loads(done.stdout)
     assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
     assert result["events"][0]["pair"] == 12
+
+
+@pytest.mark.parametrize("conditions", [{"stokes": 5.0, "theta12": 30.0}, {"stokes": 2.0, "theta12": 45.0}])
+def test_times_of_events_are_converged(conditions: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within 1e-8 of their value of times with tolerances a hundred times tighter, endless bouncing included."""
+    usual = simulate_three_spheres(**conditions).events
+    monkeypatch.setattr(three_sphere_events, "RELATIVE", 1e-13)
+    monkeypatch.setattr(three_sphere_events, "ABSOLUTE", 1e-15)
+    tight = simulate_three_spheres(**conditions).events
+    assert [(e.kind, e.pair) for e in usual] == [(e.kind, e.pair) for e in tight]
+    assert [e.time for e in usual] == pytest.approx([e.time for e in tight], rel=1e-8)
+
+
+def test_a_pair_in_endless_bouncing_keeps_its_minimum_gap() -> None:
+    """St 2: sphere 3 presses spheres 1 and 2 together; a missed contact would let them overlap and separate late."""
+    run = simulate_three_spheres(2.0, 45.0)
+    assert run.history["gap12"].min() > 0.05 - 1e-9
+    assert study.of(run, "separate t_star", 12) == pytest.approx(2.596286, abs=1e-5)

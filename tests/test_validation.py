@@ -14,12 +14,13 @@ import h5py
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.view import plots
-from scenarios import binary_collision_checks as checks
-from scenarios import binary_collision_validation as study
-from scenarios import bouncing_sphere, validation
-from scenarios.validation import Row, replacing, validate, worst, write_histories
+from cfddem.backend.errors import InputError
+from cfddem.plotting import curves as plots
+from scenarios.collisions.bouncing_sphere import study as bouncing_sphere
+from scenarios.collisions.immersed_pair import checks
+from scenarios.collisions.immersed_pair import validation as study
+from scenarios.validation import table as validation
+from scenarios.validation.table import Row, replacing, validate, worst, write_histories
 
 
 def test_a_row_fails_only_by_a_limit() -> None:
@@ -38,7 +39,7 @@ def test_the_worst_of_many_points_is_shown_and_all_are_kept() -> None:
 def target(monkeypatch: pytest.MonkeyPatch, *rows: Row) -> None:
     """Make `example` a target with these rows."""
     module = ModuleType("example_of_a_target")
-    module.study = lambda folder, tell: list(rows)  # type: ignore[attr-defined]
+    module.study = lambda folder, progress: list(rows)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setitem(validation.TARGETS, "example", module.__name__)
 
@@ -69,7 +70,7 @@ def test_the_outcome_is_that_of_the_rows(
 def test_the_exit_code_says_whether_the_limits_hold(
     limit: float, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from cfddem import cli
+    from cfddem.cli import app as cli
 
     target(monkeypatch, Row("e", 0.5, 0.4, limit))
     monkeypatch.setattr(sys, "argv", ["cfddem", "validate", "example", "--output", str(tmp_path)])
@@ -118,7 +119,7 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
     ids=lambda part: part.__name__,
 )
 def test_quick_parts_of_the_binary_collisions_hold(part: Callable[[study.Curves], list[Row]]) -> None:
-    assert [row.card() for row in part({}) if row.verdict == "FAILS"] == []
+    assert [row.as_dict() for row in part({}) if row.verdict == "FAILS"] == []
 
 
 @pytest.mark.parametrize("module", [bouncing_sphere, plots], ids=lambda module: module.__name__)

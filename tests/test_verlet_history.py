@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from impacts import STEP, Pair, until_apart
 
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import HERTZ, LINEAR, Laws
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
+from cfddem.particles.state import make_particles
 from closures import contact
 
 GRAVITY = 9.81
@@ -24,7 +25,7 @@ GRAIN = 0.25e-3
 """Radius of the small grain [m]; it is of glass."""
 
 SOLID = Material(density=2500, youngs_modulus=5e8, poisson=0.3, restitution=0.5)
-STIFF = Laws(contact=LINEAR, normal_stiffness=1e4, tangential_stiffness=8235.0)
+STIFF = Laws(contact="linear", normal_stiffness=1e4, tangential_stiffness=8235.0)
 """The springs of the case of Vyas et al., as it stands in the examples of LAMMPS [N/m]."""
 
 
@@ -34,13 +35,15 @@ def grain_and_large(
     """A grain and two fixed spheres, `ratio` times larger, with centres at x = -half_distance and half_distance."""
     solid = SOLID.model_copy(update={"friction": friction})
     centres = [[-half_distance, 0.0, 0.0], [half_distance, 0.0, 0.0]]
-    made = bodies([position, *centres], [GRAIN, ratio * GRAIN, ratio * GRAIN], solid.density, fixed=[False, True, True])
+    made = make_particles(
+        [position, *centres], [GRAIN, ratio * GRAIN, ratio * GRAIN], solid.density, fixed=[False, True, True]
+    )
     return ParticleSolver(
         made, pair_table([solid]), laws=laws, gravity=(0.0, 0.0, -GRAVITY), skin=ratio * GRAIN, **options
     )  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("laws", [STIFF, Laws(contact=HERTZ)], ids=["linear", "hertz"])
+@pytest.mark.parametrize("laws", [STIFF, Laws(contact="hertz")], ids=["linear", "hertz"])
 @pytest.mark.parametrize("ratio", [3.0, 10.0, 20.0, 100.0])
 def test_grain_rolls_out_of_a_groove(ratio: float, laws: Laws) -> None:
     """A grain in the groove of two large spheres rolls off: energy to 2e-4, spin to 5e-5, and no deeper.
@@ -58,14 +61,14 @@ def test_grain_rolls_out_of_a_groove(ratio: float, laws: Laws) -> None:
     while angle < 0.65:
         run.advance(1e-6, 200)
         assert run.time < 0.5, "the grain sticks in the groove"
-        _, y, z = run.bodies.position[0]
-        angle, speed = math.atan2(y, z), np.linalg.norm(run.bodies.velocity[0])
+        _, y, z = run.particles.position[0]
+        angle, speed = math.atan2(y, z), np.linalg.norm(run.particles.velocity[0])
         if angle > 0.3:
             energy = 2.0 * GRAVITY * reach * (math.cos(start) - math.cos(angle))
             assert (1.0 + 0.4 / upright**2) * speed**2 == pytest.approx(energy, rel=2e-4)
-            assert -run.bodies.spin[0, 0] * upright * GRAIN == pytest.approx(speed, rel=5e-5)
-    push = 0.5 * run.bodies.mass[0] * (GRAVITY * math.cos(angle) - speed**2 / reach) / upright
-    overlap = push / laws.normal_stiffness if laws.contact == LINEAR else hertz_overlap(push, ratio)
+            assert -run.particles.spin[0, 0] * upright * GRAIN == pytest.approx(speed, rel=5e-5)
+    push = 0.5 * run.particles.mass[0] * (GRAVITY * math.cos(angle) - speed**2 / reach) / upright
+    overlap = push / laws.normal_stiffness if laws.contact == "linear" else hertz_overlap(push, ratio)
     assert 0.0 < reach - math.hypot(y, z) <= 1.05 * overlap / upright
 
 
@@ -85,7 +88,7 @@ def test_grain_falls_through_a_wide_gap(ratio: float, friction: float) -> None:
     angle = 0.2  # above the horizontal, where it touches the left one at first
     place = [-half + (large + GRAIN) * math.cos(angle), 0.0, (large + GRAIN) * math.sin(angle)]
     run = grain_and_large(place, ratio, half, friction, STIFF, free=(1.0, 0.0, 1.0))
-    while run.bodies.position[0, 2] > -0.5 * large:
+    while run.particles.position[0, 2] > -0.5 * large:
         run.advance(2e-6, 1000)
         assert run.time < 1.0, "the grain sticks in the gap"
 
@@ -99,9 +102,9 @@ def test_grain_rests_above_a_narrow_gap(ratio: float, friction: float) -> None:
     height = math.sqrt((large + GRAIN) ** 2 - half**2)
     run = grain_and_large([0.01 * GRAIN, 0.0, height + 0.5 * GRAIN], ratio, half, friction, STIFF, free=(1.0, 0.0, 1.0))
     run.advance(2e-6, 250000)
-    assert np.linalg.norm(run.bodies.velocity[0]) <= 1e-6
-    assert run.bodies.position[0, 0] == pytest.approx(0.0, abs=2e-2 * GRAIN)
-    assert height - 2e-2 * GRAIN <= run.bodies.position[0, 2] <= height
+    assert np.linalg.norm(run.particles.velocity[0]) <= 1e-6
+    assert run.particles.position[0, 0] == pytest.approx(0.0, abs=2e-2 * GRAIN)
+    assert height - 2e-2 * GRAIN <= run.particles.position[0, 2] <= height
 
 
 GLASS = Material(
@@ -134,16 +137,16 @@ def test_a_run_repeats_bit_by_bit(film: bool) -> None:
     pair, laws = oblique(film)
     first, again = (after_contact(pair.simulation(laws), pair) for _ in range(2))
     for name in STATE:
-        assert np.array_equal(getattr(first.bodies, name), getattr(again.bodies, name)), name
+        assert np.array_equal(getattr(first.particles, name), getattr(again.particles, name)), name
 
 
 def moved(
     pair: Pair, laws: Laws, order: list[int], axes: np.ndarray, shift: float, **options: object
 ) -> ParticleSolver:
-    """The same encounter with its bodies listed in another order, axes reflected, and elsewhere."""
-    given = pair.simulation(laws).bodies
+    """The same encounter with its particles listed in another order, axes reflected, and elsewhere."""
+    given = pair.simulation(laws).particles
     reflected = np.prod(axes) * axes  # spins are axial vectors
-    made = bodies(
+    made = make_particles(
         (given.position * axes + shift)[order],
         given.radius[order],
         given.density[order],
@@ -159,11 +162,11 @@ def moved(
 @pytest.mark.parametrize("order", [[0, 1], [1, 0]], ids=["same order", "swapped"])
 @pytest.mark.parametrize("axes", [(1, 1, 1), (-1, 1, 1), (1, -1, 1), (-1, -1, -1)], ids=str)
 def test_order_and_mirror_do_not_matter(film: bool, order: list[int], axes: tuple[int, int, int]) -> None:
-    """Bodies listed the other way round, space reflected: the mirrored result to 1e-12."""
+    """Particles listed the other way round, space reflected: the mirrored result to 1e-12."""
     pair, laws = oblique(film)
     signs = np.array(axes, float)
-    plain = after_contact(pair.simulation(laws), pair).bodies
-    other = after_contact(moved(pair, laws, order, signs, 0.0), pair).bodies
+    plain = after_contact(pair.simulation(laws), pair).particles
+    other = after_contact(moved(pair, laws, order, signs, 0.0), pair).particles
     for name in ("velocity", "spin"):
         expected = (getattr(plain, name) * (signs if name == "velocity" else np.prod(signs) * signs))[order]
         scale = np.abs(expected).max()
@@ -174,8 +177,8 @@ def test_order_and_mirror_do_not_matter(film: bool, order: list[int], axes: tupl
 def test_place_does_not_matter(shift: float) -> None:
     """Far from the origin the result changes by no more than the rounding of a position against the overlap."""
     pair, laws = oblique(False)
-    plain = after_contact(pair.simulation(laws), pair).bodies
-    away = after_contact(moved(pair, laws, [0, 1], np.ones(3), shift), pair).bodies
+    plain = after_contact(pair.simulation(laws), pair).particles
+    away = after_contact(moved(pair, laws, [0, 1], np.ones(3), shift), pair).particles
     overlap = contact.hertz_largest_overlap(pair.reduced_mass, pair.stiffness, pair.approach)
     rounding = np.finfo(float).eps * shift / overlap
     for name in ("velocity", "spin"):
@@ -200,5 +203,5 @@ def test_age_of_the_neighbour_list_does_not_matter(film: bool, order: list[int])
     assert lists > 5
     assert once.gap[0] > 0.0
     for name in ("velocity", "spin"):
-        expected = getattr(once.bodies, name)[order]
-        assert getattr(often.bodies, name) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max()), name
+        expected = getattr(once.particles, name)[order]
+        assert getattr(often.particles, name) == pytest.approx(expected, abs=1e-3 * np.abs(expected).max()), name

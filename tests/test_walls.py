@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.materials import Material, pair_table
-from cfddem.particles.forces import Laws
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
-from cfddem.particles.walls import Box, Cone, Cylinder, Mesh, Plane, Wall
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
 from closures import contact
 
 RADIUS, GRAVITY = 1e-3, 9.81
@@ -27,7 +28,7 @@ def sphere(
     gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY), record: bool = False,
 ) -> ParticleSolver:  # fmt: skip
     """One sphere and walls; `film` is the viscosity [Pa s]."""
-    made = bodies([place], RADIUS, solid.density, velocity=velocity, viscosity=film)  # type: ignore[arg-type]
+    made = make_particles([place], RADIUS, solid.density, velocity=velocity, viscosity=film)  # type: ignore[arg-type]
     return ParticleSolver(
         made, pair_table([solid]), walls=walls, laws=Laws(film=film > 0.0), gravity=gravity, record=record
     )
@@ -52,7 +53,7 @@ def sheet(count: int, fold: float = 0.0, size: float = 0.02) -> Mesh:
 def trace(wall: Wall, film: float) -> np.ndarray:
     """State of a sphere that slides, rolls and crosses many edges of the sheet."""
     run = sphere([-0.004, -0.0031, RADIUS], [wall], velocity=[0.1, 0.07, 0.0], film=film)
-    made, states = run.bodies, []
+    made, states = run.particles, []
     for _ in range(200):
         run.advance(STEP, 100)
         states.append(np.concatenate([made.position[0], made.velocity[0], made.spin[0], made.force[0]]))
@@ -89,9 +90,9 @@ def test_force_does_not_jump_at_a_fold(fold: float, way: tuple[float, float]) ->
             x = s * way[0]
             height = fold * abs(x) + RADIUS * math.sqrt(1.0 + fold**2) - depth
             height = min(height, RADIUS - depth) if fold < 0.0 else height
-            run.bodies.position[0] = [x, 0.0011 + s * way[1], height]
+            run.particles.position[0] = [x, 0.0011 + s * way[1], height]
             run.refresh()
-            found.append(run.bodies.force[0] + [0.0, 0.0, MASS * GRAVITY])
+            found.append(run.particles.force[0] + [0.0, 0.0, MASS * GRAVITY])
         return np.array(found)
 
     coarse, fine = (np.linalg.norm(np.diff(forces(count), axis=0), axis=1).max() for count in (3001, 30001))
@@ -120,8 +121,8 @@ def test_a_corner_of_a_mesh_carries_as_three_walls() -> None:
         run = sphere([RADIUS, RADIUS, RADIUS], [wall], solid=solid, gravity=tuple(pull))
         run.advance(STEP, 20000)
         depth = [overlap(MASS * abs(part), solid) for part in pull]
-        assert RADIUS - run.bodies.position[0] == pytest.approx(depth, rel=1e-2)
-        places.append(run.bodies.position[0].copy())
+        assert RADIUS - run.particles.position[0] == pytest.approx(depth, rel=1e-2)
+        places.append(run.particles.position[0].copy())
         assert run.wall_force[0] == pytest.approx(MASS * pull, rel=1e-6)
     assert places[0] == pytest.approx(places[1], rel=1e-12)
 
@@ -136,7 +137,7 @@ def test_a_sphere_turns_about_edge_and_corner_of_a_mesh() -> None:
         normal = np.array(direction) / np.linalg.norm(direction)
         foot = np.where(normal > 0.0, 0.0, -0.002)
         again = sphere(list(foot + (RADIUS - depth) * normal), [cube], gravity=(0.0, 0.0, 0.0))
-        assert again.bodies.force[0] == pytest.approx(expected * normal, rel=1e-6, abs=1e-9 * expected)
+        assert again.particles.force[0] == pytest.approx(expected * normal, rel=1e-6, abs=1e-9 * expected)
 
 
 def test_a_crossing_is_one_encounter() -> None:
@@ -161,7 +162,7 @@ def test_a_sphere_swings_in_a_cylinder() -> None:
         [0.0, (arm + overlap(MASS * GRAVITY)) * math.sin(start), -(arm + overlap(MASS * GRAVITY)) * math.cos(start)],
         [Cylinder(axis=(1.0, 0.0, 0.0), radius=wide)],
     )  # fmt: skip
-    made = run.bodies
+    made = run.particles
 
     def energy() -> float:
         speeds = np.sum(made.velocity**2) + 0.4 * RADIUS**2 * np.sum(made.spin**2)
@@ -193,7 +194,7 @@ def test_a_sphere_goes_down_a_cone(friction: float, share: float) -> None:
     start = -0.045 / math.cos(slope) * down + (RADIUS - depth) * inward
     run = sphere(list(start), [cone], solid=solid)
     run.advance(STEP, 25000)
-    run_way = float((run.bodies.position[0] - start) @ down)
+    run_way = float((run.particles.position[0] - start) @ down)
     assert run_way == pytest.approx(0.5 * share * GRAVITY * math.cos(slope) * run.time**2, rel=1e-3)
 
 
@@ -204,8 +205,8 @@ def test_a_turning_drum_drags_a_sphere() -> None:
     run = sphere([0.01, 0.0, -(0.05 - RADIUS + overlap(MASS * GRAVITY))], [drum], solid=solid)
     run.advance(STEP, 5000)
     gained = 0.2 * GRAVITY * run.time
-    assert run.bodies.velocity[0, 1] == pytest.approx(gained, rel=1e-2)
-    assert RADIUS * run.bodies.spin[0, 0] == pytest.approx(2.5 * gained, rel=1e-2)
+    assert run.particles.velocity[0, 1] == pytest.approx(gained, rel=1e-2)
+    assert RADIUS * run.particles.spin[0, 0] == pytest.approx(2.5 * gained, rel=1e-2)
 
 
 MOVING = {
@@ -240,8 +241,8 @@ def test_a_moving_wall_gives_momentum(kind: str) -> None:
             struck = run.time
     angle = math.atan2(0.01, 0.1) if kind == "paddle" else 0.0
     assert struck == pytest.approx(angle / 5.0 if kind == "paddle" else 0.02, rel=2e-3)
-    assert MASS * run.bodies.velocity[0] == pytest.approx(given, abs=1e-6 * MASS)
-    assert np.linalg.norm(run.bodies.velocity[0]) == pytest.approx(1.0, rel=2e-2 if kind == "paddle" else 2e-3)
+    assert MASS * run.particles.velocity[0] == pytest.approx(given, abs=1e-6 * MASS)
+    assert np.linalg.norm(run.particles.velocity[0]) == pytest.approx(1.0, rel=2e-2 if kind == "paddle" else 2e-3)
 
 
 @pytest.mark.parametrize("wall", [Box(low=(-0.02, -0.02, 0.0), high=(0.02, 0.02, 0.02)), sheet(5, size=0.04)], ids=str)
@@ -250,7 +251,7 @@ def test_a_floor_carries_the_weight(wall: Wall) -> None:
     solid = SOLID.model_copy(update={"restitution": 0.2})
     x = 2.2 * RADIUS * np.arange(-3, 4)
     place = np.stack([*(grid.ravel() for grid in np.meshgrid(x, x)), np.full(49, 1.05 * RADIUS)], axis=1)
-    made = bodies(place, RADIUS, solid.density)
+    made = make_particles(place, RADIUS, solid.density)
     run = ParticleSolver(made, pair_table([solid]), walls=[wall], gravity=(0.0, 0.0, -GRAVITY))
     run.advance(5e-6, 20000)
     assert run.wall_force[0] == pytest.approx([0.0, 0.0, -49.0 * MASS * GRAVITY], rel=1e-4, abs=1e-9)
@@ -280,13 +281,13 @@ def test_a_film_stops_a_slow_sphere_at_every_wall(kind: str) -> None:
         list(foot + 2.001 * RADIUS * normal), [wall], velocity=-speed * normal, film=viscosity, gravity=(0.0, 0.0, 0.0)
     )
     run.advance(0.002 * RADIUS / speed, 20000)
-    gap = float((run.bodies.position[0] - foot) @ normal) - RADIUS
+    gap = float((run.particles.position[0] - foot) @ normal) - RADIUS
     assert gap == pytest.approx(RADIUS * math.exp(-number), rel=1e-3)
 
 
 def test_walls_repeat_in_a_periodic_box() -> None:
     """A floor and a trough along the periodic axis are taken; a wall across it is refused."""
-    made = bodies([[0.01, 0.0, 0.0]], RADIUS, SOLID.density)
+    made = make_particles([[0.01, 0.0, 0.0]], RADIUS, SOLID.density)
     along = {"box": (0.02, None, None), "skin": 1e-4}
     for wall in (Plane(point=(0.0, 0.0, -RADIUS)), Cylinder(axis=(1.0, 0.0, 0.0), radius=0.02)):
         ParticleSolver(made, pair_table([SOLID]), walls=[wall], **along)  # type: ignore[arg-type]

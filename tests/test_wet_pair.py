@@ -1,4 +1,4 @@
-"""Wet pairs: converged solutions of each film, closed forms, a hard contact beside the soft one, and laws of films."""
+"""Wet pairs: converged solutions of each film, closed forms, soft against hard contacts, and film laws."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import math
 
 import numpy as np
 import pytest
-from test_command_line import cfddem
+from command_line import cfddem
 from test_three_spheres import failed
 
-from cfddem.errors import InputError
+from cfddem.backend.errors import InputError
 from closures.bridge import deforming_potential, deforming_share, static_potential, static_share
-from closures.law import page
+from closures.registry import law_of
 from closures.restitution import davis_sitison, singh
-from scenarios import wet_validation as study
-from scenarios.wet_pair import TRANSITION_PRESSURES, collide_wet
+from scenarios.collisions.wet_pair import TRANSITION_PRESSURES, collide_wet
+from scenarios.validation import wet as study
 
 
 @pytest.mark.parametrize("part", [study.pairs, study.engine_pairs, study.thick_films], ids=lambda part: part.__name__)
@@ -49,13 +49,13 @@ def test_head_on_with_zero_cut_is_the_closed_form(bridge: str) -> None:
 
 def test_a_dry_contact_returns_its_restitution_and_rolls() -> None:
     """Next to no film: e_dry head-on, and full sliding turns each sphere by 2.5 mu (1 + e) v_n / (2 R)."""
-    thin = {"viscosity": 1e-8, "film": 1e-6, "tangential": None, "stokes": 4e5, "radius": 1e-3}
+    thin = {"viscosity": 1e-8, "film": 1e-6, "tangential": "none", "stokes": 4e5, "radius": 1e-3}
     assert collide_wet(**thin).restitution == pytest.approx(0.9, abs=1e-3)  # type: ignore[arg-type]
     run = collide_wet(**thin, angle=60.0, friction=0.05)  # type: ignore[arg-type]
     assert run.spin == pytest.approx(2.5 * 0.05 * 1.9 * run.velocity / (2.0 * 1e-3), rel=2e-3)
 
 
-def test_spin_takes_what_the_line_of_centres_gives() -> None:
+def test_angular_momentum_passes_from_the_line_of_centres_to_the_spins() -> None:
     """Angular momentum changes only because the film pulls at the arm R and not at half the distance: below 1 %."""
     for stokes, friction in ((0.8, 0.0), (2.0, 0.05)):
         history = collide_wet(stokes, 60.0, friction=friction).history
@@ -76,14 +76,14 @@ def test_a_faster_liquid_glass_keeps_the_solids_farther_apart() -> None:
     """h_min grows as the root of the speed and ends at the film."""
     slow, fast = collide_wet(1.0).minimum_gap, collide_wet(4.0).minimum_gap
     assert fast / slow == pytest.approx(2.0)
-    with pytest.warns(UserWarning, match="glass through the whole film"):
+    with pytest.warns(UserWarning, match="the whole film .* is above its glass transition pressure"):
         stiff = collide_wet(6.0, bridge="deforming", cut="constant")
     assert stiff.minimum_gap == 270e-6
     assert len(stiff.warnings) == 1
 
 
 @pytest.mark.parametrize("kind", TRANSITION_PRESSURES, ids="-".join)
-def test_films_order_as_they_should(kind: tuple[str, str]) -> None:
+def test_films_dissipate_in_the_expected_order(kind: tuple[str, str]) -> None:
     """A constant film below h_min takes more than none at the same pressure; oblique impacts never lose more."""
     bridge, cut = kind
     runs = [collide_wet(2.0, bridge=bridge, cut=each, glass_transition_pressure=1e7) for each in ("constant", "zero")]
@@ -91,9 +91,9 @@ def test_films_order_as_they_should(kind: tuple[str, str]) -> None:
     assert collide_wet(2.0, 60.0, bridge, cut).restitution > collide_wet(2.0, 0.0, bridge, cut).restitution
 
 
-def test_the_law_of_thick_films_says_where_it_does_not_hold() -> None:
-    assert page(singh).outside(stokes=1000.0, film_ratio=0.1) == []
-    assert page(singh).outside(stokes=20.0, film_ratio=0.01) == ["stokes", "film_ratio"]
+def test_the_law_of_thick_films_reports_its_range() -> None:
+    assert law_of(singh).outside(stokes=1000.0, film_ratio=0.1) == []
+    assert law_of(singh).outside(stokes=20.0, film_ratio=0.01) == ["stokes", "film_ratio"]
     stokes = np.geomspace(34.0, 3440.0, 4001)
     for ratio in (0.05, 0.08, 0.143):
         e = np.array([singh(each, ratio) for each in stokes])
@@ -112,7 +112,7 @@ def test_the_law_of_thick_films_says_where_it_does_not_hold() -> None:
      ("poisson", 0.6, "0.5"), ("glass_transition_pressure", -1.0, "above 0"),
      ("friction", math.nan, "finite")],
 )  # fmt: skip
-def test_what_cannot_be_is_refused_by_name(name: str, value: object, said: str) -> None:
+def test_invalid_arguments_are_refused_by_name(name: str, value: object, said: str) -> None:
     with pytest.raises(InputError, match=f"{name}.*{said}"):
         collide_wet(**{"stokes": 2.0, name: value})  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""Wet spheres that are stirred: what is kept, and agglomerates that grow."""
+"""Stirred wet spheres: conservation, and growth of agglomerates."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from scenarios.wet_tumbler import tumble
+from cfddem.backend.errors import InputError
+from scenarios.collisions.wet_tumbler import tumble
 
 
-def test_stirred_spheres_keep_momentum_number_and_liquid() -> None:
+def test_stirred_spheres_conserve_momentum_number_and_liquid() -> None:
     result = tumble(0.05, 150, until=0.03, samples=10)
     assert result.momentum_error < 1e-12
     assert result.liquid_error < 1e-12
@@ -24,7 +24,7 @@ def test_stirred_spheres_keep_momentum_number_and_liquid() -> None:
 
 def test_the_same_seed_gives_the_same_run() -> None:
     one, other = (tumble(0.05, 60, until=0.004, samples=2) for _ in range(2))
-    assert np.array_equal(one.run.bodies.position, other.run.bodies.position)
+    assert np.array_equal(one.run.particles.position, other.run.particles.position)
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfddem.errors import InputError
-from cfddem.materials import Material
+from cfddem.backend.errors import InputError
+from cfddem.case.materials import Material
 from closures import capillary, layer
-from scenarios.wet_wall import impact, sticking_velocity
-from scenarios.wet_wall_checks import LIQUIDS, SPHERES, independent
-from scenarios.wet_wall_materials import Ball, Liquid
+from scenarios.collisions.wet_wall import impact, sticking_velocity
+from scenarios.collisions.wet_wall.checks import LIQUIDS, SPHERES, independent
+from scenarios.collisions.wet_wall.materials import Ball, Liquid
 
 CASES = [  # sphere, liquid, film, half-filling angle, speed, angle, spin, friction
     ("glass_1.74", "water", 100e-6, 35.0, 0.4, 0.0, 0.0, 0.0),
@@ -210,7 +210,7 @@ def test_sliding_and_spin_in_the_film_are_reciprocal() -> None:
 
 
 def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.CaptureFixture[str]) -> None:
-    from cfddem.cli import app
+    from cfddem.cli.app import app
 
     def say(*words: str) -> str:
         app(["wet-wall", *words], result_action="return_value")

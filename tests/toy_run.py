@@ -1,22 +1,29 @@
-"""A small run to be killed: a state that only its own past can give, snapshots, history, checkpoints, going on."""
+"""A small run to be killed: a state that depends on all earlier steps, with snapshots, history and checkpoints."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
-from cfddem.record.checkpoint import newest
-from cfddem.record.output import RunFolder
+from cfddem.io.checkpoint import newest
+from cfddem.io.quantities import TIME, Quantity
+from cfddem.io.writer import RunFolder
 
 GRID = SimpleNamespace(cells=(4, 3, 5), spacing=(0.1, 0.1, 0.1), origin=(0.0, 0.0, 0.0))
 STEP = 0.01
+QUANTITIES = {
+    "history": {"time": TIME, "bed_height": Quantity("m", "bed height")},
+    "particles": {"position": Quantity("m", "position")},
+    "fluid": {"voidage": Quantity("1", "voidage")},
+}
 
 
 def advance(state: dict) -> dict:
-    """The state one step later: every number depends on all steps before and on the random generator."""
+    """The state one step later; every number depends on all earlier steps and on the random generator."""
     generator = np.random.Generator(np.random.PCG64())
     generator.bit_generator.state = state["random"]
     position = np.sin(state["position"] * 1.7 + generator.random(state["position"].shape))
@@ -39,13 +46,13 @@ def beginning(particles: int = 500) -> dict:
 
 
 def run(folder: Path, steps: int) -> None:
-    """Begin or go on, to a number of steps; a snapshot at each, a checkpoint at every third."""
+    """Start or resume, up to a number of steps; a snapshot at each, a checkpoint at every third."""
     if (folder / "run.json").exists():
         output = RunFolder.reopen(folder)
         state = newest(folder) if (folder / "checkpoint").exists() and any((folder / "checkpoint").iterdir()) else None
         output.drop_after(-1.0 if state is None else state["step"] * STEP)
     else:
-        output, state = RunFolder.create(folder, "toy = true\n", {"seed": 7}, GRID), None
+        output, state = RunFolder.create(folder, "toy = true\n", {"seed": 7}, GRID, QUANTITIES), None
     state = state or beginning()
     while state["step"] < steps:
         print(state["step"], flush=True)
@@ -57,6 +64,20 @@ def run(folder: Path, steps: int) -> None:
         if state["step"] % 3 == 0:
             output.write_checkpoint(state)
     output.finish("finished")
+
+
+def series(path: Path) -> Iterator[tuple[float, dict]]:
+    """All steps of an index as VTK reads them: time, block name -> pyvista object."""
+    import pyvista
+    import vtk
+
+    reader = vtk.vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    for when in reader.GetOutputInformation(0).Get(vtk.vtkStreamingDemandDrivenPipeline.TIME_STEPS()):
+        reader.UpdateTimeStep(when)
+        blocks = pyvista.wrap(reader.GetOutputDataObject(0))
+        yield when, {blocks.get_block_name(k): blocks[k] for k in range(len(blocks))}
 
 
 if __name__ == "__main__":

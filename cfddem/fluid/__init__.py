@@ -1,14 +1,19 @@
 """The fluid: volume-averaged incompressible flow on a coarse staggered grid.
 
-grid        the box, its cells and masks, and values at points
-conditions  walls, inlets, outlets, periodic sides, and the times and regions in which they hold
-boundaries  the same as known faces and ghost values
-momentum    models A and B written out, one term a function; predictor
-projection  what continuity asks of the pressure; corrector
-pressure    the pressure equation: conjugate gradients with a multigrid preconditioner
-viscosity   sub-grid viscosity
-stability   the rates that limit a step
-state       the fields and what they are at any point
-checks      what is refused, in one line each
-solver      the step
+grid         the box, its cells and solid cells, and values at points
+cell_counts  how cells divide a box; nothing compiled
+fields       declared fields of cells and faces
+conditions   walls, inlets, outlets, periodic sides, and the times and regions in which they hold
+boundaries   the conditions as known faces and values of ghosts
+sides        arrays of one side, and the loop that applies its conditions
+halo         fills the ghosts of padded fields
+momentum     the terms of the momentum balance (models A and B); predictor
+viscosity    effective viscosity, with the sub-grid viscosity
+pressure/    the pressure equation: conjugate gradients with a multigrid preconditioner; projection; closed regions
+stability    rates that limit a step
+checks       checks of input and of divergence
+state        the fields and their values in cells and at points
+budgets      momentum, drag and energy of the step just made
+work         the work of each term of the momentum balance
+solver       the step
 """

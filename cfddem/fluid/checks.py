@@ -1,46 +1,44 @@
-"""What a fluid cannot start from or go on with, each refused in one line."""
+"""Checks of what a fluid starts from and of the fields handed to its steps."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from cfddem.errors import InputError, RunFailed
+from cfddem.backend.communicator import Communicator
+from cfddem.backend.errors import InputError, RunFailed
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.grid import HIGH, LOW, Array, Grid
+from cfddem.fluid.grid import Array, Grid
 
 
-def checked_voidage(grid: Grid, voidage: Array | float) -> Array:
-    """The voidage (nz, ny, nx), 1 in solid cells, if it lies in (0, 1] everywhere."""
+def checked_voidage(grid: Grid, voidage: Array | float, communicator: Communicator) -> Array:
+    """The voidage (nz, ny, nx), 1 in solid cells; `InputError` unless it lies in (0, 1] everywhere."""
     try:
         given = np.where(grid.open, np.asarray(voidage, dtype=float), 1.0)
     except ValueError as refusal:
         raise InputError("voidage", np.shape(voidage), f"of shape (nz, ny, nx) = {grid.shape}") from refusal
     if given.shape != grid.shape:
         raise InputError("voidage", np.shape(voidage), f"of shape (nz, ny, nx) = {grid.shape}")
-    bad = ~((given > 0.0) & (given <= 1.0 + 1e-12))
-    if bad.any():
-        k, j, i = (int(n) for n in np.argwhere(bad)[0])
-        raise InputError(
-            "voidage", float(given[k, j, i]), "above 0 and at most 1", f"it is not in cell [k, j, i] = {[k, j, i]}"
-        )
+    wrong = _first_place(~((given > 0.0) & (given <= 1.0 + 1e-12)), given, communicator)
+    if wrong is not None:
+        cell, value = wrong
+        raise InputError("voidage", value, "above 0 and at most 1", f"it is not in cell [k, j, i] = {cell}")
     return given
 
 
-def checked_viscosity(grid: Grid, viscosity: Array | float) -> Array:
-    """The viscosity (nz, ny, nx), if it is positive everywhere or zero everywhere; in solid cells that of the nearest
-    open one."""
+def checked_viscosity(grid: Grid, viscosity: Array | float, communicator: Communicator) -> Array:
+    """The viscosity (nz, ny, nx), in a solid cell that of the nearest open one; `InputError` unless it is positive
+    everywhere or zero everywhere."""
     try:
         everywhere = np.broadcast_to(np.asarray(viscosity, dtype=float), grid.shape)
     except (TypeError, ValueError) as refusal:
         limit = f"a number, or one of every cell, (nz, ny, nx) = {grid.shape}, in Pa s"
         raise InputError("fluid.viscosity", np.shape(viscosity) or str(viscosity), limit) from refusal
-    asked = everywhere[grid.open]
-    if not (np.isfinite(asked).all() and asked.min() >= 0.0):
-        bad = float(asked[~(asked >= 0.0) | np.isinf(asked)].flat[0])
-        raise InputError("fluid.viscosity", bad, "zero or positive, in Pa s")
-    if asked.min() == 0.0 < asked.max():
+    wrong = _first_place(grid.open & (~(everywhere >= 0.0) | np.isinf(everywhere)), everywhere, communicator)
+    if wrong is not None:
+        raise InputError("fluid.viscosity", wrong[1], "zero or positive, in Pa s")
+    inside = everywhere[grid.open]
+    if communicator.smallest(inside) == 0.0 < communicator.largest(inside):
         raise InputError("fluid.viscosity", 0.0, "positive everywhere, or zero everywhere")
     if grid.solid is None:
         return everywhere
@@ -49,44 +47,36 @@ def checked_viscosity(grid: Grid, viscosity: Array | float) -> Array:
     return filled
 
 
-def checked_field(name: str, field: Array, shape: tuple[int, ...], negative: bool = True) -> Array:
-    """A field handed to a step, if it has its shape and numbers everywhere."""
+def checked_field(
+    name: str, field: Array, shape: tuple[int, ...], communicator: Communicator, *, negative: bool = True
+) -> Array:
+    """A field handed to a step; `InputError` unless it has its shape and finite values.
+
+    negative  whether values below zero are allowed
+    """
     given = np.asarray(field, dtype=float)
     if given.shape != shape:
         raise InputError(name, given.shape, f"of shape {shape}")
-    if not np.isfinite(given).all():
-        raise InputError(name, None, "a number everywhere", f"it is not at {np.argwhere(~np.isfinite(given))[0]}")
-    if not negative and given.min() < 0.0:
-        raise InputError(name, float(given.min()), "zero or positive everywhere")
+    wrong = _first_place(~np.isfinite(given), given, communicator)
+    if wrong is not None:
+        raise InputError(name, None, "finite everywhere", f"it is not at {wrong[0]}")
+    least = np.inf if negative else communicator.smallest(given)
+    if least < 0.0:
+        raise InputError(name, least, "zero or positive everywhere")
     return given
 
 
-def closed_regions(grid: Grid, boundaries: Boundaries) -> NDArray[np.int64] | None:
-    """Connected regions of open cells that no outlet touches, numbered from 1 (0 elsewhere); None if there are none."""
-    from scipy.ndimage import label
-
-    region, count = label(grid.open)
-    links = list(range(count + 1))
-
-    def root(n: int) -> int:
-        while links[n] != n:
-            n = links[n]
-        return n
-
-    for axis in range(3):
-        if boundaries.periodic[axis]:
-            first, last = np.take(region, 0, 2 - axis).ravel(), np.take(region, -1, 2 - axis).ravel()
-            for a, b in {(int(a), int(b)) for a, b in zip(first, last) if a and b}:
-                links[root(a)] = root(b)
-    region = np.array([root(n) for n in range(count + 1)])[region]
-    for side in boundaries.sides:
-        touched = side.layer(region, -1 if side.high else 0)[side.outlet[LOW:-HIGH, LOW:-HIGH]]
-        region[np.isin(region, touched[touched > 0])] = 0
-    return region.astype(np.int64) if region.any() else None
+def _first_place(wrong: np.ndarray, values: Array, communicator: Communicator) -> tuple[list[int], float] | None:
+    """Index and value of the first wrong element of an array; None if no element is wrong on any rank."""
+    found = None
+    if wrong.any():  # local: this rank names the place, the communicator decides
+        index = np.unravel_index(np.argmax(wrong), wrong.shape)  # local: first on this rank
+        found = [int(n) for n in index], float(values[index])
+    return communicator.first(found)
 
 
 def refuse_trapped_inflow(grid: Grid, boundaries: Boundaries) -> None:
-    """Steady inflow needs somewhere to go."""
+    """Raise `InputError` if the steady inflow has no outlet to leave through."""
     if boundaries.has_outlet:
         return
     net, gross = 0.0, 0.0
@@ -94,8 +84,8 @@ def refuse_trapped_inflow(grid: Grid, boundaries: Boundaries) -> None:
         for number in side.inlets:
             here = side.owner == number
             speed = boundaries.superficial(side, number, here, 0.0, steady=True)[:, side.axis]
-            net += float((speed * side.inward).sum() * grid.face_area(side.axis))
-            gross += float(np.abs(speed).sum() * grid.face_area(side.axis))
+            net += float((speed * side.inward).sum()) * grid.face_area(side.axis)  # local: inlets of the whole box
+            gross += float(np.abs(speed).sum()) * grid.face_area(side.axis)  # local: inlets of the whole box
     if abs(net) > 1e-9 * gross:
         raise InputError(
             "boundaries", None, "such that what flows in can leave",
@@ -103,29 +93,17 @@ def refuse_trapped_inflow(grid: Grid, boundaries: Boundaries) -> None:
         )  # fmt: skip
 
 
-def refuse_imbalance(region: NDArray[np.int64] | None, wanted: Array, scale: float, time: float) -> None:
-    """Where no outlet is, inflow and change of voidage must cancel; wanted [m3/s] is what each cell lacks."""
-    if region is None:
-        return
-    excess = np.bincount(region.ravel(), wanted.ravel())[1:]
-    size = np.bincount(region.ravel(), np.abs(wanted).ravel())[1:]
-    bad = np.abs(excess) > 1e-9 * size + 1e-9 * scale
-    if bad.any():
-        amount = float(excess[np.argmax(bad)])
-        raise InputError(
-            "boundaries", None, "such that inflow and change of voidage cancel where there is no outlet",
-            f"{abs(amount):.3g} m3/s too {'little' if amount > 0 else 'much'} fluid at t = {time:g} s; add Outlet()",
-        )  # fmt: skip
+def refuse_nan(grid: Grid, missing: Array, time: float, communicator: Communicator) -> None:
+    """Raise `RunFailed` where the velocity is not finite.
 
-
-def refuse_nonsense(grid: Grid, wanted: Array, time: float) -> None:
-    """A velocity that is no number stops the run and names its place."""
-    if np.isfinite(wanted.sum()):
+    missing  fluid that each cell lacks (nz, ny, nx) [m3/s]; finite where the velocities of its faces are
+    """
+    if np.isfinite(communicator.sum(missing)):
         return
-    bad = np.argwhere(~np.isfinite(wanted))
-    k, j, i = bad[0] if bad.size else (0, 0, 0)
+    wrong = _first_place(~np.isfinite(missing), missing, communicator)
+    k, j, i = (0, 0, 0) if wrong is None else wrong[0]
     x, y, z = (float(c.ravel()[n]) for c, n in zip(grid.centres(), (i, j, k)))
     raise RunFailed(
-        f"fluid: the velocity is no number at x, y, z = {x:g}, {y:g}, {z:g} m, t = {time:g} s; "
+        f"fluid: the velocity is not finite at x, y, z = {x:g}, {y:g}, {z:g} m, t = {time:g} s; "
         "take steps below `largest_step()`, and look at voidage, drag and source there"
     )

@@ -1,4 +1,4 @@
-"""Conditions on the sides of the box, and the times and regions in which they hold."""
+"""Conditions on the sides of the box, and functions for the times and regions in which they hold."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class NoSlip(Condition):
-    """A wall the fluid sticks to. velocity: of the wall in its own plane (x, y, z) [m/s], e.g. a lid."""
+    """A no-slip wall. velocity: of the wall in its own plane (x, y, z) [m/s], for example of a lid."""
 
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -47,15 +47,17 @@ class Inlet(Condition):
 
 @dataclass(frozen=True)
 class Outlet(Condition):
-    """Fluid leaves against a given pressure p' [Pa]; what flows back enters from rest."""
+    """Fluid leaves against a given pressure p' [Pa]; fluid that flows back enters without momentum."""
 
     pressure: float = 0.0
 
 
 @dataclass(frozen=True)
 class Periodic(Condition):
-    """What leaves here enters at the opposite side. pressure_gradient: mean fall of pressure along the axis that
-    drives the flow [Pa/m], the same on both sides."""
+    """A periodic side: fluid that leaves here enters at the opposite side.
+
+    pressure_gradient  mean fall of the pressure along the axis, which drives the flow; the same on both sides [Pa/m]
+    """
 
     pressure_gradient: float = 0.0
 

@@ -1,4 +1,4 @@
-"""The grid: a box of equal cells, velocities on their faces, everything else at their centres.
+"""The grid: a box of equal cells. Velocities sit on faces, all other fields at cell centres.
 
 Index order is `[k, j, i]` for `(z, y, x)` everywhere, x running fastest: a cell field has the shape
 `(nz, ny, nx)`, which is also the order of the output files. Users pass and receive cell fields as
@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.errors import InputError
-from cfddem.fluid.division import cell_counts
-from cfddem.kernels import prange, threaded
+from cfddem.backend.compile import prange, threaded
+from cfddem.backend.errors import InputError
+from cfddem.fluid.cell_counts import cell_counts
 
 Array = NDArray[np.float64]
 Region = Callable[[Array, Array, Array], NDArray[np.bool_]]
-"""Answers, for coordinates x, y, z [m] that broadcast, which points belong to the region."""
+"""A function of coordinates x, y, z [m] that broadcast: true for points in the region."""
 
 LOW, HIGH = 2, 3
-"""Ghost layers: a limited flux looks two faces upstream, on the high boundary face from one face further out."""
+"""Layers of ghosts. A limited flux reads two faces upstream, on the high boundary face from one face further out."""
 
 UNIT = ((0, 0, 1), (0, 1, 0), (1, 0, 0))
 """Index step (k, j, i) along x, y, z."""
@@ -49,7 +49,7 @@ class Grid:
     cells    nx, ny, nz; 1 makes the problem two-dimensional
     spacing  hx, hy, hz of a cell [m]; need not be equal
     origin   corner of the box with the lowest x, y, z [m]
-    solid    (nz, ny, nx) true where a cell is filled with wall, or None
+    solid    (nz, ny, nx) true where a cell is solid, or None
     """
 
     cells: tuple[int, int, int]
@@ -86,7 +86,7 @@ class Grid:
         size     edge lengths of the box along x, y, z [m]
         cell     edge of a cube, or three edges [m]; must divide the box to within 1e-6
         origin   lowest corner [m]
-        solid    region that is wall; a cell is solid if its centre lies in it
+        solid    region of solid cells; a cell is solid if its centre lies in it
         returns  Grid
         errors   InputError where the cells do not fit the box
         """
@@ -165,7 +165,7 @@ class Grid:
 
 
 def outside_cylinder(centre: Sequence[float], radius: float, axis: int = 2) -> Region:
-    """Region outside an endless cylinder along `axis` through the point `centre` [m]: the wall of a pipe."""
+    """Region outside an infinite cylinder along `axis` through the point `centre` [m]: the wall of a pipe."""
     return outside_cone(centre, (0.0, 1.0), (radius, radius), axis)
 
 

@@ -4,7 +4,7 @@ Continuity, the same in both models, with the time derivative kept:
 
 .. math:: \partial_t\varepsilon + \nabla\cdot(\varepsilon u) = 0
 
-Gravity is taken into the pressure, :math:`p' = p - \rho\, g\cdot x`, so that a fluid at rest is at rest to the
+The pressure p' excludes gravity, :math:`p' = p - \rho\, g\cdot x`, so that a fluid at rest stays at rest to the
 last bit. The viscous stress of both models is :math:`\tau = \mu(\nabla u + \nabla u^T - \tfrac23 \nabla\cdot u)`.
 
 **Model A**: pressure and gravity are shared between the phases by volume.
@@ -13,17 +13,17 @@ last bit. The viscous stress of both models is :math:`\tau = \mu(\nabla u + \nab
           + \varepsilon\rho g + \nabla\cdot(\varepsilon\tau) + \beta_A(v-u) + s
           \quad\text{with}\quad -\varepsilon\nabla p_A + \varepsilon\rho g = -\varepsilon\nabla p_A'
 
-**Model B**: the whole pressure gradient stays with the fluid, particles feel the buoyancy of the displaced
-weight, :math:`-\rho V g`, whose reaction :math:`(1-\varepsilon)\rho g` the fluid gets, and a larger drag.
+**Model B**: the fluid carries the whole pressure gradient. Particles feel the buoyancy of the displaced weight,
+:math:`-\rho V g`, and a larger drag; the fluid gets the reaction of the buoyancy, :math:`(1-\varepsilon)\rho g`.
 
 .. math:: \partial_t(\rho\varepsilon u) + \nabla\cdot(\rho\varepsilon u u) = -\nabla p_B
           + \varepsilon\rho g + (1-\varepsilon)\rho g + \nabla\cdot(\varepsilon\tau) + \beta_B(v-u) + s
           \quad\text{with}\quad -\nabla p_B + \rho g = -\nabla p_B',\ \ \beta_B = \beta_A/\varepsilon
 
-Here v is the velocity of the particles, s a source per volume. The coefficient beta [kg/m3/s] handed to the
-solver is the one of the model chosen. With uniform eps and no drag both give the same velocities, and
+Here v is the velocity of the particles, s a source per volume. The coefficient beta [kg/m3/s] passed to the solver
+is that of the model chosen. With uniform eps and no drag both give the same velocities, and
 :math:`p_B' = \varepsilon p_A'`. Where eps varies, :math:`-\varepsilon\nabla p = -\nabla(\varepsilon p) +
-p\nabla\varepsilon`: the second part is what model A hands to the particles, and a ledger of the fluid must count it.
+p\nabla\varepsilon`: model A gives the second part to the particles, and a ledger of the fluid must count it.
 
 In time (step h, from n to n+1) storage is centred, convection and viscous stress follow Heun's two stages,
 the pressure is the one that makes the new velocity satisfy continuity, and drag acts on
@@ -34,8 +34,8 @@ the pressure is the one that makes the new velocity satisfy continuity, and drag
 
 from __future__ import annotations
 
+from cfddem.backend.compile import inline, prange, serial, threaded
 from cfddem.fluid.grid import LOW, UNIT
-from cfddem.kernels import inline, kernel, prange, threaded
 
 # ---------------------------------------------------------------- terms, one function each
 
@@ -81,7 +81,7 @@ def slip_weight(face_voidage, cell_voidage, model_b):
 # ---------------------------------------------------------------- loops
 
 
-@kernel
+@serial
 def row(field, k, j, start, count):
     """Cells start ... start + count of a row: loops over rows indexed from zero are the ones that vectorise."""
     return field[k, j, start : start + count]
@@ -107,13 +107,13 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
                     out[i] = 0.5 * (here[i] + before[i]) * u[i]
             if k < pz - 1 and j < py - 1:
                 n = px - 2
-                out, thickness = row(expansion, k, j, 1, n), row(viscosity, k, j, 1, n)
+                out, effective_viscosity = row(expansion, k, j, 1, n), row(viscosity, k, j, 1, n)
                 u0, u1 = row(velocity[0], k, j, 1, n), row(velocity[0], k, j, 2, n)
                 v0, v1 = row(velocity[1], k, j, 1, n), row(velocity[1], k, j + 1, 1, n)
                 w0, w1 = row(velocity[2], k, j, 1, n), row(velocity[2], k + 1, j, 1, n)
                 for i in range(n):
                     growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
-                    out[i] = (2.0 / 3.0) * thickness[i] * growth
+                    out[i] = (2.0 / 3.0) * effective_viscosity[i] * growth
     # The high boundary face of a direction is the low face of the first ghost cell: one more than cells.
     for k in prange(LOW, pz - LOW):
         n = px - 2 * LOW
@@ -131,7 +131,7 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
                     )  # fmt: skip
 
 
-@kernel
+@serial
 def _balance(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_e, inverse_d, central):
     """Add to a row of the component u_d the balance over its two momentum faces along e; v is u_e.
 
@@ -203,7 +203,11 @@ def predict(
                 x_right, x_left = row(x, k, j, LOW, n), row(x, k - dk, j - dj, LOW - di, n)
                 p_right, p_left = row(pressure, k, j, LOW, n), row(pressure, k - dk, j - dj, LOW - di, n)
                 first, second = row(rate_a[d], k, j, LOW, n), row(rate_b[d], k, j, LOW, n)
-                u, out, ease = row(old[d], k, j, LOW, n), row(new[d], k, j, LOW, n), row(mobility[d], k, j, LOW, n)
+                u, out, mobility_row = (
+                    row(old[d], k, j, LOW, n),
+                    row(new[d], k, j, LOW, n),
+                    row(mobility[d], k, j, LOW, n),
+                )
                 free = row(solved[d], k, j, LOW, n)
                 for i in range(n):
                     face = 0.5 * (c_right[i] + c_left[i])
@@ -223,7 +227,7 @@ def predict(
                     )
                     inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
                     out[i] = momentum / inertia if free[i] > 0.0 else u[i]
-                    ease[i] = free[i] * step * share / inertia
+                    mobility_row[i] = free[i] * step * share / inertia
 
 
 @threaded

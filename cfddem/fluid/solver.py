@@ -1,53 +1,50 @@
-"""The fluid solver: one step is predict - pressure - correct, twice.
+"""The fluid solver: a step predicts the velocity, solves for the pressure and corrects the velocity, twice.
 
     solver = FluidSolver(Grid.of_size((0.1, 0.1, 0.4), 0.005), {"z_low": Inlet(0.3), "z_high": Outlet()},
                          density=1.2, viscosity=1.8e-5)
     solver.step(1e-3, voidage, drag_coefficient, drag_momentum)
 
 **Times.** A step takes the velocity from `time` to `time + step` and the voidage from one field to the next. The
-change of voidage over the step *is* the outflow of the new velocity (continuity holds to the pressure tolerance
-for exactly these two fields), so the velocity belongs to the middle of the interval over which its voidage
-moved: hand over the voidage half a step ahead of the velocity and everything is second order in time; hand it
-over at `time + step` and what a moving voidage adds is first order. A voidage at rest is second order either
-way. The pressure belongs to the middle of the step.
+change of voidage over the step *is* the outflow of the new velocity: continuity holds to the pressure tolerance for
+exactly these two fields. The velocity therefore belongs to the middle of the interval over which its voidage moved.
+Pass the voidage half a step ahead of the velocity, and everything is second order in time; pass it at `time + step`,
+and the effect of a moving voidage is first order. A voidage at rest is second order either way. The pressure belongs
+to the middle of the step.
 
-**Order.** The two stages are Heun's: the first, with a looser pressure tolerance, gives the end velocity whose
-convection and stress are averaged with those of the start. Mass flux and storage agree in each stage, so that a
-uniform velocity stays uniform in a moving voidage, and momentum is conserved by construction.
+**Order.** The two stages are Heun's. The first has a looser pressure tolerance; its end velocity gives the convection
+and stress that are averaged with those of the start. Mass flux and storage agree in each stage, so that a uniform
+velocity stays uniform in a moving voidage, and momentum is conserved by construction.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from cfddem.errors import InputError
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.checks import (
-    checked_field,
-    checked_voidage,
-    closed_regions,
-    refuse_imbalance,
-    refuse_nonsense,
-    refuse_trapped_inflow,
-)
+from cfddem.fluid.budgets import FluidBudgets
+from cfddem.fluid.cell_counts import VISCOUS
+from cfddem.fluid.checks import checked_field, checked_voidage, refuse_nan, refuse_trapped_inflow
 from cfddem.fluid.conditions import Condition
-from cfddem.fluid.division import VISCOUS
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.momentum import predict, transport
-from cfddem.fluid.pressure import PressureEquation
-from cfddem.fluid.projection import correct, gather
-from cfddem.fluid.stability import StepLimit, clocks
-from cfddem.fluid.state import FluidState
+from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.fluid.pressure.projection import correct, gather
+from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.stability import Rates, StepLimit, largest_rates
+from cfddem.fluid.state import FluidProperties
 
 LOOSE = 1e-6
 """Pressure tolerance of the first stage: it only shapes the convecting flux of the second."""
 
 ROUND_OFF = 1e-6
-"""Times the tolerance of 1e-9: change of voidage that is no change [-]."""
+"""Relative change of the voidage that counts as round-off, over the tolerance of 1e-9 [-]."""
 
 STIFF = 1.0
 """beta h/(eps rho) above which the second stage may be repeated, until the velocity moves by less than SETTLED."""
@@ -64,20 +61,21 @@ class StepReport:
     passes: int
 
 
-class FluidSolver(FluidState):
+class FluidSolver(FluidBudgets):
     """Volume-averaged incompressible flow on a grid.
 
-    grid         Grid
-    boundaries   side name -> condition or list of conditions (see `cfddem.fluid.boundaries`)
-    density      rho [kg/m3]
-    viscosity    mu, dynamic: a number, or of every cell (nz, ny, nx) [Pa s]
-    gravity      g (x, y, z) [m/s2]; enters only the static pressure, see `cfddem.fluid.momentum`
-    model        "A" or "B"
-    convection   "limited" (upwind with the MC limiter, bounded) or "central" (unlimited, for smooth fields)
-    smagorinsky  constant C of the sub-grid viscosity rho (C Delta)^2 |S|, about 0.1; 0 switches it off
-    voidage      (nz, ny, nx) at the start, or a number
-    tolerance    largest continuity residual of a cell over the largest flux through a face
-    passes       most runs of the second stage where drag is stiff
+    grid          Grid
+    boundaries    side name -> condition or list of conditions (see `cfddem.fluid.boundaries`)
+    density       rho [kg/m3]
+    viscosity     mu, dynamic: a number, or of every cell (nz, ny, nx) [Pa s]
+    gravity       g (x, y, z) [m/s2]; enters only the static pressure, see `cfddem.fluid.momentum`
+    model         "A" or "B"
+    convection    "limited" (upwind with the MC limiter, bounded) or "central" (unlimited, for smooth fields)
+    smagorinsky   constant C of the sub-grid viscosity rho (C Delta)^2 |S|, about 0.1; 0 for none
+    voidage       (nz, ny, nx) at the start, or a number
+    tolerance     largest continuity residual of a cell over the largest flux through a face
+    passes        most runs of the second stage where drag is stiff
+    communicator  path to sums, extremes and decisions over all ranks
     """
 
     def __init__(
@@ -94,6 +92,7 @@ class FluidSolver(FluidState):
         voidage: Array | float = 1.0,
         tolerance: float = 1e-9,
         passes: int = 3,
+        communicator: Communicator = SERIAL,
     ) -> None:
         if not (np.isfinite(density) and density > 0.0):
             raise InputError("fluid.density", density, "a positive number, in kg/m3")
@@ -105,13 +104,14 @@ class FluidSolver(FluidState):
             raise InputError("fluid.tolerance", tolerance, "between 1e-13 and 1e-3")
         sides = boundaries if isinstance(boundaries, Boundaries) else Boundaries(grid, boundaries)
         refuse_trapped_inflow(grid, sides)
-        super().__init__(grid, sides, density, viscosity, gravity, smagorinsky, float(model == "B"))
-        self.model, self.tolerance, self.passes = model, float(tolerance), int(passes)
+        super().__init__(grid, sides, FluidProperties(density, gravity, model, smagorinsky), communicator)
+        self.tolerance, self.passes = float(tolerance), int(passes)
         self._central = float(convection == "central")
-        self._equation = PressureEquation(grid, closed_regions(grid, sides))
-        self._wanted = np.zeros(grid.shape)
-        self._clock_inverse = self._inverse * [sides.varies_along(d) for d in range(3)]
+        self._equation = PressureEquation(grid, ClosedRegions.of(grid, sides, communicator), communicator)
+        self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
+        self._inverse_where_varied = self.inverse_spacing * [sides.varies_along(d) for d in range(3)]
         self._by_plane = np.zeros((3, grid.shape[0]))
+        self.set_viscosity(viscosity)
         self.set_voidage(voidage)
         self.set_velocity((0.0, 0.0, 0.0))
 
@@ -132,112 +132,151 @@ class FluidSolver(FluidState):
         drag_momentum     beta v (nz, ny, nx, 3), v the velocity of the particles [N/m3]; None is zero
         source            (nz, ny, nx, 3) force on the fluid per volume of the cell [N/m3]; None is zero
         returns           StepReport
-        errors            InputError for fields that are no numbers or cannot be, RunFailed if the flow runs away
+        errors            InputError for fields of a wrong shape or range, RunFailed if the flow diverges
         """
         if not (np.isfinite(step) and step > 0.0):
             raise InputError("step", step, "a positive time, in s")
-        new_voidage = self.voidage if voidage is None else checked_voidage(self.grid, voidage)
-        voidage_rate = (new_voidage - self.voidage) / step * self._open
-        self._take(drag_coefficient, drag_momentum, source)
-        self._pad(0.5 * (self.voidage + new_voidage), self._other_mean)
-        np.add(self._mean_voidage, self._other_mean, out=self._centred)
-        self._centred *= 0.5
-        self.boundaries.set_inlets(self.time + step, self._other_mean)
+        fields = self.fields
+        new_voidage = self._take_voidage(voidage, step)
+        self._take_exchange(drag_coefficient, drag_momentum, source)
+        self.boundaries.set_inlets(self.time + step, fields.other_voidage)
 
-        # Stage one: carried by the old flux, and stored with the voidage that agrees with that flux.
-        self._pad(self.grid.inner(self._other_mean) - step * self._voidage_rate, self._stored)
-        self._transport(self._velocity, self._mean_voidage, self._rate_a)
-        self._predict(0.0, step, self._stage)
-        scale = self._flux_scale(voidage_rate, step)
-        iterations = [self._project(self._stage, voidage_rate, scale, max(LOOSE, self.tolerance), fresh=True)]
+        # First stage: carried by the old flux, and stored with the voidage that agrees with that flux.
+        self._store_with(self.grid.inner(fields.other_voidage) - step * fields.owned("voidage_rate"))
+        self._find_explicit_force(fields.velocity, fields.mean_voidage, fields.start_force)
+        self._predict(fields.stage_velocity, step, weight=0.0)
+        scale = self._flux_scale(step)
+        loose = max(LOOSE, self.tolerance)
+        iterations = [self._project(fields.stage_velocity, fields.other_voidage, loose * scale, scale, fresh=True)]
 
-        # Stage two: the average of start and end; again while drag is stiff and the end still moves.
-        np.copyto(self._stored, self._mean_voidage)
+        # Second stage: the average of start and end; again while drag is stiff and the end still moves.
+        self._store_with(self.mean_voidage)
+        tight = self.tolerance * scale
         for passes in range(1, self.passes + 1):
-            self._transport(self._stage, self._other_mean, self._rate_b)
-            self._predict(0.5, step, self._other)
-            iterations.append(self._project(self._other, voidage_rate, scale, self.tolerance, fresh=False))
-            if passes == self.passes or not self._still_moving(step):
+            self._find_explicit_force(fields.stage_velocity, fields.other_voidage, fields.stage_force)
+            self._predict(fields.other_velocity, step, weight=0.5)
+            iterations.append(self._project(fields.other_velocity, fields.other_voidage, tight, scale, fresh=False))
+            if passes == self.passes or not self._still_moves(step):
                 break
-            self._stage, self._other = self._other, self._stage
+            fields.swap("stage_velocity", "other_velocity")
 
-        self._velocity, self._other = self._other, self._velocity
-        self._mean_voidage, self._other_mean = self._other_mean, self._mean_voidage
-        self.voidage[:], self._voidage_rate[:] = new_voidage, voidage_rate
-        self.time += step
-        self._last_step = step
+        self._accept(new_voidage, step)
         return StepReport(tuple(iterations), passes)
 
-    def _take(self, coefficient: Array | None, momentum: Array | None, source: Array | None) -> None:
-        """Copy the fields of the step into padded arrays."""
-        shape = self.grid.shape
+    def _take_voidage(self, voidage: Array | None, step: float) -> Array:
+        """Rate of change, mean and centre of the voidage of this step; returns the voidage at its end (nz, ny, nx)."""
+        fields, old = self.fields, self.voidage
+        new = old if voidage is None else checked_voidage(self.grid, voidage, self.communicator)
+        self._set_cells(fields.new_voidage_rate, (new - old) / step * self._open)
+        self._set_cells(fields.other_voidage, 0.5 * (old + new))
+        np.add(fields.mean_voidage, fields.other_voidage, out=fields.centred_voidage)
+        np.multiply(fields.centred_voidage, 0.5, out=fields.centred_voidage)
+        return new
+
+    def _take_exchange(self, coefficient: Array | None, momentum: Array | None, source: Array | None) -> None:
+        """Check and copy what the particles do to the fluid in this step."""
+        fields, shape = self.fields, self.grid.shape
+        if coefficient is None:
+            fields.drag.fill(0.0)
+        else:
+            given = checked_field("drag_coefficient", coefficient, shape, self.communicator, negative=False)
+            self._set_cells(fields.drag, given)
         for name, field, target in (
-            ("drag_coefficient", coefficient, self._drag),
-            ("drag_momentum", momentum, self._drag_momentum),
-            ("source", source, self._source),
+            ("drag_momentum", momentum, fields.drag_momentum),
+            ("source", source, fields.source),
         ):
             if field is None:
                 target.fill(0.0)
-            elif target is self._drag:
-                self._pad(checked_field(name, field, shape, negative=False), target)
             else:
-                self._pad(np.moveaxis(checked_field(name, field, (*shape, 3)), -1, 0), target)
+                given = checked_field(name, field, (*shape, 3), self.communicator)
+                self._set_cells(target, np.moveaxis(given, -1, 0))
 
-    def _pad(self, cells: Array, padded: Array) -> None:
+    def _set_cells(self, padded: Array, cells: Array) -> None:
+        """Write the cells of a padded field, and fill its ghosts."""
         self.grid.inner(padded)[:] = cells
-        self.boundaries.fill_cells(padded)
+        self.boundaries.halo.fill(padded)
 
-    def _transport(self, velocity: Array, voidage: Array, rate: Array) -> None:
-        self._thicken(velocity, voidage)
+    def _store_with(self, voidage: Array) -> None:
+        """Set the voidage (nz, ny, nx) that is stored with the old velocity."""
+        self._set_cells(self.fields.stored_voidage, voidage)
+
+    def _find_explicit_force(self, velocity: Array, voidage: Array, force: Array) -> None:
+        """Write convection and viscous stress on the faces [N/m3]."""
+        fields = self.fields
+        self._effective.update(velocity, voidage, fields.viscosity, fields.effective_viscosity)
         transport(
-            velocity, voidage, self._thickness, self._buried, self.density, self._inverse, self._central,
-            self._flux, self._expansion, rate,
+            velocity, voidage, fields.effective_viscosity, self.faces.buried, self.density, self.inverse_spacing,
+            self._central, fields.flux, fields.expansion, force,
         )  # fmt: skip
 
-    def _predict(self, weight_b: float, step: float, new: Array) -> None:
-        self.boundaries.fill_pressure(self._pressure)
+    def _predict(self, new: Array, step: float, weight: float) -> None:
+        """Write the velocity after the step with the pressure as it is; the second explicit force has this weight."""
+        fields = self.fields
+        self.boundaries.fill_pressure(fields.pressure)
         predict(
-            self._velocity, self._rate_a, self._rate_b, weight_b, self._pressure, self._stored, self._centred,
-            self._other_mean, self._drag, self._drag_momentum, self._source, self.boundaries.driving, self._solved,
-            self.density, step, self._inverse, self._model_b, new, self._mobility,
+            fields.velocity, fields.start_force, fields.stage_force, weight, fields.pressure, fields.stored_voidage,
+            fields.centred_voidage, fields.other_voidage, fields.drag, fields.drag_momentum, fields.source,
+            self.boundaries.driving, self.faces.solved, self.density, step, self.inverse_spacing, self.model_b,
+            new, fields.mobility,
         )  # fmt: skip
         self.boundaries.fill_velocity(new)
 
-    def _flux_scale(self, voidage_rate: Array, step: float) -> float:
+    def _flux_scale(self, step: float) -> float:
         """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or
         displaced by the change of voidage in a cell."""
-        old, predicted = self._clocks(self._velocity, self._mean_voidage), self._clocks(self._stage, self._other_mean)
-        displaced = self.grid.cell_volume * max(float(voidage_rate.max()), -float(voidage_rate.min()))
+        fields, rate = self.fields, self.fields.owned("new_voidage_rate")
+        old = self._rates(fields.velocity, fields.mean_voidage).flux
+        predicted = self._rates(fields.stage_velocity, fields.other_voidage).flux
+        fastest = max(self.communicator.largest(rate), -self.communicator.smallest(rate))
+        displaced = self.grid.cell_volume * fastest
         # a voidage is known to its last digits only, and so is its rate
-        displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * voidage_rate.size**0.5 / step)
-        return max(float(self._areas.max()) * max(old[2], 0.01 * predicted[2]), displaced)
+        displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * math.prod(self.grid.cells) ** 0.5 / step)
+        return max(float(max(self._areas)) * max(old, 0.01 * predicted), displaced)
 
-    def _project(self, velocity: Array, voidage_rate: Array, scale: float, tolerance: float, fresh: bool) -> int:
-        """Find the pressure with which a velocity satisfies continuity; returns the iterations it took."""
-        finest = self._equation.finest
+    def _project(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
+        """Find the pressure with which a velocity satisfies continuity; returns the iterations it took.
+
+        limit  largest residual of a cell [m3/s]
+        scale  largest volume flux [m3/s]
+        fresh  whether the mobility is new, and with it the coefficients of the equation
+        """
+        fields, finest = self.fields, self._equation.finest
         gather(
-            velocity, self._mobility, self._other_mean, voidage_rate, self._open, fresh, self.boundaries.periodic,
-            self._areas, self._inverse, finest.ax, finest.ay, finest.az, finest.anchor, self._wanted,
+            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, fresh, self.boundaries.periodic,
+            self._areas, self.inverse_spacing, finest.ax, finest.ay, finest.az, finest.anchor, self._missing,
         )  # fmt: skip
         if fresh:
             self._equation.prepare()
-        refuse_nonsense(self.grid, self._wanted, self.time)
-        refuse_imbalance(self._equation.closed_regions, self._wanted, scale, self.time)
-        correction, iterations = self._equation.solve(self._wanted, tolerance * scale)
+        refuse_nan(self.grid, self._missing, self.time, self.communicator)
+        if self._equation.closed_regions is not None:
+            self._equation.closed_regions.refuse_imbalance(self._missing, scale, self.time)
+        correction, iterations = self._equation.solve(self._missing, limit)
         if iterations:
-            self.grid.inner(self._correction)[:] = correction
-            self.boundaries.fill_pressure(self._correction, correction=True)
-            correct(velocity, self._mobility, self._correction, self._inverse)
+            self.grid.inner(fields.correction)[:] = correction
+            self.boundaries.fill_pressure(fields.correction, correction=True)
+            correct(velocity, fields.mobility, fields.correction, self.inverse_spacing)
             self.boundaries.fill_velocity(velocity)
             self.pressure[:] += correction
         return iterations
 
-    def _still_moving(self, step: float) -> bool:
-        stiffness = step * self._drag.max() / (self.density * self.voidage.min())
+    def _still_moves(self, step: float) -> bool:
+        """Whether drag is stiff and the last pass has changed the velocity."""
+        largest, fields = self.communicator.largest, self.fields
+        stiffness = step * largest(fields.drag) / (self.density * self.communicator.smallest(self.voidage))
         if stiffness < STIFF:
             return False
-        moved = np.abs(self._other - self._stage).max()
-        return bool(moved > SETTLED * np.abs(self._other).max())
+        moved = largest(np.abs(fields.other_velocity - fields.stage_velocity))
+        return bool(moved > SETTLED * largest(np.abs(fields.other_velocity)))
+
+    def _accept(self, voidage: Array, step: float) -> None:
+        """Make the new velocity and voidage those of the fluid."""
+        fields = self.fields
+        fields.swap("velocity", "other_velocity")
+        fields.swap("mean_voidage", "other_voidage")
+        fields.swap("voidage_rate", "new_voidage_rate")
+        self._set_cells(fields.voidage, voidage)
+        self.time += step
+        self.last_step = step
 
     # ------------------------------------------------------------ step size
 
@@ -248,76 +287,88 @@ class FluidSolver(FluidState):
 
         courant  C; Heun's scheme with the limiter is bounded up to 1. A direction one cell thick without walls
                  that stick does not count
-        returns  StepLimit; infinite with the clock "none" where nothing moves and nothing is viscous
+        returns  StepLimit; infinite with the criterion "none" where nothing moves and nothing is viscous
         """
-        self._thicken(self._velocity, self._mean_voidage)
-        advection, diffusion, _ = self._clocks(self._velocity, self._mean_voidage)
+        rates = self.rates()
         limits = {
-            "Courant": courant / advection if advection > 0.0 else np.inf,
-            "viscous": VISCOUS / diffusion if diffusion > 0.0 else np.inf,
+            "Courant": courant / rates.advection if rates.advection > 0.0 else np.inf,
+            "viscous": VISCOUS / rates.viscous if rates.viscous > 0.0 else np.inf,
         }
-        clock = min(limits, key=limits.__getitem__)
-        return StepLimit(limits[clock], clock if np.isfinite(limits[clock]) else "none")
+        criterion = min(limits, key=limits.__getitem__)
+        return StepLimit(limits[criterion], criterion if np.isfinite(limits[criterion]) else "none")
 
-    def _clocks(self, velocity: Array, voidage: Array) -> tuple[float, float, float]:
-        """Largest |u|/h [1/s], viscous rate [1/s] and eps |u| [m/s]."""
-        clocks(velocity, voidage, self._thickness, self._open, self.density, self._clock_inverse, *self._by_plane)
-        advection, diffusion, fastest = (float(most) for most in self._by_plane.max(axis=1))
-        return advection, diffusion, fastest
+    def rates(self) -> Rates:
+        """Largest rates of the flow as it is."""
+        fields = self.fields
+        self._effective.update(fields.velocity, fields.mean_voidage, fields.viscosity, fields.effective_viscosity)
+        return self._rates(fields.velocity, fields.mean_voidage)
+
+    def _rates(self, velocity: Array, voidage: Array) -> Rates:
+        """Largest rates of a velocity, with the effective viscosity as it is."""
+        largest_rates(
+            velocity, voidage, self.fields.effective_viscosity, self._open, self.density, self._inverse_where_varied,
+            *self._by_plane,
+        )  # fmt: skip
+        return Rates(*(float(rate) for rate in self.communicator.largest(self._by_plane, axis=1)))
 
     def run_until(self, time: float, *, courant: float = 0.5, largest: float = np.inf, **fields: Any) -> dict[str, int]:
-        """Step to `time` [s] with the largest stable steps; returns how often each clock set the step.
+        """Step to `time` [s] with the largest stable steps; returns how often each criterion set the step.
 
         largest  a step never to exceed [s], counted as "given"; needed where the fluid starts at rest
         fields   voidage, drag_coefficient, drag_momentum, source: handed to every step
         """
-        binding: dict[str, int] = {}
+        limiting: dict[str, int] = {}
         while self.time < time * (1.0 - 1e-12):
             limit = self.largest_step(courant)
-            size, clock = min((limit.step, limit.clock), (float(largest), "given"))
+            size, criterion = min((limit.step, limit.criterion), (float(largest), "given"))
             left = time - self.time
             if size >= left:
-                size, clock = left, "end"
+                size, criterion = left, "end"
             elif size > 0.5 * left:
                 size = 0.5 * left  # two equal last steps instead of a tiny one
             self.step(size, **fields)
-            binding[clock] = binding.get(clock, 0) + 1
-        return binding
+            limiting[criterion] = limiting.get(criterion, 0) + 1
+        return limiting
 
     # ------------------------------------------------------------ start
 
     def set_voidage(self, voidage: Array | float, before: Array | None = None, step: float | None = None) -> None:
-        """Voidage (nz, ny, nx) at the start, or a number; and where it moves, what it was a step [s] before.
+        """Set the voidage at the start.
 
-        The velocity set next belongs to the middle of that step.
+        voidage  (nz, ny, nx), or a number
+        before   voidage a step earlier, where it moves; the velocity set next belongs to the middle of that step
+        step     time between the two [s]
         """
-        self.voidage[:] = checked_voidage(self.grid, voidage)
-        self._voidage_rate.fill(0.0)
-        mean = self.voidage
+        new = checked_voidage(self.grid, voidage, self.communicator)
+        mean, rate = new, np.zeros(self.grid.shape)
         if before is not None:
             if step is None or not step > 0.0:
                 raise InputError("step", step, "the time between the two voidages, in s")
-            earlier = checked_voidage(self.grid, before)
-            mean = 0.5 * (self.voidage + earlier)
-            self._voidage_rate[:] = (self.voidage - earlier) / step * self._open
-        self._pad(mean, self._mean_voidage)
+            earlier = checked_voidage(self.grid, before, self.communicator)
+            mean = 0.5 * (new + earlier)
+            rate = (new - earlier) / step * self._open
+        self._set_cells(self.fields.voidage, new)
+        self._set_cells(self.fields.mean_voidage, mean)
+        self._set_cells(self.fields.voidage_rate, rate)
 
     def set_velocity(self, velocity: Sequence[Any]) -> None:
-        """Start from a velocity, made to satisfy continuity by the smallest potential flow.
+        """Start from a velocity, corrected by the smallest potential flow that makes it satisfy continuity.
 
         velocity  three components: numbers, arrays on the faces, or functions of x, y, z [m/s]
         """
+        fields = self.fields
         for d in range(3):
             given = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
             self.face_velocity(d)[:] = given
-        self._velocity[self._blocked] = 0.0
-        np.copyto(self._other_mean, self._mean_voidage)
-        self.boundaries.set_inlets(self.time, self._mean_voidage)
-        self.boundaries.fill_velocity(self._velocity)
-        share = 1.0 if self.model == "B" else self._mean_voidage
-        np.multiply(self._solved, share / self.density, out=self._mobility)
+        fields.velocity[self.faces.blocked] = 0.0
+        np.copyto(fields.other_voidage, fields.mean_voidage)
+        np.copyto(fields.new_voidage_rate, fields.voidage_rate)
+        self.boundaries.set_inlets(self.time, fields.mean_voidage)
+        self.boundaries.fill_velocity(fields.velocity)
+        share = 1.0 if self.model == "B" else fields.mean_voidage
+        np.multiply(self.faces.solved, share / self.density, out=fields.mobility)
         kept = self.pressure.copy()
-        np.copyto(self._stage, self._velocity)
-        scale = self._flux_scale(self._voidage_rate, np.inf)
-        self._project(self._velocity, self._voidage_rate, scale, self.tolerance, fresh=True)
+        np.copyto(fields.stage_velocity, fields.velocity)
+        scale = self._flux_scale(np.inf)
+        self._project(fields.velocity, fields.mean_voidage, self.tolerance * scale, scale, fresh=True)
         self.pressure[:] = kept

@@ -1,4 +1,4 @@
-"""Sub-grid viscosity, and the viscosity that a solid cell shows to the fluid beside it."""
+"""Effective viscosity of cells: voidage times viscosity, the sub-grid viscosity included."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from cfddem.fluid.boundaries import Boundaries
+from cfddem.backend.compile import prange, threaded
 from cfddem.fluid.grid import HIGH, LOW, UNIT, Array, Grid
-from cfddem.kernels import prange, threaded
+from cfddem.fluid.halo import Halo
 
 
 @threaded
 def eddy_viscosity(velocity, factor, inverse, viscosity):
-    r"""Sub-grid viscosity rho (C Delta)^2 sqrt(2 S:S) of every cell; factor is rho (C Delta)^2 [kg/m]."""
+    """Write the sub-grid viscosity rho (C Delta)^2 sqrt(2 S:S) of every cell; factor is rho (C Delta)^2 [kg/m]."""
     pz, py, px = viscosity.shape
     for k in prange(LOW, pz - HIGH):
         for j in range(LOW, py - HIGH):
@@ -40,13 +40,53 @@ def eddy_viscosity(velocity, factor, inverse, viscosity):
                 viscosity[k, j, i] = factor * math.sqrt(squares)
 
 
-def rim(grid: Grid, boundaries: Boundaries) -> tuple[np.ndarray, np.ndarray, Array] | None:
-    """Solid cells that touch an open one: their places in a padded field, those of their 26 neighbours, shares."""
+class EffectiveViscosity:
+    """The effective viscosity of a fluid.
+
+    A solid cell that touches open cells takes the mean of their values, so that the stress on a wall is that of the
+    fluid next to it.
+
+    grid         cells, some of them solid
+    halo         fills ghosts
+    density      rho [kg/m3]
+    smagorinsky  constant C of the sub-grid viscosity; 0 for none
+    """
+
+    def __init__(self, grid: Grid, halo: Halo, density: float, smagorinsky: float) -> None:
+        self.halo, self._inverse = halo, 1.0 / np.array(grid.spacing)
+        resolved = [h for h, n in zip(grid.spacing, grid.cells) if n > 1] or [0.0]
+        width = math.prod(resolved) ** (1.0 / len(resolved))
+        self._factor = density * (smagorinsky * width) ** 2
+        self._has_eddies = smagorinsky > 0.0
+        self._rim = _rim(grid, halo)
+
+    def update(self, velocity: Array, voidage: Array, viscosity: Array, effective: Array) -> None:
+        """Write the effective viscosity of every cell and ghost.
+
+        velocity   padded, its ghosts filled (3, nz, ny, nx) [m/s]
+        voidage    padded
+        viscosity  dynamic viscosity of the fluid, padded [Pa s]
+        effective  written, padded [Pa s]
+        """
+        if self._has_eddies:
+            eddy_viscosity(velocity, self._factor, self._inverse, effective)
+            effective += viscosity
+            self.halo.fill(effective)
+            effective *= voidage
+        else:
+            np.multiply(voidage, viscosity, out=effective)
+        if self._rim is not None:
+            cells, neighbours, shares = self._rim
+            flat = effective.ravel()
+            flat[cells] = (flat[neighbours] * shares).sum(axis=1)
+            self.halo.fill(effective)
+
+
+def _rim(grid: Grid, halo: Halo) -> tuple[np.ndarray, np.ndarray, Array] | None:
+    """Solid cells that touch open ones: indices in a flat padded field, those of their 26 neighbours, weights."""
     if grid.solid is None:
         return None
-    is_open = np.zeros(grid.padded_shape)
-    grid.inner(is_open)[:] = grid.open
-    boundaries.wrap(is_open)
+    is_open = halo.padded(grid.open, outside=0.0)
     _, ny, nx = grid.padded_shape
     steps = np.array([(c * ny + b) * nx + a for c in (-1, 0, 1) for b in (-1, 0, 1) for a in (-1, 0, 1) if a or b or c])
     k, j, i = np.nonzero(grid.solid)

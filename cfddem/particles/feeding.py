@@ -1,4 +1,4 @@
-"""Particles that enter and leave during a run."""
+"""Particles that enter and leave during a run: feeds and outlets."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import cKDTree
 
-from cfddem.errors import InputError
+from cfddem.backend.errors import InputError
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import bodies
+from cfddem.particles.state import make_particles
 from cfddem.particles.vectors import Vector
 
 _TRIES = 20
-"""Places that are tried for a particle before it waits for the next call."""
+"""Positions that are tried for a particle before it waits for the next call."""
 
 
 _NOWHERE_BELOW, _NOWHERE_ABOVE = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, np.inf)
 
 
 class Feed:
-    """Particles that come in through a box at a steady rate.
+    """Inserts particles in a box at a constant rate.
 
-    Call it with the run now and then; it inserts what is due since its first call. A particle that finds no free
-    place in the box waits for the next call.
+    Call it with the run from time to time; it inserts the particles due since its first call. A particle that finds no
+    free position in the box waits for the next call.
 
     rate          [1/s]
     corner, size  of the box in which centres appear; a size may be 0 [m]
-    diameters     number -> diameters (number,) [m], as the functions of :mod:`cfddem.particles.packing`
+    diameters     number -> diameters (number,) [m], as the functions of :mod:`cfddem.particles.initial.packing`
     density       [kg/m3]
-    velocity      at which they enter [m/s]
+    velocity      of inserted particles [m/s]
     material      row of the pair table
     viscosity     of the fluid around them [Pa s]
-    seed          same seed, same feed
+    seed          of the random positions
     """
 
     def __init__(
@@ -54,12 +54,12 @@ class Feed:
         self.diameters, self.density = diameters, density
         self.velocity, self.material, self.viscosity = velocity, material, viscosity
         self.entered = 0
-        self.waiting = np.zeros(0)  # diameters of those that are due [m]
+        self.waiting = np.zeros(0)  # diameters of particles that are due [m]
         self._begin: float | None = None
         self._generator = np.random.default_rng(seed)
 
     def __call__(self, run: ParticleSolver) -> int:
-        """Insert what is due; returns how many came in."""
+        """Insert the particles that are due; returns their number."""
         if self._begin is None:
             self._begin = run.time
         due = int(self.rate * (run.time - self._begin) * (1.0 + 1e-12)) - self.entered - len(self.waiting)
@@ -69,7 +69,7 @@ class Feed:
         place, free = self._places(run, radius)
         if free.any():
             run.insert(
-                bodies(
+                make_particles(
                     place[free],
                     radius[free],
                     self.density,
@@ -83,11 +83,11 @@ class Feed:
         return int(free.sum())
 
     def _places(self, run: ParticleSolver, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A place for each sphere, and whether it is free."""
-        largest = float(max(run.bodies.radius.max(), radius.max(initial=0.0)))
-        near = (run.bodies.position >= self.corner - 2.0 * largest).all(axis=1)
-        near &= (run.bodies.position <= self.corner + self.size + 2.0 * largest).all(axis=1)
-        there, sizes = run.bodies.position[near], run.bodies.radius[near]
+        """A position for each sphere, and whether it is free."""
+        largest = float(max(run.particles.radius.max(), radius.max(initial=0.0)))
+        near = (run.particles.position >= self.corner - 2.0 * largest).all(axis=1)
+        near &= (run.particles.position <= self.corner + self.size + 2.0 * largest).all(axis=1)
+        there, sizes = run.particles.position[near], run.particles.radius[near]
         place, free = np.zeros((len(radius), 3)), np.zeros(len(radius), bool)
         tree = cKDTree(there) if len(there) else None
         for n in range(len(radius)):
@@ -103,9 +103,9 @@ class Feed:
 
 
 class Outlet:
-    """A room that particles leave for good; who is outside at a call is taken out of the run and counted.
+    """Removes and counts particles outside a region.
 
-    low, high  opposite corners of the room; infinite where it is open without an outlet [m]
+    low, high  opposite corners of the region; infinite in directions without an outlet [m]
     """
 
     def __init__(self, low: Vector = _NOWHERE_BELOW, high: Vector = _NOWHERE_ABOVE) -> None:
@@ -113,8 +113,8 @@ class Outlet:
         self.left, self.mass = 0, 0.0
 
     def __call__(self, run: ParticleSolver) -> int:
-        """Take out who has left; returns how many."""
-        place = run.bodies.position
+        """Remove the particles that have left; returns their number."""
+        place = run.particles.position
         gone = run.remove(np.any((place < self.low) | (place > self.high), axis=1))
         self.left += gone.count
         self.mass += float(gone.mass.sum())

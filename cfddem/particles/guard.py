@@ -1,4 +1,4 @@
-"""The conserved count: a particle that is no number, has left, or was pressed through something ends the run."""
+"""Checks that end a run: a position is NaN, a particle has left the domain, or was pressed through another body."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import math
 
 import numpy as np
 
-from cfddem.errors import RunFailed
-from cfddem.kernels import kernel
-from cfddem.particles.pairs import Edges
-from cfddem.particles.state import Bodies
+from cfddem.backend.compile import serial
+from cfddem.backend.errors import RunFailed
+from cfddem.particles.pair_graph import Edges
+from cfddem.particles.state import Particles
 
 EVERYWHERE = ((-math.inf,) * 3, (math.inf,) * 3)
 
 CRUSHED = 1.0
-"""Overlap over radius at which a sphere's centre is in the surface of the other body: it has gone through."""
+"""Overlap over radius at which the centre of a sphere reaches the surface of the other body."""
 
 
 def guard(
-    bodies: Bodies,
+    particles: Particles,
     edges: Edges,
     gap: np.ndarray | None,
     domain: np.ndarray | None,
@@ -26,41 +26,41 @@ def guard(
     step: float,
     owner: np.ndarray,
 ) -> None:
-    """Stop the run, naming the particle, where one is lost.
+    """Stop the run if a particle is lost, and name it.
 
-    gap     (n,) of every edge [m]; None leaves out who was pressed through whom
-    domain  (2, 3) corners of the room that no centre may leave; None for all of space [m]
+    gap     (n,) of every edge [m]; None skips the check of overlaps
+    domain  (2, 3) opposite corners of the region that no centre may leave; None if unlimited [m]
     time    [s]
     step    last time step [s]
     owner   wall that each piece of a wall belongs to
     """
-    lost, gone = _first_lost(bodies.position, bodies.velocity, np.array(EVERYWHERE) if domain is None else domain)
+    lost, gone = _first_lost(particles.position, particles.velocity, np.array(EVERYWHERE) if domain is None else domain)
     if lost >= 0:
         raise RunFailed(
-            f"{_place(bodies, lost, time, step)} is no number any more; "
-            "the step is too large or a force from outside is no number: halve the step, check the forces"
+            f"{_place(particles, lost, time, step)} is NaN; "
+            "the step is too large or an applied force is NaN: halve the step, check the forces"
         )
     if gone >= 0 and domain is not None:
         raise RunFailed(
-            f"{_place(bodies, gone, time, step)} has left the domain {domain[0]} to {domain[1]} m"
+            f"{_place(particles, gone, time, step)} has left the domain {domain[0]} to {domain[1]} m"
             f"{_last_wall(gone, edges, owner)}; close the walls there, enlarge the domain, or take a smaller step"
         )
     if gap is None:
         return
     split = edges.between_particles
-    deepest, overlap = _deepest(gap, edges.first, edges.second, split, bodies.radius)
+    deepest, overlap = _deepest(gap, edges.first, edges.second, split, particles.radius)
     if overlap > CRUSHED:
         row, other = int(edges.first[deepest]), int(edges.second[deepest])
-        what = f"particle {bodies.id[other]}" if deepest < split else f"wall {owner[other]}"
+        what = f"particle {particles.id[other]}" if deepest < split else f"wall {owner[other]}"
         raise RunFailed(
-            f"{_place(bodies, row, time, step)} is pressed into {what} by {overlap:.2g} "
+            f"{_place(particles, row, time, step)} is pressed into {what} by {overlap:.2g} "
             f"radii (limit {CRUSHED:g}); take a smaller step or a stiffer contact, or start without overlaps"
         )
 
 
-@kernel
+@serial
 def _first_lost(position, velocity, domain):
-    """First row that is no number, and first that is outside; -1 where none is."""
+    """First row that is NaN, and first row outside the domain; -1 if there is none."""
     lost, gone = -1, -1
     for n in range(len(position)):
         for d in range(3):
@@ -71,7 +71,7 @@ def _first_lost(position, velocity, domain):
     return lost, gone
 
 
-@kernel
+@serial
 def _deepest(gap, first, second, between_particles, radius):
     """The edge of the largest overlap over the smaller radius, and that."""
     deepest, largest = 0, -math.inf
@@ -84,14 +84,14 @@ def _deepest(gap, first, second, between_particles, radius):
     return deepest, largest
 
 
-def _place(bodies: Bodies, row: int, time: float, step: float) -> str:
-    x, y, z = bodies.position[row]
-    speed = float(np.linalg.norm(bodies.velocity[row]))
-    name = f"particle {bodies.id[row]} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
+def _place(particles: Particles, row: int, time: float, step: float) -> str:
+    x, y, z = particles.position[row]
+    speed = float(np.linalg.norm(particles.velocity[row]))
+    name = f"particle {particles.id[row]} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
     return f"{name}, t = {time:.6g} s, speed {speed:.3g} m/s, step {step:.3g} s,"
 
 
 def _last_wall(row: int, edges: Edges, owner: np.ndarray) -> str:
     split = edges.between_particles
-    met = edges.second[split:][edges.first[split:] == row]
-    return f", last near wall {int(owner[met[0]])}" if len(met) else ""
+    near = edges.second[split:][edges.first[split:] == row]
+    return f", last near wall {int(owner[near[0]])}" if len(near) else ""

@@ -1,32 +1,34 @@
-"""Who is near whom: the list of pairs that may interact before anything has moved half the skin.
+"""Neighbour lists: all pairs that may interact before any particle has moved by half the skin.
 
 Particles are binned by size class, each class in a grid of its own cells, so that a few large particles do
-not make the search among the small ones wide. Every particle looks once into the cells of each class and
-keeps the neighbours that come after it; lists come out sorted, the same for any number of threads.
+not widen the search among small ones. Every particle searches the cells of each class once and keeps the
+neighbours in later rows; lists are sorted, and the same for any number of threads.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.errors import InputError
-from cfddem.kernels import CHUNKS, inline, kernel, prange, threaded
-from cfddem.particles.near_walls import near_walls
-from cfddem.particles.pairs import HOME, Edges, edges, near_first, shifts
-from cfddem.particles.state import Bodies
-from cfddem.particles.surfaces import Walls
-from cfddem.particles.vectors import at, flat
+from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
+from cfddem.backend.errors import InputError
+from cfddem.data.fields import Field
+from cfddem.particles.pair_graph import HOME, Edges, make_edges, near_first, shifts
+from cfddem.particles.state import Particles
+from cfddem.particles.vectors import at
+from cfddem.particles.walls.arrays import near_walls
+from cfddem.particles.walls.nearest_point import Walls
 
 FEW = 64
-"""Up to so many particles every pair is looked at."""
+"""Up to this many particles every pair is checked."""
 
 USUAL_PAIRS = 8
-"""Room for this many listed pairs a particle is made before they are counted."""
+"""Listed pairs per particle for which room is made before they are counted."""
 
 CLASS_RATIO = 2.0
-"""Radii within this factor share a size class."""
+"""Radii within this factor are in one size class."""
 
 
 class Cells(NamedTuple):
@@ -38,71 +40,56 @@ class Cells(NamedTuple):
     number: np.ndarray  # (C, 3) int64, cells along each axis
     offset: np.ndarray  # (C,) int64, first cell of each class in `start`
     start: np.ndarray  # (all cells + 1,) int64, where the particles of a cell begin in `member`
-    member: np.ndarray  # (N,) int32, rows
+    member: np.ndarray  # (N,) int32, rows of particles
 
 
 def list_edges(
-    bodies: Bodies,
+    particles: Particles,
     walls: Walls,
     cutoff_ratio: float,
     skin: float,
     box: np.ndarray,
-    record: bool = False,
+    fields: Iterable[Field] = (),
     roughness: float = 0.0,
-    rolling: bool = False,
-    counted: bool = False,
 ) -> Edges:
-    """A fresh pair graph of all that is closer than the reach of the film plus a skin.
+    """A new pair graph of all pairs closer than the reach of the film plus a skin.
 
     cutoff_ratio  reach of a film over the reduced radius; 0 for dry contacts [-]
     skin          allowance for motion until the next list [m]
     box           (3,) length of the periodic box; infinite along axes that are open [m]
-    record        keep the begin of encounters, for a record of them
+    fields        of each pair
     roughness     largest gap at which asperities hold a pair apart [m]
-    rolling       keep what resists rolling
-    counted       count how often laws of one's own are asked outside of their range
     """
-    largest = float(bodies.radius.max())
+    largest = float(particles.radius.max())
     reach = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
     for axis in range(3):
         if box[axis] < 2.0 * reach:
             raise InputError("box", float(box[axis]), f"at least {2.0 * reach:.3g} m, twice the reach of a pair")
-    find = _among_few if bodies.count <= FEW else _among_many
-    pieces = find(bodies, cutoff_ratio, skin, box)
+    find = _among_few if particles.count <= FEW else _among_many
+    pieces = find(particles, cutoff_ratio, skin, box)
     first, second, image = (np.concatenate([piece[column] for piece in pieces]) for column in range(3))
     del pieces
     pairs = near = len(first)
     if cutoff_ratio > 0.0:
-        first, second, image, near = near_first(first, second, image, bodies, box, skin + roughness)
-    particle, wall = near_walls(bodies, walls, cutoff_ratio, skin)
+        first, second, image, near = near_first(first, second, image, particles, box, skin + roughness)
+    particle, wall = near_walls(particles, walls, cutoff_ratio, skin)
     if len(wall):
         first, second = np.concatenate([first, particle]), np.concatenate([second, wall])
         image = np.concatenate([image, np.full(len(wall), HOME, np.uint8)])
-    return edges(
-        first,
-        second,
-        image,
-        pairs,
-        bodies.count,
-        near=near,
-        film=cutoff_ratio > 0.0,
-        record=record,
-        rolling=rolling,
-        counted=counted,
-    )
+    return make_edges(fields, first, second, image, pairs, particles.count, near)
 
 
 _Pieces = list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 
-def _among_few(bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
-    """Pairs within reach, each looked at; nothing needs compiling."""
-    i, j = np.triu_indices(bodies.count, 1)
-    loose = bodies.inverse_mass[i] + bodies.inverse_mass[j] > 0.0
+def _among_few(particles: Particles, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
+    """Pairs within reach, by checking every pair; nothing is compiled."""
+    i, j = np.triu_indices(particles.count, 1)
+    loose = particles.inverse_mass[i] + particles.inverse_mass[j] > 0.0
     i, j = i[loose], j[loose]
-    touch = bodies.radius[i] + bodies.radius[j]
-    near = touch + cutoff_ratio * bodies.radius[i] * bodies.radius[j] / touch + skin
-    apart = (bodies.position[i] - bodies.position[j])[:, None, :] + shifts(box)[None, :, :]
+    touch = particles.radius[i] + particles.radius[j]
+    near = touch + cutoff_ratio * particles.radius[i] * particles.radius[j] / touch + skin
+    apart = (particles.position[i] - particles.position[j])[:, None, :] + shifts(box)[None, :, :]
     within = (apart**2).sum(axis=2) < near[:, None] ** 2
     if not np.isfinite(box).any():
         within[:, :HOME] = within[:, HOME + 1 :] = False
@@ -110,17 +97,17 @@ def _among_few(bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray
     return [(i[pair].astype(np.uint32), j[pair].astype(np.uint32), image.astype(np.uint8))]
 
 
-def _among_many(bodies: Bodies, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
-    """Pairs within reach, looked for cell by cell, in pieces one after the other.
+def _among_many(particles: Particles, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
+    """Pairs within reach, searched cell by cell, in pieces one after the other.
 
-    Each piece has room for a usual number of pairs; where that is too little all is done again with enough.
+    Each piece has room for a usual number of pairs; if that is too small, the search is repeated with enough room.
     """
-    cells = bin_particles(bodies.position, bodies.radius, cutoff_ratio, skin, box)
-    room = USUAL_PAIRS * (bodies.count // CHUNKS + 1)
+    cells = bin_particles(particles.position, particles.radius, cutoff_ratio, skin, box)
+    room = USUAL_PAIRS * (particles.count // CHUNKS + 1)
     found = np.zeros(CHUNKS, np.int64)
     while True:
         first, second, image = (np.empty(CHUNKS * room, kind) for kind in (np.uint32, np.uint32, np.uint8))
-        _search(flat(bodies), cells, cutoff_ratio, skin, box, found, first, second, image)
+        _search(particles.view, cells, cutoff_ratio, skin, box, found, first, second, image)
         if found.max() <= room:
             begins = room * np.arange(CHUNKS)
             return [(first[a:b], second[a:b], image[a:b]) for a, b in zip(begins, begins + found)]
@@ -154,9 +141,9 @@ def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float,
     return Cells(largest, low, span / number, number, offset, start, member)
 
 
-@kernel
+@serial
 def _sort_into_cells(position, size_class, low, width, number, offset, start, member):
-    """Find the cell of each particle, and write the particles cell by cell, each cell in the order of rows."""
+    """Find the cell of each particle, and list the particles cell by cell, in each cell in the order of rows."""
     cell = np.empty(len(size_class), np.int64)
     for i in range(len(cell)):
         c = size_class[i]
@@ -177,15 +164,15 @@ def _sort_into_cells(position, size_class, low, width, number, offset, start, me
 
 
 @threaded
-def _search(bodies, cells, cutoff_ratio, skin, box, found, first, second, image):
-    """Write the later neighbours of each particle in ascending order, and count them also where there is no room."""
-    count, room = len(bodies.radius), len(first) // CHUNKS
+def _search(particles, cells, cutoff_ratio, skin, box, found, first, second, image):
+    """Write the neighbours of each particle in later rows, ascending; count them also where room is missing."""
+    count, room = len(particles.radius), len(first) // CHUNKS
     for chunk in prange(CHUNKS):
         base = chunk * room
         end, total = base + room, base
         for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             begin = total
-            radius, here = bodies.radius[i], at(bodies.position, i)
+            radius, here = particles.radius[i], at(particles.position, i)
             for c in range(len(cells.largest)):
                 largest = cells.largest[c]
                 reach = radius + largest + cutoff_ratio * radius * largest / (radius + largest) + skin
@@ -198,7 +185,7 @@ def _search(bodies, cells, cutoff_ratio, skin, box, found, first, second, image)
                         iy, shift_y = _wrap(y, cells.number[c, 1])
                         column = cells.offset[c] + (ix * cells.number[c, 1] + iy) * cells.number[c, 2]
                         z = z0
-                        while z <= z1:  # cells that follow each other in a column hold particles that do so too
+                        while z <= z1:  # neighbouring cells of a column hold neighbouring particles
                             iz, shift_z = _wrap(z, cells.number[c, 2])
                             last = min(z1 - z + iz, cells.number[c, 2] - 1)
                             z += last - iz + 1
@@ -206,16 +193,16 @@ def _search(bodies, cells, cutoff_ratio, skin, box, found, first, second, image)
                                 j = cells.member[place]
                                 if j <= i:
                                     continue
-                                there = at(bodies.position, j)
+                                there = at(particles.position, j)
                                 dx = here[0] - there[0] - (shift_x * box[0] if shift_x != 0 else 0.0)
                                 dy = here[1] - there[1] - (shift_y * box[1] if shift_y != 0 else 0.0)
                                 dz = here[2] - there[2] - (shift_z * box[2] if shift_z != 0 else 0.0)
                                 square = dx * dx + dy * dy + dz * dz
                                 if square >= reach * reach:
                                     continue
-                                touch = radius + bodies.radius[j]
-                                near = touch + cutoff_ratio * radius * bodies.radius[j] / touch + skin
-                                if square < near * near and bodies.inverse_mass[i] + bodies.inverse_mass[j] > 0.0:
+                                touch = radius + particles.radius[j]
+                                near = touch + cutoff_ratio * radius * particles.radius[j] / touch + skin
+                                if square < near * near and particles.inverse_mass[i] + particles.inverse_mass[j] > 0.0:
                                     if total < end:
                                         code = HOME - 9 * shift_x - 3 * shift_y - shift_z
                                         _insert(first, second, image, begin, total - begin, i, j, code)
@@ -225,19 +212,19 @@ def _search(bodies, cells, cutoff_ratio, skin, box, found, first, second, image)
 
 @inline
 def _range(coordinate, reach, axis, c, cells, box):
-    """Cells within reach along one axis; they run past the ends of a periodic box and are wrapped there."""
+    """Cells within reach along one axis; beyond the ends of a periodic box they are wrapped later."""
     low = int(np.floor((coordinate - reach - cells.low[axis]) / cells.width[c, axis]))
     high = int(np.floor((coordinate + reach - cells.low[axis]) / cells.width[c, axis]))
     number = cells.number[c, axis]
     if np.isinf(box[axis]):
         return min(max(low, 0), number - 1), min(max(high, 0), number - 1)
-    # a cell is looked into once for each image of the box it stands for
+    # a cell is searched once for each image of the box that it represents
     return max(low, -number), min(high, 2 * number - 1)
 
 
 @inline
 def _wrap(cell, number):
-    """Cell inside the box and the number of boxes it was shifted by."""
+    """Cell inside the box, and the number of boxes by which it was shifted."""
     if cell < 0:
         return cell + number, -1
     if cell >= number:

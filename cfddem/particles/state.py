@@ -2,40 +2,49 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections import namedtuple
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from cfddem.errors import InputError
+from cfddem.backend.errors import InputError
+from cfddem.data.fields import Field, Table
+
+PARTICLE_FIELDS = (
+    Field("position", "m", 3, halo="motion", snapshot=True, meaning="position of the centre"),
+    Field("velocity", "m/s", 3, halo="motion", snapshot=True, meaning="velocity"),
+    Field("spin", "rad/s", 3, halo="motion", snapshot=True, meaning="angular velocity"),
+    Field("radius", "m", snapshot=True, meaning="radius"),
+    Field("density", "kg/m3", meaning="density"),
+    Field("inverse_mass", "1/kg", meaning="1/m, 0 for a particle that nothing moves"),
+    Field("inverse_inertia", "1/(kg m2)", meaning="1/I, 0 for a particle that nothing moves"),
+    Field("material", "1", dtype=np.int32, meaning="row of the pair table"),
+    Field("id", "1", dtype=np.int64, snapshot=True, meaning="name of the particle, which never changes"),
+    Field("viscosity", "Pa s", meaning="viscosity of the fluid around the particle, for its films"),
+    Field("applied", "N", 3, meaning="force from outside: gravity, fluid, a hand"),
+    Field("force", "N", 3, snapshot=True, meaning="sum of all forces at the last step"),
+    Field("torque", "N m", 3, meaning="sum of all torques at the last step"),
+    Field("film_rate", "1/s", halo="film", meaning="resistance of all films of the particle over its mass"),
+)
+"""Fields of every particle; laws and users may declare more."""
+
+ParticleArrays = namedtuple("ParticleArrays", [field.name for field in PARTICLE_FIELDS])  # type: ignore[misc]
+"""The arrays of these fields, as compiled loops take them."""
 
 
-class Bodies(NamedTuple):
-    """The arrays of N particles, as compiled loops take them."""
-
-    position: np.ndarray  # (N, 3) [m]
-    velocity: np.ndarray  # (N, 3) [m/s]
-    spin: np.ndarray  # (N, 3) [rad/s]
-    radius: np.ndarray  # (N,) [m]
-    density: np.ndarray  # (N,) [kg/m3]
-    inverse_mass: np.ndarray  # (N,) [1/kg], 0 for a body that nothing moves
-    inverse_inertia: np.ndarray  # (N,) [1/(kg m2)]
-    material: np.ndarray  # (N,) int32, row of the pair table
-    id: np.ndarray  # (N,) int64, never changes
-    viscosity: np.ndarray  # (N,) of the fluid around the particle, for its films [Pa s]
-    applied: np.ndarray  # (N, 3) force from outside: gravity, fluid, a hand [N]
-    force: np.ndarray  # (N, 3) sum of all forces at the last step [N]
-    torque: np.ndarray  # (N, 3) [N m]
-    film_rate: np.ndarray  # (N,) resistance of all the particle's films over its mass [1/s]
+class Particles(Table):
+    """The particles: one array for each declared field, one row for each particle; ids name particles, rows do not."""
 
     @property
-    def count(self) -> int:  # type: ignore[override]
+    def count(self) -> int:
         """Number of particles."""
-        return len(self.radius)
+        return self.rows
 
-    def reorder(self, order: np.ndarray) -> None:
-        """Put the particles into another order, in place; their ids go with them."""
-        for array in self:
-            array[:] = array[order]
+    @property
+    def view(self) -> Any:
+        """The arrays of `PARTICLE_FIELDS` as loops take them: vectors one after the other; nothing is copied."""
+        return ParticleArrays(*(self.arrays[field.name].reshape(-1) for field in PARTICLE_FIELDS))
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """Rows of the particles (N, ...) in the order of their ids; zero for ids that are gone."""
@@ -52,10 +61,11 @@ class Bodies(NamedTuple):
     @property
     def mass(self) -> np.ndarray:
         """Mass of each particle (N,) [kg]."""
-        return self.density * (4.0 / 3.0) * np.pi * self.radius**3
+        mass: np.ndarray = self.density * (4.0 / 3.0) * np.pi * self.radius**3
+        return mass
 
 
-def bodies(
+def make_particles(
     position: np.ndarray,
     radius: np.ndarray | float,
     density: np.ndarray | float,
@@ -65,7 +75,7 @@ def bodies(
     material: np.ndarray | int = 0,
     viscosity: np.ndarray | float = 0.0,
     fixed: np.ndarray | bool = False,
-) -> Bodies:
+) -> Particles:
     """Make particles from what distinguishes them.
 
     position  (N, 3) [m]
@@ -74,7 +84,7 @@ def bodies(
     velocity, spin  (N, 3) or one for all [m/s, rad/s]
     material  (N,) or one for all, row of the pair table
     viscosity of the fluid around the particles [Pa s]
-    fixed     (N,) or one for all: bodies that nothing moves
+    fixed     (N,) or one for all: particles that nothing moves
     """
     position = np.ascontiguousarray(np.atleast_2d(np.asarray(position, float)))
     count = len(position)
@@ -92,25 +102,32 @@ def bodies(
             raise InputError(f"{field} of particle {int(np.argmax(bad))}", float(values[bad][0]), "above 0")
     mass = density * (4.0 / 3.0) * np.pi * radius**3
     free = ~scalars(fixed, bool)
-    return Bodies(
-        position=position.copy(),
-        velocity=vectors(velocity),
-        spin=vectors(spin),
-        radius=radius,
-        density=density,
-        inverse_mass=free / mass,
-        inverse_inertia=free / (0.4 * mass * radius**2),
-        material=scalars(material, np.int32),  # type: ignore[arg-type]
-        id=np.arange(count, dtype=np.int64),
-        viscosity=scalars(viscosity),
-        applied=vectors(0.0),
-        force=vectors(0.0),
-        torque=vectors(0.0),
-        film_rate=scalars(0.0),
+    return Particles(
+        PARTICLE_FIELDS,
+        count,
+        {
+            "position": position,
+            "velocity": vectors(velocity),
+            "spin": vectors(spin),
+            "radius": radius,
+            "density": density,
+            "inverse_mass": free / mass,
+            "inverse_inertia": free / (0.4 * mass * radius**2),
+            "material": scalars(material, np.int32),  # type: ignore[arg-type]
+            "id": np.arange(count),
+            "viscosity": scalars(viscosity),
+        },
     )
 
 
-def kinetic_energy(spheres: Bodies) -> float:
+def particles_in(kept: Mapping[str, np.ndarray]) -> Particles:
+    """Particles with `PARTICLE_FIELDS` from a checkpoint of particles; it may hold more fields, which are left out."""
+    particles = Particles(PARTICLE_FIELDS, 0)
+    particles.restore({field.name: kept[field.name] for field in PARTICLE_FIELDS})
+    return particles
+
+
+def kinetic_energy(spheres: Particles) -> float:
     """Kinetic energy of all particles, spin included [J]."""
     mass = spheres.mass
     linear = np.sum(mass[:, None] * spheres.velocity**2)

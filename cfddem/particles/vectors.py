@@ -1,7 +1,7 @@
 """Three numbers as a vector, for compiled loops.
 
-Loops see the vectors of all rows as one flat array: x, y, z of row 0, then of row 1. Rows are unsigned, so
-that no row can be negative; both let the compiler work on several rows at once.
+Loops take the vectors of all rows as one flat array: x, y, z of row 0, then of row 1. Rows are unsigned, so that
+no row can be negative. Both let the compiler work on several rows at once.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cfddem.kernels import inline
+from cfddem.backend.compile import inline
 
 Vector = tuple[float, float, float]
 Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
@@ -19,7 +19,7 @@ _1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
 
 
 def flat(arrays: Arrays) -> Arrays:
-    """The same named arrays with every table of vectors as one flat array; nothing is copied."""
+    """The same named arrays, every table of vectors as one flat array; nothing is copied."""
     views = {name: value.reshape(-1) for name, value in arrays._asdict().items() if np.ndim(value) == 2}  # type: ignore[attr-defined]
     return arrays._replace(**views)  # type: ignore[attr-defined, no-any-return]
 

@@ -1,7 +1,7 @@
-"""Docstrings as Markdown: equations, lists of arguments, examples; and the source and range of every law.
+"""Convert docstrings to Markdown; add source and range to those of laws.
 
-Docstrings of this package are made to be read in the code: an equation behind `.. math::`, arguments one a line with
-their units, examples behind `>>>`. What is sentences stays; the rest is marked up for the page.
+Docstrings of this package hold equations after `.. math::`, one argument per line with its unit, and examples after
+`>>>`. These become equations, tables and code blocks. Sentences stay as they are.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import griffe
 
 ARGUMENT = re.compile(r"(\.{0,3}[A-Za-z_][\w.,]*(?:, [\w.]+)*) {2,}(\S.*)")
-"""A line that names arguments and, two spaces on, says what they are."""
+"""A line with names of arguments, at least two spaces, and their description."""
 
 ROLE = re.compile(r":(\w+):`([^`]+)`")
 
@@ -25,30 +25,30 @@ def to_markdown(text: str) -> str:
 
 
 def _parts(lines: list[str]) -> list[str]:
-    """A paragraph, cut where sentences, equations and examples meet."""
-    made: list[str] = []
+    """A paragraph, split into sentences, equations, arguments and examples."""
+    parts: list[str] = []
     while lines:
         if lines[0].startswith(".. math::"):
             end = _first(lines, lambda line: not line.startswith(" "), 1)
-            made.append("$$ " + " ".join([lines[0][9:].strip(), *(line.strip() for line in lines[1:end])]) + " $$")
+            parts.append("$$ " + " ".join([lines[0][9:].strip(), *(line.strip() for line in lines[1:end])]) + " $$")
         elif lines[0].startswith(">>>"):
             end = len(lines)
-            made.append("\n".join(["```pycon", *lines, "```"]))
+            parts.append("\n".join(["```pycon", *lines, "```"]))
         elif lines[0].startswith("    "):
             end = _first(lines, lambda line: not line.startswith("    "), 1)
-            made.append("\n".join(["```text", *(line[4:] for line in lines[:end]), "```"]))
+            parts.append("\n".join(["```text", *(line[4:] for line in lines[:end]), "```"]))
         elif ARGUMENT.match(lines[0]):
             end = _first(lines, lambda line: line.startswith((".. math::", ">>>")), 1)
-            made.append(_arguments(lines[:end]))
+            parts.append(_arguments(lines[:end]))
         else:
             end = _first(lines, lambda line: line.startswith((".. math::", ">>>")) or bool(ARGUMENT.match(line)), 1)
-            made.append(sentence(" ".join(line.strip() for line in lines[:end])))
+            parts.append(sentence(" ".join(line.strip() for line in lines[:end])))
         lines = lines[end:]
-    return made
+    return parts
 
 
 def _first(lines: list[str], wanted: Any, start: int) -> int:
-    """Place of the first line that is wanted."""
+    """Index of the first line that satisfies a condition."""
     return next((place for place in range(start, len(lines)) if wanted(lines[place])), len(lines))
 
 
@@ -68,7 +68,7 @@ def _arguments(lines: list[str]) -> str:
 
 
 def sentence(text: str) -> str:
-    """Words as they are, but for what Markdown would take for markup."""
+    """Text with characters escaped that Markdown would take for markup."""
     text = ROLE.sub(lambda role: f"${role[2]}$" if role[1] == "math" else f"`{role[2]}`", text)
     pieces = re.split(r"(`[^`]+`|\$[^$]+\$|\*\*[^*]+\*\*)", text)
     for place in range(0, len(pieces), 2):
@@ -79,7 +79,7 @@ def sentence(text: str) -> str:
 
 
 def of_the_law(reference: str, ranges: dict[str, tuple[float, float]]) -> str:
-    """What `@law(kind, reference, **ranges)` says, as a paragraph.
+    """The arguments of `@law(kind, reference, **ranges)` as paragraphs.
 
     >>> of_the_law("Di Felice (1994)", {"voidage": (0.4, 1.0)})
     '**Source.** Di Felice (1994)\\n\\n**Fitted for** voidage 0.4 to 1'
@@ -93,21 +93,25 @@ def of_the_law(reference: str, ranges: dict[str, tuple[float, float]]) -> str:
 
 
 class Docstrings(griffe.Extension):
-    """Turns the docstrings that are read for the reference into Markdown."""
+    """Convert the docstrings of the reference to Markdown."""
 
     def on_object(self, *, obj: griffe.Object, loader: Any, **_: Any) -> None:
-        """Called for every module, class, function and constant."""
+        """Called by griffe for every module, class, function and constant."""
         if obj.docstring is None:
             return
         text = to_markdown(obj.docstring.value)
-        card = _laws().get(obj.path)
-        obj.docstring.value = text if card is None else text + "\n\n" + of_the_law(card.reference, card.ranges)
+        entry = _laws().get(obj.path)
+        obj.docstring.value = text if entry is None else text + "\n\n" + of_the_law(entry.reference, entry.ranges)
 
 
 @cache
 def _laws() -> dict[str, Any]:
-    """The card of every law, by its dotted name."""
-    from closures import shelf
+    """The registry entry of every law, by its dotted name."""
+    from closures import registry
 
-    shelf.fill()
-    return {f"{card.function.__module__}.{name}": card for laws in shelf.SHELF.values() for name, card in laws.items()}
+    registry.load_built_in_laws()
+    return {
+        f"{entry.function.__module__}.{name}": entry
+        for laws in registry.REGISTRY.values()
+        for name, entry in laws.items()
+    }

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from cfddem.kernels import use_threads
-from scenarios.dense_bed import STEP, bed
+from cfddem.backend.compile import use_threads
+from scenarios.benchmarks.dense_bed import STEP, bed
 
 
 @pytest.mark.slow

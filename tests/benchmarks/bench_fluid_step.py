@@ -5,7 +5,7 @@
 
 The work: a bed of voidage about 0.45 that moves a little each step fills the lower half of a box, gas enters below at
 0.3 m/s and leaves above, drag 2 000 kg/m3/s, model A, pressure tolerance 1e-9 of the largest face flux in every
-cell; two stages, so two pressure solves. A step counts everything: checks, ghost cells, step-size clocks.
+cell; two stages, so two pressure solves. A step counts everything: checks, ghost cells, step-size time_scales.
 
 The memory limit is the time to move the bytes the loops must touch at the triad speed of the machine, if no loop
 found anything in a cache: 200 B a cell and stage for transport, 260 for the predictor, 120 for the rest of a stage,
@@ -23,10 +23,10 @@ import time
 import numpy as np
 import pytest
 
+from cfddem.backend.compile import use_threads
 from cfddem.fluid.conditions import Inlet, Outlet
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
-from cfddem.kernels import use_threads
 
 LIMITS = {(32, 8, 128): 0.05, (64, 64, 64): 0.25}
 STAGE_BYTES, ITERATION_BYTES = 200 + 260 + 120, 780

@@ -10,8 +10,8 @@ from __future__ import annotations
 import argparse
 import resource
 
-from cfddem.kernels import use_threads
-from scenarios.dense_bed import STEP, bed
+from cfddem.backend.compile import use_threads
+from scenarios.benchmarks.dense_bed import STEP, bed
 
 
 def peak() -> float:

@@ -29,7 +29,7 @@ def main() -> None:
             for _ in range(2):
                 begin = time.perf_counter()
                 subprocess.run(
-                    [sys.executable, "-m", "cfddem.cli", *words],
+                    [sys.executable, "-m", "cfddem", *words],
                     cwd=Path(folder),
                     check=True,
                     stdout=subprocess.DEVNULL,

@@ -13,8 +13,8 @@ import math
 import tempfile
 from pathlib import Path
 
-from cfddem.case import Case
-from cfddem.run import Run
+from cfddem.case.schema import Case
+from cfddem.run.runner import Run
 
 WRITINGS = ("snapshots", "checkpoints")
 

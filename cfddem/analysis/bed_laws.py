@@ -1,0 +1,113 @@
+"""Published laws of beds, compared with the means of a run: weight balance, Ergun, bed expansion."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cfddem.case.particle_properties import particle_properties
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import LIQUID
+from closures import bed as laws_of_beds
+from closures import numbers
+from closures.registry import REGISTRY
+
+FREE_SIDES = ("free_slip", "periodic")
+"""Sides that do not retard the flow: no wall correction applies."""
+
+
+def compared_with_bed_laws(case: Case, measures: dict[str, Any]) -> list[dict[str, Any]]:
+    """One row for each law that applies to the case.
+
+    measures  of the report
+    """
+    if (
+        case.fluid is None
+        or case.column.ends != "flow"
+        or not isinstance(case.bed.inlet_velocity, float)
+        or case.bed.inlet_velocity <= 0.0
+        or case.bed.jet is not None
+        or not {"bed_voidage", "pressure_drop"} <= {*measures}
+    ):
+        return []
+    drop = measures["pressure_drop"]["mean"]
+    if case.bed.fixed:
+        height, voidage = measures["bed_height"]["mean"], measures["bed_voidage"]["mean"]
+        inlet, fluid = case.bed.inlet_velocity, case.fluid
+        slope = laws_of_beds.ergun_gradient(inlet, case.bed.diameter, fluid.density, fluid.viscosity, voidage)
+        outside = _outside_range("ergun_gradient", voidage=voidage)
+        return [comparison("pressure drop by Ergun", drop, slope * height, "Pa", outside)]
+    weight = buoyant_weight(case) / case.column.floor_area
+    rows = [comparison("pressure drop by the buoyant weight", drop, weight, "Pa")]
+    if case.fluid.density > LIQUID and abs(case.laws.gravity[2]) > 0.0 and not case.bed.species:
+        for law, voidage in expansion_laws(case).items():
+            for name, source in (("bed_voidage", "height"), ("bed_voidage_from_pressure", "pressure")):
+                if name in measures:
+                    rows.append(comparison(f"voidage by {law}, from {source}", measures[name]["mean"], voidage, "1"))
+    return rows
+
+
+def comparison(law: str, computed: float, expected: float, unit: str, outside_range: str = "") -> dict[str, Any]:
+    """A row of the comparison: value of the run, value of the law, their ratio."""
+    return {
+        "law": law, "computed": computed, "expected": expected, "ratio": computed / expected, "unit": unit,
+        "outside_range": outside_range,
+    }  # fmt: skip
+
+
+def expansion_laws(case: Case) -> dict[str, float]:
+    """Voidage of a liquid-fluidised bed by each published expansion law [-]."""
+    assert isinstance(case.bed.inlet_velocity, float)
+    return {
+        name: laws_of_beds.expanded_voidage(case.bed.inlet_velocity, limit, exponent)
+        for name, (exponent, limit) in expansion_exponents(case).items()
+    }
+
+
+def expansion_exponents(case: Case) -> dict[str, tuple[float, float]]:
+    """Exponent n [-] and velocity at voidage 1 [m/s] of each published expansion law, with wall corrections."""
+    assert case.fluid is not None
+    density, viscosity, diameter = case.fluid.density, case.fluid.viscosity, case.bed.diameter
+    archimedes = numbers.archimedes(diameter, case.solid_density, density, viscosity, abs(case.laws.gravity[2]))
+    if archimedes <= 0.0:
+        return {}
+    reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
+    terminal = reynolds * viscosity / (density * diameter)
+    wall = 0.0 if case.column.sides in FREE_SIDES else diameter / min(case.column.size[:2])
+    laws = {
+        "Richardson-Zaki": (
+            laws_of_beds.exponent_richardson_zaki(reynolds, wall),
+            laws_of_beds.wall_factor_richardson_zaki(wall),
+        ),
+        "Garside": (laws_of_beds.exponent_garside(reynolds), laws_of_beds.wall_factor_richardson_zaki(wall)),
+        "Khan-Richardson": (
+            laws_of_beds.exponent_khan_richardson(archimedes, wall),
+            laws_of_beds.wall_factor_khan_richardson(wall),
+        ),
+    }
+    return {name: (exponent, factor * terminal) for name, (exponent, factor) in laws.items()}
+
+
+def buoyant_weight(case: Case) -> float:
+    """Weight of the particles minus that of the displaced fluid [N]."""
+    assert case.fluid is not None
+    particles = particle_properties(case)
+    excess = float((math.pi / 6.0 * particles.diameter**3 * (particles.density - case.fluid.density)).sum())
+    return excess * abs(case.laws.gravity[2])
+
+
+def weight_over_floor(case: Case) -> float | None:
+    """Buoyant weight per floor area [Pa]; None if the flow does not have to carry it."""
+    if case.fluid is None or case.bed.fixed or abs(case.laws.gravity[2]) == 0.0:
+        return None
+    return buoyant_weight(case) / case.column.floor_area
+
+
+def _outside_range(law: str, **arguments: float) -> str:
+    """Arguments that lie outside of the fitted range of a law, in words; empty if there are none."""
+    ranges = REGISTRY["bed"][law].ranges
+    return "; ".join(
+        f"{name} {value:.3g} is outside of {ranges[name][0]:g} to {ranges[name][1]:g}"
+        for name, value in arguments.items()
+        if name in ranges and not ranges[name][0] <= value <= ranges[name][1]
+    )

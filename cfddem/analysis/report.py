@@ -1,0 +1,151 @@
+"""The report of a run: means with errors, comparison with published laws, conservation, warnings."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison
+from cfddem.analysis.regimes import RegimeMap, regime_map
+from cfddem.analysis.run_warnings import last_value, warnings_of
+from cfddem.analysis.series import block_average, stationarity
+from cfddem.analysis.single_sphere import compared_with_drag_law
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.io.reading import Run, open_run
+from cfddem.preflight.summary import preflight
+
+ENERGY = "energy_"
+"""Prefix of the columns of the energy budget in the history."""
+
+
+def report(folder: Path) -> dict[str, Any]:
+    """Means over the averaging window of a run, and the laws that apply to it.
+
+    folder   of the run
+    returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
+             (law, computed, expected, ratio), `ledger` (largest imbalances), `energy` and `energy_lines` (energy budget
+             at the end [J], if the case asks for it), `collisions` (of the window, if recorded with films),
+             `warnings`, `wall_time`, `preflight`, `provenance`
+    errors   InputError if the run has no history
+    """
+    run = open_run(folder)
+    if not len(run.history.get("time", ())):
+        raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
+    case = case_of(run)
+    begin, end = window_of(run, case)
+    measures = _measures(run, run.history["time"] >= begin)
+    drag_law = (comparison(*row) for row in compared_with_drag_law(run, case))
+    laws = [*compared_with_bed_laws(case, measures), *drag_law]
+    energy = _energy(run)
+    return {
+        "case": case.title or folder.resolve().name,
+        "folder": str(folder),
+        "status": run.status,
+        "message": run.message,
+        "window": [begin, end],
+        "measures": measures,
+        "laws": laws,
+        "ledger": _ledger(run),
+        "energy": energy,
+        "energy_lines": _energy_lines(run, energy),
+        "collisions": _collisions(run, begin),
+        "warnings": warnings_of(run, case, measures, laws),
+        "wall_time": run.about.get("wall_time", {}),
+        "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
+        "preflight": preflight(case).summary(),
+        "provenance": run.provenance,
+    }
+
+
+def case_of(run: Run) -> Case:
+    """The case of a run."""
+    return Case.from_text(run.case_text, str(run.folder / "case.toml"))
+
+
+def window_of(run: Run, case: Case) -> tuple[float, float]:
+    """Start and end of the averaging window [s]: from `run.average_from`, or the second half of the run."""
+    end = float(run.history["time"][-1])
+    return (0.5 * end if case.run.average_from is None else min(case.run.average_from, end)), end
+
+
+def recorded_regimes(run: Run, begin: float) -> RegimeMap | None:
+    """The regime map of all collisions that ended after a time [s]; None if none with films were recorded."""
+    rows = run.collisions
+    if "weight" not in rows:
+        return None
+    late = (rows["end"] >= begin) & np.isfinite(rows["stokes"]) & (rows["stokes"] > 0.0)
+    return regime_map({name: column[late] for name, column in rows.items()}) if late.any() else None
+
+
+def _in_group(run: Run, group: str) -> list[str]:
+    """Columns of the history whose declared group is, or starts with, the given one."""
+    declared = run.quantities.get("history", {})
+    return [name for name in run.history if name in declared and declared[name].group.startswith(group)]
+
+
+def _measures(run: Run, inside: np.ndarray) -> dict[str, Any]:
+    """Every measure with a value in at least half of the rows of the window: its mean and error, and its drift."""
+    measures = {}
+    for name in _in_group(run, "measure"):
+        column, quantity = run.history[name][inside], run.quantity(name)
+        values = column[np.isfinite(column)]
+        if len(values) <= 0.5 * len(column):
+            continue
+        average, steady = block_average(values), stationarity(values)
+        measures[name] = {
+            "mean": average.mean,
+            "error": average.error,
+            "error_is_lower_bound": not average.enough,
+            "unit": quantity.unit,
+            "meaning": quantity.meaning,
+            "drift": steady.drift,
+            "drift_error": steady.error,
+            "stationary": None if math.isnan(steady.drift) else steady.stationary,
+        }
+    return measures
+
+
+def _ledger(run: Run) -> dict[str, float]:
+    """Largest imbalance of each conserved quantity over the run, and the particles that are lost."""
+    ledger = {
+        name: float(np.nanmax(np.abs(run.history[name][1:]))) if len(run.history[name]) > 1 else math.nan
+        for name in _in_group(run, "imbalance")
+    }
+    count = run.history["particle_count"]
+    return ledger | {"particles_lost": float(count[0] - count[-1])}
+
+
+def _energy(run: Run) -> dict[str, float]:
+    """The energy budget at the end [J]; empty if the run has none."""
+    return {name.removeprefix(ENERGY): float(run.history[name][-1]) for name in _in_group(run, "energy")}
+
+
+def _energy_lines(run: Run, energy: dict[str, float]) -> list[dict[str, Any]]:
+    """Lines of the energy budget in reading order: group, name, energy [J] and its fraction of the input [-].
+
+    Terms that are zero are omitted.
+    """
+    lines = []
+    for name in energy:
+        group = run.quantity(ENERGY + name).group.removeprefix("energy: ")
+        if name != "put_in" and (energy[name] != 0.0 or group == "balance"):
+            share = energy[name] / max(energy["put_in"], 1e-300)
+            lines.append({"group": group, "name": name, "energy": energy[name], "fraction": share})
+    return lines
+
+
+def _collisions(run: Run, begin: float) -> dict[str, float]:
+    """Summary of the collisions in the window; empty if none with films were recorded."""
+    found = recorded_regimes(run, begin)
+    if found is None:
+        return {}
+    return {
+        "number": found.collisions,
+        "median_stokes": found.median_stokes,
+        "contact_fraction": found.contact_fraction,
+        "deformed_fraction": found.deformed_fraction,
+    }

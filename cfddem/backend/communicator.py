@@ -1,0 +1,111 @@
+"""Sums, extreme values and decisions over all ranks of a run.
+
+A run on a cluster divides cells and particles among ranks. A rank then knows only a part of every array, so a sum, an
+extreme value or a decision over the whole array must go through a communicator. `Communicator` is that of a run in one
+process. A parallel communicator replaces `_combine` and `broadcast`, and nothing else.
+
+Each method first reduces the array of this rank with NumPy, in NumPy's order, and then combines the ranks in the order
+of their numbers. All ranks get the same bits. All ranks must make the same calls in the same order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+Value = TypeVar("Value")
+Axis = int | tuple[int, ...] | None
+
+
+class Communicator:
+    """The communicator of a run in one process.
+
+    rank  number of this process among all, from 0
+    size  number of processes
+
+    >>> one = Communicator()
+    >>> one.sum([1.0, 2.0]), one.largest([1.0, float("nan")]), one.any([False, True])
+    (3.0, nan, True)
+    """
+
+    rank: int = 0
+    size: int = 1
+
+    def sum(self, values: ArrayLike, axis: Axis = None) -> Any:
+        """Sum over all elements, or over some axes, of the arrays of all ranks.
+
+        axis     axes to sum over; all if None; () adds the arrays of the ranks element by element. The axes that
+                 stay must be equally long on all ranks
+        returns  a number, or an array of the axes that stay
+        """
+        return self._combine(_plain(np.sum(values, axis=axis)), np.add)
+
+    def largest(self, values: ArrayLike, axis: Axis = None, *, default: float = -np.inf) -> Any:
+        """Largest element of the arrays of all ranks; NaN if any element is NaN.
+
+        default  contribution of a rank without elements
+        """
+        return self._combine(_plain(_extreme(np.max, values, axis, default)), np.maximum)
+
+    def smallest(self, values: ArrayLike, axis: Axis = None, *, default: float = np.inf) -> Any:
+        """Smallest element of the arrays of all ranks; NaN if any element is NaN.
+
+        default  contribution of a rank without elements
+        """
+        return self._combine(_plain(_extreme(np.min, values, axis, default)), np.minimum)
+
+    def any(self, condition: ArrayLike) -> bool:
+        """Whether a condition holds for any element on any rank; False without elements."""
+        return bool(self._combine(bool(np.any(condition)), np.logical_or))
+
+    def all(self, condition: ArrayLike) -> bool:
+        """Whether a condition holds for all elements on all ranks; True without elements."""
+        return bool(self._combine(bool(np.all(condition)), np.logical_and))
+
+    def count(self, condition: ArrayLike) -> int:
+        """Number of elements on all ranks for which a condition holds."""
+        return int(self._combine(int(np.count_nonzero(condition)), np.add))
+
+    def mean(self, values: ArrayLike) -> float:
+        """Mean of the elements on all ranks; NaN without elements."""
+        total, count = self.sum(values), self._combine(int(np.size(values)), np.add)
+        return float(total / count) if count else float("nan")
+
+    def first(self, value: Value | None) -> Value | None:
+        """The value of the lowest rank that passes one; None if all pass None."""
+        return self._combine(value, _not_none)  # type: ignore[no-any-return]
+
+    def broadcast(self, value: Value, root: int = 0) -> Value:
+        """The value that rank `root` passes, on all ranks."""
+        return value
+
+    def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
+        """Combine the values of all ranks, in the order of the ranks; the value of this rank if it is the only one."""
+        return local
+
+
+def _extreme(find: Callable[..., Any], values: ArrayLike, axis: Axis, default: float) -> Any:
+    """The extreme of an array along some axes; `default` where these axes hold no element."""
+    array = np.asarray(values)
+    if array.size:
+        return find(array, axis=axis)
+    if axis is None:
+        return default
+    return find(array.astype(float), axis=axis, initial=default)
+
+
+def _not_none(first: Any, second: Any) -> Any:
+    """The first of two values that is not None."""
+    return second if first is None else first
+
+
+def _plain(value: Any) -> Any:
+    """A Python number for an array without axes, so that no NumPy scalar leaves the communicator."""
+    return value.item() if np.ndim(value) == 0 and hasattr(value, "item") else value
+
+
+SERIAL = Communicator()
+"""The communicator of solvers that are not given one."""

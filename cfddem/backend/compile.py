@@ -1,0 +1,142 @@
+"""How a loop is compiled, cached and threaded.
+
+`@serial` compiles a loop once and keeps the machine code between runs; `@threaded` does the same for a
+loop written with `prange`. Neither allows the compiler to reorder arithmetic: results are the same bits
+on any number of threads, and a NaN stays a NaN.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from numba import get_num_threads, njit, prange, set_num_threads
+from numba.core import event
+
+import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
+from cfddem.backend.errors import InputError
+
+__all__ = [
+    "CHUNKS",
+    "announce_compilation",
+    "either",
+    "inline",
+    "part",
+    "prange",
+    "serial",
+    "threaded",
+    "threaded_part",
+    "use_threads",
+]
+
+if "OMP_WAIT_POLICY" not in os.environ:
+    # A thread that waits for another by spinning keeps it from its core where other work runs too, and a step takes
+    # a hundred times as long. A short spin, then sleep, costs a quiet machine little.
+    os.environ.setdefault("GOMP_SPINCOUNT", "1000")
+
+CHUNKS = 64
+"""Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
+
+
+_INLINE: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "forceinline": True,
+    "_nrt": False,
+}
+"""Helpers are never called from outside, always inlined, and count no references: they own no arrays."""
+
+
+def serial(function: Callable[..., Any]) -> Any:
+    """Compile a serial loop; kept on disk."""
+    return _marked(njit(cache=True, error_model="numpy")(function), serial)
+
+
+def threaded(function: Callable[..., Any]) -> Any:
+    """Compile a loop over `prange` that runs on all threads; kept on disk."""
+    return _marked(njit(cache=True, error_model="numpy", parallel=True)(function), threaded)
+
+
+def either(function: Callable[..., Any]) -> Any:
+    """Compile a loop over `prange` for one thread; `law_set.specialise` can compile it for all threads."""
+    return _marked(njit(cache=True, error_model="numpy")(function), either)
+
+
+def part(function: Callable[..., Any]) -> Any:
+    """Compile a loop over `prange` that is part of a larger one, with which it is kept; as `either` for threads."""
+    return _marked(njit(error_model="numpy")(function), part)
+
+
+def threaded_part(function: Callable[..., Any]) -> Any:
+    """Compile a loop over `prange` that is part of a larger one and runs on all threads."""
+    return _marked(njit(error_model="numpy", parallel=True)(function), threaded_part)
+
+
+def inline(function: Callable[..., Any]) -> Any:
+    """Compile a small helper into the loops that call it."""
+    return _marked(njit(**_INLINE)(function), inline)
+
+
+def _marked(compiled: Any, how: Callable[..., Any]) -> Any:
+    """Note how a function is compiled, so that a copy of it can be compiled the same way."""
+    compiled.compiled_as = how
+    return compiled
+
+
+def use_threads(count: int | None) -> int:
+    """Run threaded loops on `count` threads (None: leave as it is); returns the number in use."""
+    if count is not None:
+        try:
+            set_num_threads(count)
+        except ValueError as refusal:
+            raise InputError("threads", count, f"1 to {_most_threads()} on this machine") from refusal
+    return int(get_num_threads())
+
+
+def _most_threads() -> int:
+    import numba
+
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+
+
+def _on_its_own_line(what: str) -> None:
+    print(f"\r{what:<60}\r", end="", file=sys.stderr, flush=True)
+
+
+class _Announcer(event.Listener):
+    """Shows a message while a loop is compiled."""
+
+    def __init__(self) -> None:
+        self.compiled, self.depth = 0, 0
+        self.progress: Callable[[str], None] | None = None
+
+    def on_start(self, seen: event.Event) -> None:
+        """A compilation begins. Helpers are compiled within the loop that calls them and are not counted."""
+        self.depth += 1
+        if self.depth == 1 and self.progress is not None:
+            self.compiled += 1
+            self.progress(f"compiling loop {self.compiled} (kept for next time) ...")
+
+    def on_end(self, seen: event.Event) -> None:
+        """A compilation has ended."""
+        self.depth -= 1
+        if self.depth == 0 and self.progress is not None:
+            self.progress("")
+
+
+_announcer = _Announcer()
+
+
+def announce_compilation(progress: Callable[[str], None] = _on_its_own_line) -> None:
+    """Show a message at the terminal while loops are compiled.
+
+    progress  called with the message, and with an empty text at the end; prints to the terminal if not given
+    """
+    if not sys.stderr.isatty():
+        return
+    if _announcer.progress is None:
+        event.register("numba:compile", _announcer)
+    _announcer.progress = progress

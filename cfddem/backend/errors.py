@@ -1,0 +1,94 @@
+"""Errors that say what, where, the number, its limit, and the remedy, in one or two lines."""
+
+from __future__ import annotations
+
+import reprlib
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from typing import Any
+
+MANY = 10
+"""Largest number of known words that a message lists if one of them is similar."""
+
+
+LONGEST = 60
+"""Longest value or key that is shown [characters]."""
+
+
+class CfddemError(Exception):
+    """A failure that the user can resolve; the command line shows it without a traceback."""
+
+    exit_code = 1
+
+
+class InputError(CfddemError, ValueError):
+    """An invalid input value."""
+
+    exit_code = 2
+
+    def __init__(self, field: str, value: Any, limit: str, remedy: str = "") -> None:
+        self.field, self.value, self.limit, self.remedy = field, value, limit, remedy
+        shown = f" = {value!r}" if value is not None else ""
+        super().__init__(f"{field}{shown}: must be {limit}" + (f"; {remedy}" if remedy else ""))
+
+
+class UnstableStep(CfddemError):
+    """A time step above the stability limit."""
+
+    exit_code = 2
+
+    def __init__(self, step: float, limit: float, criterion: str, remedy: str) -> None:
+        super().__init__(
+            f"time step {step:.3g} s is above the stability limit {limit:.3g} s of the {criterion}; {remedy}"
+        )
+
+
+class RunFailed(CfddemError):
+    """A run that cannot continue: a value is NaN, or a particle is lost."""
+
+    exit_code = 3
+
+
+class RunStopped(CfddemError):
+    """A run that was stopped by a signal and can be resumed; the exit code is that of the signal."""
+
+    def __init__(self, message: str, signal_number: int) -> None:
+        self.exit_code = 128 + signal_number
+        super().__init__(message)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """The limit to state for an unknown word: all known words, or the nearest of many, and the nearest one.
+
+    >>> nearest("restituton", ["friction", "restitution"])
+    "one of friction, restitution (did you mean 'restitution'?)"
+    """
+    words = list(known)
+    close = get_close_matches(word, words, n=3)
+    shown = words if len(words) <= (MANY if close else 2 * MANY) else close or words[:MANY]
+    more = f" and {len(words) - len(shown)} more" if len(shown) < len(words) else ""
+    return f"one of {', '.join(shown)}{more}" + (f" (did you mean {close[0]!r}?)" if close else "")
+
+
+class _Words(str):
+    """A text that is shown without quotation marks."""
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def shown(value: Any) -> Any:
+    """A value as an error message shows it: itself if it is short, else what it is."""
+    if isinstance(value, Mapping) or hasattr(value, "model_fields"):
+        return _Words("a table")
+    if isinstance(value, int) and abs(value) >= 10**LONGEST:
+        return _Words("a whole number of more than 60 digits")
+    if isinstance(value, str | list | tuple):
+        brief = reprlib.Repr()
+        brief.maxstring = brief.maxother = LONGEST
+        brief.maxlevel, brief.maxlist = 2, 3
+        try:
+            return _Words(brief.repr(value))
+        except ValueError:  # whole numbers in it that are too long to print
+            return _Words("a list")
+    return value

@@ -1,0 +1,261 @@
+"""Compile loops for the laws of a run.
+
+A loop that calls laws which the user chooses is written once, as a template: it calls a :class:`Slot` where a law
+goes. :func:`specialise` copies the template, and every helper that it calls and that has slots, with the chosen laws in
+place of the slots, and compiles the copy. Laws are inlined, so a user's law costs what a built-in law costs.
+
+    drag_factor = Slot("drag_factor")                       # in the module of the loop
+
+    @threaded
+    def factors(reynolds, voidage, factor):
+        for n in prange(len(factor)):
+            factor[n] = drag_factor(reynolds[n], voidage[n])
+
+    loop = specialise(factors, {"drag_factor": callable_in_loops(law)})     # once a run
+
+Constants are slots, too: `if FILM:` leaves out what a run does not have before it is compiled.
+
+Compiled copies are kept on disk. The name of a copy contains a fingerprint of all that was put into its slots: the
+bytecode and constants of the functions, and of the functions and values that they refer to. A change of a law's
+source, also in a user's file, therefore compiles its loops again; changes of the package's own files are seen
+by the folder of the cache (:mod:`closures.compiled`). Limits: what a law reads through containers or attributes of
+objects is not part of the fingerprint, and the compiler refuses most of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+from numba import float64
+
+from cfddem.backend.compile import either, inline, part, threaded, threaded_part
+from cfddem.backend.errors import InputError
+from closures.compiled import is_exposed
+
+
+class Slot:
+    """A place in a template where a law or a constant of the run goes.
+
+    name  key of the choice in `specialise`
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __call__(self, *arguments: Any) -> Any:
+        raise TypeError(f"{self.name} is a slot for a law; call the loop that specialise() returns")
+
+
+def specialise(template: Any, choices: Mapping[str, Any], threads: bool = False) -> Any:
+    """The loop of a template for chosen laws; equal choices give the same loop.
+
+    template  compiled by `inline`, `serial`, `threaded` or `either`
+    choices   slot name -> function compiled by `inline`, template, or constant
+    threads   compile loops marked `either` for all threads
+    """
+    return _Specialiser(choices, threads).of(template)
+
+
+_COPIES: dict[tuple[Any, str], Any] = {}
+_ON_ALL_THREADS = {either: threaded, part: threaded_part}
+
+
+class _Specialiser:
+    """Copies the functions of one template; each once."""
+
+    def __init__(self, choices: Mapping[str, Any], threads: bool) -> None:
+        self.choices, self.threads = choices, threads
+        self._done: dict[int, Any] = {}
+
+    def of(self, template: Any) -> Any:
+        key = id(template)
+        if key not in self._done:
+            self._done[key] = template  # a function that calls itself
+            self._done[key] = self._copy(template)
+        return self._done[key]
+
+    def _copy(self, template: Any) -> Any:
+        plain = _plain(template)
+        bound = {}
+        for name in _names(plain.__code__):
+            value = plain.__globals__.get(name)
+            if isinstance(value, Slot):
+                value = self.choices.get(value.name, value)  # empty slots are behind an `if` that is not compiled
+                bound[name] = self.of(value) if _is_compiled(value) else value
+            elif _is_compiled(value) and (made := self.of(value)) is not value:
+                bound[name] = made
+        how = template.compiled_as
+        if self.threads:
+            how = _ON_ALL_THREADS.get(how, how)
+        if not bound and how is template.compiled_as:
+            return template
+        tag = _digest([how.__name__, *(f"{name}={fingerprint(bound[name])}" for name in sorted(bound))])
+        if (plain, tag) not in _COPIES:
+            made = how(_twin(plain, bound, f"{plain.__name__}_{tag}"))
+            made.tag = tag
+            _COPIES[plain, tag] = made
+        return _COPIES[plain, tag]
+
+
+def callable_in_loops(law: Callable[..., Any]) -> Any:
+    """A plain function of numbers as loops call it; helper functions that it calls are compiled, too.
+
+    Compiled once, until the function or anything that it refers to changes.
+    """
+    if _is_compiled(law) or hasattr(law, "py_func"):
+        return law
+    assert isinstance(law, FunctionType)
+    return _compiled_law(law, fingerprint(law))
+
+
+@lru_cache(maxsize=256)
+def _compiled_law(law: FunctionType, mark: str) -> Any:
+    """The compiled twin of a function with this fingerprint.
+
+    The cache on disk imports the module of each function that it loads, and the user's may not be there in the next
+    run: the twin belongs to this module.
+    """
+    helpers = {
+        name: callable_in_loops(value)
+        for name in _names(law.__code__)
+        if isinstance(value := law.__globals__.get(name), FunctionType) and value is not law and not is_exposed(value)
+    }
+    twin = _twin(law, helpers, law.__name__)
+    twin.__module__ = __name__
+    return inline(twin)
+
+
+def adapted(law: Callable[..., Any], arguments: str, sources: Mapping[str, str], result: str = "{}") -> Any:
+    """A law with named arguments as a template calls it.
+
+    law        takes some of the names of `sources`, in any order
+    arguments  of the template's call, for instance "contact, row"
+    sources    name -> where the template has it, for instance {"overlap": "contact.overlap"}
+    result     what to make of the value
+    """
+    taken = list(inspect.signature(law).parameters)
+    for name in taken:
+        if name not in sources:
+            raise InputError(f"argument of {law.__name__}", name, f"one of {', '.join(sources)}")
+    call = result.format(f"law({', '.join(sources[name] for name in taken)})")
+    return written(f"def adapter({arguments}):\n    return {call}\n", law=callable_in_loops(law))
+
+
+def written(source: str, how: Callable[..., Any] = inline, **names: Any) -> Any:
+    """The function of a source text, compiled.
+
+    how    inline, or another way to compile
+    names  what the function can refer to
+    """
+    scope: dict[str, Any] = {"__name__": __name__}
+    exec(source, scope)
+    made: FunctionType = next(value for value in scope.values() if isinstance(value, FunctionType))
+    made.__globals__.update(names)
+    return how(made)
+
+
+def check_compiles(what: str, law: Callable[..., Any]) -> None:
+    """Refuse a user's law that cannot be compiled, by its name.
+
+    what  the law is chosen for, as in a case
+    """
+    loop = callable_in_loops(law)
+    if not hasattr(loop, "compile"):  # compilation is switched off
+        return
+    try:
+        loop.compile((float64,) * len(inspect.signature(law).parameters))
+    except Exception as refusal:
+        reason = " ".join(str(refusal).split())[:200]
+        raise InputError(what, law.__name__, "numbers, math and if, which can be compiled", reason) from None
+
+
+def fingerprint(value: Any) -> str:
+    """Hash of a value, or of a function with all that it refers to."""
+    return _digest(_parts(value, set()))
+
+
+def _parts(value: Any, seen: set[int]) -> Iterator[str]:
+    if isinstance(value, FunctionType) or hasattr(value, "py_func"):
+        plain = _plain(value)
+        has_file = not plain.__code__.co_filename.startswith("<")
+        if hasattr(value, "tag") and has_file:  # the tag tells copies apart
+            yield f"{plain.__module__}.{plain.__name__}"
+            return
+        yield plain.__name__ if "<" in plain.__name__ else plain.__qualname__
+        if id(plain) in seen:
+            return
+        seen.add(id(plain))
+        yield from _code_parts(plain.__code__)
+        for each in (*(plain.__defaults__ or ()), *(cell.cell_contents for cell in plain.__closure__ or ())):
+            yield from _parts(each, seen)
+        names = _names(plain.__code__)
+        for name in names:
+            if name in plain.__globals__:
+                yield name
+                yield from _referred(plain.__globals__[name], names, seen)
+    elif isinstance(value, np.ndarray):
+        yield f"{value.dtype}{value.shape}{_digest([value.tobytes().hex()])}"
+    elif isinstance(value, tuple | list):
+        for each in value:
+            yield from _parts(each, seen)
+    elif value is None or isinstance(value, bool | int | float | complex | str | bytes | np.generic):
+        yield repr(value)
+    else:
+        name = getattr(value, "__qualname__", type(value).__qualname__)
+        yield f"{getattr(value, '__module__', '')}.{name}"
+
+
+def _referred(value: Any, names: list[str], seen: set[int]) -> Iterator[str]:
+    """Parts of a global value; of a module those attributes that the function may use."""
+    if not isinstance(value, ModuleType):
+        yield from _parts(value, seen)
+    elif value.__name__.partition(".")[0] not in sys.stdlib_module_names | {"numpy"}:
+        for name in names:
+            if hasattr(value, name):
+                yield f"{value.__name__}.{name}"
+                yield from _parts(getattr(value, name), seen)
+
+
+def _code_parts(code: CodeType) -> Iterator[str]:
+    yield code.co_code.hex()
+    yield repr((code.co_names, code.co_varnames))
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _code_parts(constant)
+        else:
+            yield repr(sorted(map(repr, constant)) if isinstance(constant, frozenset) else constant)
+
+
+def _names(code: CodeType) -> list[str]:
+    """Names that a function's code may look up, those of its inner functions included."""
+    inner = [name for each in code.co_consts if isinstance(each, CodeType) for name in _names(each)]
+    return list(dict.fromkeys([*code.co_names, *inner]))
+
+
+def _plain(function: Any) -> FunctionType:
+    return getattr(function, "py_func", function)  # type: ignore[no-any-return]
+
+
+def _is_compiled(value: Any) -> bool:
+    return hasattr(value, "compiled_as")
+
+
+def _twin(plain: FunctionType, bound: Mapping[str, Any], name: str) -> FunctionType:
+    """A copy of a function that finds other values under some names; the cache on disk tells copies apart by name."""
+    twin = FunctionType(plain.__code__, {**plain.__globals__, **bound}, name, plain.__defaults__, plain.__closure__)
+    twin.__qualname__, twin.__module__, twin.__doc__ = name, plain.__module__, plain.__doc__
+    return twin
+
+
+def _digest(parts: Any) -> str:
+    digest = hashlib.sha256()
+    for each in parts:
+        digest.update(each.encode() + b"\n")
+    return digest.hexdigest()[:12]

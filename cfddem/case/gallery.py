@@ -1,0 +1,105 @@
+"""Finds cases: the user's files and the gallery of the package; reads `key=value` overrides."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.input_errors import sections_of
+from cfddem.case.materials import Material
+from cfddem.case.renamed import new_name
+from cfddem.case.schema import Case
+
+
+def gallery() -> dict[str, Path]:
+    """Case files of the gallery by name."""
+    home = Path(str(files("scenarios"))) / "beds"
+    return {path.parent.name.replace("_", "-"): path for path in sorted(home.glob("*/case.toml"))}
+
+
+def copy_from_gallery(name: str, output: Path | None = None) -> Path:
+    """Copy a gallery case to a file of the user; an existing file is never overwritten.
+
+    name     of the gallery case
+    output   file to write; default: NAME.toml in the working directory
+    returns  the file
+    """
+    known = gallery()
+    if name.replace("_", "-") not in known:
+        raise InputError("name", name, nearest(name, known), "cfddem new lists the gallery")
+    source = known[name.replace("_", "-")]
+    output = output or Path(f"{source.parent.name}.toml")
+    try:
+        with output.open("x", encoding="utf-8") as file:
+            file.write(source.read_text(encoding="utf-8"))
+    except FileExistsError:
+        raise InputError(
+            "output", str(output), "a file that does not exist yet", "choose another name with -o"
+        ) from None
+    except OSError as failure:
+        raise InputError("output", str(output), "a file that can be written", str(failure.strerror)) from None
+    return output
+
+
+def find_case(name: Path | None) -> Path:
+    """Case file of a path or a gallery name; without a name, the only TOML file in the working directory."""
+    if name is None:
+        here = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
+        if len(here) != 1:
+            found = ", ".join(path.name for path in here) or "none"
+            raise InputError("case", None, f"given, unless the folder holds exactly one TOML file (found: {found})")
+        return here[0]
+    if name.is_file():
+        return name
+    known = gallery()
+    if str(name) in known:
+        return known[str(name)]
+    raise InputError("case", str(name), f"a file, or {nearest(str(name), known)}")
+
+
+def overrides(given: Sequence[str]) -> dict[str, Any]:
+    """Values of `key=value` texts by full key."""
+    values: dict[str, Any] = {}
+    for each in given:
+        key, equals, value = each.partition("=")
+        if not equals or not key:
+            raise InputError("--set", each, "key=value, such as bed.inlet_velocity=0.06")
+        values[full_key(key)] = read_value(value)
+    return values
+
+
+def read_value(text: str) -> Any:
+    """A value in TOML notation; other text is returned as a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (ValueError, RecursionError):
+        return text
+
+
+def full_key(key: str) -> str:
+    """The key with its table; the table may be left out if only one table has the key.
+
+    >>> full_key("seed"), full_key("fluid.viscosity"), full_key("title")
+    ('bed.seed', 'fluid.viscosity', 'title')
+    """
+    if "." in key or key in Case.model_fields:
+        return key
+    if renamed := new_name(key):
+        raise InputError("key", key, f"written as {renamed}", "the key has been renamed")
+    tables = {
+        name: sections[0].model_fields for name, field in Case.model_fields.items() if (sections := sections_of(field))
+    }
+    tables.pop("material")  # its keys need the name of the solid: material.NAME.density
+    found = [f"{name}.{key}" for name, words in tables.items() if key in words]
+    if len(found) > 1:
+        raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
+    if not found and key in Material.model_fields:
+        raise InputError("key", key, f"written as material.NAME.{key}", "NAME is the name of a material of the case")
+    if not found:
+        raise InputError("key", key, nearest(key, sorted({*Case.model_fields, *itertools.chain(*tables.values())})))
+    return found[0]

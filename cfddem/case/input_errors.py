@@ -1,0 +1,223 @@
+"""Turns validation failures into readable input errors: one line each with place, key, value, limit and remedy.
+
+All errors of a file are reported at once. A misspelled key or value is reported with the closest valid one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+import typing
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from cfddem.backend.errors import LONGEST, InputError, nearest, shown
+from cfddem.case.renamed import new_key, new_value
+
+MOST = 20
+"""At most this many input errors are listed."""
+
+Key = tuple[str | int, ...]
+
+
+class InputErrors(InputError):
+    """Several input errors, one line each.
+
+    each     the errors
+    omitted  number of further errors that are not listed
+    """
+
+    def __init__(self, each: Sequence[InputError], omitted: int = 0) -> None:
+        first = each[0]
+        super().__init__(first.field, first.value, first.limit, first.remedy)
+        self.each = tuple(each)
+        self.args = ("\n".join([*map(str, each), *([f"and {omitted} more input errors"] if omitted else [])]),)
+
+
+def dotted(key: Iterable[str | int]) -> str:
+    """A key as text: its parts joined by dots."""
+    text = ".".join(str(part) for part in key)
+    text = text if text.isprintable() else repr(text)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
+# ---------------------------------------------------------------- from pydantic to input errors
+
+
+def input_error(
+    failure: ValidationError,
+    model: type[BaseModel],
+    values: Any,
+    more: Iterable[InputError] = (),
+    place: typing.Callable[[Key], str] = lambda _: "",
+) -> InputError:
+    """The input error for a failed validation.
+
+    failure  what pydantic reports
+    model    class that was to be made
+    values   raw values
+    more     further errors, found elsewhere
+    place    location of a key, such as "bed.toml:14: "
+    """
+    reported = _by_key(failure, values)
+    found = [(key, _one(key, several, model)) for key, several in itertools.islice(reported.items(), MOST)]
+    errors = []
+    for key, error in [*found, *(((), error) for error in more)]:
+        beyond = error.field.removeprefix(dotted(key)).strip(".")  # a section names a key of its own
+        whole = (*key, *beyond.split(".")) if beyond else key
+        errors.append(InputError(place(whole) + error.field, error.value, error.limit, error.remedy))
+    omitted = max(0, len(reported) - MOST)
+    return errors[0] if len(errors) == 1 and not omitted else InputErrors(errors, omitted)
+
+
+def _by_key(failure: ValidationError, values: Any) -> dict[Key, list[Any]]:
+    """Reports grouped by key; a value that may be of two types gives one report for each type."""
+    found: dict[Key, list[Any]] = {}
+    for each in failure.errors(include_url=False):
+        found.setdefault(_key(each["loc"], values, each["type"]), []).append(each)
+    return found
+
+
+def _key(place: tuple[str | int, ...], values: Any, kind: str) -> Key:
+    """The key of a report: its location without the names of the types that were tried."""
+    key: list[str | int] = []
+    for part in place:
+        if isinstance(values, BaseModel):
+            values = dict(values)
+        entry = isinstance(values, list | tuple) and isinstance(part, int) and part < len(values)
+        if entry or (isinstance(values, Mapping) and part in values):
+            values = values[part]
+        elif not (kind == "missing" and part == place[-1] and isinstance(part, str)):
+            continue
+        key.append(part)
+    return tuple(key)
+
+
+def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError:
+    """One input error: field, value, limit, remedy."""
+    owner, field = _owner(model, key), dotted(key) or model.__name__.lower()
+    first = reports[0]
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        whole = field if key and str(key[-1]) == cause.field else dotted((*key, cause.field))
+        return InputError(whole, shown(cause.value), cause.limit, cause.remedy)
+    if cause is not None:
+        name, _, limit = str(cause).partition(": must be ")
+        return InputError(dotted((*key, name)), None, limit or str(cause))
+    last = str(key[-1]) if key else ""
+    if first["type"] == "extra_forbidden" and (renamed := new_key(field)):
+        return InputError(field, None, f"written as {renamed}", "the key has been renamed")
+    if first["type"] == "literal_error" and (renamed := new_value(field, first["input"])):
+        return InputError(field, shown(first["input"]), f"written as {renamed!r}", "the value has been renamed")
+    if first["type"] == "extra_forbidden":
+        return InputError(
+            field, shown(first["input"]), nearest(last, owner.model_fields), _right_table(last, owner, model)
+        )
+    limits = dict.fromkeys(filter(None, (_limit(each) for each in reports)))
+    about = owner.model_fields[last].description if last in owner.model_fields else None
+    value = None if limits.keys() == {"given"} else shown(first["input"])
+    return InputError(field, value, " or ".join(limits) or first["msg"], f"{last}: {about}" if about else "")
+
+
+_LIMITS = {
+    "missing": "given",
+    "finite_number": "a finite number",
+    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float", "int_parsing_size"), "a whole number"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
+    "string_type": "a string",
+    "string_pattern_mismatch": "made of letters, digits, _ and -",
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a table"),
+    "callable_type": "",
+    "none_required": "",
+}
+
+
+def _limit(report: Any) -> str:
+    """The limit that a value violates, in words."""
+    kind, context = report["type"], report.get("ctx", {})
+    bounds = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
+    for name, word in bounds.items():
+        if name in context:
+            return f"{word} {context[name]:g}"
+    if kind == "missing" and isinstance(report["loc"][-1], int):
+        return "a longer list"
+    if kind == "literal_error":
+        known = re.findall(r"'([^']*)'", str(context.get("expected", "")))
+        return nearest(str(report["input"])[:LONGEST], known)
+    if kind in ("tuple_type", "too_short", "too_long"):
+        length = context.get("actual_length")
+        return "a list" if length is None else f"a list of another length than {length}"
+    return _LIMITS.get(kind, str(report["msg"]).lower())
+
+
+def _owner(model: type[BaseModel], key: Key) -> type[BaseModel]:
+    """The section that the last part of a key belongs to."""
+    for part in key[:-1]:
+        if part in model.model_fields:
+            model = next(iter(sections_of(model.model_fields[str(part)])), model)
+    return model
+
+
+def field_of(model: type[BaseModel], key: Sequence[str]) -> str | None:
+    """Description of a key; None for an unknown one."""
+    owner = _owner(model, tuple(key))
+    return owner.model_fields[key[-1]].description if key[-1] in owner.model_fields else None
+
+
+def sections_of(field: FieldInfo) -> list[type[BaseModel]]:
+    """Models nested in a field."""
+    return list(_models(field.annotation))
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models in a type annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for each in typing.get_args(annotation):
+        yield from _models(each)
+
+
+def _right_table(word: str, owner: type[BaseModel], model: type[BaseModel]) -> str:
+    """Remedy for a key in the wrong table; empty if no table has the key."""
+    for name, field in model.model_fields.items():
+        for part in sections_of(field):
+            if part is not owner and word in part.model_fields:
+                return f"{word} belongs to {name}"
+    return ""
+
+
+# ---------------------------------------------------------------- line of a key in a file
+
+_PART = r"(?:[\w-]+|\"[^\"\n]*\"|'[^'\n]*')"
+_DOTTED = rf"{_PART}(?:[ \t]*\.[ \t]*{_PART})*"
+_LINE = re.compile(rf"[ \t]*(?:\[\[?[ \t]*(?P<table>{_DOTTED})[ \t]*\]|(?P<key>{_DOTTED})[ \t]*=)")
+
+
+def key_lines(text: str) -> dict[Key, int]:
+    """Line number of every key and table of a TOML text that begins a line."""
+    lines: dict[Key, int] = {}
+    table: Key = ()
+    for number, line in enumerate(text.split("\n"), 1):
+        found = _LINE.match(line[:1000])
+        if found is None:
+            continue
+        parts = tuple(each.strip("\"'") for each in re.findall(_PART, found["table"] or found["key"]))
+        if found["table"]:
+            table = parts
+        else:
+            parts = (*table, *parts)
+        lines.setdefault(parts, number)
+    return lines
+
+
+def line_of(key: Key, lines: Mapping[Key, int]) -> int | None:
+    """Line number of a key, or of the table that should hold it; None if neither is in the file."""
+    words = tuple(part for part in key if isinstance(part, str))
+    for length in range(len(words), 0, -1):
+        if words[:length] in lines:
+            return lines[words[:length]]
+    return None

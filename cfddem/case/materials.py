@@ -1,0 +1,102 @@
+"""Solids and fluids as a case describes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+
+from cfddem.backend.errors import InputError
+from cfddem.case.input_errors import input_error
+
+
+class Checked(BaseModel):
+    """A frozen description. Its values are checked when it is made; every invalid value is one line of the error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_bool_as_number(cls, value: Any, about: ValidationInfo) -> Any:
+        field = cls.model_fields[about.field_name or ""]
+        if isinstance(value, bool) and field.annotation is not bool:
+            raise InputError(about.field_name or "", value, "something other than true or false")
+        return value
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as failure:
+            raise input_error(failure, type(self), values) from None
+
+    __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # a nested description keeps its own errors
+
+
+class Material(Checked):
+    """A solid.
+
+    Films always use the real `youngs_modulus`. A smaller `contact_modulus` softens the contact only, so that
+    larger time steps are stable.
+    """
+
+    density: float = Field(gt=0, description="density rho_p [kg/m3]")
+    youngs_modulus: float = Field(gt=0, description="Young's modulus E of the real solid [Pa]")
+    poisson: float = Field(gt=-1, le=0.5, description="Poisson's ratio nu [-]")
+    restitution: float = Field(1.0, gt=0, le=1, description="dry normal restitution e [-]")
+    friction: float = Field(0.0, ge=0, description="dry friction coefficient mu [-]")
+    rolling_friction: float = Field(0.0, ge=0, description="rolling friction mu_r: lever arm over R* [-]")
+    friction_lubricated: float | None = Field(
+        None, ge=0, description="friction coefficient while a film separates the solids; default: friction [-]"
+    )
+    surface_energy: float = Field(
+        0.0, ge=0, description="surface energy gamma, half the work of adhesion of two like solids [J/m2]"
+    )
+    roughness: float = Field(0.0, ge=0, description="height of asperities sigma [m]")
+    contact_modulus: float | None = Field(
+        None, gt=0, description="Young's modulus used in contacts; default: youngs_modulus [Pa]"
+    )
+
+    @model_validator(mode="after")
+    def _contact_not_stiffer_than_solid(self) -> Material:
+        if self.contact_modulus is not None and self.contact_modulus > self.youngs_modulus:
+            raise InputError(
+                "contact_modulus", self.contact_modulus, f"at most youngs_modulus, {self.youngs_modulus:g} Pa",
+                "it can only soften contacts",
+            )  # fmt: skip
+        return self
+
+
+class Fluid(Checked):
+    """A Newtonian fluid with constant viscosity or a viscosity that varies with height.
+
+    Viscosity 0 means no drag and no films.
+    """
+
+    density: float = Field(gt=0, description="density rho_f [kg/m3]")
+    viscosity: float = Field(ge=0, description="dynamic viscosity eta [Pa s]")
+    viscosity_profile: tuple[tuple[float, float], ...] = Field(
+        (),
+        description="[height, eta] pairs, interpolated linearly; the pre-run check uses `viscosity` [m, Pa s]",
+    )
+
+    @model_validator(mode="after")
+    def _profile_ordered_and_positive(self) -> Fluid:
+        heights, values = [height for height, _ in self.viscosity_profile], [eta for _, eta in self.viscosity_profile]
+        if sorted(set(heights)) != heights:
+            raise InputError("viscosity_profile", heights, "[height, eta] pairs in increasing height, in m and Pa s")
+        if self.viscosity_profile and not min(self.viscosity, *values) > 0.0:
+            lowest = min(self.viscosity, *values)
+            raise InputError("viscosity_profile", lowest, "above 0 everywhere, and so must viscosity")
+        return self
+
+    def viscosity_at(self, height: np.ndarray) -> np.ndarray:
+        """Dynamic viscosity at heights [m] [Pa s].
+
+        >>> Fluid(density=1e3, viscosity=1e-3, viscosity_profile=((0.0, 1e-3), (0.1, 5e-3))).viscosity_at([0.05, 0.2])
+        array([0.003, 0.005])
+        """
+        if not self.viscosity_profile:
+            return np.full(np.shape(height), self.viscosity)
+        heights, values = np.array(self.viscosity_profile).T
+        return np.interp(height, heights, values)

@@ -1,0 +1,270 @@
+"""The case: the complete description of a run. It is checked when it is made and does not change afterwards.
+
+Python and TOML use the same keys. A case is data; reading one executes nothing. :mod:`cfddem.run.build` makes the
+walls, boundaries, particles and solvers from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError, field_validator, model_validator
+
+from cfddem.backend.errors import InputError, nearest, shown
+from cfddem.backend.law_choice import BUILT_IN
+from cfddem.case.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
+from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
+from cfddem.case.laws import CaseLaws
+from cfddem.case.materials import Checked, Fluid, Material
+from cfddem.case.toml_text import parse, read_text, set_value
+
+
+class Column(Checked):
+    """The vessel and its grid: a box, or an upright cylinder inside a box of cells."""
+
+    shape: Literal["box", "cylinder"] = Field("box", description="shape of the vessel; a cylinder is upright")
+    width: Positive = Field(description="width along x, or diameter of a cylinder [m]")
+    depth: Positive | None = Field(None, description="depth along y; default: width [m]")
+    height: Positive = Field(description="height along z [m]")
+    cell: Positive | tuple[Positive, Positive, Positive] = Field(
+        description="edge of a cubic cell, or edges along x, y, z [m]"
+    )
+    sides: Literal["no_slip", "free_slip", "periodic"] = Field(
+        "no_slip", description="boundary condition of the fluid on the sides"
+    )
+    front: Literal["no_slip", "free_slip", "periodic"] | None = Field(
+        None, description="boundary condition on the two sides normal to y; default: sides"
+    )
+    ends: Literal["flow", "closed", "periodic"] = Field(
+        "flow", description="floor and lid: inlet and outlet, closed walls, or periodic"
+    )
+    material: str | None = Field(None, description="material of the walls; default: that of the bed")
+
+    @property
+    def size(self) -> Point:
+        """Edges of the box (x, y, z) [m]."""
+        return self.width, self.width if self.depth is None else self.depth, self.height
+
+    @property
+    def floor_area(self) -> float:
+        """Area of the floor [m2]."""
+        width, depth, _ = self.size
+        return 0.25 * math.pi * width**2 if self.shape == "cylinder" else width * depth
+
+    @model_validator(mode="after")
+    def _check_cylinder(self) -> Column:
+        if self.shape == "cylinder":
+            if self.depth not in (None, self.width):
+                raise InputError(
+                    "depth", self.depth, "left out, or equal to width", "the width of a cylinder is its diameter"
+                )
+            if self.sides == "periodic":
+                raise InputError("sides", self.sides, "no_slip or free_slip", "the side of a cylinder is a wall")
+            if self.front is not None:
+                raise InputError("front", self.front, "left out", "a cylinder has only one side")
+        return self
+
+
+class CaseRun(Checked):
+    """Duration, output and time steps."""
+
+    until: Positive = Field(description="end time [s]")
+    every: Positive | None = Field(None, description="interval between snapshots; default: until / 50 [s]")
+    history_every: Positive | None = Field(None, description="interval between history rows; default: every / 10 [s]")
+    average_from: float | None = Field(None, ge=0, description="start of time averages; default: until / 2 [s]")
+    particle_step: Positive | None = Field(None, description="particle time step; default: 2 % of the Hertz time [s]")
+    fluid_step: Positive | None = Field(
+        None, description="upper limit of the fluid time step; default: set by its stability criteria [s]"
+    )
+    reference_speed: Positive | None = Field(
+        None, description="expected highest collision speed, which sets the time step; default: estimated [m/s]"
+    )
+    energy_budget: bool = Field(
+        False, description="record the energy budget, force by force; takes up to 50 % more time"
+    )
+    record_collisions: bool = Field(
+        False, description="record every collision of two particles, from first to last contact"
+    )
+
+
+class Case(Checked):
+    """The complete description of a run.
+
+    >>> case = Case(
+    ...     fluid=dict(density=998.0, viscosity=1e-3),
+    ...     material=dict(glass=dict(density=2540.0, youngs_modulus=60e9, poisson=0.23, friction=0.4)),
+    ...     column=dict(width=0.02, height=0.12, cell=0.005),
+    ...     bed=dict(diameter=2e-3, count=2000, inlet_velocity=0.05),
+    ...     run=dict(until=2.0),
+    ... )
+    >>> case.solid.density
+    2540.0
+    """
+
+    title: str = Field("", description="title, one line")
+    fluid: Fluid | None = Field(None, description="the fluid; without this table, dry particles only")
+    material: dict[str, Material] = Field(min_length=1, description="solids by name")
+    column: Column
+    bed: Bed
+    laws: CaseLaws = CaseLaws.model_validate({})
+    run: CaseRun
+
+    @field_validator("title")
+    @classmethod
+    def _title_is_one_line(cls, value: str) -> str:
+        if not value.isprintable() or len(value) > 200:
+            raise InputError("title", value, "one line of at most 200 printable characters")
+        return value
+
+    @model_validator(mode="after")
+    def _material_names_exist(self) -> Case:
+        named = {f"bed.species.{name}": each.material for name, each in self.bed.species.items()}
+        for error in _unknown_materials(list(self.material), named or {"bed": self.bed.material}, self.column.material):
+            raise error
+        return self
+
+    @property
+    def species(self) -> dict[str, Species]:
+        """Species by name; a bed of one kind is one species, named after its material."""
+        only = next(iter(self.material))
+        return dict(self.bed.species) or {self.bed.material or only: self.bed}
+
+    def material_of(self, species: Species) -> Material:
+        """Material of the particles of a species."""
+        return self.material[self.material_name_of(species)]
+
+    def material_name_of(self, species: Species) -> str:
+        """Name of the material of a species."""
+        return species.material or next(iter(self.material))
+
+    @property
+    def solid(self) -> Material:
+        """Material of the particles, if they are all of one kind.
+
+        Raises InputError for a mixture.
+        """
+        if self.bed.species:
+            raise InputError("bed.species", None, "left out; this operation needs a bed of one material")
+        return self.material_of(self.bed)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of particles of each species: as given, or as many as a poured bed of the given height holds."""
+        bed = self.bed
+        if bed.height is None:
+            return {name: each.count or len(bed.positions) for name, each in self.species.items()}
+        solids = POURED_SOLID_FRACTION * self.column.floor_area * bed.height
+        shares = bed.species_volumes(solids) or dict.fromkeys(self.species, solids)
+        return {name: int(shares[name] / each.mean_volume) for name, each in self.species.items()}
+
+    @property
+    def volumes(self) -> dict[str, float]:
+        """Particle volume of each species [m3]."""
+        return {name: count * self.species[name].mean_volume for name, count in self.counts.items()}
+
+    @property
+    def solid_density(self) -> float:
+        """Volume mean of the particle density [kg/m3]."""
+        volumes, species = self.volumes, self.species
+        mass = sum(volume * self.material_of(species[name]).density for name, volume in volumes.items())
+        return mass / sum(volumes.values())
+
+    @property
+    def has_films(self) -> bool:
+        """Whether lubrication films form between close spheres."""
+        return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.lubrication != "none"
+
+    @property
+    def particle_count(self) -> int:
+        """Total number of particles."""
+        return sum(self.counts.values())
+
+    @property
+    def reference_speed(self) -> float:
+        """Highest collision speed to expect [m/s].
+
+        As given in `run.reference_speed`, or the largest of twice the inlet velocity, the speed after a fall of one
+        diameter, and the initial speed.
+        """
+        if self.run.reference_speed is not None:
+            return self.run.reference_speed
+        fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.largest_diameter)
+        return max(2.0 * self.bed.fastest_inflow, fall, math.hypot(*self.bed.initial_velocity))
+
+    @classmethod
+    def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
+        """Read a case from a TOML file.
+
+        overrides  values that replace those of the file, {"bed.inlet_velocity": 0.06, ...}
+
+        Raises InputError that lists every input error with file, line, key, value and limit.
+        """
+        return cls.from_text(read_text(Path(path)), str(path), overrides)
+
+    @classmethod
+    def from_text(cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None) -> Case:
+        """Read a case from the text of a TOML file; errors call it `name`."""
+        values = parse(text, name)
+        for key, value in (overrides or {}).items():
+            set_value(values, key.split("."), value, key)
+        try:
+            return cls.model_validate(values)
+        except ValidationError as failure:
+            lines, given = key_lines(text), {tuple(key.split(".")) for key in overrides or {}}
+
+            def place(key: Key) -> str:
+                if key in given:
+                    return "--set "
+                line = line_of(key, lines)
+                return f"{name}: " if line is None else f"{name}:{line}: "
+
+            raise input_error(failure, cls, values, _unknown_materials_in(failure, values), place) from None
+
+    def to_toml(self) -> str:
+        """The case as TOML text; `Case.from_text` reads it back as an equal case."""
+        import tomli_w
+
+        values = self.model_dump(exclude_defaults=True, exclude_none=True)
+        for kind in BUILT_IN:
+            if callable(law := getattr(self.laws, kind)):
+                values["laws"][kind] = getattr(law, "__name__", "user-defined law")
+        return tomli_w.dumps(values)
+
+    def with_(self, **changes: Any) -> Case:
+        """A changed copy: `case.with_(**{"bed.inlet_velocity": 0.06})`, or whole tables by name."""
+        values = self.model_dump()
+        for key, value in changes.items():
+            set_value(values, key.split("."), value, key)
+        return Case(**values)
+
+
+def _unknown_materials(known: list[str], beds: Mapping[str, str | None], column: str | None) -> Iterator[InputError]:
+    """Errors for material names without a [material.NAME] table; `beds` holds the name used under each key."""
+    for key, name in beds.items():
+        if name is None and len(known) > 1:
+            yield InputError(f"{key}.material", None, f"given, {nearest('', known)}")
+    for key, name in {**beds, "column": column}.items():
+        if name is not None and name not in known:
+            remedy = "every material is a table [material.NAME]"
+            yield InputError(f"{key}.material", shown(name), nearest(name, known), remedy)
+
+
+def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -> list[InputError]:
+    """Errors for unknown material names in raw values, where other errors prevent the case from being made."""
+    if any(each["loc"] == () for each in failure.errors()):
+        return []
+    known, bed, column = (values.get(name) for name in ("material", "bed", "column"))
+    if not (isinstance(known, dict) and known and isinstance(bed, dict) and isinstance(column, dict)):
+        return []
+    species = bed.get("species") or {"": bed}
+    if not isinstance(species, dict):
+        return []
+    tables = {f"bed.species.{name}" if name else "bed": each for name, each in species.items()}
+    named = {key: each.get("material") for key, each in tables.items() if isinstance(each, dict)}
+    beds = {dotted([key]): name for key, name in named.items() if isinstance(name, str | None)}
+    walls = column.get("material")
+    names = [dotted([each]) for each in known]
+    return list(_unknown_materials(names, beds, walls if isinstance(walls, str) else None))

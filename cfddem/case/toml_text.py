@@ -1,0 +1,73 @@
+"""Reads and parses the text of a case file, and sets single values. Text that cannot be a case is refused early."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from cfddem.backend.errors import InputError, shown
+
+LONGEST_FILE = 500_000
+"""Largest case file; very many particle positions are given from Python instead [characters]."""
+
+DEEPEST_KEY = 20
+"""Most dots in a key; the time to parse a dotted key grows with the square of their number."""
+
+
+def read_text(path: Path) -> str:
+    """Text of a case file."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(LONGEST_FILE + 1)
+        if len(content) > LONGEST_FILE:
+            raise _too_long(f"case {path}")
+        return content.decode("utf-8-sig").replace("\r\n", "\n")
+    except OSError as failure:
+        raise InputError(f"case {path}", None, "a readable TOML file", failure.strerror or str(failure)) from None
+    except UnicodeDecodeError as failure:
+        remedy = f"byte {failure.start} is not UTF-8; save the file as UTF-8"
+        raise InputError(f"case {path}", None, "UTF-8 text", remedy) from None
+
+
+_DEEP = re.compile(rf"(?:[\w\"'-]{{1,64}}+[ \t]*+\.[ \t]*+){{{DEEPEST_KEY}}}")
+
+
+def parse(text: str, name: str) -> dict[str, Any]:
+    """Values of a TOML text; errors call it `name`."""
+    text = text.removeprefix("\ufeff")
+    if len(text) > LONGEST_FILE:
+        raise _too_long(name)
+    deep = _DEEP.search(text)
+    if deep is not None:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(f"{name}:{line}", None, f"a case with fewer than {DEEPEST_KEY} dots in a key")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError(name, None, "a case with lists and tables nested a few levels deep") from None
+    except ValueError as failure:
+        reason, _, where = str(failure).partition(" (at ")
+        found = re.match(r"line (\d+), column (\d+)", where)
+        place = f"{name}:{found[1]}" if found else name
+        where = f" in column {found[2]}" if found else ""
+        remedy = "; strings need quotation marks" if reason == "Invalid value" else ""
+        raise InputError(place, None, "valid TOML", reason + where + remedy) from None
+
+
+def _too_long(name: str) -> InputError:
+    return InputError(name, None, f"at most {LONGEST_FILE // 1000} kB", "give very many positions from Python instead")
+
+
+def set_value(values: dict[str, Any], keys: list[str], value: Any, whole: str) -> None:
+    """Set a value in nested tables.
+
+    keys   of the tables and of the value
+    whole  the dotted key, for errors
+    """
+    for key in keys[:-1]:
+        values = values.setdefault(key, {})
+        if not isinstance(values, dict):
+            raise InputError(f"--set {whole}", shown(value), f"inside a table; {key} is a value")
+    values[keys[-1]] = value

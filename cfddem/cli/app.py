@@ -1,0 +1,98 @@
+"""The command line `cfddem`: its commands, and how their errors are printed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import textwrap
+
+from cyclopts import App, CycloptsError, Group
+
+from cfddem import __version__
+from cfddem.backend.errors import CfddemError
+from cfddem.cli import cases, laws, results, validation
+
+WIDTH = 100
+"""Widest line on a terminal [characters]."""
+
+app = App(
+    name="cfddem",
+    version=__version__,
+    help="""CFD-DEM of spheres in a fluid, with lubrication films between close spheres. All values are in SI units.
+
+A first run: cfddem new liquid-bed, then cfddem check, cfddem run, cfddem report, cfddem view
+
+Exit codes: 0 success; 1 a limit is exceeded (validate), warnings with --strict (check), or the machine is not ready
+(doctor); 2 wrong input, or a case with errors; 3 the run failed; 130 stopped from the keyboard, 143 by SIGTERM.
+""",
+    help_flags=["--help", "-h"],
+    group_commands=Group("Options", sort_key=99),
+)
+
+COMMANDS = {
+    "Cases": (cases.new, cases.check, cases.run, cases.resume, cases.sweep),
+    "Results": (results.report, results.view, results.export),
+    "Collisions of a few spheres": ("collide", "wet-wall", "three-spheres", "wet-pair"),
+    "Validation": (validation.validate, validation.bench),
+    "Information": (laws.explain, laws.doctor),
+}
+"""Commands by the panel of the help that lists them; those given by name are in :data:`COLLISIONS`."""
+
+COLLISIONS = {
+    "collide": ("collide", "Collide two spheres, or a sphere and a wall, in a fluid.",
+                "--material delrin --stokes 30 --velocity 0.1"),
+    "wet-wall": ("impact", "Let a sphere strike a wall under a thin liquid layer.",
+                 "--particle glass_1.74 --film 2e-4 --velocity 0.6"),
+    "three-spheres": ("simulate_three_spheres", "Let a wet sphere strike a resting pair of wet spheres.",
+                      "--stokes 12 --theta12 30"),
+    "wet-pair": ("collide_wet", "Let a wet sphere strike an equal one at rest; by default, steel in silicone oil.",
+                 "--stokes 1.2 --angle 60"),
+}  # fmt: skip
+"""Name in :mod:`cfddem.cli.collisions`, summary and example of each; loaded when called, as they load the compiler."""
+
+for position, (panel, commands) in enumerate(COMMANDS.items()):
+    group = Group(panel, sort_key=position)
+    for place, command in enumerate(commands):
+        if not isinstance(command, str):
+            app.command(command, group=group, sort_key=place)
+            continue
+        attribute, summary, example = COLLISIONS[command]
+        text = f"{summary}\n\nExample: cfddem {command} {example}\n"
+        app.command(f"cfddem.cli.collisions:{attribute}", name=command, help=text, group=group, sort_key=place)
+
+app.register_install_completion_command(help="Complete commands and options in this shell with the Tab key.")
+
+
+def main() -> None:
+    """Run a command. A user's error ends in one line and exit code 2, never in a traceback."""
+    try:
+        app(sys.argv[1:], exit_on_error=False, print_error=False)
+    except CycloptsError as failure:
+        _print_error(" ".join(str(failure).split()))
+        sys.exit(2)
+    except CfddemError as failure:
+        for line in str(failure).splitlines():
+            _print_error(line)
+        sys.exit(failure.exit_code)
+    except BrokenPipeError:  # the reader of the output has closed it, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as failure:  # such as a full disk, or a folder without write permission
+        _print_error(f"{failure.filename or 'file'}: {failure.strerror or failure}")
+        sys.exit(2)
+    except KeyboardInterrupt:
+        _print_error("stopped")
+        sys.exit(130)
+
+
+def _print_error(message: str) -> None:
+    """Print an error: wrapped between words on a terminal, on one line elsewhere."""
+    line = f"cfddem: {message}"
+    if sys.stderr.isatty():
+        width = min(WIDTH, shutil.get_terminal_size().columns)
+        line = textwrap.fill(line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    print(line, file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

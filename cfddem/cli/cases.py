@@ -1,0 +1,174 @@
+"""Commands for cases: start one, check it, run it, resume it, sweep over its values."""
+
+from __future__ import annotations
+
+import json as _json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from cfddem.cli.printing import announce_compilation, with_colour
+
+CASE = "case file or gallery name; default: the only TOML file here"
+SET = "KEY=VALUE that replaces a value of the case; may be repeated"
+THREADS = "number of threads; default: all processors"
+LOG = "file for progress, one line per history row"
+
+
+def new(
+    name: Annotated[str | None, Parameter(help="gallery name; without it, the gallery is listed")] = None,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="file to write; default: NAME.toml")] = None,
+    schema: Annotated[bool, Parameter(help="print the JSON schema of case files, for editors", negative="")] = False,
+) -> None:
+    """Copy a commented case from the gallery to this folder, as a start for your own.
+
+    Example: cfddem new liquid-bed
+    """
+    from cfddem.case.gallery import copy_from_gallery, gallery
+    from cfddem.case.schema import Case
+
+    if schema:
+        print(_json.dumps(Case.model_json_schema(), indent=2))
+    elif name is None:
+        for known, path in gallery().items():
+            print(f"{known:<20}  {Case.from_toml(path).title}")
+    else:
+        written = copy_from_gallery(name, output)
+        print(f"written to {written}; edit it, then: cfddem check {written}, cfddem run {written}")
+
+
+def check(
+    case: Annotated[Path | None, Parameter(help=CASE)] = None,
+    *,
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run or written.
+
+    Exit code: 0 without errors, 2 with errors.
+
+    Example: cfddem check liquid-bed --set bed.inlet_velocity=0.1
+    """
+    from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.schema import Case
+    from cfddem.preflight.summary import preflight
+
+    result = preflight(Case.from_toml(find_case(case), overrides(set or [])))
+    print(_json.dumps(result.summary()) if json else "\n".join(with_colour(result.lines())))
+    sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
+
+
+def run(
+    case: Annotated[Path | None, Parameter(help=CASE)] = None,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; default: NAME-run")] = None,
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    threads: Annotated[int | None, Parameter(help=THREADS)] = None,
+    log: Annotated[Path | None, Parameter(help=LOG)] = None,
+) -> None:
+    """Run a case, write snapshots and history to a new folder, and print a report.
+
+    The case is checked first. With errors it is not run.
+
+    Example: cfddem run liquid-bed -o bed --set start=suspended --set run.until=0.02
+    """
+    from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.schema import Case
+    from cfddem.case.toml_text import read_text
+    from cfddem.preflight.summary import refuse_errors
+
+    path = find_case(case)
+    described = Case.from_toml(path, overrides(set or []))
+    for issue in refuse_errors(described).issues:
+        print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
+    from cfddem.analysis.report import report as summary
+    from cfddem.analysis.report_text import lines
+    from cfddem.backend.compile import use_threads
+    from cfddem.run.progress import live_line
+    from cfddem.run.runner import Run
+    from cfddem.run.warmup import warmup
+
+    folder = output or Path(f"{path.stem}-run")
+    use_threads(threads)
+    with live_line(log) as line:
+        text = described.to_toml() if set else read_text(path)
+        with warmup(described):
+            prepared = Run.begin(described, folder, text=text, report=line.update, progress=line.progress)
+        prepared.go()
+    print("\n".join(lines(summary(folder))))
+    print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
+
+
+def resume(
+    folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
+    *,
+    until: Annotated[float | None, Parameter(help="new end time [s]")] = None,
+    threads: Annotated[int | None, Parameter(help=THREADS)] = None,
+    log: Annotated[Path | None, Parameter(help=LOG)] = None,
+) -> None:
+    """Continue a run that was stopped or killed, or extend one that has finished.
+
+    The result is the same to the last bit as that of an uninterrupted run.
+
+    Example: cfddem resume bed --until 0.03
+    """
+    from cfddem.backend.compile import use_threads
+    from cfddem.io.reading import newest_run
+    from cfddem.run.progress import live_line
+    from cfddem.run.runner import Run
+
+    use_threads(threads)
+    folder = folder or newest_run(Path())
+    with live_line(log) as line:
+        Run.resume(folder, until=until, report=line.update, progress=line.progress).go()
+    print(f"written to {folder}")
+
+
+def sweep(
+    case: Annotated[Path | None, Parameter(help=CASE)] = None,
+    *,
+    over: Annotated[list[str], Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")],
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
+    json: Annotated[bool, Parameter(help="print the outcomes as JSON", negative="")] = False,
+) -> None:
+    """Run a case for many values, one folder each, and write a table and a figure of the results.
+
+    After a stop, the same command continues with the missing runs. Exit code: 3 if a run fails; the others are kept.
+
+    Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
+    """
+    from dataclasses import asdict
+
+    from cfddem.case.gallery import find_case, overrides
+    from cfddem.run.sweep import Outcome, failures, ranges
+    from cfddem.run.sweep import sweep as run_all
+
+    path = find_case(case)
+    values = ranges(over)
+    done = 0
+
+    def progress(outcome: Outcome) -> None:
+        nonlocal done
+        done += 1
+        status = "already finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
+        print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
+
+    folder = output or Path(f"{path.stem}-sweep")
+    if jobs == 1:
+        announce_compilation()
+    outcomes = run_all(path, values, folder, overrides=overrides(set or []), jobs=jobs, progress=progress)
+    failed = list(failures(outcomes))
+    if json:
+        print(_json.dumps([asdict(each) for each in outcomes]))
+    else:
+        print(f"table and figure written to {folder}")
+    for line in failed:
+        print(f"cfddem: {line}", file=sys.stderr)
+    if failed:
+        sys.exit(3)

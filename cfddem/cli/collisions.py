@@ -1,0 +1,102 @@
+"""Commands for collisions of a few spheres; loaded when one is called, because the scenarios load the compiler."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.cli.printing import show
+from cfddem.cli.scenario_commands import command
+from scenarios.collisions import immersed_pair, three_spheres, wet_pair, wet_wall
+from scenarios.collisions.three_spheres.figures import draw_map
+
+
+def _collide(
+    *, material: str, target: str | None, diameter: float, target_diameter: float | None, spin: float, **given: Any
+) -> immersed_pair.Collision:
+    """Collide two spheres of named materials."""
+    known = immersed_pair.MATERIALS
+    for name in (material, target):
+        if name is not None and name not in known:
+            raise InputError("material", name, nearest(name, known))
+    return immersed_pair.collide(
+        (known[material], known[target or material]),
+        diameter=(diameter, diameter if target_diameter is None else target_diameter),
+        spin=(spin, 0.0),
+        **given,
+    )
+
+
+collide = command(
+    immersed_pair.collide,
+    units={
+        "rebound_angle_striker": "deg",
+        "rebound_angle_relative": "deg",
+        "minimum_gap": "m",
+        "stop_gap": "m",
+        "spin": "rad/s",
+    },
+    options={
+        "material": (str, "delrin", "steel_smooth, steel_rough, glass or delrin"),
+        "target": (str | None, None, "material of the target or wall; the same if not given"),
+        "diameter": (float, 12.7e-3, "of the striker [m]"),
+        "target_diameter": (float | None, None, "of the target; the same if not given [m]"),
+        "spin": (float, 0.0, "of the striker before the collision [rad/s]"),
+    },
+    call=_collide,
+)
+
+
+def _show_impact(result: wet_wall.Impact, json: bool) -> None:
+    values = result.summary()
+    units = {
+        "spin": "rad/s",
+        "half_filling_angle": "deg",
+        "contact_speed": "m/s",
+        "bridge_volume": "m3",
+        "rupture_length": "m",
+        "duration": "s",
+    }
+    if not json:
+        lost = {f"{name}_lost": energy for name, energy in values.pop("energy_lost").items()}
+        values |= lost
+        units |= dict.fromkeys(lost, "J/kg")
+    show(values, units, json)
+
+
+impact = command(
+    wet_wall.impact,
+    show_result=_show_impact,
+)
+
+
+def _three_spheres(*, map: Path | None, **given: Any) -> three_spheres.Triplet:
+    """Simulate three spheres, and draw the map of outcomes if asked for."""
+    if map is not None:
+        draw_map(map, given)
+    return three_spheres.simulate_three_spheres(**given)
+
+
+def _show_triplet(result: three_spheres.Triplet, json: bool) -> None:
+    values = result.summary()
+    if json:
+        show(values, {}, json)
+        return
+    events, contacts = values.pop("events"), values.pop("contacts")
+    show(values | {f"contacts{pair}": count for pair, count in contacts.items()}, {}, json)
+    for event in events:
+        print("t = {time:<9.4f} t* = {time_star:<8.4f} {pair} {kind:<8} at {speed:.4f}".format(**event))
+
+
+simulate_three_spheres = command(
+    three_spheres.simulate_three_spheres,
+    options={"map": (Path | None, None, "PNG file for a map of the outcomes at all St and angles")},
+    call=_three_spheres,
+    show_result=_show_triplet,
+)
+
+collide_wet = command(
+    wet_pair.collide_wet,
+    units={"spin": "rad/s", "separation_time": "s", "minimum_gap": "m", "velocity": "m/s", "turned": "deg"},
+)

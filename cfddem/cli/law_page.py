@@ -1,0 +1,180 @@
+"""Documentation of a law on a terminal: sentence, equation, arguments, range, reference; and a plot."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+import textwrap
+from pathlib import Path
+from typing import Any
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.cli.equation_text import equation_text
+from closures import registry
+from closures.registry import Law
+
+WIDTH = 100
+"""Columns of printed text."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
+CURVES = 4
+"""Curves in a plot, one for each value of the second argument."""
+
+
+def laws() -> dict[str, dict[str, Law]]:
+    """All laws by kind and name, including those of installed packages."""
+    registry.load_built_in_laws()
+    registry.load_package_laws()
+    return registry.REGISTRY
+
+
+def find(name: str) -> Law:
+    """A law by its name, or by its kind and name where two laws share the name.
+
+    >>> find("di_felice").kind, find("drag.stokes").kind
+    ('drag', 'drag')
+    """
+    kind, _, word = name.replace("-", "_").rpartition(".")
+    every = [law for those in laws().values() for law in those.values()]
+    found = [law for law in every if law.name == word and kind in ("", law.kind)]
+    if not found:
+        closest = _closest(word, [law.name for law in every])
+        raise InputError("law", name, f"a name listed by `cfddem explain`, such as {closest}")
+    if len(found) > 1:
+        raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")
+    return found[0]
+
+
+def _closest(word: str, known: list[str]) -> str:
+    """The closest known name."""
+    found = nearest(word, known).partition("did you mean ")[2]
+    return found.rstrip("?)").strip("'") or "di_felice"
+
+
+def summary(law: Law) -> dict[str, Any]:
+    """Documentation of a law as plain values."""
+    text = inspect.getdoc(law.function) or ""
+    equation = re.search(r"\.\. math:: (.*?)\n\n", text + "\n\n", re.DOTALL)
+    return {
+        "name": law.name,
+        "kind": law.kind,
+        "sentence": text.split("\n\n")[0].replace("\n", " "),
+        "equation": " ".join(equation[1].split()) if equation else None,
+        "arguments": list(inspect.signature(law.function).parameters),
+        "ranges": {name: [low, high] for name, (low, high) in law.ranges.items()},
+        "reference": law.reference,
+        "module": law.function.__module__,
+    }
+
+
+def page(law: Law) -> list[str]:
+    """Documentation of a law as text, at most 100 columns wide."""
+    out = [f"{law.name}, {law.kind}   ({law.function.__module__})", ""]
+    text = inspect.getdoc(law.function) or ""
+    paragraphs: list[str] = [each for each in text.split("\n\n") if not each.lstrip().startswith(">>>")]
+    for paragraph in paragraphs:
+        if paragraph.startswith(".. math::"):
+            out += _equation_lines(" ".join(paragraph.removeprefix(".. math::").split()))
+        elif re.match(r"\w+(, \w+)*  +\S", paragraph):
+            for line in plain_words(paragraph).split("\n"):
+                indent = len(line) - len(re.sub(r"^(\w+(, \w+)*)?  +", "", line))
+                out += textwrap.wrap(line, WIDTH, subsequent_indent=" " * indent, drop_whitespace=True) or [""]
+        else:
+            out += textwrap.wrap(" ".join(plain_words(paragraph).split()), WIDTH)
+        out.append("")
+    for name, (low, high) in law.ranges.items():
+        out.append(f"fitted for {name} from {low:g} to {high:g}")
+    out += textwrap.wrap(f"reference: {law.reference}", WIDTH, subsequent_indent="  ")
+    return out
+
+
+def _equation_lines(equation: str) -> list[str]:
+    """An equation in LaTeX as lines of text: one for each part between wide spaces."""
+    out = []
+    for part in re.split(r"\\q?quad|\\\\", equation):
+        text = _solid_brackets(equation_text(part.strip()))
+        out += textwrap.wrap(text, WIDTH - 4, initial_indent="    ", subsequent_indent="        ")
+    return [line.replace(NO_BREAK, " ") for line in out]
+
+
+def _solid_brackets(equation: str) -> str:
+    """An equation without places for a line break inside brackets."""
+    depth, out = 0, ""
+    for letter in equation:
+        depth += (letter in "([") - (letter in ")]")
+        out += NO_BREAK if letter == " " and depth > 0 else letter
+    return out
+
+
+def listing() -> list[str]:
+    """All laws by kind: one line each, and one for the range if there is one, at most 100 columns wide."""
+    out: list[str] = []
+    for kind, those in sorted(laws().items()):
+        out += ["", kind.replace("_", " ")]
+        for law in those.values():
+            sentence = plain_words(summary(law)["sentence"])
+            out.append(textwrap.shorten(f"{law.name:.<36} {sentence}", WIDTH - 2, placeholder=" ..."))
+            out[-1] = "  " + re.sub(r"\.{2,}(?= )", lambda dots: " " * len(dots[0]), out[-1], count=1)
+            if law.ranges:
+                out += textwrap.wrap(
+                    f"for {law.fitted_for}", WIDTH, initial_indent=" " * 39, subsequent_indent=" " * 43
+                )
+    return out[1:]
+
+
+def plain_words(text: str) -> str:
+    """Text of a docstring without markup."""
+    text = re.sub(r":\w+:`~?([^`]*)`", r"\1", text)
+    return text.replace("``", "").replace("`", "")
+
+
+# ---------------------------------------------------------------- plot
+
+
+def plot(law: Law, output: Path) -> Path:
+    """Plot a law over its first argument, with one curve for each value of the second.
+
+    output   PNG file
+    returns  the file
+    """
+    from cfddem.plotting import curves as plots
+
+    names = list(inspect.signature(law.function).parameters)
+    spans = {name: _span(law, name) for name in names}
+    middle = {name: values[len(values) // 2] for name, values in spans.items()}
+    figure, axes = plots.panels(width=6.4, height=4.4)
+    others = spans[names[1]] if len(names) > 1 else [math.nan]
+    chosen = [others[round(k * (len(others) - 1) / (CURVES - 1))] for k in range(CURVES)] if len(names) > 1 else others
+    for value, colour in zip(chosen, plots.shades(len(chosen))):
+        fixed = middle | ({names[1]: value} if len(names) > 1 else {})
+        curve = [_value(law, fixed | {names[0]: x}) for x in spans[names[0]]]
+        axes.plot(spans[names[0]], curve, color=colour, label=f"{names[1]} = {value:.3g}" if len(names) > 1 else None)
+    if spans[names[0]][-1] > 100.0 * spans[names[0]][0] > 0.0:
+        axes.set_xscale("log")
+    low, high = axes.dataLim.intervaly
+    if high > 100.0 * low > 0.0:
+        axes.set_yscale("log")
+    axes.set_xlabel(names[0].replace("_", " "))
+    axes.set_ylabel(law.name.replace("_", " "))
+    if len(names) > 1:
+        plots.legend(axes)
+    rest = [f"{name} = {middle[name]:.3g}" for name in names[2:]]
+    axes.set_title("\n".join(textwrap.wrap(", ".join(rest), 70)) or law.kind, loc="left", fontsize=9)
+    plots.save(figure, output)
+    return output
+
+
+def _span(law: Law, name: str) -> list[float]:
+    """Values at which an argument is plotted."""
+    from closures.check import samples
+
+    return samples(law, name, 121)
+
+
+def _value(law: Law, arguments: dict[str, float]) -> float:
+    try:
+        return float(law.function(**arguments))
+    except (ArithmeticError, ValueError):
+        return math.nan

@@ -1,0 +1,66 @@
+"""Commands that inform: the documentation of a law, and the state of this machine."""
+
+from __future__ import annotations
+
+import json as _json
+import sys
+import textwrap
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from cfddem.cli.printing import announce_compilation
+
+
+def explain(
+    law: Annotated[str | None, Parameter(help="name of a law; without it, all laws are listed")] = None,
+    *,
+    plot: Annotated[Path | None, Parameter(help="PNG file for a plot of the law")] = None,
+    json: Annotated[bool, Parameter(help="print the documentation as JSON", negative="")] = False,
+) -> None:
+    """Show the documentation of a law: equation, arguments, range, reference. Or list all laws.
+
+    Example: cfddem explain di_felice --plot di_felice.png
+    """
+    from cfddem.cli import law_page as pages
+    from cfddem.io.files import require_folder
+
+    if law is None:
+        every = [pages.summary(each) for kind in pages.laws().values() for each in kind.values()]
+        print(_json.dumps(every) if json else "\n".join(pages.listing()))
+        return
+    found = pages.find(law)
+    require_folder(plot)
+    print(_json.dumps(pages.summary(found)) if json else "\n".join(pages.page(found)))
+    if plot is not None:
+        print(pages.plot(found, plot), file=sys.stderr if json else sys.stdout)
+
+
+def doctor(
+    *,
+    quick: Annotated[bool, Parameter(help="without rendering and the test run", negative="")] = False,
+    json: Annotated[bool, Parameter(help="print the answers as JSON", negative="")] = False,
+) -> None:
+    """Check that this machine is ready: packages, threads, compiled loops, disk, rendering, and a short test run.
+
+    Exit code: 1 if a check fails.
+
+    Example: cfddem doctor --quick
+    """
+    from cfddem.cli.doctor import examine
+
+    if not quick:
+        announce_compilation()
+    answers = []
+    for answer in examine(quick):
+        answers.append(answer)
+        if not json:
+            for k, line in enumerate(answer.text.split("\n")):
+                head = f"{'ok' if answer.ok else 'FAILS':<7}{answer.name:<16}" if k == 0 else ""
+                print("\n".join(textwrap.wrap(f"{head:<23}{line}", 100, subsequent_indent=" " * 23)), flush=True)
+    if json:
+        print(_json.dumps([asdict(each) for each in answers]))
+    if not all(each.ok for each in answers):
+        sys.exit(1)

@@ -1,0 +1,49 @@
+"""Prints results as aligned lines or as JSON."""
+
+from __future__ import annotations
+
+import json as _json
+import os
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+_COLOURS = {"ok": "32", "warning": "33", "error": "31"}
+"""Terminal colour codes of the words that state a status."""
+
+
+def announce_compilation() -> None:
+    """Print a message when loops are compiled for the first time. Loads the compiler."""
+    from cfddem.backend.compile import announce_compilation
+
+    announce_compilation()
+
+
+def with_colour(lines: Iterable[str]) -> Iterator[str]:
+    """Lines with their leading status word coloured on a terminal; unchanged elsewhere, or where NO_COLOR is set."""
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
+        yield from lines
+        return
+    for line in lines:
+        yield re.sub(r"^(ok|warning|error)(?=:)", lambda word: f"\x1b[{_COLOURS[word[0]]}m{word[0]}\x1b[0m", line)
+
+
+def show(values: dict[str, Any], units: dict[str, str], as_json: bool) -> None:
+    """Print a result as aligned lines or as JSON."""
+    if as_json:
+        print(_json.dumps(values))
+        return
+    width = max(len(name) for name in values)
+    for name, value in values.items():
+        print(f"{name:<{width}}  {_readable(value)} {units.get(name, '')}".rstrip())
+
+
+def _readable(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return ", ".join(_readable(each) for each in value) or "-"
+    return str(value)

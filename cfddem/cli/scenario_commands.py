@@ -1,0 +1,107 @@
+"""Commands made from the functions of the scenarios: their options are the arguments of the function."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from types import UnionType
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+
+from cfddem.cli.printing import announce_compilation, show
+
+SIMPLE = (float, int, bool, str)
+"""Types that a command line can give."""
+
+JSON = inspect.Parameter(
+    "json",
+    inspect.Parameter.KEYWORD_ONLY,
+    default=False,
+    annotation=Annotated[bool, Parameter(help="print the result as JSON", negative="")],
+)
+
+
+def command(
+    function: Callable[..., Any],
+    *,
+    units: Mapping[str, str] | None = None,
+    options: Mapping[str, tuple[Any, Any, str]] | None = None,
+    call: Callable[..., Any] | None = None,
+    show_result: Callable[[Any, bool], None] | None = None,
+) -> Callable[..., None]:
+    """Make a command that calls a function and prints the summary of its result.
+
+    Arguments of the function that a command line can give become options, with their defaults; the help of each is its
+    line in the docstring. Other arguments keep their defaults.
+
+    function     returns a result that has a method `summary`
+    units        of the printed values, by name
+    options      further options, or replacements: name -> (type, default, help)
+    call         takes all options and returns the result; the function itself if not given
+    show_result  prints the result, given it and whether to print JSON; prints the summary if not given
+    """
+    lines = descriptions(function)
+    parameters: dict[str, inspect.Parameter] = {}
+    for name, given in inspect.signature(function, eval_str=True).parameters.items():
+        kind = _simple(given.annotation)
+        if kind is not None and given.default is not inspect.Parameter.empty:
+            parameters[name] = _option(name, kind, given.default, lines.get(name, ""))
+    for name, (kind, default, text) in (options or {}).items():
+        parameters[name] = _option(name, kind, default, text)
+
+    defaults = {name: each.default for name, each in parameters.items()}
+
+    def run(**given: Any) -> None:
+        as_json = given.pop("json", False)
+        announce_compilation()
+        result = (call or function)(**defaults | given)
+        if show_result is None:
+            show(result.summary(), dict(units or {}), as_json)
+        else:
+            show_result(result, as_json)
+
+    run.__signature__ = inspect.Signature([*parameters.values(), JSON])  # type: ignore[attr-defined]
+    return run
+
+
+def descriptions(function: Callable[..., Any]) -> dict[str, str]:
+    """Description of each argument, from the docstring.
+
+    >>> def area(width: float) -> float:
+    ...     '''Area of a square.
+    ...
+    ...     width    of one side,
+    ...              without the rim [m]
+    ...     returns  [m2]
+    ...     '''
+    >>> descriptions(area)["width"]
+    'of one side, without the rim [m]'
+    """
+    found: dict[str, str] = {}
+    name = ""
+    for line in (inspect.getdoc(function) or "").splitlines():
+        if match := re.fullmatch(r"(\w+) {2,}(\S.*)", line):
+            name, found[match[1]] = match[1], match[2]
+        elif name and line.startswith("  "):
+            found[name] += " " + line.strip()
+        else:
+            name = ""
+    return found
+
+
+def _simple(annotation: Any) -> Any:
+    """The part of an annotation that a command line can give; None where there is none."""
+    parts = annotation.__args__ if isinstance(annotation, UnionType) else (annotation,)
+    kept = [part for part in parts if part in SIMPLE]
+    if not kept:
+        return None
+    return kept[0] | None if type(None) in parts else kept[0]
+
+
+def _option(name: str, kind: Any, default: Any, text: str) -> inspect.Parameter:
+    parameter = Parameter(help=text, negative="") if kind is bool else Parameter(help=text)
+    return inspect.Parameter(
+        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, parameter]
+    )

@@ -1,0 +1,69 @@
+"""Commands that compare with published results and with other codes."""
+
+from __future__ import annotations
+
+import json as _json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.cli.printing import announce_compilation
+
+
+def validate(
+    target: Annotated[
+        str,
+        Parameter(
+            help="binary-collision, particles, fluid, coupling, beds, lubrication, wet, wet-tumbler, waves, resolved "
+            "or all"
+        ),
+    ] = "all",
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"], help="folder for figures, tables and histories")] = Path(
+        "results/validation"
+    ),
+    json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
+) -> None:
+    """Reproduce published results and compare; exits 1 if a limit is exceeded.
+
+    Example: cfddem validate binary-collision
+    """
+    announce_compilation()
+    from scenarios.validation.table import TARGETS
+    from scenarios.validation.table import validate as run
+
+    if target != "all" and target not in TARGETS:
+        raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
+    names = list(TARGETS) if target == "all" else [target]
+    held = [run(name, output, json) for name in names]  # every target runs, even after a failure
+    if not all(held):
+        sys.exit(1)
+
+
+def bench(
+    target: Annotated[str, Parameter(help="dem, or bed")] = "dem",
+    *,
+    particles: Annotated[int, Parameter(help="1000, 10000, 100000 or 1000000")] = 10_000,
+    threads: Annotated[int, Parameter(help="of each code")] = 1,
+    film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Measure the speed of this machine: a dense bed of spheres (dem) or a gas bed of 24 750 spheres (bed).
+
+    Example: cfddem bench dem --particles 10000
+    """
+    announce_compilation()
+    from scenarios.beds.gas_bed import study as gas_bed
+    from scenarios.benchmarks import dense_bed
+
+    if target not in ("dem", "bed"):
+        raise InputError("target", target, nearest(target, ["dem", "bed"]))
+    result = dense_bed.bench(particles, threads, film) if target == "dem" else gas_bed.bench(threads)
+    if json:
+        print(_json.dumps(result))
+    else:
+        for name, text in (dense_bed if target == "dem" else gas_bed).rows(result):
+            print(f"{name:<20}  {text}")

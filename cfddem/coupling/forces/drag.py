@@ -1,0 +1,61 @@
+"""Drag of every particle, by the drag law of the run."""
+
+from __future__ import annotations
+
+import math
+from inspect import signature
+
+import numpy as np
+
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.backend.compile import prange, threaded
+from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.fluid.grid import Array
+from cfddem.particles.state import Particles
+from closures.registry import Law
+
+ARGUMENTS = ("reynolds", "voidage", "diameter_ratio")
+"""Arguments that a drag law may take, by these names: Reynolds number of the superficial slip, voidage, diameter over
+the Sauter mean of the particles around."""
+
+drag_factor = Slot("drag_factor")
+
+
+class Drag:
+    """Drag over slip of every particle.
+
+    law    drag law; None for no drag
+    model  "A" or "B" of the fluid
+
+    outside  how often the law was evaluated outside its range
+    """
+
+    def __init__(self, law: Law | None, model: str) -> None:
+        self.needs_sizes = law is not None and "diameter_ratio" in signature(law.function).parameters
+        self.model, self.outside, self._loop = model, 0, None
+        if law is not None:
+            factor = adapted(law.function, ", ".join(ARGUMENTS), {name: name for name in ARGUMENTS})
+            self._loop = specialise(_factors, {"drag_factor": factor})
+        ranges = {} if law is None else law.ranges
+        self._ranges = tuple(ranges.get(name, (0.0, math.inf)) for name in ARGUMENTS)
+
+    def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
+        r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
+        factor = np.zeros(particles.count)
+        if self._loop is not None:
+            self.outside += int(self._loop(flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges, factor))
+        conductance: Array = 6.0 * math.pi * particles.viscosity * particles.radius * flow.voidage * factor
+        return conductance / flow.voidage if self.model == "B" else conductance
+
+
+@threaded
+def _factors(reynolds, voidage, ratio, numbers, voidages, ratios, factor):
+    """Drag factor of every particle; returns how many are outside the range of the law."""
+    outside = 0
+    for n in prange(len(reynolds)):
+        factor[n] = drag_factor(reynolds[n], voidage[n], ratio[n])
+        beyond = reynolds[n] < numbers[0] or reynolds[n] > numbers[1]
+        beyond = beyond or voidage[n] < voidages[0] or voidage[n] > voidages[1]
+        outside += 1 if beyond or ratio[n] < ratios[0] or ratio[n] > ratios[1] else 0
+    return outside

@@ -1,0 +1,64 @@
+"""Lift on a sphere in shear (Saffman-Mei) and on a spinning sphere (Magnus)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.backend.compile import inline, prange, threaded
+from cfddem.fluid.grid import Array
+from cfddem.particles.vectors import cross, dot, minus, times
+from closures.lift import magnus, saffman_mei
+
+
+def vorticity(velocity: Array, spacing: tuple[float, float, float]) -> Array:
+    """Curl of the velocity of cells (3, nz, ny, nx) [m/s] by central differences: (3, nz, ny, nx) [1/s]."""
+
+    def along(component: int, axis: int) -> Array:
+        at = 2 - axis
+        if velocity.shape[1 + at] == 1:
+            return np.zeros_like(velocity[component])
+        return np.asarray(np.gradient(velocity[component], spacing[axis], axis=at))
+
+    return np.stack(
+        [along(2, 1) - along(1, 2), along(0, 2) - along(2, 0), along(1, 0) - along(0, 1)],
+    )
+
+
+def lift_force(slip: Array, curl: Array, spin: Array, radius: Array, density: float, viscosity: Array) -> Array:
+    """Lift of shear and of spin on every particle (N, 3) [N].
+
+    slip       u - v (N, 3) [m/s]
+    curl       vorticity of the fluid around the particle (N, 3) [1/s]
+    spin       of the particle (N, 3) [rad/s]
+    viscosity  of the fluid around the particle (N,), positive [Pa s]
+    """
+    force = np.empty_like(slip)
+    _lift(slip, curl, spin, radius, density, viscosity, force)
+    return force
+
+
+@inline
+def _vector(rows, n):
+    return rows[n, 0], rows[n, 1], rows[n, 2]
+
+
+@threaded
+def _lift(slip, curl, spin, radius, density, viscosity, force):
+    """Saffman-Mei along slip x curl; Magnus along slip x (spin - curl/2)."""
+    for n in prange(len(radius)):
+        u, w = _vector(slip, n), _vector(curl, n)
+        diameter, kinematic = 2.0 * radius[n], viscosity[n] / density
+        speed, turning = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
+        reynolds = diameter * speed / kinematic
+        across = cross(u, w)
+        size = math.sqrt(dot(across, across))
+        stokes = 3.0 * math.pi * viscosity[n] * diameter * speed
+        shear = stokes * saffman_mei(reynolds, diameter * diameter * turning / kinematic) / max(size, 1e-300)
+        relative = minus(_vector(spin, n), times(0.5, w))
+        twist = cross(u, relative)
+        rolled = math.pi / 8.0 * density * diameter**3 * magnus(reynolds)
+        for d in range(3):
+            force[n, d] = (shear * across[d] if size > 0.0 else 0.0) + rolled * twist[d]

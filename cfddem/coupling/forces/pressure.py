@@ -1,0 +1,63 @@
+r"""Force of the fluid's pressure on the volume of a particle, :math:`-V\nabla p'` in model A."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.backend.compile import prange, threaded
+from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.data.fields import Field
+from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.state import Particles
+
+MAPPED, MAPPED_EARLIER = (
+    Field(
+        name, "m", 3, "memory", lambda table, rows: table.position[rows],
+        meaning=f"position from which the voidage was computed {when}",
+    )
+    for name, when in (("mapped_position", "in the last fluid step"), ("earlier_mapped_position", "in the step before"))
+)  # fmt: skip
+"""The voidage that the fluid sees is a mean over three steps; so is the pressure gradient that a particle sees."""
+
+
+class PressureForce:
+    """Pressure force of model A; zero in model B, where the fluid carries the whole pressure gradient.
+
+    fluid   the fluid solver
+    kernel  gathers the pressure gradient
+    """
+
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
+        self.fluid, self.kernel = fluid, kernel
+        self.fields = (MAPPED, MAPPED_EARLIER) if fluid.model == "A" else ()
+
+    def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array:
+        """Force on every particle (N, 3) [N], after the step of the fluid.
+
+        The fluid has used the voidage of the last three steps with the weights 1/4, 1/2 and 1/4. The gradient is
+        gathered from the places of these three steps with the same weights.
+        """
+        force = np.zeros((particles.count, 3))
+        if self.fields:
+            kernel, gradient = self.kernel, self.kernel.smooth(self.fluid.cell_pressure_gradient())
+            earlier, last = (
+                kernel.stencil(particles[field.name], particles.radius) for field in (MAPPED_EARLIER, MAPPED)
+            )
+            gathered = (kernel.gather(stencil, gradient) for stencil in (earlier, last, cell_map.stencil))
+            _weighted(cell_map.volume, *gathered, force)
+        return force
+
+    def store(self, particles: Particles, cell_map: ParticleCellMap) -> None:
+        """Store the places of this step for the next two."""
+        if self.fields:
+            particles.earlier_mapped_position = particles.mapped_position
+            particles.mapped_position = cell_map.position
+
+
+@threaded
+def _weighted(volume, earlier, last, now, force):
+    """Force (N, 3) [N] of the pressure gradients [Pa/m] gathered from three places."""
+    for n in prange(len(volume)):
+        for d in range(3):
+            force[n, d] = -volume[n] * (0.25 * earlier[n, d] + 0.5 * last[n, d] + 0.25 * now[n, d])

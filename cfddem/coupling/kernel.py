@@ -1,0 +1,234 @@
+r"""The filter kernel: particles deposit on cells and gather from them.
+
+A particle deposits its volume, drag and momentum on cells with weights that add up to one, and gathers fields of the
+cells with the same weights. The two operations are adjoint, so that one side receives what the other gives. The kernel
+has two stages: the weights of the particle (`mapping`), then a diffusion of the cell field until the whole kernel has
+the given standard deviation, for any cell size:
+
+.. math:: \varphi_c V = \sum_c' S_{cc'} \sum_p w_{c'p} V_p, \qquad S = (1 + a \nabla_h^2)^n, \qquad
+          \sigma^2 = h^2/6 + 2 n a h^2
+
+S is symmetric, keeps sums, and does not pass walls or solid cells. What the first stage puts behind a wall is put into
+the nearest open cell.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError, nearest
+from cfddem.coupling import kernel_loops as loops
+from cfddem.fluid.grid import Array, Grid
+
+MAPPINGS = ("linear", "centroid", "divided")
+"""First stage: a cube as large as a cell around the centre; the cell of the centre; equal pieces of the sphere, each in
+the cell of its centre."""
+
+PIECES = 32
+"""Number of pieces of the divided mapping."""
+
+SLAB = 4
+"""Least number of cell layers that one thread fills at a time. Slabs that are filled at the same time do not touch."""
+
+
+class Stencil(NamedTuple):
+    """Cells on which particles deposit, and the weight of each."""
+
+    cells: np.ndarray  # (N, m) uint32, flat index of the cell
+    weights: Array  # (N, m), the sum of a row is 1
+
+
+class ParticleCellMap(NamedTuple):
+    """Positions of particles among the cells at one time."""
+
+    position: Array  # (N, 3) [m]
+    radius: Array  # (N,) [m]
+    volume: Array  # (N,) [m3]
+    order: np.ndarray  # rows of the particles, sorted by slab
+    start: np.ndarray  # (slabs + 1,) first place of each slab in `order`
+    stencil: Stencil
+
+
+class FilterKernel:
+    """Deposits values of particles on the cells of a grid, and gathers fields of the cells.
+
+    grid          cells, some of them solid
+    periodic      whether x, y, z are periodic
+    mapping       "linear", "centroid" or "divided", see `MAPPINGS`
+    smoothing     standard deviation of the whole kernel [m]; 0 for the mapping alone
+    communicator  of the run
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        periodic: Sequence[bool],
+        *,
+        mapping: str = "linear",
+        smoothing: float = 0.0,
+        communicator: Communicator = SERIAL,
+    ) -> None:
+        if mapping not in MAPPINGS:
+            raise InputError("laws.mapping", mapping, nearest(mapping, MAPPINGS))
+        if not (np.isfinite(smoothing) and smoothing >= 0.0):
+            raise InputError("kernel width", smoothing, "zero or positive, in m")
+        self.grid, self.mapping, self.smoothing, self.communicator = grid, mapping, float(smoothing), communicator
+        self._periodic = np.array(periodic, bool)
+        self._linear = 1.0 if mapping == "linear" else 0.0
+        self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
+        self._origin, self._inverse = np.array(grid.origin), 1.0 / np.array(grid.spacing)
+        self._home = _homes(grid, self._periodic)
+        self._gates = _gates(grid, self._periodic)
+        self.sweeps, self.strength = self._diffusion()
+
+    def _diffusion(self) -> tuple[int, Array]:
+        """Number of sweeps, and strength of each along x, y, z, that widen the mapping to the whole kernel."""
+        spacing = np.array(self.grid.spacing)
+        own = spacing**2 / 6.0  # mean variance of the linear mapping, twice that of a point within its cell
+        missing = np.maximum(self.smoothing**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
+        total = missing / (2.0 * spacing**2)
+        sweeps = math.ceil(2.0 * float(total.sum()) - 1e-9)  # local: three directions
+        return sweeps, total / max(sweeps, 1)
+
+    # ------------------------------------------------------------ particles to cells
+
+    def map_particles(self, position: Array, radius: Array) -> ParticleCellMap:
+        """Map of particles at positions (N, 3) [m] with radii (N,) [m]."""
+        order, start = np.empty(len(position), np.int64), np.zeros(max(self.grid.cells[2] // SLAB, 1) + 1, np.int64)
+        loops.sort_into_slabs(position, self._origin[2], self._inverse[2], SLAB, order, start)
+        volume = (4.0 / 3.0) * math.pi * radius**3
+        return ParticleCellMap(position.copy(), radius, volume, order, start, self.stencil(position, radius))
+
+    def wrapped(self, position: Array) -> Array:
+        """Positions (N, 3) [m], moved into the grid along periodic directions."""
+        size = np.array(self.grid.size)
+        inside: Array = position - self._periodic * size * np.floor((position - self._origin) / size)
+        return inside
+
+    def stencil(self, position: Array, radius: Array) -> Stencil:
+        """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
+        shape = len(position), 8 * len(self._offsets)
+        stencil = Stencil(np.empty(shape, np.uint32), np.empty(shape))
+        loops.stencils(position, radius, self._offsets, self._linear, self._origin, self._inverse, self._home, *stencil)
+        return stencil
+
+    def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
+        """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx)."""
+        fields = np.zeros((math.prod(self.grid.cells), values.shape[1]))
+        loops.deposit(cell_map.order, cell_map.start, np.ascontiguousarray(values), *cell_map.stencil, fields)
+        return np.ascontiguousarray(fields.T).reshape(-1, *self.grid.shape)
+
+    def gather(self, stencil: Stencil, fields: Array) -> Array:
+        """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
+        count = len(fields)
+        values = np.empty((len(stencil.cells), count))
+        by_cell = np.zeros((math.prod(self.grid.cells), -(-count // loops.FOUR) * loops.FOUR))
+        by_cell[:, :count] = fields.reshape(count, -1).T
+        loops.gather(*stencil, by_cell, values)
+        return values
+
+    def smooth(self, fields: Array) -> Array:
+        """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""
+        now = np.array(fields, float)
+        other = np.empty_like(now)
+        for _ in range(self.sweeps):
+            loops.sweep(now, other, self.strength, *self._gates)
+            now, other = other, now
+        return now
+
+    def solid_fraction(self, cell_map: ParticleCellMap) -> Array:
+        """Solid fraction of the cells (nz, ny, nx) [-]."""
+        solid: Array = self.smooth(self.deposit(cell_map, cell_map.volume[:, None]))[0] / self.grid.cell_volume
+        return solid
+
+    # ------------------------------------------------------------ flux
+
+    def solid_flux(self, old: ParticleCellMap, new: ParticleCellMap, step: float) -> list[Array]:
+        r"""Volume flux of particles through every face between two maps.
+
+        .. math:: (\varphi^{new} - \varphi^{old})/\Delta t + \nabla\cdot q = 0
+
+        holds to round-off, because the flux follows each particle along its path with the weights of its volume. A
+        particle may move by less than a cell.
+
+        old, new  maps of the same particles in the same order
+        step      time between them [s]
+        returns   along x, y, z: (nz, ny, nx+1), (nz, ny+1, nx), (nz+1, ny, nx) [m/s]
+        errors    InputError for solid cells, or a particle that moves by a cell or more
+        """
+        grid = self.grid
+        moved = new.position - old.position
+        moved -= self._periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
+        farthest = self.communicator.largest(np.abs(moved * self._inverse), default=0.0)
+        if farthest >= 1.0:
+            raise InputError("way of the fastest particle", farthest, "below one cell", "take a smaller fluid step")
+        if grid.solid is not None:
+            raise InputError("solid_flux", None, "computed on a grid without solid cells")
+        flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
+        volume = new.volume
+        loops.carry_all(
+            old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
+            self._periodic, *flux,
+        )  # fmt: skip
+        change = self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None])
+        passed = np.zeros_like(change)
+        for _ in range(self.sweeps):
+            passed += change
+            other = np.empty_like(change)
+            loops.sweep(change, other, self.strength, *self._gates)
+            change = other
+        for axis in range(3):
+            self._add_diffused(flux[axis], passed[0], axis)
+            flux[axis] /= grid.face_area(axis) * step
+        return flux
+
+    def _add_diffused(self, flux: Array, passed: Array, axis: int) -> None:
+        """Add the flux of the second stage through the faces normal to an axis: strength times difference."""
+        at, gate = 2 - axis, np.moveaxis(self._gates[axis], 2 - axis, 0)
+        field, out = np.moveaxis(passed, at, 0), np.moveaxis(flux, at, 0)
+        fall = np.roll(field, 1, axis=0) - field
+        out[:-1] += self.strength[axis] * gate * fall
+        out[-1] = out[0] if self._periodic[axis] else out[-1]
+
+
+def _pieces(count: int) -> Array:
+    """Centres of equal pieces of a unit sphere: in shells of equal volume, at the golden angle (count, 3)."""
+    number = np.arange(count) + 0.5
+    radius = np.cbrt((np.arange(count) * 0.6180339887498949) % 1.0)
+    height, angle = 1.0 - 2.0 * number / count, number * math.pi * (3.0 - math.sqrt(5.0))
+    ring = np.sqrt(1.0 - height**2)
+    points = radius[:, None] * np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
+    return np.ascontiguousarray(points - points.mean(axis=0))  # local: pieces of one sphere
+
+
+def _homes(grid: Grid, periodic: np.ndarray) -> np.ndarray:
+    """Flat index of the cell that receives a deposit, for every cell and a layer around the grid.
+
+    It is the cell itself, its periodic image, or the nearest open cell.
+    """
+    inside = np.pad(grid.open, [(0, 0) if periodic[2 - d] else (1, 1) for d in range(3)])
+    nearest_open = distance_transform_edt(~inside, sampling=grid.spacing[::-1], return_indices=True)[1]
+    flat = np.zeros(inside.shape, np.int64)
+    for d in range(3):
+        low = 0 if periodic[2 - d] else 1
+        flat = flat * grid.shape[d] + nearest_open[d] - low
+    wrapped = np.pad(flat, [(1, 1) if periodic[2 - d] else (0, 0) for d in range(3)], mode="wrap")
+    return np.ascontiguousarray(wrapped)
+
+
+def _gates(grid: Grid, periodic: np.ndarray) -> tuple[Array, Array, Array]:
+    """1 on the low face of every cell where the second stage may pass, 0 at walls and solid cells; for x, y, z."""
+    gates = []
+    for axis in range(3):
+        at = 2 - axis
+        gate = (grid.open & np.roll(grid.open, 1, axis=at)).astype(float)
+        if not periodic[axis]:
+            np.moveaxis(gate, at, 0)[0] = 0.0
+        gates.append(gate)
+    return gates[0], gates[1], gates[2]

@@ -1,0 +1,102 @@
+"""The flow around each particle, sampled from the cells without the disturbance that the particle causes itself."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import prange, threaded
+from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.self_disturbance import SelfDisturbance
+from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.state import Particles
+
+
+class SampledFlow(NamedTuple):
+    """The undisturbed flow around every particle."""
+
+    slip: Array  # u - v (N, 3) [m/s]
+    disturbance: Array  # self-disturbance in the gathered velocity (N, 3) [m/s]
+    voidage: Array  # (N,)
+    reynolds: Array  # of the superficial slip (N,)
+    others: Array  # number of other particles per volume (N,) [1/m3]
+    diameter_ratio: Array  # diameter over the Sauter mean of the particles around (N,)
+
+
+class FlowSampler:
+    """Samples the flow around particles.
+
+    fluid             the fluid solver
+    kernel            gathers the fields of the fluid
+    self_disturbance  correction for the disturbance of each particle; None for no correction
+    sizes             whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
+    """
+
+    def __init__(
+        self, fluid: FluidSolver, kernel: FilterKernel, self_disturbance: SelfDisturbance | None, sizes: bool
+    ) -> None:
+        self.fluid, self.kernel, self.self_disturbance, self.sizes = fluid, kernel, self_disturbance, sizes
+
+    def sample(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> SampledFlow:
+        """The flow around every particle now.
+
+        solid  solid fraction of the cells (nz, ny, nx)
+        """
+        kernel, fluid, count = self.kernel, self.fluid, particles.count
+        velocity = kernel.smooth(np.moveaxis(fluid.velocity, -1, 0))
+        gathered = kernel.gather(cell_map.stencil, np.concatenate([velocity, solid[None]]))
+        if self.self_disturbance is None:
+            modes, own = np.zeros((count, 0, 3)), np.zeros(count)
+        else:
+            modes, own = particles["disturbance_modes"], self.self_disturbance.solid(cell_map)
+        (slip, disturbance), (voidage, reynolds, others) = np.empty((2, count, 3)), np.empty((3, count))
+        _sample(
+            gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, modes, own,
+            fluid.density, slip, disturbance, voidage, reynolds, others,
+        )  # fmt: skip
+        ratio = self._diameter_ratio(particles, cell_map, solid)
+        return SampledFlow(slip, disturbance, voidage, reynolds, others, ratio)
+
+    def _diameter_ratio(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
+        """Diameter of every particle over the Sauter mean around it (N,) [-]; 1 unless sizes are sampled.
+
+        The Sauter mean is the volume of the particles around, over the sum of their volumes divided by diameters.
+        """
+        if not self.sizes:
+            return np.ones(particles.count)
+        kernel, diameter, volume = self.kernel, 2.0 * particles.radius, cell_map.volume
+        surface = kernel.smooth(kernel.deposit(cell_map, (volume / diameter)[:, None])) / kernel.grid.cell_volume
+        around = kernel.gather(cell_map.stencil, np.concatenate([solid[None], surface]))
+        ratio: Array = diameter * around[:, 1] / around[:, 0]
+        return ratio
+
+
+@threaded
+def _sample(
+    gathered, volume, radius, velocity, viscosity, modes, own, density, slip, disturbance, voidage, reynolds, others
+):
+    """Slip, voidage, Reynolds number and number of others, each without the particle's own part.
+
+    gathered     mean velocity of the fluid and solid fraction around each (N, 4) [m/s], [-]
+    modes        modes of the self-disturbance (N, modes, 3) [m/s]
+    own          own part of the gathered solid fraction (N,) [-]; zeros switch the correction off
+    others       per volume [1/m3]
+    disturbance  self-disturbance in the gathered velocity (N, 3) [m/s]
+    """
+    for n in prange(len(radius)):
+        solid = gathered[n, 3]
+        share = min(max(own[n] / max(solid, 1e-300), 0.0), 1.0)
+        others[n] = max(solid - own[n], 0.0) / volume[n]
+        voidage[n] = 1.0 - max(solid - share * own[n], 0.0)
+        square = 0.0
+        for d in range(3):
+            disturbed = 0.0
+            for k in range(modes.shape[1]):
+                disturbed += modes[n, k, d]
+            disturbance[n, d] = share * disturbed
+            slip[n, d] = gathered[n, d] - disturbance[n, d] - velocity[n, d]
+            square += slip[n, d] * slip[n, d]
+        reynolds[n] = density * 2.0 * radius[n] * voidage[n] * math.sqrt(square) / max(viscosity[n], 1e-300)

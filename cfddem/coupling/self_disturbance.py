@@ -1,0 +1,147 @@
+r"""Self-disturbance: the velocity and the voidage that a particle itself causes in the cells around it.
+
+A particle's force, deposited on cells, drives a flow that the particle then gathers from the same cells; its own
+volume lowers the voidage there. Drag laws need the fluid without the particle. Both disturbances are known, because
+the kernel and the discrete equations of the grid are. Per force, at a place f within its cell (0 to 1 along each axis),
+
+.. math:: M_d(f) = \sum_{\Delta} G_d(\Delta) \prod_e A_e(\Delta_e),\qquad
+          A(0) = (1-f)^2 + f^2,\ A(\pm1) = f(1-f)
+
+where G is the flow of the grid's own Stokes equations, smoothing included, between cells that lie Delta apart. It is
+a sum over waves. Each builds up at its own rate, nu times its eigenvalue L; waves of similar L are summed to one mode.
+A moving particle leaves its disturbance behind: of a wave with the wave number k along its path the share
+:math:`1/(1 + (Uk/\nu L)^2)` remains, which gives the steady sum (Oseen's, on the grid). With s the width of the
+kernel, :math:`s^2 = M\eta/(2a_0)` where F a_0/rho is the first acceleration, every rate grows by nu/s^2 times
+:func:`closures.disturbance.wake_decay`. Their sum is then close to the steady one; the rest is scaled away.
+
+In a suspension the drag of the other particles damps the disturbance (Brinkman), which adds beta/(eps rho) to each
+rate. Drag laws of dense beds are fitted to means that include every particle: of both disturbances only the share is
+subtracted that the particle has in the solids gathered at its place.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.backend.compile import inline, prange, threaded
+from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
+from cfddem.data.fields import Field
+from cfddem.fluid.grid import Array
+from cfddem.particles.state import Particles
+from closures.disturbance import wake_decay
+
+DISTURBANCE = Field(
+    "disturbance_modes", "m/s", (MODES, 3), "memory",
+    meaning="fluid velocity that the particle itself causes at its place, by mode",
+)  # fmt: skip
+
+
+class SelfDisturbance:
+    """Disturbance of every particle by its own force and volume.
+
+    kernel  of the run; its tables are found once for each grid
+    """
+
+    fields = (DISTURBANCE,)
+
+    def __init__(self, kernel: FilterKernel) -> None:
+        grid = kernel.grid
+        self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
+        self._tables = tables(kernel)
+
+    def solid(self, cell_map: ParticleCellMap) -> Array:
+        """Own part of the solid fraction that every particle gathers (N,) [-]."""
+        own = np.empty(len(cell_map.volume))
+        _self_solid_fraction(cell_map.position, cell_map.volume, self._tables.solid, *self._cell, own)
+        return own
+
+    def advance(
+        self,
+        particles: Particles,
+        cell_map: ParticleCellMap,
+        slip: Array,
+        drag: Array,
+        screening: Array,
+        density: float,
+        step: float,
+    ) -> None:
+        """Let the modes grow and decay over a step [s] in which the particles have pushed the fluid.
+
+        slip       u - v, without the self-disturbance (N, 3) [m/s]
+        drag       on the particles; the fluid has received its opposite (N, 3) [N]
+        screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
+        density    of the fluid [kg/m3]
+        """
+        _build_up(
+            cell_map.position, *self._cell, drag, slip, screening, *self._tables[1:], density, particles.viscosity,
+            step, particles.disturbance_modes,
+        )  # fmt: skip
+
+
+@inline
+def _shares(n, position, origin, inverse, linear):
+    """Along x, y, z, the share that a particle gathers from the neighbours of the cells on which it has deposited."""
+    x = (position[n, 0] - origin[0]) * inverse[0] - 0.5
+    y = (position[n, 1] - origin[1]) * inverse[1] - 0.5
+    z = (position[n, 2] - origin[2]) * inverse[2] - 0.5
+    a, b, c = linear * (x - math.floor(x)), linear * (y - math.floor(y)), linear * (z - math.floor(z))
+    return 2.0 * a * (1.0 - a), 2.0 * b * (1.0 - b), 2.0 * c * (1.0 - c)
+
+
+@inline
+def _at_shares(table, shares):
+    """A table (2, 2, 2) by distance in cells between deposit and gather, averaged with these shares."""
+    a, b, c = shares
+    near = (1.0 - b) * ((1.0 - a) * table[0, 0, 0] + a * table[0, 0, 1])
+    near += b * ((1.0 - a) * table[0, 1, 0] + a * table[0, 1, 1])
+    far = (1.0 - b) * ((1.0 - a) * table[1, 0, 0] + a * table[1, 0, 1])
+    far += b * ((1.0 - a) * table[1, 1, 0] + a * table[1, 1, 1])
+    return (1.0 - c) * near + c * far
+
+
+@threaded
+def _self_solid_fraction(position, volume, table, origin, inverse, linear, own):
+    for n in prange(len(volume)):
+        own[n] = volume[n] * _at_shares(table, _shares(n, position, origin, inverse, linear))
+
+
+@inline
+def _steady(moving, slowest, wave_number, shares):
+    """Steady velocity times viscosity per force [1/m] at U/nu [1/m], interpolated in logarithms."""
+    place = max(PER_DECADE * math.log10(max(wave_number, slowest) / slowest), 0.0)
+    node = min(int(place), len(moving) - 2)
+    low, high = _at_shares(moving[node], shares), _at_shares(moving[node + 1], shares)
+    return low * (high / low) ** (place - node)
+
+
+@threaded
+def _build_up(
+    position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
+    viscosity, step, modes_of,
+):  # fmt: skip
+    """Exact relaxation of every mode towards its value under a steady force."""
+    modes = rates.shape[1]
+    for n in prange(len(position)):
+        diffusivity = viscosity[n] / density
+        shares = _shares(n, position, origin, inverse, linear)
+        speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
+        for d in range(3):
+            at_rest = 0.0
+            for k in range(modes):
+                at_rest += _at_shares(flow[d, k], shares)
+            square = 0.5 * at_rest / _at_shares(start[d], shares)
+            decay = wake_decay(speed * math.sqrt(square) / diffusivity) / square
+            total = 0.0
+            for k in range(modes):
+                total += _at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
+            scale = -_steady(moving[d], slowest, speed / diffusivity, shares) / total * drag[n, d] / viscosity[n]
+            for k in range(modes):
+                steady = scale * _at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
+                rate = diffusivity * (rates[d, k] + decay)
+                left = math.exp(-step * (rate + screening[n]))
+                steady *= rate / (rate + screening[n])
+                modes_of[n, k, d] = steady + left * (modes_of[n, k, d] - steady)

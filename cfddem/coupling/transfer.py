@@ -1,0 +1,191 @@
+r"""Implicit transfer of one quantity between particles and the cells of a fluid: momentum, heat, a species.
+
+A particle with the value :math:`v` and the capacity :math:`C` exchanges the quantity with a fluid of value :math:`u`
+through the conductance :math:`b`, and receives :math:`f` from everything else:
+
+.. math:: C\,\dot v = b\,(u - v) + f
+
+| quantity | value | capacity | conductance |
+|---|---|---|---|
+| momentum | velocity | mass, with added mass [kg] | drag over slip [kg/s] |
+| heat | temperature | heat capacity m c [J/K] | heat transfer coefficient times surface h A [W/K] |
+
+**Implicit on both sides.** Over a step h the particle receives
+
+.. math:: J = h\,b^*(u - v^*),\qquad b^* = \frac{b}{1+\theta\lambda},\quad v^* = v + \theta\frac{hf}{C},\quad
+          \lambda = \frac{hb}{C},\quad \theta=\frac{1+\lambda}{2+\lambda}
+
+which is of second order for small lambda and never passes the value of the fluid for large lambda. f is the mean over
+the step before. The fluid takes b* and v* into its own implicit step. What it has given in each cell is returned to
+the particles by the weights of the deposit, so that the sum over particles is the opposite of the sum over cells to
+round-off, for any stiffness of either side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import prange, threaded
+from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.data.fields import Field, Table
+from cfddem.fluid.grid import Array
+from cfddem.fluid.momentum import implicitness
+from cfddem.particles.state import Particles
+
+
+class ImplicitCoefficients(NamedTuple):
+    """Implicit coefficients of one step, of the particles and summed over cells."""
+
+    step: float  # [s]
+    conductance: Array  # b (N,)
+    implicit: Array  # b* (N,)
+    target: Array  # v* (N, m)
+    cell_conductance: Array  # sum of b* per volume (nz, ny, nx)
+    cell_product: Array  # sum of b* v* per volume (nz, ny, nx, m)
+
+
+@dataclass
+class Transfer:
+    """Transfer of one quantity between particles and cells.
+
+    kernel       deposits the coefficients and gathers the field of the fluid
+    value        field of the particles that relaxes towards the fluid: "velocity", "temperature"; (N, m) or (N,)
+    received     name of the field that stores what each particle received in the last step, and its unit
+    conductance  law: particles and the flow around each -> b (N,)
+    capacity     particles -> C (N,), infinite where the value is held
+    source       particles -> f in the first step, (N, m); zero if None
+    """
+
+    kernel: FilterKernel
+    value: str
+    received: tuple[str, str]
+    conductance: Callable[[Particles, SampledFlow], Array]
+    capacity: Callable[[Particles], Array]
+    source: Callable[[Particles], Array] | None = None
+    last_step: float = 0.0  # length of the step before; 0 before the first [s]
+
+    def declare(self, particles: Particles) -> list[str]:
+        """Declare what the transfer stores of each particle: the value before the last step, and what it received.
+
+        returns  names of these fields
+        """
+        field, (received, unit) = particles.fields[self.value], self.received
+        particles.declare(
+            Field(
+                self.before, field.unit, field.components, "memory", _present(self.value),
+                meaning=f"{field.meaning or field.name} before the last fluid step",
+            )
+        )  # fmt: skip
+        meaning = "received from the fluid in the last fluid step"
+        particles.declare(Field(received, unit, field.components, "memory", meaning=meaning))
+        return [self.before, received]
+
+    @property
+    def before(self) -> str:
+        """Name of the field with the value before the last step."""
+        return f"{self.value}_before"
+
+    def prepare(
+        self,
+        particles: Particles,
+        cell_map: ParticleCellMap,
+        flow: SampledFlow,
+        step: float,
+        disturbance: Array | None = None,
+    ) -> ImplicitCoefficients:
+        """Coefficients of the coming step [s].
+
+        disturbance  part of the fluid's value that the particle causes itself, not part of u (N, m); zero if None
+        """
+        kernel, value = self.kernel, _columns(particles[self.value])
+        conductance, disturbance = self.conductance(particles, flow), _or_zero(disturbance, value)
+        implicit, target = np.empty(particles.count), np.empty(value.shape)
+        carried = np.empty((particles.count, 1 + value.shape[1]))
+        _implicit_coefficients(
+            conductance, self.capacity(particles), self._other(particles), value, disturbance, step,
+            implicit, target, carried,
+        )  # fmt: skip
+        cells = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
+        return ImplicitCoefficients(step, conductance, implicit, target, cells[0], np.moveaxis(cells[1:], 0, -1))
+
+    def apply(
+        self, particles: Particles, cell_map: ParticleCellMap, sent: ImplicitCoefficients, weight: Array, seen: Array
+    ) -> Array:
+        """Return the rate at which each particle receives the quantity in this step (N, m), and store it.
+
+        sent    what `prepare` returned
+        weight  W: the cell has given W h (b* v* - b* u) per volume (nz, ny, nx, m) [-]
+        seen    u, the value of the fluid in its implicit step (nz, ny, nx, m)
+        """
+        kernel, value = self.kernel, _columns(particles[self.value])
+        fields = np.moveaxis(np.concatenate([weight, weight * seen], axis=-1), -1, 0)
+        gathered, rate = kernel.gather(cell_map.stencil, kernel.smooth(fields)), np.empty(value.shape)
+        _received(gathered, sent.implicit, sent.target, rate)
+        _columns(particles[self.before])[:] = value
+        _columns(particles[self.received[0]])[:] = sent.step * rate
+        self.last_step = sent.step
+        return rate
+
+    def _other(self, particles: Particles) -> Array:
+        """Mean over the step before of everything but this transfer (N, m)."""
+        value = _columns(particles[self.value])
+        if self.last_step == 0.0:
+            return _or_zero(None if self.source is None else self.source(particles), value)
+        before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
+        other = np.empty(value.shape)
+        _mean_other(value, before, received, self.capacity(particles), self.last_step, other)
+        return other
+
+
+@cache
+def _present(name: str) -> Callable[[Table, np.ndarray], np.ndarray]:
+    """The present value of another field, as initial value of a field; the same function for the same name."""
+    return lambda table, rows: table[name][rows]
+
+
+def _columns(values: Array) -> Array:
+    """Values of the particles as (N, m), a view."""
+    return values.reshape(len(values), -1)
+
+
+def _or_zero(values: Array | None, like: Array) -> Array:
+    return np.zeros_like(like) if values is None else values
+
+
+@threaded
+def _implicit_coefficients(conductance, capacity, other, value, disturbance, step, implicit, target, carried):
+    """b*, v*, and what each particle deposits: b* and b* v* (N, 1 + m)."""
+    for n in prange(len(conductance)):
+        inverse = 1.0 / capacity[n]
+        stiffness = step * conductance[n] * inverse
+        theta = implicitness(stiffness)
+        implicit[n] = conductance[n] / (1.0 + theta * stiffness)
+        carried[n, 0] = implicit[n]
+        for d in range(value.shape[1]):
+            target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other[n, d]
+            carried[n, 1 + d] = implicit[n] * target[n, d]
+
+
+@threaded
+def _received(gathered, implicit, target, rate):
+    """Rate b* (W u - W v*) of every particle; gathered holds W and W u (N, 2 m)."""
+    components = target.shape[1]
+    for n in prange(len(target)):
+        for d in range(components):
+            rate[n, d] = implicit[n] * (gathered[n, components + d] - gathered[n, d] * target[n, d])
+
+
+@threaded
+def _mean_other(value, before, received, capacity, last_step, other):
+    """Change of the quantity over the last step, less what the transfer gave, per time; held values change nothing."""
+    for n in prange(len(value)):
+        for d in range(value.shape[1]):
+            gained = capacity[n] * (value[n, d] - before[n, d]) if math.isfinite(capacity[n]) else 0.0
+            other[n, d] = (gained - received[n, d]) / last_step

@@ -1,0 +1,75 @@
+r"""Projection: the pressure equation that continuity gives, and the correction of the velocity by the pressure.
+
+With the mobility m of a face (velocity lost per pressure gradient, from the momentum balance) the corrected
+velocity is u - m grad q, and continuity of every cell
+
+.. math:: V\,\partial_t\varepsilon + \sum_f \pm A_f\, \varepsilon_f (u_f - m_f\, \partial_n q) = 0
+
+is the pressure equation with face coefficients eps_f m_f A_f / h. An outlet has its pressure half a cell away.
+"""
+
+from __future__ import annotations
+
+from cfddem.backend.compile import prange, threaded
+from cfddem.fluid.grid import LOW, UNIT
+from cfddem.fluid.momentum import row
+
+
+@threaded
+def gather(
+    velocity, mobility, voidage, rate, open_cells, fresh, periodic, areas, inverse, ax, ay, az, anchor, b
+):  # fmt: skip
+    """Right-hand side of the pressure equation and, if fresh, its coefficients.
+
+    b = -(V d eps/dt + outflow of eps u) of every open cell (nz, ny, nx) [m3/s]; rate is d eps/dt, padded [1/s].
+    """
+    nz, ny, nx = b.shape
+    for k in prange(nz):
+        for j in range(ny):
+            for i in range(nx):
+                kk, jj, ii = k + LOW, j + LOW, i + LOW
+                outflow, held = rate[kk, jj, ii] * areas[0] / inverse[0], 0.0
+                here = voidage[kk, jj, ii]
+                for d in range(velocity.shape[0]):
+                    dk, dj, di = UNIT[d]
+                    below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here)
+                    above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
+                    outflow += areas[d] * (
+                        above * velocity[d, kk + dk, jj + dj, ii + di] - below * velocity[d, kk, jj, ii]
+                    )
+                    if fresh:
+                        a_below = below * mobility[d, kk, jj, ii] * areas[d] * inverse[d]
+                        a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
+                        place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
+                        # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
+                        if not periodic[d] and place == 0:
+                            held += 2.0 * a_below
+                            a_below = 0.0
+                        if not periodic[d] and place == cells - 1:
+                            held += 2.0 * a_above
+                        if cells == 1:
+                            a_below = 0.0
+                        if d == 0:
+                            ax[k, j, i] = a_below
+                        elif d == 1:
+                            ay[k, j, i] = a_below
+                        else:
+                            az[k, j, i] = a_below
+                b[k, j, i] = -outflow * open_cells[k, j, i]
+                if fresh:
+                    anchor[k, j, i] = held
+
+
+@threaded
+def correct(new, mobility, correction, inverse):
+    """Subtract mobility times the gradient of the pressure correction from the velocity."""
+    pz, py, px = correction.shape
+    n = px - 2 * LOW
+    for k in prange(LOW, pz - LOW):
+        for j in range(LOW, py - LOW):
+            for d in range(new.shape[0]):
+                dk, dj, di = UNIT[d]
+                right, left = row(correction, k, j, LOW, n), row(correction, k - dk, j - dj, LOW - di, n)
+                out, mobility_row = row(new[d], k, j, LOW, n), row(mobility[d], k, j, LOW, n)
+                for i in range(n):
+                    out[i] -= mobility_row[i] * ((right[i] - left[i]) * inverse[d])

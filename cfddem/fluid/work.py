@@ -1,0 +1,177 @@
+r"""Energy of the fluid: the work of each term of its momentum balance in a step.
+
+The balance of a face, times the mean of its old and new velocity, is a balance of kinetic energy,
+
+.. math:: \tfrac12\rho\,(\varepsilon_1 u_1^2 - \varepsilon_0 u_0^2)
+          = \bar u\,h\,(\text{terms of momentum}) - \tfrac12\rho\,(\varepsilon_1-\varepsilon_0)\,u_0 u_1
+
+to round-off. The last part belongs to convection. Convection, less the kinetic energy that the flow carries in and
+out, is the dissipation of the scheme. Drag acts with the velocity u_theta of its implicit step; the rest of its work
+is the dissipation of that step. Faces of an outlet count half, because half of their volume is outside.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cfddem.fluid.grid import HIGH, LOW, Array
+from cfddem.fluid.sides import Side
+from cfddem.fluid.state import FluidState, on_faces
+
+
+class Works(NamedTuple):
+    """Energy that each term has given to the fluid in a step [J]."""
+
+    kinetic: float  # change of the kinetic energy
+    inflow: float  # of the pressure at inlets and outlets, and kinetic energy carried through them
+    held: float  # of the inlets, which hold their velocity against the drag of particles beside them
+    driving: float  # of the mean pressure gradient of periodic sides
+    solids: float  # of the pressure, where the volume of the particles makes room or takes it
+    model_b: float  # of the pressure on the particles' share of the volume, which model B gives to the fluid
+    viscous: float  # of viscous stress
+    convection: float  # of the convection scheme
+    drag: float  # of drag, at the velocity with which it acts
+    implicit: float  # of drag, beyond that
+    source: float  # of other forces of particles
+
+
+def works(fluid: FluidState) -> Works:
+    """Work of each term in the step just made."""
+    fields, volumes = fluid.fields, face_volumes(fluid)
+    fluid.boundaries.fill_pressure(fields.pressure)
+    start = fluid.viscous_force(fields.other_velocity, fields.other_voidage)
+    end = fluid.viscous_force(fields.stage_velocity, fields.mean_voidage)
+    sums: dict[str, float] = {}
+    for d in range(3):
+        for name, work in _work_on_faces(fluid, d, 0.5 * (start[d] + end[d])).items():
+            sums[name] = sums.get(name, 0.0) + fluid.communicator.sum(work * volumes[d])
+    pressed, brought, held = _at_sides(fluid)
+    return Works(
+        kinetic=sums["kinetic"],
+        inflow=pressed + brought,
+        held=held,
+        driving=sums["driving"],
+        solids=sums["pressure"] - pressed,
+        model_b=sums["model_b"],
+        viscous=sums["viscous"],
+        convection=sums["carried"] - brought,
+        drag=sums["drag"],
+        implicit=sums["implicit"],
+        source=sums["source"],
+    )
+
+
+def kinetic_energy(fluid: FluidState) -> float:
+    """Kinetic energy of the fluid [J]."""
+    total, volumes = 0.0, face_volumes(fluid)
+    for d in range(3):
+        stored = on_faces(fluid.fields.mean_voidage, d) * fluid.fields.velocity[d] ** 2
+        total += 0.5 * fluid.density * fluid.communicator.sum(stored * volumes[d])
+    return total
+
+
+def face_volumes(fluid: FluidState) -> Array:
+    """Volume of each face that carries an unknown (3, ...) [m3]: of every face once, of an outlet half."""
+    volumes = np.zeros_like(fluid.faces.solved)
+    for d in range(3):
+        faces = fluid.grid.inner_faces(volumes[d], d)
+        faces[:] = fluid.grid.cell_volume
+        ends = np.moveaxis(faces, 2 - d, 0)
+        if fluid.boundaries.periodic[d]:
+            ends[-1] = 0.0
+        else:
+            ends[[0, -1]] *= 0.5
+    return np.asarray(volumes * fluid.faces.solved)
+
+
+def _work_on_faces(fluid: FluidState, d: int, stress: Array) -> dict[str, Array]:
+    """Work of each term per volume on the faces normal to d, padded [J/m3]; stress is the mean viscous force [N/m3]."""
+    fields, h, rho = fluid.fields, fluid.last_step, fluid.density
+    old, new = fields.other_velocity[d], fields.velocity[d]
+    mean = 0.5 * (old + new)
+    stored, centred, ended = (
+        on_faces(each, d) for each in (fields.stored_voidage, fields.centred_voidage, fields.mean_voidage)
+    )
+    explicit = 0.5 * (fields.start_force[d] + fields.stage_force[d])
+    gradient = (fields.pressure - np.roll(fields.pressure, 1, 2 - d)) * fluid.inverse_spacing[d]
+    driving = fluid.boundaries.driving[d]
+    drag, acting = _drag(fluid, d)
+    of_particles = fluid.model_b * (1.0 - centred)
+    return {
+        "kinetic": 0.5 * rho * (ended * new**2 - stored * old**2),
+        "pressure": -h * centred * gradient * mean,
+        "driving": h * centred * driving * mean,
+        "model_b": h * of_particles * (driving - gradient) * mean,
+        "viscous": h * stress * mean,
+        "carried": h * (explicit - stress) * mean - 0.5 * rho * (ended - stored) * old * new,
+        "drag": h * drag * acting,
+        "implicit": h * drag * (mean - acting),
+        "source": h * on_faces(fields.source[d], d) * mean,
+    }
+
+
+def _drag(fluid: FluidState, d: int) -> tuple[Array, Array]:
+    """Force of drag on the fluid of each face [N/m3], and the velocity with which it acts [m/s]."""
+    axis, fields, model_b = 2 - d, fluid.fields, fluid.model_b
+    centred, face = fields.centred_voidage, on_faces(fields.centred_voidage, d)
+    share = face / centred
+    right = share * (share + model_b * (1.0 - share))
+    share = face / np.roll(centred, 1, axis)
+    left = share * (share + model_b * (1.0 - share))
+    beta = 0.5 * (right * fields.drag + left * np.roll(fields.drag, 1, axis))
+    pull = 0.5 * (right * fields.drag_momentum[d] + left * np.roll(fields.drag_momentum[d], 1, axis))
+    theta = _implicitness(beta * fluid.last_step / (fluid.density * face))
+    acting = theta * fields.velocity[d] + (1.0 - theta) * fields.other_velocity[d]
+    return pull - beta * acting, acting
+
+
+def _implicitness(stiffness: Array) -> Array:
+    return (1.0 + stiffness) / (2.0 + stiffness)
+
+
+def _at_sides(fluid: FluidState) -> tuple[float, float, float]:
+    """Work of the pressure at inlets and outlets, kinetic energy brought in, work of the inlets on drag [J]."""
+    pressed = brought = held = 0.0
+    for side in fluid.boundaries.sides:
+        inlet, outlet = np.isin(side.owner, side.inlets), _inner(side.outlet)
+        if inlet.any() or outlet.any():  # local: conditions of the whole box
+            through, carried, against = _at_side(fluid, side, inlet, outlet)
+            pressed += through
+            brought += carried
+            held += against
+    return pressed, brought, held
+
+
+def _at_side(fluid: FluidState, side: Side, inlet: np.ndarray, outlet: np.ndarray) -> tuple[float, float, float]:
+    """The three numbers of `_at_sides` for one side."""
+    fields, h, d, total = fluid.fields, fluid.last_step, side.axis, fluid.communicator.sum
+    cells = fluid.grid.cells[d]
+    at_face, inside = (LOW + cells, LOW + cells - 1) if side.high else (LOW, LOW)
+
+    def layer(field: Array, place: int) -> Array:
+        return _inner(side.layer(field, place))
+
+    old, new = layer(fields.other_velocity[d], at_face), layer(fields.velocity[d], at_face)
+    mean = 0.5 * (old + new)
+    voidage = layer(on_faces(fields.centred_voidage, d), at_face)
+    flow = side.inward * voidage * mean * h * fluid.grid.face_area(d)  # volume that came in [m3]
+    pressure = np.where(inlet, layer(fields.pressure, inside), _inner(side.pressure))
+    pressed = total((flow * pressure)[inlet | outlet])
+
+    carries = inlet | outlet & (flow < 0.0)  # what flows back through an outlet comes from rest
+    across = sum(layer(fields.velocity[e], inside) ** 2 for e in range(3) if e != d)
+    energy = 0.5 * fluid.density * flow * (mean**2 + np.where(outlet, across, 0.0))
+    brought = total(energy[carries])
+
+    drag, momentum = layer(fields.drag, inside), layer(fields.drag_momentum[d], inside)
+    theta = _implicitness(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
+    acting = theta * new + (1.0 - theta) * old
+    work = 0.5 * h * fluid.grid.cell_volume * (drag * acting - momentum) * acting
+    return pressed, brought, total(work[inlet])
+
+
+def _inner(plane: np.ndarray) -> np.ndarray:
+    """A layer of cells, or the array of a side, without the ghost rows around it."""
+    return plane[LOW:-HIGH, LOW:-HIGH]

@@ -1,0 +1,167 @@
+"""Checkpoints: the full state of a run, bit for bit, so that a resumed run continues exactly.
+
+A checkpoint is an HDF5 file. Its first 512 bytes, the HDF5 user block, hold one line of text with the format and the
+checksum of the rest. Two checkpoints are kept, so that a damaged one can be replaced by the previous one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io.files import disk_error, hdf5_in_memory, reason, write_whole
+
+FORMAT = 3
+"""Format of checkpoints. Checkpoints of any other format are refused."""
+
+KEPT = 2
+
+_HEAD = 512
+_WORDS = "cfddem checkpoint, format {}, sha256 of this number, a line end and all beyond byte 512: {}\n"
+_log = logging.getLogger("cfddem")
+
+
+def write(folder: Path, state: Mapping[str, Any]) -> Path:
+    """Write a checkpoint and remove the oldest.
+
+    folder   of the run
+    state    nested dict of arrays (of numbers, flags or records), numbers, texts, flags, None and lists of these
+    returns  the file
+    errors   InputError for a value that cannot be stored; RunFailed if the disk fails, older ones are then kept
+    """
+    home = Path(folder) / "checkpoint"
+    try:
+        home.mkdir(exist_ok=True)
+    except OSError as failure:
+        raise disk_error("create", home, failure) from failure
+    image = io.BytesIO()
+    with hdf5_in_memory(image, userblock_size=_HEAD, track_order=True) as file:
+        _put(file, state, "state")
+    content = image.getbuffer()
+    content[:_HEAD] = _words(FORMAT, content).encode().ljust(_HEAD, b"\0")
+
+    earlier = _files(home)
+    number = 1 + int(earlier[0].stem) if earlier else 0
+    path = home / f"{number:08d}.h5"
+    write_whole(path, content)
+    whole = [each for each in earlier if _fault(each) is None][: KEPT - 1]
+    for each in earlier:
+        if each not in whole:
+            each.unlink(missing_ok=True)
+    return path
+
+
+def exists(folder: Path) -> bool:
+    """Whether a run has written a checkpoint, whole or damaged."""
+    return bool(_files(Path(folder) / "checkpoint"))
+
+
+def newest(folder: Path) -> dict[str, Any]:
+    """The newest undamaged state of a run. Damaged checkpoints are skipped with a warning.
+
+    folder   of the run
+    returns  the state given to `write`, bit for bit
+    errors   InputError if there is none, or one of another format; RunFailed if all are damaged
+    """
+    home = Path(folder) / "checkpoint"
+    found = _files(home)
+    if not found:
+        raise InputError("folder", str(folder), "a run with a checkpoint", "delete the folder and run the case again")
+    for path in found:
+        fault = _fault(path)
+        if fault is None:
+            _require_format(path)
+            return _get_all(path)
+        _log.warning("%s: %s; using the previous checkpoint", path, fault)
+    raise RunFailed(f"{home}: all checkpoints are damaged ({len(found)}); delete the folder and run the case again")
+
+
+def _files(home: Path) -> list[Path]:
+    """Checkpoint files, newest first."""
+    return sorted((each for each in home.glob("*.h5") if each.stem.isdigit()), reverse=True)
+
+
+def _fault(path: Path) -> str | None:
+    """Why a checkpoint is damaged; None if it is not."""
+    try:
+        content = path.read_bytes()
+    except OSError as failure:
+        return reason(failure)
+    words = content[:_HEAD].rstrip(b"\0").decode("ascii", "replace")
+    number = _format(words)
+    if not number.isdecimal() or words != _words(int(number), memoryview(content)):
+        return "damaged, wrong checksum"
+    return None
+
+
+def _format(words: str) -> str:
+    """The format number in the head of a checkpoint."""
+    return words.removeprefix(_WORDS.split("{")[0]).split(",")[0]
+
+
+def _require_format(path: Path) -> None:
+    """Refuse another format. Such a checkpoint is not damaged, so the previous one is no substitute."""
+    with path.open("rb") as file:
+        number = int(_format(file.read(_HEAD).decode("ascii", "replace")))
+    if number != FORMAT:
+        remedy = (
+            "it was written by a newer version of cfddem; update cfddem"
+            if number > FORMAT
+            else f"it was written by an earlier version; run {path.parent.parent}/case.toml again in another folder"
+        )
+        raise InputError(f"{path}: format", number, str(FORMAT), remedy)
+
+
+def _words(number: int, content: memoryview) -> str:
+    """The head of a checkpoint: its format, and a checksum of the format and the content."""
+    checksum = hashlib.sha256(f"{number}\n".encode())
+    checksum.update(content[_HEAD:])
+    return _WORDS.format(number, checksum.hexdigest())
+
+
+def _put(group: Any, values: Mapping[str, Any], where: str) -> None:
+    """Arrays become datasets, dicts become groups, other values become JSON text, which keeps every bit of a number."""
+    for name, value in values.items():
+        here = f"{where}.{name}"
+        if not isinstance(name, str) or not name or "/" in name or name == ".":
+            raise InputError(here, None, "named by a non-empty text without '/'")
+        if isinstance(value, Mapping):
+            _put(group.create_group(name, track_order=True), value, here)
+        elif isinstance(value, np.ndarray | np.generic):
+            if value.dtype.hasobject or value.dtype.kind in "USMm":
+                raise InputError(here, str(value.dtype), "an array of numbers, flags or records of these")
+            group.create_dataset(name, data=value)
+        else:
+            try:
+                group.create_dataset(name, data=json.dumps(value)).attrs["json"] = True
+            except TypeError:
+                raise InputError(here, type(value).__name__, "an array, number, text, flag, list or dict") from None
+
+
+def _get_all(path: Path) -> dict[str, Any]:
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return _get(file)
+
+
+def _get(group: Any) -> dict[str, Any]:
+    import h5py
+
+    values: dict[str, Any] = {}
+    for name, each in group.items():
+        if isinstance(each, h5py.Group):
+            values[name] = _get(each)
+        elif "json" in each.attrs:
+            values[name] = json.loads(each[()])
+        else:
+            values[name] = each[()]
+    return values

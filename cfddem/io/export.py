@@ -1,0 +1,154 @@
+"""Export a run to VTU (meshio), CSV (pandas) or netCDF (xarray)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.io.quantities import shown_unit
+from cfddem.io.reading import Run, open_run
+
+FORMATS = ("vtu", "csv", "netcdf")
+
+
+def export(
+    folder: str | Path, kind: str, output: str | Path | None = None, snapshots: Sequence[int] | None = None
+) -> list[Path]:
+    """Write a run in another format.
+
+    folder     of the run
+    kind       vtu: particles as points and fluid as hexahedra, one file each per snapshot;
+               csv: particles of each snapshot, the history, the collisions;
+               netcdf: the fluid in time, the history, the particles of each snapshot
+    output     folder, created if needed; NAME-KIND in the current folder if not given
+    snapshots  numbers of snapshots, 0 the first, -1 the last; all if not given
+    returns    the written files
+    errors     InputError for an unknown format, or if its library is not installed
+    """
+    if kind not in FORMATS:
+        raise InputError("to", kind, nearest(kind, FORMATS))
+    run = open_run(folder)
+    home = Path(f"{run.folder.resolve().name}-{kind}" if output is None else output)
+    count = len(run.times)
+    places = list(range(count)) if snapshots is None else list(snapshots)
+    for each in places:
+        if not -count <= each < count:
+            raise InputError("snapshot", each, f"from 0 to {count - 1}, or -1 for the last")
+    places = [each % count for each in places]
+    library = _library({"vtu": "meshio", "csv": "pandas", "netcdf": "xarray"}[kind])
+    home.mkdir(parents=True, exist_ok=True)
+    return {"vtu": _vtu, "csv": _csv, "netcdf": _netcdf}[kind](run, home, places, library)
+
+
+def _vtu(run: Run, home: Path, places: list[int], meshio: Any) -> list[Path]:
+    files = []
+    for place in places:
+        particles = run.particles(place)
+        if particles:
+            points = particles.pop("position")
+            cells = [("vertex", np.arange(len(points))[:, None])]
+            files.append(home / f"particles-{place:08d}.vtu")
+            meshio.Mesh(points, cells, point_data=particles).write(files[-1])
+        if run.grid is not None:
+            corners, cells = _hexahedra(run.grid)
+            fields = {name: [_by_cell(run.fluid(name, place))] for name in run.fluid_fields}
+            files.append(home / f"fluid-{place:08d}.vtu")
+            meshio.Mesh(corners, cells, cell_data=fields).write(files[-1])
+    return files
+
+
+def _csv(run: Run, home: Path, places: list[int], pandas: Any) -> list[Path]:
+    tables = {f"particles-{place:08d}.csv": _flat(run, run.particles(place)) for place in places}
+    tables["history.csv"] = _flat(run, run.history)
+    tables["collisions.csv"] = _flat(run, run.collisions)
+    files = []
+    for name, table in tables.items():
+        if table:
+            files.append(home / name)
+            pandas.DataFrame(table).to_csv(files[-1], index=False)
+    return files
+
+
+def _netcdf(run: Run, home: Path, places: list[int], xarray: Any) -> list[Path]:
+    _library("h5netcdf")
+    files = []
+
+    def write(name: str, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
+        files.append(home / name)
+        xarray.Dataset(variables, coordinates, {"run": run.folder.resolve().name}).to_netcdf(
+            files[-1], engine="h5netcdf"
+        )
+
+    times = ("time", run.times[places], {"units": "s"})
+    if run.grid is not None:
+        names = ("time", "z", "y", "x", "component")
+        centres: dict[str, Any] = {
+            axis: (axis, x0 + h * (np.arange(n) + 0.5), {"units": "m"})
+            for axis, x0, h, n in zip("xyz", run.grid.origin, run.grid.spacing, run.grid.cells)
+        }
+        fields: dict[str, Any] = {}
+        for name in run.fluid_fields:
+            series = np.stack([run.fluid(name, place) for place in places])
+            fields[name] = (names[: series.ndim], series, {"units": run.unit(name)})
+        write("fluid.nc", fields, centres | {"time": times, "component": ["x", "y", "z"]})
+    for place in places:
+        particles = {
+            name: (("particle", "component")[: each.ndim], each, {"units": run.unit(name)})
+            for name, each in run.particles(place).items()
+        }
+        if particles:
+            instant = ((), run.times[place], {"units": "s"})
+            write(f"particles-{place:08d}.nc", particles, {"time": instant, "component": ["x", "y", "z"]})
+    if run.history:
+        columns = {
+            name: ("time", each, {"units": run.unit(name)}) for name, each in run.history.items() if name != "time"
+        }
+        write("history.nc", columns, {"time": ("time", run.history["time"], {"units": "s"})})
+    return files
+
+
+def _flat(run: Run, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Columns named with their units, vectors as three columns."""
+    flat: dict[str, np.ndarray] = {}
+    for name, values in columns.items():
+        unit = shown_unit(run.unit(name))
+        parts = {name: values} if values.ndim == 1 else {f"{name}_{axis}": values[:, k] for k, axis in enumerate("xyz")}
+        flat |= {f"{part} [{unit}]" if unit != "-" else part: each for part, each in parts.items()}
+    return flat
+
+
+def _by_cell(field: np.ndarray) -> np.ndarray:
+    return field.reshape(-1, *field.shape[3:])
+
+
+def _hexahedra(grid: Any) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
+    """Corners of a grid and the eight corners of each cell, cells in the order of the fields."""
+    nx, ny, nz = (n + 1 for n in grid.cells)
+    z, y, x = np.meshgrid(
+        *[x0 + h * np.arange(n) for x0, h, n in zip(grid.origin, grid.spacing, (nx, ny, nz))][::-1], indexing="ij"
+    )
+    row = np.arange(nx * ny * nz).reshape(nz, ny, nx)
+    low, high = row[:-1], row[1:]
+    corners = [layer[around] for layer in (low, high) for around in _AROUND]
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3), [
+        ("hexahedron", np.stack([each.ravel() for each in corners], axis=1))
+    ]
+
+
+_FIRST, _SECOND = slice(None, -1), slice(1, None)
+_AROUND = tuple(
+    (slice(None), *each) for each in ((_FIRST, _FIRST), (_FIRST, _SECOND), (_SECOND, _SECOND), (_SECOND, _FIRST))
+)
+"""Corners of a cell in a layer, counter-clockwise, as (y, x) slices."""
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise InputError("export", None, f"used with {name} installed", "`pip install 'cfddem[export]'`") from None

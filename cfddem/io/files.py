@@ -1,0 +1,90 @@
+"""Write files that appear whole or not at all, and report a failing disk in one line.
+
+The content is assembled in memory, written to a temporary file, flushed to the disk, and renamed.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+from cfddem.backend.errors import InputError, RunFailed
+
+PARTIAL = ".partial"
+"""Suffix of a file that is still being written. A killed process can leave one behind; it is never read."""
+
+_REMEDY = {
+    errno.ENOSPC: "free space on that disk; earlier files are intact",
+    errno.EDQUOT: "free space within your quota; earlier files are intact",
+    errno.EACCES: "choose a folder with write permission",
+    errno.EPERM: "choose a folder with write permission",
+    errno.EROFS: "choose a folder on a writable disk",
+    errno.ENOENT: "its folder is missing; create it, or move it back if it was moved during the run",
+}
+
+
+def write_whole(path: Path, content: bytes | memoryview) -> None:
+    """Write a file atomically: its name always refers to the old content or to the new one.
+
+    path     of the file
+    content  all of it
+    errors   RunFailed with the reason of the disk; the old file is then unchanged
+    """
+    fresh = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL}")
+    try:
+        with fresh.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        fresh.replace(path)
+        _sync_folder(path.parent)
+    except OSError as failure:
+        fresh.unlink(missing_ok=True)
+        raise disk_error("write", path, failure) from failure
+
+
+def disk_error(verb: str, path: Path, failure: OSError) -> RunFailed:
+    """The error for a failed disk operation: which file, why, and the remedy."""
+    remedy = _REMEDY.get(failure.errno or 0, "")
+    return RunFailed(f"{path}: cannot {verb} the file: {reason(failure)}" + (f"; {remedy}" if remedy else ""))
+
+
+def reason(failure: OSError) -> str:
+    """The message of the operating system in lower case."""
+    return (failure.strerror or str(failure)).lower()
+
+
+def require_folder(output: Path | None) -> None:
+    """Refuse an output file whose folder does not exist, before any work is done.
+
+    errors  InputError
+    """
+    if output is not None and not output.parent.is_dir():
+        raise InputError("output", str(output), "a file in an existing folder", f"create {output.parent} first")
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove the temporary files of killed processes."""
+    for left in folder.glob(f".*{PARTIAL}"):
+        left.unlink(missing_ok=True)
+
+
+def hdf5_in_memory(image: io.BytesIO, **options: Any) -> Any:
+    """An open HDF5 file whose bytes go to `image`; use it in a `with` statement."""
+    import h5py
+
+    return h5py.File(image, "w", **options)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Flush the file names of a folder to the disk, so that a power cut does not undo a rename."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError:  # some network file systems do not support this; the file itself is on the disk
+        pass
+    finally:
+        os.close(descriptor)

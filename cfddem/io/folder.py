@@ -1,0 +1,142 @@
+"""The rules of a run folder: what makes a folder a run, which formats are read, and who may write it."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io.files import disk_error, reason
+from cfddem.io.index import POINTS, Layout, Snapshot
+
+FORMAT = 2
+"""Format of run folders. Folders of any other format are refused."""
+
+RUN_FILES = ("run.json", "run.vtkhdf", "history.h5", "checkpoint")
+"""A folder that holds one of these files holds a run."""
+
+
+def read_about(folder: Path) -> dict[str, Any]:
+    """The content of `run.json`.
+
+    errors  InputError if the folder holds no run or a run of another format; RunFailed if the file is damaged
+    """
+    path = folder / "run.json"
+    try:
+        about: dict[str, Any] = json.loads(path.read_text())
+        found = int(about["format"])
+    except FileNotFoundError:
+        raise InputError("folder", str(folder), "a run folder", "it contains no run.json") from None
+    except OSError as failure:
+        raise disk_error("read", path, failure) from failure
+    except (ValueError, KeyError, TypeError) as damage:
+        raise RunFailed(f"{path}: the file is damaged ({damage}); restore it, the snapshots are in data/") from damage
+    if found != FORMAT:
+        remedy = (
+            "the run was written by a newer version of cfddem; update cfddem"
+            if found > FORMAT
+            else f"the run was written by an earlier version of cfddem; run {folder}/case.toml again in another folder"
+        )
+        raise InputError(f"{path}: format", found, str(FORMAT), remedy)
+    return about
+
+
+def scan(folder: Path) -> tuple[list[Snapshot], Layout | None]:
+    """All snapshots of a run, read from the data files, and their layout."""
+    found: list[Snapshot] = []
+    layout = None
+    for path in sorted((folder / "data").glob("*.h5")):
+        snapshot, layout = read_snapshot_header(path)
+        found.append(snapshot)
+    return found, layout
+
+
+def read_snapshot_header(path: Path) -> tuple[Snapshot, Layout]:
+    """Time, step, particle count and layout of one snapshot file.
+
+    errors  RunFailed if the file is damaged
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            particles = file.get("particles", {})
+            count = len(particles[POINTS]) if POINTS in particles else 0
+            snapshot = Snapshot(path.name, float(file.attrs["time"]), int(file.attrs["step"]), count)
+            return snapshot, Layout.of(file.get("fluid", {}), particles)
+    except (OSError, KeyError) as damage:
+        raise RunFailed(f"{path}: the snapshot is damaged ({damage}); move the file elsewhere and retry") from damage
+
+
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a history file; empty if there is no such file.
+
+    errors  RunFailed if the file is damaged
+    """
+    import h5py
+
+    if not path.exists():
+        return {}
+    try:
+        with h5py.File(path, "r") as file:
+            return {name: each[:] for name, each in file.items()}
+    except OSError as damage:
+        raise RunFailed(f"{path}: the history is damaged ({damage}); move the file elsewhere and retry") from damage
+
+
+def require_free(folder: Path, case_text: str) -> None:
+    """Refuse a folder that holds a run, or a file where the folder should be.
+
+    A run that was killed before it wrote any data does not count: the same case may start there again.
+
+    errors  InputError
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError("output", str(folder), "a folder", "a file of that name exists")
+    taken = [name for name in RUN_FILES if (folder / name).exists()]
+    if any((folder / "data").glob("*.h5")):
+        taken.append("data")
+    if (folder / "case.toml").exists() and (folder / "case.toml").read_text() != case_text:
+        taken.append("case.toml")
+    if taken:
+        raise InputError(
+            "output",
+            str(folder),
+            f"a folder without a run ({', '.join(taken)} found)",
+            f"continue that run with `cfddem resume {folder}`, or choose another folder",
+        )
+
+
+def make_folder(folder: Path) -> None:
+    """Create the folder of a run.
+
+    errors  InputError with the reason if this is not possible
+    """
+    try:
+        (folder / "data").mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
+        raise InputError("output", str(folder), "a writable folder", reason(failure)) from failure
+
+
+def lock(folder: Path) -> Any:
+    """Lock a run for this process; the lock ends with the process, however it ends.
+
+    errors  InputError if another process holds the lock
+    """
+    path = folder / ".lock"
+    try:
+        file = path.open("w")
+    except OSError as failure:
+        raise disk_error("write", path, failure) from failure
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        raise InputError("folder", str(folder), "unused", "another process is writing this run") from None
+    except OSError:  # the file system does not support locks
+        pass
+    return file

@@ -1,0 +1,247 @@
+"""Reading a run folder: times, fields, particles and history as numpy arrays; a snapshot as pyvista objects.
+
+>>> from cfddem import open_run                     # doctest: +SKIP
+>>> run = open_run("bed-run")                       # doctest: +SKIP
+>>> run.history["bed_height"][-1], run.fluid("voidage").min(), run.track(17)["position"]  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, RunFailed, nearest
+from cfddem.io.folder import read_about, read_columns, read_snapshot_header
+from cfddem.io.index import Box, Snapshot, field_name, listed
+from cfddem.io.quantities import Quantity, from_json
+
+if TYPE_CHECKING:
+    import pyvista
+
+_log = logging.getLogger("cfddem")
+
+
+def open_run(folder: str | Path) -> Run:
+    """Open a run folder, finished or still being written.
+
+    folder   of the run
+    returns  Run; fields are read on demand
+    errors   InputError if the folder holds no run or a run of another format
+    """
+    return Run(Path(folder))
+
+
+def newest_run(place: Path) -> Path:
+    """The most recently written run folder: the given folder or one in it.
+
+    errors  InputError if there is none
+    """
+    found = [path for path in (place / "run.json", *place.glob("*/run.json")) if path.exists()]
+    if not found:
+        raise InputError("folder", None, "a run folder", f"there is none in {place.resolve()}")
+    return max(found, key=lambda path: max(path.stat().st_mtime, path.with_name("data").stat().st_mtime)).parent
+
+
+class Run:
+    """A written run. Snapshots are numbered in time: 0 is the first, -1 the last."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.about = read_about(folder)
+        self.quantities = from_json(self.about["quantities"])
+        grid = self.about["grid"]
+        self.grid = None if grid is None else Box(**{key: tuple(each) for key, each in grid.items()})
+        self.snapshots, self.missing = self._find()
+        if self.missing:
+            shown = ", ".join(self.missing[:3]) + (" ..." if len(self.missing) > 3 else "")
+            _log.warning("%s: %d snapshots are missing: %s", folder / "data", len(self.missing), shown)
+
+    def __repr__(self) -> str:
+        ends = f"{self.times[0]:g} to {self.times[-1]:g} s" if len(self.snapshots) else "no time"
+        return f"Run({str(self.folder)!r}: {self.status}, {len(self.snapshots)} snapshots, {ends})"
+
+    # ------------------------------------------------------------ about
+
+    @property
+    def status(self) -> str:
+        """running, finished, stopped or failed; a killed run remains `running`."""
+        return str(self.about["status"])
+
+    @property
+    def message(self) -> str:
+        """Why the run stopped or failed."""
+        return str(self.about["message"])
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Versions, platform and random seed."""
+        return dict(self.about["provenance"])
+
+    @cached_property
+    def case_text(self) -> str:
+        """The case in TOML as it was run."""
+        return (self.folder / "case.toml").read_text()
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Time of each snapshot [s]."""
+        return np.array([each.time for each in self.snapshots])
+
+    @cached_property
+    def steps(self) -> np.ndarray:
+        """Particle steps up to each snapshot."""
+        return np.array([each.step for each in self.snapshots], np.int64)
+
+    @property
+    def fluid_fields(self) -> list[str]:
+        """Names of the fluid fields."""
+        return self._names["fluid"]
+
+    @property
+    def particle_fields(self) -> list[str]:
+        """Names of the particle fields."""
+        return self._names["particles"]
+
+    def quantity(self, name: str) -> Quantity:
+        """Unit and meaning of a column of the history, or of a field of particles, fluid or collisions.
+
+        errors  InputError if the run has no such quantity
+        """
+        for block in ("history", "particles", "fluid", "collisions"):
+            if name in self.quantities.get(block, {}):
+                return self.quantities[block][name]
+        known = {each for names in self.quantities.values() for each in names}
+        raise InputError("quantity", name, nearest(name, sorted(known)))
+
+    def unit(self, name: str) -> str:
+        """Unit of a field or column, `1` for a plain number."""
+        return self.quantity(name).unit
+
+    # ------------------------------------------------------------ values
+
+    def fluid(self, name: str, snapshot: int = -1) -> np.ndarray:
+        """A fluid field (nz, ny, nx) or (nz, ny, nx, 3) of one snapshot."""
+        self._require_name(name, self.fluid_fields, "fluid")
+        with self._opened(snapshot) as file:
+            return np.asarray(file[f"fluid/{name}"][0])
+
+    def particles(self, snapshot: int = -1) -> dict[str, np.ndarray]:
+        """All particle fields of one snapshot, one row per particle, in the order of ids."""
+        with self._opened(snapshot) as file:
+            return {field_name(name): np.asarray(each[:]) for name, each in file.get("particles", {}).items()}
+
+    def track(self, particle: int) -> dict[str, np.ndarray]:
+        """One particle in all snapshots that contain it: `time` and every field, one row per snapshot.
+
+        particle  its id
+        """
+        self._require_name("id", self.particle_fields, "particles")
+        rows: dict[str, list[Any]] = {"time": []}
+        for place, time in enumerate(self.times):
+            with self._opened(place) as file:
+                group = file["particles"]
+                at = int(np.searchsorted(group["id"][:], particle))
+                if at < len(group["id"]) and group["id"][at] == particle:
+                    rows["time"].append(time)
+                    for name, each in group.items():
+                        rows.setdefault(field_name(name), []).append(each[at])
+        if not rows["time"]:
+            raise InputError("particle", particle, "the id of a particle in this run")
+        return {name: np.array(values) for name, values in rows.items()}
+
+    @cached_property
+    def history(self) -> dict[str, np.ndarray]:
+        """Measures in time, name -> column; `pandas.DataFrame(run.history)` makes a table."""
+        return read_columns(self.folder / "history.h5")
+
+    @cached_property
+    def collisions(self) -> dict[str, np.ndarray]:
+        """All completed collisions, name -> column; empty if the run records none."""
+        parts: dict[str, list[np.ndarray]] = {}
+        for place in range(len(self.snapshots)):
+            with self._opened(place) as file:
+                for name, each in file.get("collisions", {}).items():
+                    parts.setdefault(name, []).append(each[:])
+        return {name: np.concatenate(each) for name, each in parts.items()}
+
+    def mesh(self, snapshot: int = -1) -> pyvista.MultiBlock:
+        """One snapshot as pyvista objects: an ImageData `fluid` with cell fields and a PolyData `particles`."""
+        import pyvista
+
+        blocks = pyvista.MultiBlock()
+        if self.grid is not None:
+            image = pyvista.ImageData(
+                dimensions=[n + 1 for n in self.grid.cells], spacing=self.grid.spacing, origin=self.grid.origin
+            )
+            for name in self.fluid_fields:
+                values = self.fluid(name, snapshot)
+                image.cell_data[name] = values.reshape(-1, *values.shape[3:])
+            blocks["fluid"] = image
+        particles = self.particles(snapshot)
+        if particles:
+            points = pyvista.PolyData(particles.pop("position"))
+            for name, values in particles.items():
+                points.point_data[name] = values
+            blocks["particles"] = points
+        return blocks
+
+    # ------------------------------------------------------------ details
+
+    def _find(self) -> tuple[list[Snapshot], list[str]]:
+        """The snapshots in the folder, indexed or not, and the names of missing ones.
+
+        Snapshots are numbered without a gap, so a gap is a loss.
+        """
+        present = {path.name for path in (self.folder / "data").glob("[0-9]*.h5")}
+        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf")}
+        found = [
+            known[name] if name in known else read_snapshot_header(self.folder / "data" / name)[0]
+            for name in sorted(present)
+        ]
+        last = max((int(name[:8]) for name in {*present, *known}), default=-1)
+        return found, [name for name in (f"{k:08d}.h5" for k in range(last + 1)) if name not in present]
+
+    @cached_property
+    def _names(self) -> dict[str, list[str]]:
+        if not self.snapshots:
+            return {"fluid": [], "particles": []}
+        with self._opened(-1) as file:
+            return {block: sorted(map(field_name, file.get(block, {}))) for block in ("fluid", "particles")}
+
+    @contextmanager
+    def _opened(self, snapshot: int) -> Iterator[Any]:
+        """The open file of a snapshot."""
+        import h5py
+
+        if not self.snapshots:
+            raise InputError("folder", str(self.folder), "a run with a snapshot", "the run ended before its first one")
+        if not -len(self.snapshots) <= snapshot < len(self.snapshots):
+            raise InputError("snapshot", snapshot, f"from 0 to {len(self.snapshots) - 1}, or -1 for the last")
+        path = self.folder / "data" / self.snapshots[snapshot].name
+        try:
+            file = h5py.File(path, "r")
+        except OSError as damage:
+            raise RunFailed(f"{path}: cannot be read ({damage})") from damage
+        with file:
+            yield file
+
+    def _require_name(self, name: str, known: list[str], where: str) -> None:
+        if name not in known:
+            raise InputError(f"{where} field", name, nearest(name, known))
+
+
+def _indexed(path: Path) -> list[Snapshot]:
+    """The snapshots in the index; none if it is missing or unreadable, since every snapshot can be read by itself."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return listed(file)
+    except (OSError, KeyError):
+        return []

@@ -1,0 +1,312 @@
+"""Writing a run folder: immutable snapshots, a small index over them, the history, the case and the provenance.
+
+    run/
+      run.json               format, status, grid, quantities with units, versions, seed
+      case.toml              the case as it was run
+      data/00000012.h5       one snapshot: /fluid/<name> (1, nz, ny, nx[, 3]), /particles/Points (n, 3) and <name>
+      run.vtkhdf             all snapshots as one series for ParaView, pyvista and h5py
+      history.h5             one dataset per column
+      checkpoint/            full states to resume from
+
+Every file is written atomically. Whenever a run is killed, every file is whole and everything up to the last snapshot
+is in the folder.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time as clock
+from array import array
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io import checkpoint
+from cfddem.io.files import hdf5_in_memory, remove_partial, write_whole
+from cfddem.io.folder import FORMAT, lock, make_folder, read_about, read_columns, require_free, scan
+from cfddem.io.index import POINTS, Box, Layout, Snapshot, describe, field_name, index
+from cfddem.io.quantities import Quantities, declared, from_json
+
+_ALWAYS_INDEXED = 200
+_INDEX_SHARE = 0.02
+"""After so many snapshots the index may lag behind if writing it would take more than this share of the run time."""
+
+
+class RunFolder:
+    """Writes a run. Make one with `RunFolder.create`, or with `RunFolder.reopen` to continue a run."""
+
+    def __init__(self, folder: Path, about: dict[str, Any], case_text: str) -> None:
+        self.folder, self.case_text, self.about = folder, case_text, about
+        self.quantities = from_json(about["quantities"])
+        self.box = None if about["grid"] is None else Box(**{key: tuple(each) for key, each in about["grid"].items()})
+        self.snapshots: list[Snapshot] = []
+        self._layout: Layout | None = None
+        self._real = np.dtype("f4" if about["precision"] == "single" else "f8")
+        self._history: dict[str, array[float]] = {}
+        self._history_is_new = False
+        self._indexed, self._indexed_at, self._index_cost = 0, clock.monotonic(), 0.0
+        self._lock = lock(folder)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path,
+        case_text: str,
+        provenance: Mapping[str, Any],
+        grid: Any = None,
+        quantities: Quantities | None = None,
+        precision: str = "single",
+    ) -> RunFolder:
+        """Start a run in a new folder.
+
+        folder      is created; must not hold a run
+        case_text   the case in TOML, stored unchanged
+        provenance  plain values, from `cfddem.io.provenance.provenance()`
+        grid        with cells, spacing and origin; None for particles alone
+        quantities  unit and meaning of every field and column that will be written, by block
+        precision   of real fields in snapshots, single or double; history and checkpoints are always double
+        errors      InputError if the folder holds a run or cannot be written
+        """
+        folder = Path(folder)
+        if precision not in ("single", "double"):
+            raise InputError("output.precision", precision, "single or double")
+        require_free(folder, case_text)
+        about = {
+            "format": FORMAT,
+            "status": "running",
+            "message": "",
+            "precision": precision,
+            "grid": None if grid is None else asdict(_box(grid)),
+            "quantities": {block: dict(names) for block, names in (quantities or {}).items()},
+            "provenance": dict(provenance),
+        }
+        make_folder(folder)
+        run = cls(folder, about, case_text)
+        write_whole(folder / "case.toml", case_text.encode())
+        run._write_about()
+        return run
+
+    @classmethod
+    def reopen(cls, folder: Path) -> RunFolder:
+        """Continue a run that was stopped or killed. Everything written is kept until `drop_after`.
+
+        folder  of the run
+        errors  InputError if it holds no run, a run of another format, or one that another process is writing
+        """
+        folder = Path(folder)
+        about = read_about(folder)
+        run = cls(folder, about, (folder / "case.toml").read_text())
+        for place in (folder, folder / "data", folder / "checkpoint"):
+            remove_partial(place)
+        run.snapshots, run._layout = scan(folder)
+        run._history = {name: array("d", column) for name, column in read_columns(folder / "history.h5").items()}
+        about.update(status="running", message="")
+        run._write_about()
+        return run
+
+    # ------------------------------------------------------------ writing
+
+    def write_snapshot(
+        self,
+        time: float,
+        step: int,
+        fluid: Mapping[str, np.ndarray] | None,
+        particles: Mapping[str, np.ndarray] | None,
+        collisions: np.ndarray | None = None,
+    ) -> None:
+        """Write the history so far, one snapshot, and the index, in this order.
+
+        time, step  of the snapshot [s], [-]
+        fluid       name -> (nz, ny, nx) or (nz, ny, nx, 3); None if the run has no grid
+        particles   name -> (n,) or (n, 3), with `position`; rows are written in the order of `id`; may be None
+        collisions  structured array of the collisions since the previous snapshot, or None
+        errors      InputError for an undeclared field or a wrong shape; RunFailed if the disk fails
+        """
+        cells, points = self._cells(fluid or {}), self._points(particles or {})
+        layout = Layout.of(cells, points)
+        if self._layout is not None:
+            self._layout.require_same(layout)
+        if self.snapshots and time <= self.snapshots[-1].time:
+            limit = f"later than the previous snapshot at {self.snapshots[-1].time:g} s"
+            raise InputError("snapshot.time", time, limit, "call drop_after first")
+        content = self._snapshot_file(
+            time, step, {"fluid": cells, "particles": points, "collisions": _columns(collisions)}
+        )
+        self.flush_history()
+        number = 1 + int(self.snapshots[-1].name[:8]) if self.snapshots else 0
+        snapshot = Snapshot(f"{number:08d}.h5", float(time), int(step), len(points.get(POINTS, ())))
+        write_whole(self.folder / "data" / snapshot.name, content)
+        self.snapshots.append(snapshot)
+        self._layout = layout
+        elapsed = clock.monotonic() - self._indexed_at
+        if len(self.snapshots) <= _ALWAYS_INDEXED or self._index_cost < _INDEX_SHARE * elapsed:
+            self.write_index()
+
+    def write_index(self) -> None:
+        """Write `run.vtkhdf` from the list of snapshots."""
+        begin = clock.monotonic()
+        if self.snapshots and self._layout is not None:
+            texts = {"case": self.case_text, "provenance": json.dumps(self.about["provenance"])}
+            content = index(self.snapshots, self._layout, self.box, self.quantities, texts)
+            write_whole(self.folder / "run.vtkhdf", content)
+        else:
+            (self.folder / "run.vtkhdf").unlink(missing_ok=True)
+        self._indexed, self._indexed_at = len(self.snapshots), clock.monotonic()
+        self._index_cost = self._indexed_at - begin
+
+    def append_history(self, row: Mapping[str, float]) -> None:
+        """Add a row. It is written with the next snapshot, checkpoint or `flush_history`.
+
+        row     column -> number, with `time`; the same columns every time
+        errors  InputError for different columns or an undeclared column
+        """
+        if not self._history:
+            for name in row:
+                declared(self.quantities, "history", name)
+            self._history = {name: array("d") for name in row}
+        if row.keys() != self._history.keys() or "time" not in row:
+            odd = sorted(row.keys() ^ self._history.keys()) or ["time"]
+            raise InputError(
+                "history", odd, "the same columns in every row, with time", "write NaN for a missing value"
+            )
+        for name, value in row.items():
+            self._history[name].append(value)
+        self._history_is_new = True
+
+    @property
+    def last_row(self) -> dict[str, float]:
+        """The last row of the history; empty before the first."""
+        return {name: column[-1] for name, column in self._history.items() if column}
+
+    def flush_history(self) -> None:
+        """Write all rows so far."""
+        if not self._history_is_new:
+            return
+        image = io.BytesIO()
+        with hdf5_in_memory(image, track_order=True) as file:
+            for name, column in self._history.items():
+                dataset = file.create_dataset(name, data=np.frombuffer(column))
+                describe(dataset, declared(self.quantities, "history", name))
+        write_whole(self.folder / "history.h5", image.getbuffer())
+        self._history_is_new = False
+
+    def write_checkpoint(self, state: Mapping[str, Any]) -> None:
+        """Write the history so far, then the full state (`cfddem.io.checkpoint`)."""
+        self.flush_history()
+        checkpoint.write(self.folder, state)
+
+    def note(self, name: str, value: Any) -> None:
+        """Store a plain value in `run.json`; an earlier value of that name is replaced."""
+        self.about[name] = value
+        self._write_about()
+
+    def drop_after(self, time: float) -> None:
+        """Remove snapshots and history rows later than a time [s].
+
+        The index is rewritten first, so that it never refers to a removed snapshot.
+        """
+        late = [each for each in self.snapshots if each.time > time]
+        self.snapshots = self.snapshots[: len(self.snapshots) - len(late)]
+        if not self.snapshots:
+            self._layout = None
+        self.write_index()
+        for each in reversed(late):
+            (self.folder / "data" / each.name).unlink(missing_ok=True)
+        if self._history:
+            kept = np.frombuffer(self._history["time"]) <= time
+            self._history = {name: array("d", np.frombuffer(each)[kept]) for name, each in self._history.items()}
+            self._history_is_new = True
+            self.flush_history()
+
+    def finish(self, status: str, message: str = "") -> None:
+        """Write everything that is left and how the run ended; release the folder.
+
+        status   finished, stopped or failed
+        message  one line for the user
+        """
+        if status not in ("finished", "stopped", "failed"):
+            raise InputError("status", status, "finished, stopped or failed")
+        self.about.update(status=status, message=message)
+        try:
+            self.flush_history()
+            if self._indexed != len(self.snapshots):
+                self.write_index()
+            self._write_about()
+        except RunFailed:
+            if status != "failed":  # of a failed run the user must see the first failure, not this one
+                raise
+        finally:
+            self._lock.close()
+
+    # ------------------------------------------------------------ details
+
+    def _write_about(self) -> None:
+        write_whole(self.folder / "run.json", (json.dumps(self.about, indent=1) + "\n").encode())
+
+    def _snapshot_file(self, time: float, step: int, blocks: Mapping[str, Mapping[str, np.ndarray]]) -> memoryview:
+        """The bytes of a snapshot."""
+        image = io.BytesIO()
+        with hdf5_in_memory(image) as file:
+            file.attrs["time"], file.attrs["step"], file.attrs["format"] = float(time), int(step), FORMAT
+            for block, arrays in blocks.items():
+                for name, values in arrays.items():
+                    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size else {}
+                    dataset = file.create_dataset(f"{block}/{name}", data=values, **packed)
+                    describe(dataset, declared(self.quantities, block, field_name(name)))
+        return image.getbuffer()
+
+    def _cells(self, fluid: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cell fields with a leading axis of length one, in the precision of the run."""
+        if (self.box is None) != (not fluid):
+            raise InputError("snapshot.fluid", sorted(fluid), "given if and only if the run has a grid")
+        shaped = {}
+        for name, values in fluid.items():
+            values = np.asarray(values)
+            if self.box is None or values.shape[:3] != self.box.shape or values.shape[3:] not in ((), (3,)):
+                raise InputError(f"snapshot.fluid.{name}", values.shape, "(nz, ny, nx) or (nz, ny, nx, 3) of the grid")
+            shaped[name] = self._stored(values)[None]
+        return shaped
+
+    def _points(self, particles: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Particle fields in the order of ids; positions under the name that VTK requires."""
+        if not particles:
+            if self.box is None:
+                raise InputError("snapshot.particles", None, "given if the run has no grid")
+            return {}
+        if "position" not in particles:
+            raise InputError("snapshot.particles", sorted(particles), "with the field 'position'")
+        count = len(particles["position"])
+        order = np.argsort(particles["id"], kind="stable") if "id" in particles else slice(None)
+        shaped = {}
+        for name, values in particles.items():
+            values = np.asarray(values)
+            if values.ndim not in (1, 2) or len(values) != count:
+                raise InputError(f"snapshot.particles.{name}", values.shape, f"one row for each of {count} particles")
+            shaped[POINTS if name == "position" else name] = self._stored(values[order])
+        return shaped
+
+    def _stored(self, values: np.ndarray) -> np.ndarray:
+        """Reals in the precision of the run, flags as bytes, integers unchanged."""
+        kind = self._real if values.dtype.kind == "f" else np.dtype("u1") if values.dtype.kind == "b" else values.dtype
+        return values.astype(kind, copy=False)
+
+
+def _box(grid: Any) -> Box:
+    return Box(
+        tuple(int(n) for n in grid.cells),  # type: ignore[arg-type]
+        tuple(float(h) for h in grid.spacing),  # type: ignore[arg-type]
+        tuple(float(x) for x in grid.origin),  # type: ignore[arg-type]
+    )
+
+
+def _columns(table: np.ndarray | None) -> dict[str, np.ndarray]:
+    """A structured array as columns, flags as bytes."""
+    if table is None:
+        return {}
+    columns = {name: table[name] for name in table.dtype.names or ()}
+    return {name: each.astype("u1") if each.dtype.kind == "b" else each for name, each in columns.items()}

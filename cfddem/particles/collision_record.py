@@ -1,0 +1,99 @@
+"""The record of collisions: which bodies, when, at what speed, with which film, and how they separated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.data.fields import Field
+from cfddem.particles.collision_events import COLLISION
+
+COLLISION_FIELDS = (
+    Field("first", meaning="id of the first body"),
+    Field("second", meaning="id of the second body; -1 - w for wall w"),
+    Field("begin", "s", meaning="time when the pair came within range"),
+    Field("end", "s", meaning="time when the pair left the range"),
+    Field("place", "m", meaning="position of the first body at the end"),
+    Field("stokes", meaning="Stokes number of the normal approach; infinite without a film"),
+    Field("approach_speed", "m/s", meaning="normal speed when the pair came within range"),
+    Field("minimum_gap", "m", meaning="minimum gap of the film"),
+    Field("roughness_gap", "m", meaning="gap at which asperities touch"),
+    Field("elastohydrodynamic_gap", "m", meaning="gap at which the film pressure deforms the solids"),
+    Field("deformed", meaning="1 if the film pressure, not the asperities, sets the minimum gap"),
+    Field("friction", meaning="coefficient of friction that applies"),
+    Field("restitution", meaning="normal speed after over before"),
+    Field("restitution_tangential", meaning="tangential speed after over before"),
+    Field("closest_gap", "m", meaning="smallest gap of the pair; below the minimum gap the solids touched"),
+    Field("lost_to_film", "J", meaning="energy dissipated by the film; NaN without an energy budget"),
+    Field("lost_to_contact", "J", meaning="energy dissipated by contact damping"),
+    Field("lost_to_friction", "J", meaning="energy dissipated by sliding"),
+    Field("weight", meaning="number of collisions that the row represents"),
+)
+"""Unit and meaning of the columns of the record."""
+
+MOST = 500_000
+"""Rows kept between two snapshots; where there are more, every second row is dropped, repeatedly if needed."""
+
+_FIRST, _SECOND, _SPREAD = (np.uint64(odd) for odd in (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xBF58476D1CE4E5B9))
+
+
+class CollisionRecord:
+    """A growing table of collisions, filled by the particle loop.
+
+    `table` is a structured array of dtype :data:`cfddem.particles.collision_events.COLLISION`. Above `most` rows the
+    table is thinned out evenly; the weight of a row is the number of collisions that it represents.
+
+    most  rows to keep until they are taken
+    """
+
+    def __init__(self, most: int = MOST) -> None:
+        self.most = most
+        self._kept: list[np.ndarray] = []
+        self._count, self._share = 0, 1  # rows kept; one of how many collisions is
+        self._rows = np.zeros(0, COLLISION)
+
+    @property
+    def table(self) -> np.ndarray:
+        """All collisions that have ended, in the order of their ends."""
+        return np.concatenate([np.zeros(0, COLLISION), *self._kept])
+
+    def room(self, edges: int) -> np.ndarray:
+        """Rows for the loop to write to; enough for one collision of every edge."""
+        if len(self._rows) < 2 * edges:
+            self._rows = np.zeros(2 * edges + 64, COLLISION)
+        return self._rows
+
+    def keep(self, count: int) -> None:
+        """Keep the first `count` rows that the loop has written."""
+        if not count:
+            return
+        fresh = _thinned(self._rows[:count], self._share)
+        self._kept.append(fresh)
+        self._count += len(fresh)
+        while self._count > self.most:
+            self._share *= 2
+            self._kept = [_thinned(self.table, self._share)]
+            self._count = len(self._kept[0])
+
+    def take(self) -> np.ndarray:
+        """All rows; the table is empty afterwards."""
+        table = self.table
+        self._kept, self._count, self._share = [], 0, 1
+        return table
+
+    def put_back(self, rows: np.ndarray) -> None:
+        """Put earlier rows back, as after a restart."""
+        kept = np.array(rows, COLLISION)
+        self._kept, self._count = [kept], len(kept)
+        self._share = int(kept["weight"].max(initial=1.0))
+
+
+def _thinned(rows: np.ndarray, share: int) -> np.ndarray:
+    """One of `share` rows, a power of two; the choice depends on the collisions alone, not on when they were kept."""
+    if share == 1:
+        return rows.copy()
+    mixed = np.ascontiguousarray(rows["begin"]).view(np.uint64) * _SPREAD
+    mixed = mixed ^ (rows["first"].astype(np.uint64) * _FIRST) ^ (rows["second"].astype(np.uint64) * _SECOND)
+    mixed = (mixed ^ (mixed >> np.uint64(29))) * _SPREAD
+    chosen = rows[(mixed >> np.uint64(40)) % np.uint64(share) == 0].copy()
+    chosen["weight"] = share
+    return chosen

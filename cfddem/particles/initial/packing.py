@@ -1,0 +1,191 @@
+"""Initial particles: diameters, lattices, and random packings without overlaps above a stated limit."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.backend.compile import serial
+from cfddem.backend.errors import CfddemError, InputError
+from cfddem.particles.neighbours import list_edges, wrap
+from cfddem.particles.pair_graph import Edges, shifts
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.arrays import assemble
+
+OVERLAP_LIMIT = 1e-4
+"""Largest overlap that a packing may have, over the smaller of the two radii."""
+
+Seed = int | tuple[int, ...]
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+class PackingFailed(CfddemError):
+    """Raised if a random packing does not reach its solid fraction."""
+
+    exit_code = 2
+
+
+def mono(count: int, diameter: float) -> np.ndarray:
+    """Diameters of equal spheres (count,) [m].
+
+    >>> mono(2, 1e-3).tolist()
+    [0.001, 0.001]
+    """
+    _positive("diameter", diameter)
+    return np.full(count, float(diameter))
+
+
+def normal(count: int, mean: float, deviation: float, seed: Seed) -> np.ndarray:
+    """Normally distributed diameters, cut off at three deviations and at a tenth of the mean (count,) [m].
+
+    mean, deviation  [m]
+    seed             of the random numbers
+    """
+    _positive("mean", mean)
+    generator = np.random.default_rng(seed)
+    low, high = max(0.1 * mean, mean - 3.0 * deviation), mean + 3.0 * deviation
+    drawn = generator.normal(mean, deviation, count)
+    while (outside := (drawn < low) | (drawn > high)).any():
+        drawn[outside] = generator.normal(mean, deviation, int(outside.sum()))
+    return drawn
+
+
+def log_normal(count: int, median: float, spread: float, seed: Seed) -> np.ndarray:
+    """Log-normally distributed diameters, cut off at three standard deviations (count,) [m].
+
+    median  [m]
+    spread  standard deviation of the logarithm of the diameter [-]
+    """
+    _positive("median", median)
+    steps = np.random.default_rng(seed).standard_normal(count)
+    return median * np.exp(spread * np.clip(steps, -3.0, 3.0))
+
+
+def from_table(count: int, diameters: np.ndarray, number_fractions: np.ndarray, seed: Seed) -> np.ndarray:
+    """Diameters drawn from a table of classes (count,) [m].
+
+    diameters         of each class [m]
+    number_fractions  share of each class in the number of particles; need not add up to one
+    """
+    weights = np.asarray(number_fractions, float)
+    if (weights < 0).any() or not weights.sum() > 0:
+        raise InputError("number_fractions", weights.tolist(), "at least 0, and not all 0")
+    return np.random.default_rng(seed).choice(np.asarray(diameters, float), count, p=weights / weights.sum())
+
+
+def lattice(diameter: float, room: Box, spacing: float = 1.05, seed: int | None = None) -> np.ndarray:
+    """Centres on a cubic lattice that fills a box (N, 3) [m], layer by layer from below.
+
+    diameter  of the largest sphere [m]
+    room      two opposite corners [m]
+    spacing   distance of neighbours over the diameter
+    seed      of random shifts within the free space; no shifts if not given
+    """
+    _positive("diameter", diameter)
+    low, high = np.asarray(room, float)
+    number = np.floor((high - low) / (spacing * diameter) + 1e-9).astype(int)
+    if (number < 1).any():
+        raise InputError("room", (high - low).tolist(), f"at least {spacing * diameter:.3g} m along each axis")
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in number[::-1]), indexing="ij"), axis=-1).reshape(-1, 3)[:, ::-1]
+    pitch = (high - low) / number
+    centres = low + (cells + 0.5) * pitch
+    if seed is not None:
+        free = 0.5 * (pitch - diameter) * (1.0 - 1e-9)
+        centres += np.random.default_rng(seed).uniform(-1.0, 1.0, centres.shape) * free
+    return centres
+
+
+def random_packing(
+    diameters: np.ndarray,
+    solid_fraction: float,
+    seed: int,
+    shape: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    most_sweeps: int = 20_000,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pack spheres at random in a periodic box to a given solid fraction.
+
+    Spheres start at random positions and are moved apart until no overlap exceeds :data:`OVERLAP_LIMIT`.
+
+    diameters       (N,) [m]
+    solid_fraction  up to about 0.62 for equal spheres [-]
+    seed            of the initial positions
+    shape           of the box, as ratios of its edges
+    returns         centres (N, 3) [m] and edges of the box (3,) [m]
+
+    Raises PackingFailed if the fraction is not reached within `most_sweeps`.
+    """
+    if not 0.0 < solid_fraction < 0.74:
+        raise InputError("solid_fraction", solid_fraction, "above 0 and below 0.74")
+    diameters = np.asarray(diameters, float)
+    volume = float(np.sum(np.pi / 6.0 * diameters**3)) / solid_fraction
+    ratios = np.asarray(shape, float)
+    box = ratios * (volume / np.prod(ratios)) ** (1.0 / 3.0)
+    position = np.random.default_rng(seed).uniform(0.0, 1.0, (len(diameters), 3)) * box
+    spheres = make_particles(position, 0.5 * diameters, 1000.0)
+    skin = 0.2 * float(diameters.min())
+    worst = np.inf
+    for _ in range(most_sweeps // _SWEEPS + 1):
+        wrap(spheres.position, box)
+        graph = list_edges(spheres, assemble(), 0.0, skin, box)
+        worst = _push_apart(
+            spheres.view, graph.flat_graph, shifts(box).reshape(-1), _SWEEPS, 0.25 * skin, OVERLAP_LIMIT
+        )
+        if worst <= OVERLAP_LIMIT:
+            wrap(spheres.position, box)
+            return spheres.position, box
+    raise PackingFailed(
+        f"a solid fraction of {solid_fraction:g} leaves overlaps of {worst:.2g} radii (limit {OVERLAP_LIMIT:g}) after "
+        f"{most_sweeps} sweeps; ask for less than about 0.62, or a wider size distribution"
+    )
+
+
+def largest_overlap(graph: Edges, gap: np.ndarray, radius: np.ndarray) -> float:
+    """Largest overlap of a packing over the smaller radius [-]; 0 if nothing overlaps.
+
+    gap     (n,) of every pair [m]
+    radius  (N,) [m]
+    """
+    pairs = graph.between_particles
+    if pairs == 0:
+        return 0.0
+    smaller = np.minimum(radius[graph.first[:pairs]], radius[graph.second[:pairs]])
+    return max(0.0, float((-gap[:pairs] / smaller).max()))
+
+
+_SWEEPS = 25
+
+
+@serial
+def _push_apart(particles, edges, shift, sweeps, reach, limit):
+    """Move overlapping spheres apart, each by half of the overlap; returns the largest one left, over the radius."""
+    position, radius = particles.position, particles.radius
+    way = np.zeros_like(position)
+    worst = 0.0
+    for sweep in range(sweeps + 1):
+        way[:] = 0.0
+        worst = 0.0
+        for k in range(edges.between_particles):
+            i, j = 3 * int(edges.first[k]), 3 * int(edges.second[k])
+            image = 3 * int(edges.image[k])
+            square = 0.0
+            for axis in range(3):
+                square += (position[i + axis] - position[j + axis] + shift[image + axis]) ** 2
+            touch = radius[i // 3] + radius[j // 3]
+            if square < touch * touch:
+                distance = np.sqrt(max(square, 1e-300))
+                overlap = touch - distance
+                worst = max(worst, overlap / min(radius[i // 3], radius[j // 3]))
+                for axis in range(3):
+                    push = 0.5 * (overlap + 1e-6 * touch)
+                    push *= (position[i + axis] - position[j + axis] + shift[image + axis]) / distance
+                    way[i + axis] += push
+                    way[j + axis] -= push
+        if worst <= limit or sweep == sweeps:
+            return worst
+        for place in range(len(way)):
+            position[place] += min(max(way[place], -reach), reach)
+    return worst
+
+
+def _positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(name, value, "above 0 and finite")

@@ -1,0 +1,249 @@
+"""Particles in time: one synchronised velocity Verlet step after the other.
+
+A step consists of these phases:
+
+    kick                 half a step by the forces at hand
+    film impulses        of every pair, then of every particle
+    drift                new positions; walls move
+    [halo: position, velocity, spin]
+    walls                geometry of every particle and wall
+    pairs                films, contacts and rolling of every edge
+    sum                  force and torque of every particle over its own edges, in a fixed order
+    [halo: film rate]
+    kick                 the other half
+
+A loop over edges writes what each pair does, a loop over particles sums its edges: no two threads write the same
+number, and the result does not depend on their number. Each phase is a function of its own; `integrate` compiles all of
+them into one loop over many steps, and does not return between phases. The halos in the list mark where ghost particles
+would need new values; nothing exchanges them yet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
+from cfddem.particles.collision_events import record_event
+from cfddem.particles.interactions.contact import NOTHING
+from cfddem.particles.interactions.film import film_force, film_impulse, update_edge_film
+from cfddem.particles.interactions.kinematics import wall_kinematics
+from cfddem.particles.interactions.pair_loops import edge_contact
+from cfddem.particles.interactions.slots import (
+    DRIFTING,
+    FILM,
+    RECORD,
+    ROLLING,
+    WALLS,
+    clear_contact,
+    film_impulses,
+    pair_forces,
+    update_films,
+)
+from cfddem.particles.vectors import at, dot, minus, plus, put, times
+from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
+from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
+
+
+@inline
+def _role(edge):
+    """Row of an incident edge, and 1 where the particle is its first body, -1 where it is its second."""
+    second = np.int64(edge) >> 63
+    return np.uint64(np.int64(edge) ^ second), 1.0 + 2.0 * second
+
+
+@inline
+def gather_forces(i, particles, edges, memory, gravity, near):
+    """Sum what the edges of particle i do to it, with weight and outside force; pairs from `near` on do not touch."""
+    force, couple, moment, resistance = at(particles.applied, i), NOTHING, NOTHING, 0.0
+    for place in range(edges.start[i], edges.start[i + 1]):
+        k, sign = _role(edges.incident[place])
+        if FILM:
+            resistance += memory.resistance[k]
+            if near <= k < edges.between_particles:
+                continue
+        force = plus(force, times(sign, at(memory.force, k)))
+        couple = plus(couple, at(memory.couple, k))
+        if ROLLING:
+            moment = plus(moment, times(sign, at(memory.moment, k)))
+    if particles.inverse_mass[i] > 0.0:
+        force = plus(force, times(1.0 / particles.inverse_mass[i], gravity))
+    put(particles.force, i, force)
+    put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
+    if FILM:
+        particles.film_rate[i] = particles.inverse_mass[i] * resistance
+
+
+@inline
+def kick(i, particles, step):
+    """Half a kick by the forces at hand."""
+    gain = times(0.5 * step * particles.inverse_mass[i], at(particles.force, i))
+    put(particles.velocity, i, plus(at(particles.velocity, i), gain))
+    gain = times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i))
+    put(particles.spin, i, plus(at(particles.spin, i), gain))
+
+
+@inline
+def apply_film_impulses(i, particles, edges, memory):
+    """Give particle i the impulses of its films."""
+    impulse = (0.0, 0.0, 0.0)
+    for place in range(edges.start[i], edges.start[i + 1]):
+        k, sign = _role(edges.incident[place])
+        impulse = plus(impulse, times(sign, at(memory.impulse, k)))
+    put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
+
+
+@inline
+def drift(i, particles, free, step, origin):
+    """Move particle i along the free directions; returns its squared distance from its origin."""
+    velocity = at(particles.velocity, i)
+    way = (step * free[0] * velocity[0], step * free[1] * velocity[1], step * free[2] * velocity[2])
+    put(particles.position, i, plus(at(particles.position, i), way))
+    moved = minus(at(particles.position, i), at(origin, i))
+    return dot(moved, moved)
+
+
+# ---------------------------------------------------------------- phases
+
+
+@part
+def kick_particles(count, particles, step):
+    """Half a kick of the first `count` particles."""
+    for i in prange(count):
+        kick(i, particles, step)
+
+
+@inline
+def find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Impulses of all films over the coming step."""
+    film_impulses(0, edges.between_particles, particles, edges, memory, shift, cutoff_ratio, step)
+    find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+
+
+@part
+def find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Impulses of the films that change much in this step, and of films at walls."""
+    pairs = edges.between_particles
+    for k in prange(len(edges.first)):
+        if k >= pairs or memory.hard[k]:
+            film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+
+
+@part
+def drift_particles(count, particles, edges, memory, free, step, origin):
+    """Apply the impulses of films and move the first `count` particles; returns the largest squared way from origin."""
+    farthest = np.zeros(CHUNKS)
+    for chunk in prange(CHUNKS):
+        far = 0.0
+        for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            if DRIFTING:
+                apply_film_impulses(i, particles, edges, memory)
+            moved = drift(i, particles, free, step, origin)
+            if not moved <= far:
+                far = moved
+        farthest[chunk] = far
+    largest = 0.0
+    for chunk in range(CHUNKS):
+        if not farthest[chunk] <= largest:
+            largest = farthest[chunk]
+    return largest
+
+
+@inline
+def wall_contact(k, particles, edges, memory, walls, shift, table, p, step):
+    """Contact of particle-wall edge k."""
+    part = portion(edges, k)
+    i, j = edges.first[k], edges.second[k]
+    apart = not touched_distance(edges, k) - particles.radius[i] < memory.minimum_gap[k]
+    if part == 0.0 or apart:
+        put(memory.force, k, NOTHING)
+        put(memory.couple, k, NOTHING)
+        if ROLLING:
+            put(memory.moment, k, NOTHING)
+        if part != 0.0:
+            clear_contact(memory, k)
+        return
+    kinematics = wall_kinematics(k, particles, edges, walls, shift)
+    row = table[particles.material[i], walls.material[j]]
+    edge_contact(k, kinematics, row, part, memory, p, step)
+
+
+@part
+def add_film_forces(particles, edges, memory, walls, shift, table, cutoff_ratio):
+    """Add the forces of films that act as explicit forces."""
+    for k in prange(len(edges.first)):
+        film = film_force(k, particles, edges, memory, walls, shift, table, cutoff_ratio)
+        put(memory.force, k, plus(at(memory.force, k), film))
+
+
+@inline
+def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step):
+    """Films, contacts and rolling of all edges at the present positions.
+
+    step  by which springs have moved since the last forces; 0 at the start [s]
+    """
+    pairs, number = edges.between_particles, len(edges.first)
+    near = edges.near if DRIFTING else pairs
+    kinds, rows = np.uint64(len(table)), table.reshape(-1)
+    if FILM:
+        update_films(near, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
+        for k in range(pairs, number):
+            update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ratio)
+    pair_forces(0, near, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p, free, step)
+    if WALLS:
+        for k in range(pairs, number):
+            wall_contact(np.uint64(k), particles, edges, memory, walls, shift, table, p, step)
+    if FILM and not DRIFTING:
+        add_film_forces(particles, edges, memory, walls, shift, table, cutoff_ratio)
+
+
+@part
+def sum_forces(count, particles, edges, memory, gravity, step):
+    """Sum the forces on the first `count` particles, and kick them by half a step."""
+    near = edges.near if DRIFTING else edges.between_particles
+    for i in prange(count):
+        gather_forces(i, particles, edges, memory, gravity, near)
+        if step > 0.0:
+            kick(i, particles, step)
+
+
+# ---------------------------------------------------------------- all phases of many steps
+
+
+@serial
+def integrate(
+    particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, steps, origin, reach, time, log
+):
+    """Find the forces at the present positions, then advance by up to `steps` steps.
+
+    With `steps` = 0 nothing moves. With `steps` > 0 the forces at hand are taken as they are. The loop stops early when
+    a particle has moved by `reach` from `origin`, or when `log`, the record of collisions ended since `time`, could
+    overflow. Returns the number of steps made, the largest squared displacement (NaN if a position is NaN) and the
+    number of rows written.
+    """
+    count, largest = len(particles.radius), 0.0
+    done, noted, full = 0, 0, False
+    half = step if steps > 0 else 0.0
+    while True:
+        if steps > 0:
+            kick_particles(count, particles, step)
+            if DRIFTING:
+                find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+            way = drift_particles(count, particles, edges, memory, free, step, origin)
+            largest = way if not way <= largest else largest
+            done += 1
+            if WALLS:
+                way = advance_walls(walls, step)
+                largest = max(largest, way * way)
+                if len(walls.cell_member) > 0:
+                    share_memory(edges, memory, walls)
+        if WALLS:
+            wall_contacts(particles, edges, memory.minimum_gap, walls, free, cutoff_ratio)
+        find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, half)
+        sum_forces(count, particles, edges, memory, gravity, half)
+        if RECORD:
+            now = time + done * step
+            for k in range(len(edges.first)):
+                noted = record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio, now, log, noted)
+            full = len(log) - noted < len(edges.first)
+        if done >= steps or full or not largest < reach * reach:
+            return done, largest, noted

@@ -1,0 +1,190 @@
+"""Lubrication film between two bodies: its resistance, and its impulse over a step.
+
+A film remembers its approach, from when the pair comes within reach until it leaves it. Functions of numbers without
+branches work on several pairs at once; the others work on one edge.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.backend.compile import inline
+from cfddem.data.fields import Field
+from cfddem.particles.interactions.film_law import at_least
+from cfddem.particles.interactions.kinematics import (
+    pair_mass_and_radius,
+    pair_row,
+    pair_viscosity,
+    relative_velocity,
+)
+from cfddem.particles.interactions.slots import (
+    COUNT_FILM,
+    COUNT_GAP,
+    USER_GAP,
+    FilmState,
+    GapState,
+    explicit_resistance,
+    film_outside,
+    film_resistance,
+    gap_outside,
+    speed_after_film,
+    speed_after_short_film,
+    user_minimum_gap,
+)
+from cfddem.particles.pair_graph import THICKEST, geometry
+from cfddem.particles.vectors import dot, put, times
+from cfddem.particles.walls.nearest_point import portion
+from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
+
+LEAST = 1e-300
+
+FIELDS = (
+    Field("resistance", "kg/s", role="memory", meaning="resistance of the film without lever; 0 out of its reach"),
+    Field("approach_speed", "m/s", role="memory", meaning="largest approach speed since the film began"),
+    Field("accounted_gap", "m", role="memory", initial=np.inf, meaning="gap up to which the impulse has been given"),
+    Field("impulse", "N s", 3, "scratch", meaning="impulse of the film in this step, on the first body"),
+    Field("hard", role="scratch", dtype=bool, meaning="the film changes too much in this step for the short solution"),
+)
+
+OUTSIDE = Field("outside", role="scratch", dtype=int, meaning="uses of a law outside of its range")
+"""Of pairs with a user's law of the film or the minimum gap."""
+
+
+@inline
+def minimum_gap_of(approach_speed, viscosity, reduced_radius, row):
+    """Minimum gap by the user's law, at least that of asperities, at most what neighbour lists allow; may be NaN."""
+    gap = user_minimum_gap(GapState(row.roughness_gap, approach_speed, viscosity, row.film_modulus, reduced_radius))
+    return max(row.roughness_gap, min(gap, THICKEST * reduced_radius)) if gap == gap else gap
+
+
+@inline
+def update_film(gap, viscosity, reduced_radius, memory, row, cutoff_ratio):
+    """Resistance of a film, and its memory; the memory begins anew where the pair comes within reach.
+
+    memory   resistance, approach speed, minimum gap and accounted gap of the step before
+    row      of the pair table
+    returns  the same four as they are now
+    """
+    resistance, approach_speed, minimum_gap, accounted_gap = memory
+    roughness = row.roughness_gap
+    within = gap <= cutoff_ratio * reduced_radius
+    begins = within and resistance == 0.0
+    unknown = accounted_gap == np.inf
+    approach_speed = 0.0 if begins else approach_speed
+    minimum_gap = roughness if begins or (unknown and not within) else minimum_gap
+    if USER_GAP:
+        minimum_gap = minimum_gap_of(0.0, viscosity, reduced_radius, row) if begins else minimum_gap
+    accounted_gap = gap if not within or (begins and unknown) else accounted_gap
+    state = FilmState(max(gap, minimum_gap), viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
+    return film_resistance(state) if within else 0.0, approach_speed, minimum_gap, accounted_gap
+
+
+@inline
+def update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ratio):
+    """Update the film of edge k."""
+    _, _, gap = geometry(k, particles, edges, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    viscosity = pair_viscosity(k, particles, edges)
+    row = pair_row(k, particles, edges, walls, table)
+    then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
+    now = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
+    memory.resistance[k] = portion(edges, k) * now[0]
+    memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now[1], now[2], now[3]
+
+
+@inline
+def record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row):
+    """Remember the largest approach speed and the minimum gap that belongs to it."""
+    if not (-normal_speed > memory.approach_speed[k] and gap > memory.minimum_gap[k]):
+        return
+    if USER_GAP:
+        memory.approach_speed[k] = -normal_speed
+        memory.minimum_gap[k] = minimum_gap_of(-normal_speed, viscosity, reduced_radius, row)
+        if COUNT_GAP:
+            memory.outside[k] += gap_outside(
+                GapState(row.roughness_gap, -normal_speed, viscosity, row.film_modulus, reduced_radius)
+            )
+    else:
+        # slower approaches end on asperities and need not be recorded
+        slowest = elastohydrodynamic_speed(row.roughness_gap, viscosity, row.film_modulus, reduced_radius)
+        memory.approach_speed[k] = max(-normal_speed, slowest)
+        deformed = elastohydrodynamic(viscosity, -normal_speed, row.film_modulus, reduced_radius)
+        memory.minimum_gap[k] = max(row.roughness_gap, min(deformed, THICKEST * reduced_radius))
+
+
+@inline
+def film_force(k, particles, edges, memory, walls, shift, table, cutoff_ratio):
+    """The film of edge k as an explicit force, for plain velocity Verlet."""
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    normal = times(1.0 / distance, separation)
+    normal_speed = dot(relative_velocity(k, particles, edges), normal)
+    viscosity = pair_viscosity(k, particles, edges)
+    row = pair_row(k, particles, edges, walls, table)
+    record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row)
+    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
+    if COUNT_FILM and memory.resistance[k] > 0.0:
+        memory.outside[k] += film_outside(at_least(film))
+    return times(-portion(edges, k) * explicit_resistance(film) * normal_speed, normal)
+
+
+@inline
+def clamp_speed(new_speed, speed):
+    """A film neither speeds a pair up nor turns its motion round."""
+    return min(max(new_speed, 0.0), speed) if speed > 0.0 else max(min(new_speed, 0.0), speed)
+
+
+@inline
+def film_impulse_short(speed, film, rate, memory, step):
+    """Impulse of a film over the coming step and the gap up to which it is given, where the gap hardly changes.
+
+    film     :class:`~cfddem.particles.interactions.slots.FilmState`
+    rate     resistance of all films over the mass, summed over both particles [1/s]
+    memory   resistance, approach speed and accounted gap
+    returns  impulse [N s], accounted gap [m], and whether `film_impulse` must find them instead
+    """
+    resistance, approach_speed, accounted_gap = memory
+    within = resistance > 0.0
+    strength_per_mass, inverse_mass = rate * max(film.gap, film.minimum_gap), rate / max(resistance, LEAST)
+    new_speed = speed_after_short_film(speed, film, accounted_gap, step, strength_per_mass, inverse_mass)
+    faster = -speed > approach_speed and film.gap > film.minimum_gap
+    found = new_speed == new_speed and not faster
+    new_speed = clamp_speed(new_speed, speed)
+    impulse = (new_speed - speed) * resistance / max(rate, LEAST)
+    return (
+        impulse if within and found else 0.0,
+        film.gap + step * new_speed if within and found else accounted_gap,
+        within and not found,
+    )
+
+
+@inline
+def film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Impulse of the film of edge k over the coming step.
+
+    Each body gives this film the part of its mass that the film has in the body's total resistance. The
+    pair so made is solved exactly; the sum over all films conserves momentum and never raises energy.
+    """
+    i, j = edges.first[k], edges.second[k]
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    normal = times(1.0 / distance, separation)
+    if memory.resistance[k] == 0.0:
+        put(memory.impulse, k, times(0.0, normal))
+        return
+    normal_speed = dot(relative_velocity(k, particles, edges), normal)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    rate = particles.film_rate[i]
+    if k < edges.between_particles:
+        rate += particles.film_rate[j]
+    strength_per_mass = rate * max(gap, memory.minimum_gap[k])
+    inverse_mass = rate * portion(edges, k) / memory.resistance[k]
+    viscosity, row = pair_viscosity(k, particles, edges), pair_row(k, particles, edges, walls, table)
+    record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row)
+    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
+    given = memory.accounted_gap[k]
+    new_speed = speed_after_film(normal_speed, film, given, step, strength_per_mass, inverse_mass)
+    if COUNT_FILM:
+        memory.outside[k] += film_outside(at_least(film))
+    new_speed = clamp_speed(new_speed, normal_speed)
+    memory.accounted_gap[k] = gap + step * new_speed
+    put(memory.impulse, k, times((new_speed - normal_speed) * memory.resistance[k] / rate, normal))

@@ -1,0 +1,158 @@
+"""The laws of a run: which ones the user has chosen, and what they put into the slots of the particle loops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
+from cfddem.backend.law_set import check_compiles
+from cfddem.data.fields import Field
+from cfddem.particles.interactions import contact, film, rolling
+from cfddem.particles.interactions.contact_law import ContactLaw
+from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
+from cfddem.particles.interactions.hertz import HERTZ
+from cfddem.particles.interactions.jkr import JKR
+from cfddem.particles.interactions.linear import linear
+from cfddem.particles.interactions.slots import FilmState, GapState
+
+CHOICES = {
+    "integrator": ("drift", "verlet"),
+    "friction_onset": ("film", "overlap"),
+    "contact": ("hertz", "linear"),
+    "spring": ("total", "rescaled"),
+    "rolling": ("none", "constant_torque", "spring_dashpot"),
+    "cohesion": ("none", "jkr"),
+}
+"""Words that each choice may take."""
+
+
+class Laws(NamedTuple):
+    """Which laws hold between two particles.
+
+    film                  there is a lubrication film
+    integrator            "drift": films act by impulses, without a stability limit; "verlet": as an explicit force
+    friction_onset        friction begins at h_min ("film") or at geometric overlap ("overlap")
+    contact               "hertz", "linear", or a :class:`~cfddem.particles.interactions.contact_law.ContactLaw`
+    spring                tangential force from the total displacement, or "rescaled" while the contact is loaded
+    rolling               resistance to rolling: "none", "constant_torque" or "spring_dashpot"
+    cohesion              adhesion of dry solids: "none" or "jkr", with the contact of Hertz
+    cutoff_ratio          reach of the film over R* [-]
+    normal_stiffness      of the linear contact [N/m]
+    tangential_stiffness  of the linear contact [N/m]
+    rolling_damping       of the rolling dashpot, over critical; 0.3 as in Ai et al. (2011) [-]
+    minimum_gap           a user's law of the minimum gap; the built-in elastohydrodynamic one if not given
+    lubrication           a user's film: its resistance, or a
+                          :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
+    """
+
+    film: bool = False
+    integrator: str = "drift"
+    friction_onset: str = "film"
+    contact: str | ContactLaw = "hertz"
+    spring: str = "total"
+    rolling: str = "none"
+    cohesion: str = "none"
+    cutoff_ratio: float = 1.0
+    normal_stiffness: float = 0.0
+    tangential_stiffness: float = 0.0
+    rolling_damping: float = 0.3
+    minimum_gap: Callable[..., float] | None = None
+    lubrication: Callable[..., float] | FilmLaw | None = None
+
+    def dry(self) -> Laws:
+        """The same laws without films."""
+        return self._replace(film=False, minimum_gap=None, lubrication=None)
+
+    def check(self) -> None:
+        """Refuse unknown words, laws that cannot be compiled, and choices that exclude each other."""
+        for name, words in CHOICES.items():
+            value = getattr(self, name)
+            if value not in words and not (name == "contact" and isinstance(value, ContactLaw)):
+                raise InputError(name, value, nearest(str(value), words))
+        if self.cohesion != "none" and self.film:
+            raise InputError("cohesion", self.cohesion, "absent where there are films; adhesion is that of dry solids")
+        if self.cohesion != "none" and self.contact != "hertz":
+            raise InputError("cohesion", self.cohesion, "with the contact of Hertz; linear springs do not adhere")
+        if isinstance(self.contact, ContactLaw):
+            self.contact.check()
+        if self.contact == "linear":
+            for name in ("normal_stiffness", "tangential_stiffness"):
+                if not getattr(self, name) >= 0.0:
+                    raise InputError(name, getattr(self, name), "at least 0")
+        for kind in OF_THE_PAIR_LOOP:
+            if (law := getattr(self, kind)) is None:
+                continue
+            if not self.film:
+                name = getattr(law, "__name__", type(law).__name__)
+                raise InputError(kind, name, "absent where there are no films", "take Laws(film=True)")
+            if isinstance(law, FilmLaw):
+                law.check()
+            else:
+                check_compiles(f"laws.{kind}", chosen(kind, law).function)
+
+    @property
+    def contact_law(self) -> ContactLaw:
+        """The law of the normal contact."""
+        if isinstance(self.contact, ContactLaw):
+            return self.contact
+        if self.contact == "linear":
+            return linear(float(self.normal_stiffness), float(self.tangential_stiffness))
+        return HERTZ if self.cohesion == "none" else JKR
+
+    @property
+    def film_law(self) -> FilmLaw | None:
+        """The user's film law; None where the built-in one holds or there is no film."""
+        if self.lubrication is None or isinstance(self.lubrication, FilmLaw):
+            return self.lubrication
+        return FilmLaw(chosen("lubrication", self.lubrication).function)
+
+    @property
+    def parameters(self) -> tuple[float, ...]:
+        """Numbers that the loops take: those of the contact law, and the damping of rolling last."""
+        return (*self.contact_law.values, float(self.rolling_damping))
+
+    def fields(self) -> list[Field]:
+        """What pairs remember under these laws, and what the loops write for each pair."""
+        fields = [*contact.FIELDS, *self.contact_law.memory]
+        if self.film:
+            fields += film.FIELDS
+        if self.rolling != "none":
+            fields += rolling.FIELDS
+        if self.minimum_gap is not None or self.lubrication is not None:
+            fields.append(film.OUTSIDE)
+        return fields
+
+    def choices(self) -> dict[str, Any]:
+        """What these laws put into the slots of the loops."""
+        return _choices(self.contact_law, self._replace(contact="", normal_stiffness=0.0, tangential_stiffness=0.0))
+
+
+@lru_cache(maxsize=64)
+def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
+    made = {
+        **contact_law.choices(),
+        "FILM": bool(laws.film),
+        "DRIFTING": bool(laws.film) and laws.integrator == "drift",
+        "RESCALED": laws.spring == "rescaled",
+        "FROM_OVERLAP": laws.friction_onset == "overlap",
+        "ROLLING": laws.rolling != "none",
+        "rolling_torque": rolling.ROLLINGS[laws.rolling],
+        **(built_in() if laws.film else {}),
+        "POTENTIAL": False,
+        "USER_GAP": laws.minimum_gap is not None,
+        "COUNT_GAP": False,
+        "COUNT_FILM": False,
+    }
+    if laws.minimum_gap is not None:
+        entry = chosen("minimum_gap", laws.minimum_gap)
+        made |= gap_choices(entry.function)
+        made |= {"COUNT_GAP": bool(entry.ranges), "gap_outside": range_check("gap", GapState._fields, entry.ranges)}
+    if (film_law := laws.film_law) is not None:
+        made |= film_law.choices()
+        if not isinstance(laws.lubrication, FilmLaw):
+            ranges = chosen("lubrication", laws.lubrication).ranges  # type: ignore[arg-type]
+            made |= {"COUNT_FILM": bool(ranges), "film_outside": range_check("film", FilmState._fields, ranges)}
+    return made

@@ -1,0 +1,179 @@
+"""The loops over all pairs of particles, which work on several pairs at once.
+
+The compiler does so only where it sees that no two arrays overlap: arrays must come as arguments of the loop, one by
+one. `over_pairs` writes such a loop around a function of one pair that takes its arrays in structures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from collections.abc import Callable, Collection, Iterable
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.compile import inline, part, prange
+from cfddem.backend.law_set import specialise, written
+from cfddem.data.fields import Field
+from cfddem.particles.interactions.contact import NOTHING, contact, contact_state
+from cfddem.particles.interactions.film import film_impulse_short, update_film
+from cfddem.particles.interactions.film_law import at_least
+from cfddem.particles.interactions.kinematics import sphere_kinematics
+from cfddem.particles.interactions.rolling import resist_rolling
+from cfddem.particles.interactions.slots import (
+    ADHESIVE,
+    COUNT_FILM,
+    FILM,
+    ROLLING,
+    FilmState,
+    adhesive_reach,
+    film_outside,
+    read_memory,
+    write_memory,
+)
+from cfddem.particles.pair_graph import between, memory_class
+from cfddem.particles.vectors import at, dot, minus, put, times
+
+PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
+"""Arrays of the particles that loops over pairs read."""
+
+PairEnds = namedtuple("PairEnds", "first second image")
+"""Arrays of the graph that loops over pairs read."""
+
+
+@inline
+def edge_contact(k, kinematics, row, share, memory, p, step):
+    """Contact, friction and rolling of one edge, from its kinematics.
+
+    share  part of the contact that belongs to this edge: below 1 where triangles of a mesh share one
+    """
+    separated = memory.minimum_gap[k]
+    m = read_memory(memory, k)
+    push, turn, spring, m, d = contact(kinematics, row, separated, at(memory.spring, k), m, p, step)
+    state = contact_state(kinematics, separated, step)
+    touching = kinematics.gap < separated
+    if ADHESIVE:
+        memory.minimum_gap[k] = adhesive_reach(state, row, p, m, d) if touching else 0.0
+    if ROLLING:
+        moment, roll = resist_rolling(kinematics, state, row, push, at(memory.roll, k), p, m, d)
+        put(memory.moment, k, times(share, moment))
+        put(memory.roll, k, roll)
+    put(memory.force, k, times(share, push))
+    put(memory.couple, k, times(share, turn))
+    put(memory.spring, k, spring)
+    write_memory(memory, k, m, touching)
+
+
+@inline
+def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p, free, step):
+    """Film and contact of one pair of particles."""
+    k = np.uint64(n)
+    i, j = edges.first[k], edges.second[k]
+    kinematics = sphere_kinematics(k, particles, edges, shift, free)
+    row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
+    if FILM:
+        viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
+        then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
+        now = update_film(kinematics.gap, viscosity, kinematics.reduced_radius, then, row, cutoff_ratio)
+        memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now
+    edge_contact(k, kinematics, row, 1.0, memory, p, step)
+
+
+@inline
+def pair_film(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio):
+    """Film of one pair of particles that cannot touch."""
+    k = np.uint64(n)
+    i, j = edges.first[k], edges.second[k]
+    separation = between(i, j, edges.image[k], particles.position, shift)
+    gap = math.sqrt(dot(separation, separation)) - particles.radius[i] - particles.radius[j]
+    reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
+    row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
+    viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
+    then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
+    now = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
+    memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now
+
+
+@inline
+def pair_impulse(n, particles, edges, memory, shift, cutoff_ratio, step):
+    """Impulse of the film of one pair of particles."""
+    k = np.uint64(n)
+    i, j = edges.first[k], edges.second[k]
+    separation = between(i, j, edges.image[k], particles.position, shift)
+    distance = math.sqrt(dot(separation, separation))
+    normal = times(1.0 / distance, separation)
+    gap = distance - particles.radius[i] - particles.radius[j]
+    reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
+    speed = dot(minus(at(particles.velocity, i), at(particles.velocity, j)), normal)
+    viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
+    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
+    then = (memory.resistance[k], memory.approach_speed[k], memory.accounted_gap[k])
+    rate = particles.film_rate[i] + particles.film_rate[j]
+    size, given, left = film_impulse_short(speed, film, rate, then, step)
+    if COUNT_FILM:
+        memory.outside[k] += film_outside(at_least(film)) if then[0] > 0.0 and not left else 0
+    memory.accounted_gap[k] = given
+    memory.hard[k] = left
+    put(memory.impulse, k, times(size, normal))
+
+
+LOOPS: dict[str, tuple[Callable[..., Any], str]] = {
+    "pair_forces": (pair_force, "shift, rows, kinds, cutoff_ratio, p, free, step"),
+    "update_films": (pair_film, "shift, rows, kinds, cutoff_ratio"),
+    "film_impulses": (pair_impulse, "shift, cutoff_ratio, step"),
+}
+"""Slot -> function of one pair, and what it takes beside the arrays."""
+
+
+def loop_choices(fields: Iterable[Field], choices: dict[str, Any], kept_apart: Collection[str]) -> dict[str, Any]:
+    """What goes into the slots of the loops over pairs that carry these fields.
+
+    kept_apart  fields that inactive triangles do not take over
+    """
+    fields = list(fields)
+    names = tuple(each.name for each in fields)
+    loops = {slot: over_pairs(specialise(body, choices), names, rest) for slot, (body, rest) in LOOPS.items()
+             if choices["FILM"] or slot == "pair_forces"}  # fmt: skip
+    lines = ["put(memory.{0}, to, at(memory.{0}, k))" if each.components else "memory.{0}[to] = memory.{0}[k]"
+             for each in fields]  # fmt: skip
+    copied = [line.format(each.name) for line, each in zip(lines, fields)
+              if each.role == "memory" and each.name not in kept_apart]  # fmt: skip
+    return {
+        **loops,
+        "copy_memory": written("def copy_memory(memory, k, to):\n    " + "\n    ".join(copied) + "\n", put=put, at=at),
+        "clear_contact": specialise(_clear_contact, choices),
+    }
+
+
+@inline
+def _clear_contact(memory, k):
+    """Forget what a contact remembered that has ended."""
+    put(memory.spring, k, NOTHING)
+    if ROLLING:
+        put(memory.roll, k, NOTHING)
+    if ADHESIVE:
+        memory.minimum_gap[k] = 0.0
+    write_memory(memory, k, read_memory(memory, k), False)
+
+
+def over_pairs(body: Any, names: tuple[str, ...], rest: str) -> Any:
+    """A loop `(begin, end, particles, edges, memory, rest)` over pairs, with each array an argument of its own.
+
+    body   (n, particles, edges, memory, rest), compiled by `inline`
+    names  of the fields of a pair
+    rest   further arguments
+    """
+    structures = {"particles": PairParticles, "edges": PairEnds, "memory": memory_class(names)}
+    arrays = {name: [f"{name}_{each}" for each in made._fields] for name, made in structures.items()}
+    every = ", ".join(each for some in arrays.values() for each in some)
+    rebuilt = ", ".join(f"{name}_of({', '.join(some)})" for name, some in arrays.items())
+    given = ", ".join(f"{name}.{each}" for name, made in structures.items() for each in made._fields)
+    classes = {f"{name}_of": made for name, made in structures.items()}
+    loop = (
+        f"def over_pairs(begin, end, {every}, {rest}):\n"
+        f"    for n in prange(begin, end):\n"
+        f"        body(n, {rebuilt}, {rest})\n"
+    )
+    call = f"def call(begin, end, particles, edges, memory, {rest}):\n    over_pairs(begin, end, {given}, {rest})\n"
+    return written(call, over_pairs=written(loop, part, body=body, prange=prange, **classes))

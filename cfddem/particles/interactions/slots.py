@@ -1,0 +1,100 @@
+"""The slots of the particle loops: where the laws and constants of a run go (:mod:`cfddem.backend.law_set`).
+
+:meth:`cfddem.particles.interactions.laws.Laws.choices` fills them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from cfddem.backend.law_set import Slot
+
+
+class ContactState(NamedTuple):
+    """A contact, as the functions of a contact law see it."""
+
+    overlap: float  # > 0 [m]
+    gap: float  # [m]
+    normal_speed: float  # positive apart [m/s]
+    step: float  # [s]
+    minimum_gap: float  # [m]
+    reduced_radius: float  # R* [m]
+    reduced_mass: float  # m* [kg]
+
+
+class FilmState(NamedTuple):
+    """A film, as the functions of a film law see it."""
+
+    gap: float  # [m]
+    viscosity: float  # [Pa s]
+    reduced_radius: float  # R* [m]
+    minimum_gap: float  # h_min [m]
+    cutoff_gap: float  # h_co [m]
+
+
+class GapState(NamedTuple):
+    """An approach, as a law of the minimum gap sees it."""
+
+    roughness: float  # [m]
+    approach_speed: float  # largest of this collision [m/s]
+    viscosity: float  # [Pa s]
+    reduced_modulus: float  # E* of the real solids [Pa]
+    reduced_radius: float  # R* [m]
+
+
+# ---------------------------------------------------------------- contact; arguments (contact, row, p, m, d):
+# ContactState, row of the pair table, parameters of the law, memory of the pair, derived values
+
+derive = Slot("derive")  # values that several functions of the law share; without the argument d
+remember = Slot("remember")  # the memory at this instant
+elastic_force = Slot("elastic_force")  # repulsive where positive [N]
+contact_overlap = Slot("contact_overlap")  # overlap on which damping and tangential stiffness depend [m]
+pull_off = Slot("pull_off")  # largest pull of adhesion [N]
+normal_damping = Slot("normal_damping")  # [kg/s]
+tangential_stiffness = Slot("tangential_stiffness")  # [N/m]
+secant_stiffness = Slot("secant_stiffness")  # force over overlap [N/m]
+tangent_stiffness = Slot("tangent_stiffness")  # derivative of the force [N/m]
+stored_energy = Slot("stored_energy")  # in the normal spring, below h_min times its share in the load [J]
+adhesive_reach = Slot("adhesive_reach")  # gap up to which adhesion holds a contact [m]
+read_memory = Slot("read_memory")  # (memory arrays, k) -> tuple of numbers
+write_memory = Slot("write_memory")  # (memory arrays, k, tuple, whether the solids touch)
+
+DAMPING_MEAN = Slot("DAMPING_MEAN")  # mean of the damping while the overlap grows from 0, over its last value
+ADHESIVE = Slot("ADHESIVE")
+RESCALED = Slot("RESCALED")  # the tangential spring is rescaled while the contact is loaded
+FROM_OVERLAP = Slot("FROM_OVERLAP")  # friction begins at geometric overlap, not at h_min
+
+# ---------------------------------------------------------------- rolling
+
+ROLLING = Slot("ROLLING")
+rolling_torque = Slot("rolling_torque")
+
+# ---------------------------------------------------------------- film; argument FilmState or GapState
+
+FILM = Slot("FILM")
+DRIFTING = Slot("DRIFTING")  # films act by impulses; else as an explicit force
+film_resistance = Slot("film_resistance")  # at this gap or h_min, without lever [kg/s]
+explicit_resistance = Slot("explicit_resistance")  # with lever; 0 for overlaps and out of reach [kg/s]
+speed_after_short_film = Slot("speed_after_short_film")
+speed_after_film = Slot("speed_after_film")
+user_resistance = Slot("user_resistance")
+user_potential = Slot("user_potential")
+user_short_potential = Slot("user_short_potential")
+POTENTIAL = Slot("POTENTIAL")  # the user's film has a potential
+SHORT_POTENTIAL = Slot("SHORT_POTENTIAL")
+USER_GAP = Slot("USER_GAP")  # h_min is found by a user's law
+user_minimum_gap = Slot("user_minimum_gap")
+COUNT_GAP = Slot("COUNT_GAP")  # uses of the law outside of its range are counted
+COUNT_FILM = Slot("COUNT_FILM")
+gap_outside = Slot("gap_outside")  # 1 where the law is used outside of its range, else 0
+film_outside = Slot("film_outside")
+
+# ---------------------------------------------------------------- loops
+
+WALLS = Slot("WALLS")  # there are walls
+RECORD = Slot("RECORD")  # collisions are recorded
+pair_forces = Slot("pair_forces")
+update_films = Slot("update_films")
+film_impulses = Slot("film_impulses")
+copy_memory = Slot("copy_memory")  # (memory arrays, from, to)
+clear_contact = Slot("clear_contact")  # (memory arrays, k)

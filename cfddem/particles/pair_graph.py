@@ -1,0 +1,278 @@
+"""The pair graph: which bodies are near each other, and what each pair remembers.
+
+An edge joins two particles, or a particle and a piece of a wall. Edges of particles come first, sorted by their first
+particle and then their second; edges of walls follow. Each pair has one edge. With films, pairs too far apart to touch
+before the next list follow those that may touch.
+
+What a pair remembers is declared by the laws of a run as fields (:mod:`cfddem.data.fields`). New lists, checkpoints and
+the arrays of compiled loops are made from the declarations.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import inline, serial
+from cfddem.data.fields import Field, Table
+from cfddem.particles.state import Particles
+from cfddem.particles.vectors import at, dot, flat, minus, plus, times
+from cfddem.particles.walls.nearest_point import (
+    NORMAL,
+    TOUCH,
+    Walls,
+    in_frame,
+    nearest,
+    touched,
+    touched_distance,
+)
+
+
+class Graph(NamedTuple):
+    """Which bodies each of n edges joins, as compiled loops take it."""
+
+    first: np.ndarray  # (n,) uint32, particle; unsigned, so that compiled loops need not check for negative rows
+    second: np.ndarray  # (n,) uint32, particle; piece of a wall in the edges after `between_particles`
+    image: np.ndarray  # (n,) uint8, across which borders of a periodic box the pair reaches
+    between_particles: int
+    near: int  # edges of particles that may touch before the next list; those after it have films alone
+    touch: np.ndarray  # (particle-wall edges, 18) geometry of sphere and wall: columns in `nearest_point`
+    start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
+    incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
+
+
+class Edges(Table):
+    """The edges: which bodies they join (`Graph`), and the declared fields of each pair."""
+
+    graph: Graph
+
+    def __init__(self, graph: Graph, fields: Iterable[Field], values: Mapping[str, Any] | None = None) -> None:
+        object.__setattr__(self, "graph", graph)
+        super().__init__(fields, len(graph.first), values)
+
+    def __getattr__(self, name: str) -> Any:
+        graph = self.__dict__.get("graph")
+        return getattr(graph, name) if name in Graph._fields else super().__getattr__(name)
+
+    @property
+    def flat_graph(self) -> Graph:
+        """The graph as loops take it."""
+        return flat(self.graph)
+
+    @property
+    def memory(self) -> Any:
+        """The declared fields as loops take them: vectors one after the other; nothing is copied."""
+        return memory_class(tuple(self.fields))(*(array.reshape(-1) for array in self.arrays.values()))
+
+    @property
+    def uses_outside(self) -> int:
+        """Uses of laws outside of their range that have been counted for these edges."""
+        return int(self.outside.sum()) if "outside" in self else 0
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Copies of the graph and of everything that pairs remember."""
+        graph = {name: np.copy(each) if np.ndim(each) else each for name, each in self.graph._asdict().items()}
+        return graph | {name: array.copy() for name, array in self.arrays.items()}
+
+    def restored(self, kept: Mapping[str, Any]) -> Edges:
+        """Edges with the same fields and the graph and values of a `checkpoint()`."""
+        values: dict[str, Any] = {
+            name: int(kept[name]) if np.ndim(kept[name]) == 0 else np.array(kept[name]) for name in Graph._fields
+        }
+        remembered = {name: kept[name] for name in self.fields if name in kept}
+        return Edges(Graph(**values), self.fields.values(), remembered)
+
+    def remember(self, old: Edges, old_row: np.ndarray, new_row: np.ndarray, start: np.ndarray | None = None) -> None:
+        """Take over what each pair remembers from an earlier list.
+
+        old_row  (N,) row that the particle of each new row had in the old list
+        new_row  the inverse; -1 for particles that are gone
+        start    of the old graph, where it has one row more
+        """
+        source, sign = np.empty(self.rows, np.int64), np.ones(self.rows)
+        before = old.flat_graph if start is None else old.flat_graph._replace(start=start)
+        _find(before, self.flat_graph, old_row, new_row, source, sign)
+        known = source >= 0
+        every, turned = bool(known.all()), bool((sign < 0.0).any())
+        for name, field in self.fields.items():
+            if field.role == "scratch" or name not in old:
+                continue
+            if every:
+                np.take(old[name], source, axis=0, out=self[name])
+            else:
+                self[name][known] = old[name][source[known]]
+            if field.flips and turned:
+                self[name][:] *= sign[:, None] if field.components else sign
+
+
+_MEMORY = "Memory__"
+
+
+@cache
+def memory_class(names: tuple[str, ...]) -> Any:
+    """The type of `Edges.memory` for these fields. Its name lists them: see `__getattr__`."""
+    made = namedtuple(_MEMORY + "__".join(names), names)  # type: ignore[misc]
+    made.__module__ = __name__
+    return globals().setdefault(made.__name__, made)
+
+
+def __getattr__(name: str) -> Any:
+    """The type of a memory by its name, for loops that the compile cache has kept from another process."""
+    if name.startswith(_MEMORY):
+        return memory_class(tuple(name.removeprefix(_MEMORY).split("__")))
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+HOME = 13
+"""Image of a pair within the box: 9 (x + 1) + 3 (y + 1) + (z + 1), in boxes."""
+
+
+_LAST, _1, _2 = np.uint64(3 * 26), np.uint64(1), np.uint64(2)
+
+
+def shifts(box: np.ndarray) -> np.ndarray:
+    """Shift of the separation of a pair for each of its 27 images (27, 3) [m]."""
+    whole = np.where(np.isfinite(box), box, 0.0)
+    steps = np.arange(-1.0, 2.0)
+    return np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(27, 3) * whole
+
+
+def make_edges(
+    fields: Iterable[Field],
+    first: np.ndarray,
+    second: np.ndarray,
+    image: np.ndarray,
+    between_particles: int,
+    count: int,
+    near: int | None = None,
+) -> Edges:
+    """Edges with their fields at initial values.
+
+    fields                of each pair
+    first, second, image  (n,) as in :class:`Graph`
+    between_particles     number of edges that join two particles
+    count                 number of particles
+    near                  leading edges between particles that may touch; all of them if not given
+    """
+    pairs = int(between_particles)
+    touch = np.zeros((len(first) - pairs, TOUCH))
+    incidence = _incidence(first, second, pairs, count)
+    graph = Graph(first, second, image, pairs, pairs if near is None else int(near), touch, *incidence)
+    return Edges(graph, fields)
+
+
+THICKEST = 0.02
+"""Upper limit of the minimum gap over the reduced radius, unless asperities are larger."""
+
+
+def near_first(
+    first: np.ndarray, second: np.ndarray, image: np.ndarray, particles: Particles, box: np.ndarray, allowance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Sort the pairs that may touch before the next list to the front.
+
+    allowance  skin and height of asperities [m]
+    returns    first, second and image in the new order, and the number of pairs that may touch
+    """
+    apart = particles.position[first] - particles.position[second] + shifts(box)[image]
+    radii = particles.radius[first] + particles.radius[second]
+    gap = np.sqrt(np.einsum("ij,ij->i", apart, apart)) - radii
+    far = gap >= allowance + THICKEST * particles.radius[first] * particles.radius[second] / radii
+    order = np.argsort(far, kind="stable")
+    return first[order], second[order], image[order], int(np.count_nonzero(~far))
+
+
+@serial
+def _incidence(first, second, between_particles, count):
+    """List the edges of each particle in ascending order."""
+    start = np.zeros(count + 1, np.int64)
+    for k in range(len(first)):
+        start[first[k] + 1] += 1
+        if k < between_particles:
+            start[second[k] + 1] += 1
+    for i in range(count):
+        start[i + 1] += start[i]
+    incident = np.empty(start[count], np.int32)
+    filled = start[:-1].copy()
+    for k in range(len(first)):
+        i = first[k]
+        incident[filled[i]] = k
+        filled[i] += 1
+        if k < between_particles:
+            j = second[k]
+            incident[filled[j]] = -1 - k
+            filled[j] += 1
+    return start, incident
+
+
+@serial
+def _find(old, new, old_row, new_row, source, sign):
+    """Find the old edge of each new one, -1 for new pairs, and -1 as the sign where its two bodies changed places."""
+    for k in range(len(new.first)):
+        i, j = new.first[k], new.second[k]
+        source[k] = -1
+        a = old_row[i]
+        for place in range(old.start[a], old.start[a + 1]):
+            edge = old.incident[place]
+            before = edge if edge >= 0 else -1 - edge
+            if k < new.between_particles:
+                other = old.second[before] if edge >= 0 else old.first[before]
+                same = before < old.between_particles and new_row[other] == j
+            else:
+                same = before >= old.between_particles and old.second[before] == j
+            if same:
+                source[k] = before
+                sign[k] = 1.0 if edge >= 0 else -1.0
+
+
+def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> np.ndarray:
+    """Gap of every edge (n,) [m]."""
+    result = np.empty(len(edges.first))
+    _gaps(edges.flat_graph, particles.view, flat(walls), shifts(box).reshape(-1), result)
+    return result
+
+
+@serial
+def _gaps(edges, particles, walls, shift, result):
+    for k in range(len(result)):
+        if k < edges.between_particles:
+            result[k] = geometry(k, particles, edges, shift)[2]
+        else:
+            i, w = edges.first[k], np.int64(edges.second[k])
+            place = in_frame(walls, walls.wall[w], at(particles.position, i))
+            result[k] = nearest(walls.kind, walls.shape, w, place)[1] - particles.radius[i]
+
+
+@inline
+def between(i, j, image, position, shift):
+    """Separation from particle j to the image of particle i."""
+    # the three digits of the image by integer arithmetic, which is faster than a table
+    code = np.int64(image)
+    x = (code * 57) >> 9
+    y = ((code - 9 * x) * 11) >> 5
+    z = code - 9 * x - 3 * y
+    away = (shift[_LAST] * (x - 1.0), shift[_LAST + _1] * (y - 1.0), shift[_LAST + _2] * (z - 1.0))
+    return plus(minus(at(position, i), at(position, j)), away)
+
+
+@inline
+def geometry(k, particles, edges, shift):
+    """Separation from the second body to the first, its length, and the gap."""
+    i, j = edges.first[k], edges.second[k]
+    if k < edges.between_particles:
+        separation = between(i, j, edges.image[k], particles.position, shift)
+        distance = math.sqrt(dot(separation, separation))
+        return separation, distance, distance - particles.radius[i] - particles.radius[j]
+    distance = touched_distance(edges, k)
+    return times(distance, touched(edges, k, NORMAL)), distance, distance - particles.radius[i]
+
+
+def wall_forces(edges: Edges, walls: Walls) -> np.ndarray:
+    """Contact force of the particles on each wall, without impulses of films (M, 3) [N]."""
+    result = np.zeros((len(walls.sweep), 3))
+    np.subtract.at(result, walls.wall[edges.second[edges.between_particles :]], edges.force[edges.between_particles :])
+    return result

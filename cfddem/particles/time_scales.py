@@ -1,0 +1,95 @@
+"""Time scales of the particles: how large a step their physics allows, and which criterion limits it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cfddem.backend.compile import serial
+from cfddem.backend.law_choice import FILM_ARGUMENTS, called_by_name
+from cfddem.backend.law_set import specialise
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.interactions.slots import FILM, ContactState, derive, read_memory, tangent_stiffness
+from cfddem.particles.pair_graph import Edges, memory_class
+from cfddem.particles.state import Particles
+from cfddem.particles.step_limits import STABLE, TimeScales, check_step, crossing_step
+from cfddem.particles.walls.nearest_point import Walls
+from closures import lubrication, timescales
+
+__all__ = ["TimeScales", "check_step", "time_scales"]
+
+
+def time_scales(
+    particles: Particles,
+    edges: Edges,
+    walls: Walls,
+    gap: np.ndarray,
+    table: np.ndarray,
+    laws: Laws,
+    reference_speed: float,
+) -> TimeScales:
+    """Time scales of the particles in their present state.
+
+    gap              (n,) of every edge [m]
+    reference_speed  expected fastest approach; the fastest particle counts, too [m/s]
+    """
+    speed = max(reference_speed, float(np.linalg.norm(particles.velocity, axis=1).max(initial=0.0)))
+    hertz, impact, film = math.inf, math.inf, math.inf
+    for mass, radius, row in _lightest_pairs(particles, table):
+        steps = laws.contact_law.impact_steps(mass, radius, row, speed)
+        hertz, impact = min(hertz, steps[0]), min(impact, steps[1])
+        if laws.film and laws.integrator == "verlet":
+            strongest = _film_strength(laws, float(particles.viscosity.max()), radius, float(row["roughness_gap"]))
+            film = min(film, 2.0 * timescales.film_time(mass, strongest, float(row["roughness_gap"])))
+    largest_rate = specialise(_largest_rate, laws.choices())
+    remembered = ("minimum_gap", *(field.name for field in laws.contact_law.memory))
+    memory = memory_class(remembered)(*(edges[name] for name in remembered))
+    rate = largest_rate(particles.view, edges.flat_graph, memory, walls, gap, table, laws.parameters)
+    overlap = STABLE / math.sqrt(max(rate, 1e-300))
+    return TimeScales(hertz, impact, overlap, film, crossing_step(float(particles.radius.min()), speed))
+
+
+def _film_strength(laws: Laws, viscosity: float, reduced_radius: float, gap: float) -> float:
+    """Resistance of a film at the gap of asperities, times that gap [N s]."""
+    if laws.film_law is None:
+        return lubrication.film_strength(viscosity, reduced_radius)
+    numbers = (gap, viscosity, reduced_radius, gap, laws.cutoff_ratio * reduced_radius)
+    return gap * called_by_name(laws.film_law.resistance, FILM_ARGUMENTS, numbers)
+
+
+def _lightest_pairs(particles: Particles, table: np.ndarray) -> list[tuple[float, float, np.ndarray]]:
+    """Reduced mass, reduced radius and table row of the smallest pair of each two materials."""
+    found = []
+    for kind in np.unique(particles.material):
+        own = np.flatnonzero(particles.material == kind)
+        smallest = own[np.argmin(particles.radius[own])]
+        for row in table[kind]:
+            found.append((0.5 * float(particles.mass[smallest]), 0.5 * float(particles.radius[smallest]), row))
+    return found
+
+
+@serial
+def _largest_rate(particles, edges, memory, walls, gap, table, p):
+    """Bound of the contacts' squared angular frequency: twice the stiffness on a particle over its mass."""
+    stiffness = np.zeros(len(particles.radius))
+    for k in range(len(gap)):
+        separated = memory.minimum_gap[k] if FILM else 0.0
+        overlap = separated - gap[k]
+        if overlap <= 0.0:
+            continue
+        i, j = edges.first[k], edges.second[k]
+        pair = k < edges.between_particles
+        row = table[particles.material[i], particles.material[j] if pair else walls.material[j]]
+        radius, inverse_mass = pair_mass_and_radius(k, particles, edges)
+        state = ContactState(overlap, gap[k], 0.0, 0.0, separated, radius, 1.0 / inverse_mass)
+        m = read_memory(memory, k)
+        stiff = tangent_stiffness(state, row, p, m, derive(state, row, p, m))
+        stiffness[i] += stiff
+        if pair:
+            stiffness[j] += stiff
+    largest = 0.0
+    for i in range(len(stiffness)):
+        largest = max(largest, 2.0 * stiffness[i] * particles.inverse_mass[i])
+    return largest

@@ -1,0 +1,202 @@
+"""The arrays of the walls, and the pieces of walls near each particle.
+
+Triangles are sorted into cells in the frame of their mesh, so that a moving mesh is sorted once. All other pieces
+are few, and every particle checks each of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.compile import inline, serial
+from cfddem.backend.errors import InputError
+from cfddem.particles.state import Particles
+from cfddem.particles.vectors import at, flat
+from cfddem.particles.walls.nearest_point import NUMBERS, TRIANGLE, Walls, in_frame, nearest
+from cfddem.particles.walls.shapes import Mesh, Wall
+
+
+def assemble(walls: Sequence[Wall] = ()) -> Walls:
+    """Arrays of the given walls."""
+    pieces = [(number, *piece) for number, wall in enumerate(walls) for piece in wall.pieces()]
+    shape = np.zeros((len(pieces), NUMBERS))
+    for row, (_, _, numbers) in zip(shape, pieces):
+        row[: len(numbers)] = numbers
+    kind = np.array([kind for _, kind, _ in pieces], np.int8)
+    owner = np.array([number for number, _, _ in pieces], np.int32)
+    corner = np.full((len(pieces), 3), -1, np.int32)
+    low, width, number = np.zeros((len(walls), 3)), np.ones(len(walls)), np.zeros((len(walls), 3), np.int64)
+    for m, wall in enumerate(walls):
+        if isinstance(wall, Mesh):
+            corner[owner == m] = wall.triangles
+            low[m], width[m], number[m] = _cells(wall)
+    cells = np.prod(number, axis=1)
+    made = Walls(
+        kind=kind,
+        shape=shape,
+        corner=corner,
+        material=np.array([walls[m].material for m in owner], np.int32),
+        wall=owner,
+        velocity=_vectors([wall.velocity for wall in walls]),
+        spin=_vectors([wall.spin for wall in walls]),
+        centre=_vectors([wall.middle() for wall in walls]),
+        shift=np.zeros((len(walls), 3)),
+        turned=np.tile(np.eye(3).reshape(-1), (len(walls), 1)),
+        sweep=np.array([wall.sweep() for wall in walls], float),
+        travel=np.zeros(len(walls)),
+        single=np.flatnonzero(kind != TRIANGLE).astype(np.int32),
+        cell_low=low,
+        cell_width=width,
+        cell_number=number,
+        cell_offset=np.cumsum(cells) - cells,
+        cell_start=np.zeros(int(cells.sum()) + 1, np.int64),
+        cell_member=np.zeros(0, np.int32),
+    )
+    return _with_cells(made) if len(made.single) < len(kind) else made
+
+
+def _cells(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
+    """Lower corner, width and number of the cells of a mesh: about as wide as its triangles, and not too many."""
+    corners = mesh.vertices[mesh.triangles]
+    size = float((corners.max(axis=1) - corners.min(axis=1)).max(axis=1).mean())
+    low = mesh.vertices.min(axis=0)
+    span = mesh.vertices.max(axis=0) - low
+    width = max(size, float(np.prod(span) / (8.0 * len(corners))) ** (1.0 / 3.0), float(span.max()) / 256.0)
+    return low, width, np.floor(span / width).astype(np.int64) + 1
+
+
+def _with_cells(walls: Walls) -> Walls:
+    """The same walls with their triangles sorted into cells."""
+    count = np.zeros(len(walls.cell_start) - 1, np.int64)
+    bin_triangles(flat(walls), count, walls.cell_member, False)
+    walls.cell_start[1:] = np.cumsum(count)
+    member = np.empty(walls.cell_start[-1], np.int32)
+    bin_triangles(flat(walls), walls.cell_start[:-1].copy(), member, True)
+    return walls._replace(cell_member=member)
+
+
+def _vectors(rows: Sequence[Any]) -> np.ndarray:
+    return np.array(rows, float).reshape(-1, 3)
+
+
+def check_walls(walls: Sequence[Wall], box: np.ndarray, materials: int) -> None:
+    """Refuse walls that a run cannot have: of unknown material, or not periodic where the box is.
+
+    box        (3,) length of the periodic box, infinite along open axes [m]
+    materials  number of rows of the pair table
+    """
+    periodic = np.isfinite(box)
+    for number, wall in enumerate(walls):
+        if wall.material >= materials:
+            raise InputError(f"material of wall {number}", wall.material, f"below {materials}, the rows of the table")
+        if periodic.any() and not wall.repeats(periodic):
+            raise InputError(f"walls[{number}]", type(wall).__name__, "the same all along the periodic axes of the box")
+
+
+def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32."""
+    nothing = np.zeros(0, np.uint32)
+    if len(walls.kind) == 0:
+        return nothing, nothing
+    count = np.zeros(particles.count, np.int64)
+    _near(particles.view, flat(walls), cutoff_ratio, skin, count, nothing, nothing, False)
+    begin = np.cumsum(count) - count
+    first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))
+    _near(particles.view, flat(walls), cutoff_ratio, skin, begin, first, second, True)
+    return first, second
+
+
+@serial
+def _near(particles, walls, cutoff_ratio, skin, count, first, second, fill):
+    """Count the pieces near each particle, or write them from `count` on."""
+    for i in range(len(particles.radius)):
+        if particles.inverse_mass[i] == 0.0:
+            continue
+        reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
+        for w in walls.single:
+            _list(i, w, walls.wall[w], particles, walls, reach, count, first, second, fill)
+        for m in range(len(walls.sweep)):
+            if walls.cell_number[3 * m] > 0:
+                _list_triangles(i, m, particles, walls, reach, count, first, second, fill)
+
+
+@inline
+def _list(i, w, m, particles, walls, reach, count, first, second, fill):
+    """List piece w of wall m if it is within reach of particle i."""
+    if nearest(walls.kind, walls.shape, w, in_frame(walls, m, at(particles.position, i)))[1] < reach:
+        if fill:
+            first[count[i]], second[count[i]] = i, w
+        count[i] += 1
+
+
+@serial
+def _list_triangles(i, m, particles, walls, reach, count, first, second, fill):
+    """List the triangles of mesh m within reach of particle i, each once: in the first cell within reach."""
+    place = in_frame(walls, m, at(particles.position, i))
+    low, high = _span(walls, m, place, place, reach)
+    for x in range(max(low[0], 0), min(high[0], walls.cell_number[3 * m] - 1) + 1):
+        for y in range(max(low[1], 0), min(high[1], walls.cell_number[3 * m + 1] - 1) + 1):
+            for z in range(max(low[2], 0), min(high[2], walls.cell_number[3 * m + 2] - 1) + 1):
+                cell = _cell(walls, m, x, y, z)
+                for slot in range(walls.cell_start[cell], walls.cell_start[cell + 1]):
+                    w = walls.cell_member[slot]
+                    begin, _ = _triangle_span(walls, m, w)
+                    if (
+                        x == max(low[0], begin[0], 0)
+                        and y == max(low[1], begin[1], 0)
+                        and z == max(low[2], begin[2], 0)
+                    ):
+                        _list(i, w, m, particles, walls, reach, count, first, second, fill)
+
+
+@inline
+def _span(walls, m, low, high, reach):
+    """Cells of mesh m between two corners, widened by a reach."""
+    corner, width = at(walls.cell_low, m), walls.cell_width[m]
+    return (
+        (
+            math.floor((low[0] - reach - corner[0]) / width),
+            math.floor((low[1] - reach - corner[1]) / width),
+            math.floor((low[2] - reach - corner[2]) / width),
+        ),
+        (
+            math.floor((high[0] + reach - corner[0]) / width),
+            math.floor((high[1] + reach - corner[1]) / width),
+            math.floor((high[2] + reach - corner[2]) / width),
+        ),
+    )
+
+
+@inline
+def _triangle_span(walls, m, w):
+    """Cells of mesh m that the box around triangle w touches."""
+    a, b, c = at(walls.shape, 4 * w), at(walls.shape, 4 * w + 1), at(walls.shape, 4 * w + 2)
+    low = (min(a[0], b[0], c[0]), min(a[1], b[1], c[1]), min(a[2], b[2], c[2]))
+    high = (max(a[0], b[0], c[0]), max(a[1], b[1], c[1]), max(a[2], b[2], c[2]))
+    return _span(walls, m, low, high, 0.0)
+
+
+@inline
+def _cell(walls, m, x, y, z):
+    return walls.cell_offset[m] + (x * walls.cell_number[3 * m + 1] + y) * walls.cell_number[3 * m + 2] + z
+
+
+@serial
+def bin_triangles(walls, count, member, fill):
+    """Count the triangles of each cell, or write them from `count` on."""
+    for w in range(len(walls.kind)):
+        if walls.kind[w] != TRIANGLE:
+            continue
+        m = walls.wall[w]
+        low, high = _triangle_span(walls, m, w)
+        for x in range(low[0], high[0] + 1):
+            for y in range(low[1], high[1] + 1):
+                for z in range(low[2], high[2] + 1):
+                    cell = _cell(walls, m, x, y, z)
+                    if fill:
+                        member[count[cell]] = w
+                    count[cell] += 1

@@ -1,0 +1,216 @@
+"""Triangulated walls: how the triangles of a mesh share one contact.
+
+A sphere may touch many triangles of one smooth surface at once. Two rules make them act as the surface does.
+First, a triangle is inactive if its nearest point lies on a corner or an edge that it shares with a nearer triangle.
+Second, two triangles that are both touched on their faces, as in a hollow, have a contact each; but where the common
+edge is itself inside the overlap they share one contact, in the ratio of the distances of their nearest points from
+that edge. So a force does not jump when a face is entered, and does not count twice where the faces are nearly in one
+plane. An inactive triangle keeps a copy of the memory of the contact beside it, and continues from it when it becomes
+active.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import inline, serial
+from cfddem.particles.collision_events import move_event
+from cfddem.particles.interactions.slots import RECORD, copy_memory
+from cfddem.particles.vectors import at, dot, minus, times
+from cfddem.particles.walls.nearest_point import (
+    DISTANCE,
+    FEATURE,
+    FOOT,
+    NORMAL,
+    PLACE,
+    SHARE,
+    TOUCH,
+    TRIANGLE,
+    touch,
+    touched,
+    touched_distance,
+)
+
+
+class _Neighbours(NamedTuple):
+    """The triangles near particles: few arrays, so that the functions compile fast."""
+
+    pairs: int
+    first: np.ndarray
+    second: np.ndarray
+    minimum_gap: np.ndarray
+    touch: np.ndarray
+    radius: np.ndarray
+    kind: np.ndarray
+    wall: np.ndarray
+    corner: np.ndarray
+    shape: np.ndarray
+
+
+@serial
+def _share(neighbours, cutoff_ratio):
+    """Find the share of each triangle in the contact and film of its mesh."""
+    begin, number = neighbours.pairs, len(neighbours.first)
+    while begin < number:
+        end = begin + 1
+        while end < number and neighbours.first[end] == neighbours.first[begin]:
+            end += 1
+        active = 0
+        for k in range(begin, end):
+            if _within_reach(k, neighbours, cutoff_ratio):
+                inactive, other = False, begin
+                while other < end and not inactive:
+                    inactive = _is_inactive_beside(k, other, neighbours)
+                    other += 1
+                neighbours.touch[_row(k, neighbours) + SHARE] = 0.0 if inactive else 1.0
+                active += 0 if inactive else 1
+        if active > 1:
+            _divide(begin, end, neighbours, cutoff_ratio)
+        begin = end
+
+
+@inline
+def _row(k, neighbours):
+    """Where the columns of edge k begin in `touch`."""
+    return TOUCH * (k - neighbours.pairs)
+
+
+@inline
+def _within_reach(k, neighbours, cutoff_ratio):
+    """Whether edge k is of a triangle near enough for its contact or film."""
+    radius = neighbours.radius[neighbours.first[k]]
+    gap = neighbours.touch[_row(k, neighbours) + DISTANCE] - radius
+    return neighbours.kind[neighbours.second[k]] == TRIANGLE and gap <= max(
+        cutoff_ratio * radius, neighbours.minimum_gap[k]
+    )
+
+
+@inline
+def _common(k, other, neighbours):
+    """Corners that the triangles of two edges share, as sums of the corners of the first and of the second."""
+    w, v = np.int64(neighbours.second[k]), np.int64(neighbours.second[other])
+    own, theirs = 0, 0
+    if neighbours.wall[w] == neighbours.wall[v] and neighbours.corner[3 * w] >= 0:
+        for a in range(3):
+            for b in range(3):
+                if neighbours.corner[3 * w + a] == neighbours.corner[3 * v + b]:
+                    own |= 1 << a
+                    theirs |= 1 << b
+    return own, theirs
+
+
+@inline
+def _is_inactive_beside(k, other, neighbours):
+    """Whether the nearest point of k lies on what it shares with a nearer triangle, or with an equal earlier one."""
+    own, theirs = _row(k, neighbours), _row(other, neighbours)
+    if other == k or neighbours.touch[theirs + DISTANCE] > (1.0 + 1e-9) * neighbours.touch[own + DISTANCE]:
+        return False
+    mine, others = _common(k, other, neighbours)
+    if mine == 0 or int(neighbours.touch[own + FEATURE]) & ~mine != 0:
+        return False
+    return int(neighbours.touch[theirs + FEATURE]) & ~others != 0 or neighbours.second[other] < neighbours.second[k]
+
+
+@serial
+def _divide(begin, end, neighbours, cutoff_ratio):
+    """Divide the contact of one particle among its active triangles.
+
+    The part that a triangle yields to a second one is reduced by the part that the second yields to a third.
+    """
+    active = np.zeros(end - begin, np.bool_)
+    for k in range(begin, end):
+        active[k - begin] = neighbours.touch[_row(k, neighbours) + SHARE] > 0.0 and _within_reach(
+            k, neighbours, cutoff_ratio
+        )
+    rows = begin + np.flatnonzero(active)
+    for k in rows:
+        part = 1.0
+        for other in rows:
+            weight = 1.0 - _kept(k, other, neighbours)
+            for third in rows:
+                if weight > 0.0 and third != k:
+                    weight *= _kept(other, third, neighbours)
+            part *= 1.0 - weight
+        neighbours.touch[_row(k, neighbours) + SHARE] = part
+
+
+@serial
+def _kept(k, other, neighbours):
+    """Part that edge k keeps beside another of the same mesh: 1 where their common edge is outside the overlap."""
+    common, _ = _common(k, other, neighbours)
+    if common == 0 or k == other:
+        return 1.0
+    w, row = np.int64(neighbours.second[k]), _row(k, neighbours)
+    distance = neighbours.touch[row + DISTANCE]
+    gap = distance - neighbours.radius[neighbours.first[k]]
+    beyond = _to_common(neighbours, w, common, row + PLACE) - distance
+    joint = 1.0 - beyond / max(abs(gap), neighbours.minimum_gap[k], 1e-300)
+    if joint <= 0.0:
+        return 1.0
+    mine = _to_common(neighbours, w, common, row + FOOT)
+    others = _to_common(neighbours, w, common, _row(other, neighbours) + FOOT)
+    return 1.0 - min(joint, 1.0) * others / max(mine + others, 1e-300)
+
+
+@inline
+def _to_common(neighbours, w, common, x):
+    """Distance of the point at column x of `touch` from a corner or an edge of triangle w."""
+    a = at(neighbours.shape, 4 * w + (0 if common & 1 else 1 if common & 2 else 2))
+    b = at(neighbours.shape, 4 * w + (2 if common & 4 else 1 if common & 2 else 0))
+    along, away = minus(b, a), minus((neighbours.touch[x], neighbours.touch[x + 1], neighbours.touch[x + 2]), a)
+    length = dot(along, along)
+    if length > 0.0:
+        away = minus(away, times(min(max(dot(away, along) / length, 0.0), 1.0), along))
+    return math.sqrt(dot(away, away))
+
+
+@serial
+def wall_contacts(particles, edges, minimum_gap, walls, free, cutoff_ratio):
+    """Find the geometry of all particle-wall edges.
+
+    minimum_gap   (n,) gap below which the solids of each edge touch [m]
+    cutoff_ratio  reach of films over R*; 0 without films [-]
+    """
+    touch(particles, edges, walls, free)
+    if len(walls.cell_member) > 0:
+        neighbours = _Neighbours(
+            edges.between_particles,
+            edges.first,
+            edges.second,
+            minimum_gap,
+            edges.touch,
+            particles.radius,
+            walls.kind,
+            walls.wall,
+            walls.corner,
+            walls.shape,
+        )
+        _share(neighbours, cutoff_ratio)
+
+
+@serial
+def share_memory(edges, memory, walls):
+    """Copy the memory of each contact to the inactive triangles beside it, which may become active."""
+    pairs, number = edges.between_particles, len(edges.first)
+    begin = pairs
+    for k in range(pairs, number):
+        if edges.first[k] != edges.first[begin]:
+            begin = k
+        if edges.touch[TOUCH * (k - pairs) + SHARE] > 0.0:
+            continue
+        own = times(touched_distance(edges, k), touched(edges, k, NORMAL))
+        donor, least, other = -1, np.inf, begin
+        while other < number and edges.first[other] == edges.first[k]:
+            active = edges.touch[TOUCH * (other - pairs) + SHARE] > 0.0
+            if active and walls.wall[edges.second[other]] == walls.wall[edges.second[k]]:
+                way = minus(times(touched_distance(edges, other), touched(edges, other, NORMAL)), own)
+                if dot(way, way) < least:
+                    donor, least = other, dot(way, way)
+            other += 1
+        if donor >= 0:
+            copy_memory(memory, donor, k)
+            if RECORD:
+                move_event(memory, k, donor)

@@ -1,0 +1,310 @@
+"""Energy of the particles by channel: energy stored in springs, and work of every force since the count began.
+
+A force at an instant acts over the half kick before it and the half kick after it. The mean velocity of a half kick is
+known, so the work of the force equals the gain of kinetic energy to round-off, and so does the work of a film's
+impulse. Energy stored in springs follows from the positions. Both agree to the accuracy of the time integration.
+
+Stored energies, stiffnesses and elastic forces are those of the run's contact law.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, prange, threaded
+from cfddem.backend.errors import InputError
+from cfddem.backend.law_set import specialise
+from cfddem.data.fields import Field
+from cfddem.particles.interactions.contact import NOTHING
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
+from cfddem.particles.interactions.slots import (
+    FILM,
+    RECORD,
+    RESCALED,
+    ROLLING,
+    ContactState,
+    contact_overlap,
+    derive,
+    elastic_force,
+    read_memory,
+    stored_energy,
+    tangential_stiffness,
+)
+from cfddem.particles.pair_graph import geometry
+from cfddem.particles.state import kinetic_energy
+from cfddem.particles.vectors import across, at, cross, dot, flat, minus, plus, put, times
+from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
+from closures.blend import contact_share
+from closures.friction import coulomb_limit, dry_or_lubricated
+
+if TYPE_CHECKING:
+    from cfddem.particles.solver import ParticleSolver
+
+FILMS, DAMPING, SLIDING, TURNING, WALLS, STIFFENING, FALL = range(7)
+CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffening", "fall")
+"""Energy lost to films, dashpots, sliding and rolling; energy gained from moving walls, from tangential springs whose
+stiffness changes with the overlap, and from gravity."""
+
+WAY = Field("way", "m", 3, "scratch", meaning="distance over which forces acted in the last advance")
+PATH = Field("path", "m", 3, "scratch", meaning="displacement in the last advance")
+
+ALMOST = 1.0 - 1e-9
+"""A contact slides if its tangential force is this share of Coulomb's limit or more."""
+
+
+class Count(NamedTuple):
+    """State of the count between two steps, as compiled loops take it."""
+
+    ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
+    way: np.ndarray  # (N, 3) distance moved during the half kicks around this instant [m]
+    turn: np.ndarray  # (N, 3) angle turned meanwhile [rad]
+    path: np.ndarray  # (N, 3) displacement of the particle in the step [m]
+    spring: np.ndarray  # (n,) square of the tangential spring [m2]
+    stiffness: np.ndarray  # (n,) tangential, times the share of the solids in the load [N/m]
+    power: np.ndarray  # (n,) going into the tangential spring [W]
+    held: np.ndarray  # (n,) energy of the normal spring [J]
+    totals: np.ndarray  # (CHUNKS, channels) [J]
+
+
+class Energies:
+    """The energy account of a particle solver.
+
+    totals  energy of each of `CHANNELS` since the count began [J]
+
+    Fields of the particles, set anew in every `advance`: `way`, the distance over which the forces on each particle
+    have acted (N, 3) [m], and `path`, its displacement; they differ by the impulses of films.
+    """
+
+    def __init__(self, solver: ParticleSolver) -> None:
+        laws = solver.laws
+        if laws.contact_law.energy is None:
+            name = laws.contact_law.name
+            raise InputError("energies", None, "a contact law that gives its energy", f"the law {name!r} does not")
+        if laws.film and laws.integrator != "drift":
+            raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
+        self._work = specialise(_work, solver.choices)
+        self.totals = np.zeros(len(CHANNELS))
+        self.fed = 0.0  # energy of inserted particles less that of removed ones [J]
+        for field in (WAY, PATH):
+            solver.particles.declare(field)
+        self._edges: Any = None
+        self._count: Any = None
+
+    def before(self, solver: ParticleSolver, step: float, first: bool) -> None:
+        """Count before a step [s]; `first` of an advance, in which the present forces begin to act."""
+        if first:
+            solver.particles.reset(WAY.name, PATH.name)
+        if first or self._edges is not solver.edges:
+            self._count = _room(solver) if self._edges is not solver.edges else self._count
+            self._edges = solver.edges
+            self._pass(solver, 0.0, 0.0, 0.5 * step if first else 0.0)
+        particles = solver.particles
+        self._count.ahead[:] = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
+
+    def after(self, solver: ParticleSolver, step: float, last: bool) -> None:
+        """Count after a step [s]; `last` of an advance."""
+        self._pass(solver, step, 0.5 * step, 0.0 if last else 0.5 * step)
+
+    def springs(self, solver: ParticleSolver) -> tuple[float, float]:
+        """Energy of the normal and of the tangential springs [J]."""
+        if self._edges is not solver.edges:
+            self._edges, self._count = solver.edges, _room(solver)
+            self._pass(solver, 0.0, 0.0, 0.0)
+        return float(self._count.held.sum()), 0.5 * float((self._count.stiffness * self._count.spring).sum())
+
+    def mechanical(self, solver: ParticleSolver) -> float:
+        """Kinetic energy and that of the springs [J]."""
+        return kinetic_energy(solver.particles) + sum(self.springs(solver))
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What has been counted."""
+        return {"totals": self.totals.copy(), "fed": self.fed}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self.totals, self.fed = np.array(state["totals"]), float(state["fed"])
+        self._edges = None
+
+    def _pass(self, solver: ParticleSolver, step: float, before: float, after: float) -> None:
+        particles, edges, memory, walls, shift = solver.views
+        count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
+        count.totals[:] = 0.0
+        gravity = np.array(solver.gravity, float)
+        _ways(particles, count, gravity, np.array(solver.free, float), step, before, after)
+        p = solver.laws.parameters
+        self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
+        self.totals += count.totals.sum(axis=0)
+        if before + after > 0.0:
+            solver.particles.way += self._count.way
+        if step > 0.0:
+            solver.particles.path += self._count.path
+
+
+def _room(solver: ParticleSolver) -> Count:
+    number, count = len(solver.edges.first), solver.particles.count
+    ahead, way, turn, path = np.zeros((4, count, 3))
+    spring, stiffness, power, held = np.zeros((4, number))
+    return Count(ahead, way, turn, path, spring, stiffness, power, held, np.zeros((CHUNKS, len(CHANNELS))))
+
+
+@threaded
+def _ways(particles, count, gravity, free, step, before, after):
+    """Distances over which forces act in the half kicks around this instant, and the work of gravity in the step."""
+    number = len(particles.radius)
+    for chunk in prange(CHUNKS):
+        totals = count.totals[chunk]
+        for i in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            gain = 0.5 * (after * after - before * before)
+            force, torque = at(particles.force, i), at(particles.torque, i)
+            way = plus(times(before + after, at(particles.velocity, i)), times(gain * particles.inverse_mass[i], force))
+            put(count.way, i, way)
+            turn = plus(
+                times(before + after, at(particles.spin, i)), times(gain * particles.inverse_inertia[i], torque)
+            )
+            put(count.turn, i, turn)
+            if step > 0.0 and particles.inverse_mass[i] > 0.0:
+                drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], force))
+                drifted = (free[0] * drifted[0], free[1] * drifted[1], free[2] * drifted[2])
+                put(count.path, i, times(step, drifted))
+                totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, drifted)
+            elif step > 0.0:
+                put(count.ahead, i, at(particles.velocity, i))
+
+
+@inline
+def _note(k, memory, channel, lost):
+    """Add what edge k has lost to its collision, where one is recorded; the columns are the first three channels."""
+    if RECORD and not np.isnan(memory.begin[k]):
+        if np.isnan(memory.lost[3 * k]):
+            put(memory.lost, k, NOTHING)
+        memory.lost[3 * k + channel] += lost
+
+
+@inline
+def _film_works(k, particles, edges, memory, count, step):
+    """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
+    i, j = edges.first[k], edges.second[k]
+    impulse = at(memory.impulse, k)
+    drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
+    speed = times(0.5, plus(at(count.ahead, i), drifted))
+    if k < edges.between_particles:
+        drifted = minus(
+            at(particles.velocity, j), times(0.5 * step * particles.inverse_mass[j], at(particles.force, j))
+        )
+        other, by_wall = times(0.5, plus(at(count.ahead, j), drifted)), 0.0
+    else:
+        other = touched(edges, k, SURFACE)
+        by_wall = dot(impulse, other)
+    return -dot(impulse, minus(speed, other)), by_wall
+
+
+@inline
+def _forget(k, count, totals, step):
+    """Clear the count of a contact that has ended; the energy of its tangential spring is lost."""
+    totals[STIFFENING] -= 0.5 * count.stiffness[k] * count.spring[k] if step > 0.0 else 0.0
+    count.spring[k] = 0.0
+    count.stiffness[k] = 0.0
+    count.power[k] = 0.0
+    count.held[k] = 0.0
+
+
+@inline
+def _moved(k, particles, edges, walls, count, duration):
+    """Relative motion of two bodies over the half kicks around this instant.
+
+    returns  way, turn times radius and turn of the first body relative to the second; the rates of the first two;
+             the sum of the radii; the way of a wall
+    """
+    i, j = edges.first[k], edges.second[k]
+    about = at(count.turn, i)
+    way, turn = at(count.way, i), times(particles.radius[i], about)
+    velocity, surface_spin = at(particles.velocity, i), times(particles.radius[i], at(particles.spin, i))
+    if k < edges.between_particles:
+        radius = particles.radius[j]
+        other = at(count.turn, j)
+        way, turn = minus(way, at(count.way, j)), plus(turn, times(radius, other))
+        velocity = minus(velocity, at(particles.velocity, j))
+        surface_spin = plus(surface_spin, times(radius, at(particles.spin, j)))
+        return way, turn, minus(about, other), velocity, surface_spin, particles.radius[i] + radius, NOTHING
+    surface = touched(edges, k, SURFACE)
+    by_wall = times(duration, surface)
+    about = minus(about, times(duration, at(walls.spin, walls.wall[j])))
+    return minus(way, by_wall), turn, about, minus(velocity, surface), surface_spin, particles.radius[i], by_wall
+
+
+@inline
+def _slides(row, minimum_gap, pressed, tangent):
+    """Whether a contact is at Coulomb's limit."""
+    friction = row.friction
+    if FILM:
+        friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
+    return math.sqrt(dot(tangent, tangent)) >= ALMOST * coulomb_limit(friction, pressed)
+
+
+@inline
+def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, duration, totals):
+    """Count what the contact of edge k has done, and keep what its springs hold; nothing if the solids do not touch."""
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    minimum_gap = memory.minimum_gap[k]
+    if not gap < minimum_gap:
+        _forget(k, count, totals, step)
+        return
+    normal = times(1.0 / distance, separation)
+    row = pair_row(k, particles, edges, walls, table)
+    reduced_radius, inverse_mass = pair_mass_and_radius(k, particles, edges)
+    state = ContactState(minimum_gap - gap, gap, 0.0, step, minimum_gap, reduced_radius, 1.0 / inverse_mass)
+    m = read_memory(memory, k)
+    d = derive(state, row, p, m)
+    share = portion(edges, k) * (contact_share(gap, minimum_gap) if FILM else 1.0)
+    overlap = contact_overlap(state, row, p, m, d)
+    equivalent = ContactState(overlap, gap, 0.0, step, minimum_gap, reduced_radius, 1.0 / inverse_mass)
+    tangential = share * tangential_stiffness(equivalent, row, p, m, d)
+    elastic = share * elastic_force(state, row, p, m, d)
+    force, spring = at(memory.force, k), at(memory.spring, k)
+    way, turn, about, velocity, surface_spin, radii, by_wall = _moved(k, particles, edges, walls, count, duration)
+    stretch = distance / radii
+    pressed, approach = dot(force, normal), dot(way, normal)
+    slip = minus(across(velocity, normal), times(stretch, cross(surface_spin, normal)))
+    slid = minus(across(way, normal), times(stretch, cross(turn, normal)))
+    pulled = dot(force, way) + dot(at(memory.couple, k), turn) - pressed * approach
+
+    totals[WALLS] += dot(force, by_wall)
+    damped = (elastic - pressed) * approach - pulled - tangential * dot(spring, slid)
+    totals[DAMPING] += damped
+    _note(k, memory, DAMPING, damped)
+    if ROLLING:
+        totals[TURNING] -= dot(at(memory.moment, k), about)
+    square, rate = dot(spring, spring), tangential * dot(spring, slip)
+    if step > 0.0:
+        softer, was = count.stiffness[k], count.spring[k]
+        kept = was * softer / tangential if RESCALED and tangential > softer else was
+        taken = 0.25 * (softer + tangential) * (square - kept)
+        totals[STIFFENING] += 0.5 * (tangential * square - softer * was) - taken
+        if _slides(row, minimum_gap, pressed, minus(force, times(pressed, normal))):
+            rubbed = 0.5 * step * (count.power[k] + rate) - taken
+            totals[SLIDING] += rubbed
+            _note(k, memory, SLIDING, rubbed)
+    count.spring[k] = square
+    count.stiffness[k] = tangential
+    count.power[k] = rate
+    count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
+
+
+@threaded
+def _work(particles, edges, memory, walls, count, shift, table, p, step, before, after):
+    """Count what films have done in the step, contacts in the half kicks around this instant, and what springs hold."""
+    number, pairs = len(edges.first), edges.between_particles
+    near = edges.near if FILM else pairs
+    for chunk in prange(CHUNKS):
+        totals = count.totals[chunk]
+        for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            if FILM and step > 0.0:
+                lost, by_wall = _film_works(k, particles, edges, memory, count, step)
+                totals[FILMS] += lost
+                _note(k, memory, FILMS, lost)
+                totals[WALLS] += by_wall
+            if not near <= k < pairs:
+                _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, before + after, totals)

@@ -1,0 +1,193 @@
+"""Figures with curves: one style for all, units on every axis.
+
+>>> from cfddem.plotting.curves import panels, save
+>>> figure, (left, right) = panels(2)
+>>> lines = left.plot([0, 1], [0, 1])
+>>> label(left, "St", "-", "e", "-")
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.io.quantities import shown_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from cfddem.analysis.regimes import RegimeMap
+
+BLUE, SKY, ORANGE, GREEN, RED, GREY = "#0b4f8a", "#56a6d9", "#e07b00", "#1b8a5a", "#b8323c", "#7a7a7a"
+"""Colours that differ in print and for colour-blind readers."""
+
+_STYLE: Any = {
+    "font.size": 11.0,
+    "font.family": "sans-serif",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#444444",
+    "axes.labelcolor": "#222222",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.8,
+    "xtick.color": "#444444",
+    "ytick.color": "#444444",
+    "lines.linewidth": 1.8,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 9.5,
+}
+
+
+def panels(columns: int = 1, *, width: float = 8.0, height: float = 4.6, **options: Any) -> tuple[Figure, Any]:
+    """A figure with panels side by side.
+
+    columns        number of panels
+    width, height  of the figure [inch]
+    options        of `Figure.subplots`, such as sharey=True
+    returns        the figure, and its panel or array of panels
+    """
+    figure, axes = blank(1, columns, width=width, height=height, **options)
+    return figure, axes if columns > 1 else axes[0]
+
+
+def blank(
+    rows: int, columns: int, *, width: float, height: float, layout: str = "constrained", **options: Any
+) -> tuple[Figure, Any]:
+    """A figure with rows and columns of panels.
+
+    width, height  of the figure [inch]
+    layout         of matplotlib: constrained, or compressed for panels of fixed aspect
+    options        of `Figure.subplots`
+    returns        the figure, and its panels in one array, row by row
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=(width, height), layout=layout)  # type: ignore[arg-type]
+        FigureCanvasAgg(figure)
+        return figure, figure.subplots(rows, columns, squeeze=False, **options).ravel()
+
+
+def history(folder: str | Path, output: str | Path | None = None, columns: Sequence[str] = ()) -> Path:
+    """Draw columns of the history against time, one panel per column.
+
+    folder   of a run
+    output   PNG; NAME-history.png in the current folder if not given
+    columns  of the history; bed height and pressure drop if present, else all
+    returns  the file
+    errors   InputError for an unknown column
+    """
+    from cfddem.io.reading import open_run
+
+    run = open_run(folder)
+    known = [name for name in run.history if name not in ("time", "step")]
+    if not known:
+        raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
+    for name in columns:
+        if name not in known:
+            raise InputError("columns", name, nearest(name, known))
+    usual = [name for name in ("bed_height", "pressure_drop") if name in known]
+    names = list(columns) or usual or known
+    figure, axes = blank(len(names), 1, width=8.0, height=0.7 + 2.1 * len(names), sharex=True)
+    for name, each in zip(names, axes):
+        each.plot(run.history["time"], run.history[name], color=BLUE)
+        label(each, "", "", name.replace("_", " "), shown_unit(run.unit(name)))
+        each.set_xlabel("")
+    axes[-1].set_xlabel("time  [s]")
+    figure.suptitle(run.folder.resolve().name, fontsize=12, fontweight="bold")
+    output = Path(f"{run.folder.resolve().name}-history.png" if output is None else output)
+    save(figure, output)
+    return output
+
+
+def collisions(folder: str | Path, output: str | Path | None = None) -> Path:
+    """Draw the regime map of the collisions of a run.
+
+    folder   of a run
+    output   PNG; NAME-collisions.png in the current folder if not given
+    returns  the file
+    errors   InputError if the run has no recorded collisions with films
+    """
+    from cfddem.analysis.regimes import regime_map
+    from cfddem.io.reading import open_run
+
+    run = open_run(folder)
+    found = regime_map(run.collisions)
+    figure, axes = panels(1, width=6.4, height=4.8)
+    draw_regimes(axes, found, run.folder.resolve().name)
+    output = Path(f"{run.folder.resolve().name}-collisions.png" if output is None else output)
+    save(figure, output)
+    return output
+
+
+def draw_regimes(axes: Axes, found: RegimeMap, title: str = "", most: float | None = None) -> Any:
+    """Density of collisions over Stokes number and h_eps/h_sigma; an orange line marks half of them in solid contact.
+
+    most     density of the darkest colour; that of the map if not given
+    returns  the coloured mesh, for a colour bar
+    """
+    import numpy as np
+
+    shown = np.where(found.density > 0.0, found.density, np.nan)
+    shades = axes.pcolormesh(found.stokes, found.gap_ratio, shown, cmap="Blues", vmin=0.0, vmax=most, rasterized=True)
+    column = np.nansum(found.contact * found.density, axis=0) / np.maximum(np.nansum(found.density, axis=0), 1e-300)
+    crossed = np.flatnonzero((column[:-1] < 0.5) & (column[1:] >= 0.5))
+    if len(crossed):
+        axes.axvline(float(found.stokes[crossed[0] + 1]), color=ORANGE, linewidth=1.2)
+    low, high = min(found.gap_ratio[0], 0.5), max(found.gap_ratio[-1], 2.0)
+    axes.axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")
+    axes.set(xscale="log", yscale="log", xlim=(found.stokes[0], found.stokes[-1]), ylim=(low, high))
+    label(axes, "Stokes number", "-", "elastohydrodynamic gap over roughness", "-", title)
+    axes.text(
+        0.02, 0.98, f"median St {found.median_stokes:.3g}\nsolid contact in {100.0 * found.contact_fraction:.3g} %",
+        transform=axes.transAxes, ha="left", va="top", fontsize=9.5,
+    )  # fmt: skip
+    return shades
+
+
+def label(axes: Axes, x: str, x_unit: str, y: str, y_unit: str, title: str = "") -> None:
+    """Label both axes with their units."""
+    axes.set_xlabel(f"{x}  [{x_unit}]")
+    axes.set_ylabel(f"{y}  [{y_unit}]")
+    if title:
+        axes.set_title(title, loc="left", fontsize=11, fontweight="bold")
+
+
+def legend(axes: Axes, **options: Any) -> None:
+    """A legend without a frame."""
+    axes.legend(**{"frameon": False, "fontsize": 9.5} | options)
+
+
+def decades(axes: Axes, *ticks: float) -> None:
+    """A logarithmic x axis with plain numbers at given ticks."""
+    axes.set_xscale("log")
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+
+
+def shades(count: int, name: str = "viridis") -> Sequence[Any]:
+    """Colours from dark to light for an increasing parameter."""
+    import matplotlib as mpl
+
+    scale = mpl.colormaps[name]
+    return [scale(0.9 * place / max(count - 1, 1)) for place in range(count)]
+
+
+def save(figure: Figure, path: Path, dots_per_inch: int = 160) -> None:
+    """Write a PNG atomically."""
+    import matplotlib as mpl
+
+    path = Path(path)
+    fresh = path.with_name(f".{os.getpid()}-{path.name}")
+    with mpl.rc_context(_STYLE):
+        figure.savefig(fresh, format="png", dpi=dots_per_inch, facecolor="white")
+    os.replace(fresh, path)

@@ -1,0 +1,217 @@
+"""The report of a run as one self-contained HTML page: warnings, results, laws, figures, case, versions."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.analysis.bed_laws import weight_over_floor
+from cfddem.analysis.profiles import Profiles, profiles_of
+from cfddem.analysis.report import case_of, recorded_regimes
+from cfddem.analysis.report import report as summary
+from cfddem.analysis.report_text import spelled, steadiness
+from cfddem.backend.errors import RunFailed
+from cfddem.case.schema import Case
+from cfddem.io.files import write_whole
+from cfddem.io.quantities import shown_unit
+from cfddem.io.reading import Run, open_run
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, SKY, blank, draw_regimes, label, panels
+
+Rows = list[tuple[str, ...]]
+
+
+def page(folder: Path, output: Path | None = None, result: dict[str, Any] | None = None) -> Path:
+    """Write the report of a run as a page.
+
+    folder   of the run
+    output   HTML; NAME-report.html in the current folder if not given
+    result   of :func:`cfddem.analysis.report.report`, if it has been made already
+    returns  the file
+    """
+    folder = Path(folder)
+    run, result = open_run(folder), summary(folder) if result is None else result
+    output = Path(f"{folder.resolve().name}-report.html" if output is None else output)
+    write_whole(output, render(run, result).encode())
+    return output
+
+
+def render(run: Run, result: dict[str, Any]) -> str:
+    """The page as text."""
+    case, (begin, end), steps = case_of(run), result["window"], result["steps"]
+    counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
+    figures = {"series": _encoded(_series(run, case, begin, end))}
+    captions = {}
+    if (found := _profiles(run, case, begin)) is not None:
+        figures["profiles"] = _encoded(_draw_profiles(found, result["measures"].get("bed_height", {}).get("mean")))
+        captions["profiles_caption"] = (
+            f"Means over {found.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: bed "
+            "height."
+        )
+    if (regimes := recorded_regimes(run, begin)) is not None:
+        figure, axes = panels(1, width=6.4, height=4.6)
+        draw_regimes(axes, regimes)
+        figures["collisions"] = _encoded(figure)
+        captions["collisions_caption"] = (
+            f"{regimes.collisions:.0f} collisions in the averaging window. Above the dashed line the film pressure "
+            "keeps the solids apart, below it the asperities. To the right of the orange line most collisions end in "
+            "contact."
+        )
+    text: str = _template().render(
+        result=result,
+        status=f"{result['status']} at {end:g} s; {counts}; means from {begin:g} to {end:g} s",
+        measures=_measures(result["measures"]),
+        laws=_laws(result["laws"]),
+        ledger=[(spelled(name), f"{value:.2g}") for name, value in result["ledger"].items()],
+        energy=_energy(result["energy_lines"]),
+        preflight=_preflight(result["preflight"]),
+        wall_time=_wall_time(result["wall_time"]),
+        provenance=_provenance(result["provenance"]),
+        case_text=run.case_text,
+        figures=figures,
+        **captions,
+    )
+    return text
+
+
+@cache
+def _template() -> Any:
+    from jinja2 import Environment, PackageLoader
+
+    return Environment(loader=PackageLoader("cfddem", "plotting"), autoescape=True).get_template("report.html")
+
+
+# ---------------------------------------------------------------- tables
+
+
+def _measures(measures: dict[str, Any]) -> list[dict[str, str]]:
+    rows = []
+    for name, each in measures.items():
+        error = "-" if math.isnan(each["error"]) else f"{each['error']:.2g}"
+        rows.append(
+            {
+                "name": spelled(name),
+                "meaning": each["meaning"],
+                "mean": f"{each['mean']:.4g}",
+                "error": f"at least {error}" if each["error_is_lower_bound"] and error != "-" else error,
+                "unit": shown_unit(each["unit"]),
+                "steadiness": steadiness(each),
+            }
+        )
+    return rows
+
+
+def _laws(laws: list[dict[str, Any]]) -> Rows:
+    return [
+        (each["law"], f"{each['computed']:.4g}", f"{each['expected']:.4g}", f"{each['ratio']:.3f}",
+         shown_unit(each["unit"]), each["outside_range"])
+        for each in laws
+    ]  # fmt: skip
+
+
+def _energy(lines: list[dict[str, Any]]) -> Rows:
+    return [
+        (each["group"], spelled(each["name"]), f"{each['energy']:.4g}", f"{100.0 * each['fraction']:.3f}")
+        for each in lines
+    ]
+
+
+def _preflight(made: dict[str, Any]) -> Rows:
+    return [
+        (group, name, "-" if each["value"] is None else f"{each['value']:.4g}", each["unit"], each["note"])
+        for group, numbers in made["numbers"].items()
+        for name, each in numbers.items()
+    ]
+
+
+def _wall_time(seconds: dict[str, float]) -> Rows:
+    total = sum(seconds.values())
+    parts = sorted(seconds.items(), key=lambda each: -each[1])
+    shares: Rows = [(name, f"{each:.3g}", f"{100.0 * each / total:.1f} %") for name, each in parts if total]
+    return [*shares, ("all", f"{total:.3g}", "")]
+
+
+def _provenance(values: dict[str, Any]) -> Rows:
+    rows: Rows = []
+    for name, each in values.items():
+        if isinstance(each, dict):
+            rows += [(f"{name}: {inner}", str(value)) for inner, value in each.items()]
+        else:
+            rows.append((name, " ".join(map(str, each)) if isinstance(each, list) else str(each)))
+    return rows
+
+
+# ---------------------------------------------------------------- figures
+
+
+def _encoded(figure: Any) -> str:
+    """A figure as PNG in base64."""
+    image = io.BytesIO()
+    figure.savefig(image, format="png", dpi=110, facecolor="white")
+    return base64.b64encode(image.getvalue()).decode()
+
+
+def _series(run: Run, case: Case, begin: float, end: float) -> Any:
+    """Bed height, pressure drop over the buoyant weight, and granular temperature in time, with their means."""
+    history, weight = run.history, weight_over_floor(case)
+    curves = [("bed height\n[m]", history["bed_height"])]
+    if "pressure_drop" in history:
+        named = "pressure drop\n[Pa]" if weight is None else "pressure drop\nover weight  [-]"
+        curves.append((named, history["pressure_drop"] / (weight or 1.0)))
+    if "granular_temperature" in history:
+        curves.append(("granular\ntemperature  [m2/s2]", history["granular_temperature"]))
+    inside = history["time"] >= begin
+    curves = [each for each in curves if np.isfinite(each[1][inside]).any()]
+    figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.8 * len(curves), sharex=True)
+    for each, (name, values) in zip(axes, curves):
+        each.axvspan(begin, end, color="#f3f3f3", zorder=0)
+        each.plot(history["time"], values, color=BLUE)
+        each.hlines(np.nanmean(values[inside]), begin, end, color=ORANGE, linewidth=1.2)
+        each.set_ylabel(name)
+    axes[-1].set_xlabel("time  [s]")
+    figure.align_ylabels()
+    return figure
+
+
+def _profiles(run: Run, case: Case, begin: float) -> Profiles | None:
+    """The profiles of a run; None if no snapshot in the window can be read, or none has a quantity to show."""
+    try:
+        found = profiles_of(run, case, begin)
+    except RunFailed:
+        return None
+    return None if found is None or (found.voidage is None and found.upward is None) else found
+
+
+def _draw_profiles(found: Profiles, bed_height: float | None) -> Any:
+    """Voidage, solids flux and granular temperature against height, as far as they are recorded."""
+    columns = (found.voidage is not None) + 2 * (found.upward is not None)
+    figure, axes = blank(1, columns, width=2.8 * columns + 0.4, height=3.8, sharey=True)
+    remaining = list(axes)
+    if found.voidage is not None and found.voidage_spread is not None:
+        panel = remaining.pop(0)
+        low, high = found.voidage - found.voidage_spread, found.voidage + found.voidage_spread
+        panel.fill_betweenx(found.height, low, high, color=SKY, alpha=0.4, linewidth=0)
+        panel.plot(found.voidage, found.height, color=BLUE)
+        label(panel, "voidage", "-", "", "")
+    if found.upward is not None and found.downward is not None and found.temperature is not None:
+        flux, temperature = remaining
+        flux.plot(found.upward, found.height, color=GREEN, label="up")
+        flux.plot(found.downward, found.height, color=ORANGE, label="down")
+        flux.legend(frameon=False, fontsize=9.5)
+        label(flux, "solids flux", "m/s", "", "")
+        temperature.plot(found.temperature, found.height, color=BLUE)
+        label(temperature, "granular temperature", "m2/s2", "", "")
+    for panel in axes:
+        panel.set_ylabel("")
+        panel.set_ylim(0.0, float(found.height[-1] + found.height[0]))
+        panel.locator_params(axis="x", nbins=4)
+        panel.xaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
+        if bed_height is not None:
+            panel.axhline(bed_height, color=GREY, linewidth=1.0, linestyle="--")
+    axes[0].set_ylabel("height  [m]")
+    return figure

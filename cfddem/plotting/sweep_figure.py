@@ -1,0 +1,65 @@
+"""The figure of a sweep: means against the first key that was changed."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cfddem.case.input_errors import field_of
+from cfddem.case.schema import Case
+from cfddem.io.quantities import shown_unit
+from cfddem.plotting.curves import blank, label, legend, save, shades
+
+SHOWN = ("bed_height", "bed_voidage", "pressure_drop")
+"""Measures in the figure."""
+
+MOST_LABELLED = 8
+"""Largest number of curves with a legend."""
+
+
+class Point(NamedTuple):
+    """One finished run."""
+
+    values: Mapping[str, Any]  # of the changed keys
+    measures: Mapping[str, tuple[float, float, str]]  # mean, error, unit
+
+
+def sweep_figure(points: Sequence[Point], path: Path) -> bool:
+    """Draw the means against the first key, one curve for each combination of the other keys.
+
+    returns  whether there was anything to draw
+    """
+    names = [name for name in SHOWN if points and all(name in each.measures for each in points)]
+    if not names:
+        return False
+    first, *others = points[0].values
+    groups: dict[str, list[Point]] = {}
+    for each in points:
+        group = ", ".join(f"{key.split('.')[-1]} = {each.values[key]}" for key in others)
+        groups.setdefault(group, []).append(each)
+    numeric = all(isinstance(each.values[first], int | float) for each in points)
+    ticks = {value: k for k, value in enumerate(dict.fromkeys(str(each.values[first]) for each in points))}
+    figure, panels = blank(1, len(names), width=4.2 * len(names), height=4.0)
+    for name, panel in zip(names, panels):
+        for (group, members), colour in zip(groups.items(), shades(len(groups))):
+            x = [each.values[first] if numeric else ticks[str(each.values[first])] for each in members]
+            mean, error = zip(*(each.measures[name][:2] for each in members))
+            bars = [0.0 if math.isnan(each) else each for each in error]
+            panel.errorbar(x, mean, yerr=bars, fmt="o-", color=colour, capsize=2.0, label=group or None)
+        if not numeric:
+            panel.set_xticks(range(len(ticks)), list(ticks))
+        unit = shown_unit(points[0].measures[name][2])
+        label(panel, first, _unit(first) if numeric else "-", name.replace("_", " "), unit)
+    if others and len(groups) <= MOST_LABELLED:
+        legend(panels[0])
+    save(figure, path)
+    return True
+
+
+def _unit(key: str) -> str:
+    """Unit of a key of a case, from its description."""
+    found = re.search(r"\[([^\]]*)\]$", field_of(Case, key.split(".")) or "")
+    return found[1] if found else "-"

@@ -1,0 +1,103 @@
+"""Estimates of the bed from correlations: velocities, expansion, pressure drop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cfddem.case.bed import POURED_SOLID_FRACTION
+from cfddem.case.schema import Case
+from cfddem.preflight.mixture import bed_drag
+from closures import balance, bed, drag_single, numbers
+
+LIQUID = 100.0
+"""A fluid at least this dense counts as a liquid, whose beds expand homogeneously [kg/m3]."""
+
+
+@dataclass(frozen=True)
+class BedEstimate:
+    """The bed in its flow, from correlations; NaN where none applies."""
+
+    count: int
+    solid_volume: float  # total particle volume [m3]
+    weight: float  # buoyant weight over the floor area [Pa]
+    archimedes: float
+    inlet: float  # mean superficial velocity over the floor, highest in time [m/s]
+    reynolds: float  # with the superficial velocity; without inflow, with the terminal velocity
+    onset: float  # minimum fluidisation velocity u_mf by the drag law, at the voidage of a poured bed [m/s]
+    terminal: float  # terminal velocity u_t of a single particle of the slowest species [m/s]
+    voidage: float  # in the flow
+    height: float  # in the flow [m]
+    pressure_drop: float  # [Pa]
+    drag_factor: float  # F at this voidage
+
+    @property
+    def poured_height(self) -> float:
+        """Height of the bed at rest [m]."""
+        return self.height * (1.0 - self.voidage) / POURED_SOLID_FRACTION
+
+
+def estimate_bed(case: Case) -> BedEstimate:
+    """Estimate the bed of a case.
+
+    The bed is packed below minimum fluidisation. Above it, a liquid bed expands to the voidage at which drag
+    balances the buoyant weight; for a gas bed, which bubbles, the voidage of the poured bed is returned.
+    """
+    diameter, floor = case.bed.diameter, case.column.floor_area
+    count, solids, density = case.particle_count, sum(case.volumes.values()), case.solid_density
+    packed, nan = 1.0 - POURED_SOLID_FRACTION, math.nan
+    poured = solids / (floor * POURED_SOLID_FRACTION)
+    gravity, fluid = math.hypot(*case.laws.gravity), case.fluid
+    if fluid is None:
+        weight = solids * density * gravity / floor
+        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, packed, poured, nan, nan)
+    weight = solids * abs(density - fluid.density) * gravity / floor
+    inlet = mean_inlet_velocity(case)
+    if fluid.viscosity == 0.0:
+        return BedEstimate(count, solids, weight, nan, inlet, nan, nan, nan, packed, poured, nan, nan)
+    number = abs(numbers.archimedes(diameter, density, fluid.density, fluid.viscosity, gravity))
+    scale = fluid.viscosity / (fluid.density * diameter)
+    drag = bed_drag(case)
+    terminal = min(
+        balance.terminal_velocity(
+            each.diameter, case.material_of(each).density, fluid.density, fluid.viscosity, drag_single.brown_lawler,
+            gravity,
+        )
+        for each in case.species.values()
+    )  # fmt: skip
+    onset = balance.reynolds_in_balance(number, packed, drag) * scale
+    reynolds = (inlet or terminal) / scale
+    voidage = packed
+    if case.bed.start != "poured" and (case.bed.fixed or inlet == 0.0):
+        voidage = 1.0 - solids / (floor * case.column.height)
+    elif case.bed.fixed:
+        voidage = packed
+    elif inlet > 0.0 and number > 0.0 and fluid.density >= LIQUID:
+        voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
+    height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
+    drop = weight
+    if case.bed.fixed or inlet < onset:
+        drop = bed.ergun_gradient(inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)) * height
+    factor = drag(reynolds, voidage)
+    return BedEstimate(
+        count, solids, weight, number, inlet, reynolds, onset, terminal, voidage, height, drop, factor
+    )  # fmt: skip
+
+
+def bubbles(case: Case, bed: BedEstimate) -> bool:
+    """Whether the bed bubbles: a gas bed above minimum fluidisation. Correlations for homogeneous beds then fail."""
+    return case.fluid is not None and case.fluid.density < LIQUID and bed.inlet > bed.onset
+
+
+def mean_inlet_velocity(case: Case) -> float:
+    """Mean superficial velocity over the floor including the jet, highest in time [m/s]."""
+    column, jet = case.column, case.bed.jet
+    if column.ends != "flow":
+        return 0.0
+    inlet = case.bed.highest_inlet_velocity
+    if jet is None:
+        return inlet
+    width, depth, _ = column.size
+    opening = 0.25 * math.pi * jet.width**2 if jet.round else min(jet.width, width) * min(jet.depth or depth, depth)
+    share = min(1.0, opening / column.floor_area)
+    return (1.0 - share) * inlet + share * jet.velocity

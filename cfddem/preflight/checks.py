@@ -1,0 +1,184 @@
+"""All checks of a case before it runs: errors where the run will fail, warnings where its results may be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import LIQUID, BedEstimate
+from cfddem.preflight.collision_estimate import CollisionEstimate
+from cfddem.preflight.cost_estimate import CostEstimate, available_memory
+from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel
+from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
+from cfddem.preflight.issue import Issue
+from cfddem.preflight.step_estimate import StepEstimate
+
+SOFT_OVERLAP, LARGEST_OVERLAP = 0.02, 0.1
+"""Overlap over the diameter: above the first a warning, above the second an error [-]."""
+
+LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID, SOFT_SOLID = 5.0, 1e-4, 5e-5, 10.0, 1e4
+"""Plausible values in SI units; others suggest a wrong unit.
+
+Fluids lighter than the first [kg/m3] are less viscous than the second [Pa s]; liquids are more viscous than the third;
+solids are denser than the fourth [kg/m3] and stiffer than the last [Pa].
+"""
+
+DAY, YEAR = 86_400.0, 365.0 * 86_400.0
+"""Estimated computing time above which a run gets a warning or an error [s]."""
+
+
+def find_issues(
+    case: Case, bed: BedEstimate, collision: CollisionEstimate, steps: StepEstimate, cost: CostEstimate
+) -> list[Issue]:
+    """All errors and warnings of a case, errors first; a particle larger than the column hides all others."""
+    too_large = list(check_particle_size(case))
+    if too_large:
+        return too_large
+    found = [
+        *check_units(case),
+        *check_bed_size(case, bed),
+        *check_positions(case),
+        *check_overlap(case, collision),
+        *check_surface_laws(case),
+        *check_steps(case, steps),
+        *check_cost(case, cost),
+    ]
+    if case.fluid is not None:
+        found += [*check_kernel(case, steps), *check_flow(case, bed), *check_drag(case, bed)]
+    return sorted(found, key=lambda each: each.severity != "error")
+
+
+def check_units(case: Case) -> Iterator[Issue]:
+    """Check that densities, viscosities and moduli are plausible in SI units."""
+    fluid = case.fluid
+    if fluid is not None and fluid.density < LIGHT_GAS and fluid.viscosity > VISCOUS_GAS:
+        yield Issue(
+            "warning", "fluid.density",
+            f"{fluid.density:.3g} kg/m3 is that of a gas, but {fluid.viscosity:.3g} Pa s is not",
+            "water has 1000 kg/m3 and 1e-3 Pa s, air 1.2 kg/m3 and 1.8e-5 Pa s",
+        )  # fmt: skip
+    if fluid is not None and fluid.density >= LIQUID and 0.0 < fluid.viscosity < THIN_LIQUID:
+        yield Issue(
+            "warning", "fluid.viscosity", f"{fluid.viscosity:.3g} Pa s is below that of any common liquid",
+            "give the dynamic viscosity, the kinematic one times the density; water has 1e-3 Pa s",
+        )  # fmt: skip
+    for name, solid in case.material.items():
+        if solid.density < LIGHT_SOLID:
+            yield Issue(
+                "warning", f"material.{name}.density",
+                f"{solid.density:.3g} kg/m3 is below that of any common solid",
+                "densities are in kg/m3; glass has 2500",
+            )  # fmt: skip
+        if solid.youngs_modulus < SOFT_SOLID:
+            yield Issue(
+                "warning", f"material.{name}.youngs_modulus",
+                f"{solid.youngs_modulus:.3g} Pa is below that of any common solid",
+                "moduli are in Pa, glass has 6e10; to soften contacts only, set contact_modulus",
+            )  # fmt: skip
+
+
+def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
+    """Check that contacts are stiff enough."""
+    laws, species = case.laws, case.species[collision.species]
+    if laws.contact == "linear":
+        if laws.normal_stiffness == 0.0:
+            yield Issue(
+                "error", "laws.normal_stiffness", "0 N/m, so that particles pass through each other",
+                "set a stiffness above 0",
+            )  # fmt: skip
+        return
+    if case.bed.fixed:
+        return
+    # the modulus scales with overlap to the power -2.5 at a given speed, and -1.5 under a given load
+    causes = {
+        "collisions at the reference speed": (collision.overlap, 2.5),
+        "the weight of the bed": (collision.resting_overlap, 1.5),
+    }
+    cause, (overlap, power) = max(causes.items(), key=lambda each: each[1])
+    part, solid = overlap / species.diameter, case.material_of(species)
+    if part > SOFT_OVERLAP:
+        softer = solid.contact_modulus or solid.youngs_modulus
+        yield Issue(
+            "error" if part > LARGEST_OVERLAP else "warning",
+            f"material.{case.material_name_of(species)}.contact_modulus",
+            f"overlap of {100.0 * part:.2g} % of a diameter under {cause}; the limit is {100.0 * SOFT_OVERLAP:g} %",
+            f"use {softer * (part / (0.5 * SOFT_OVERLAP)) ** power:.1g} Pa",
+        )  # fmt: skip
+
+
+def check_surface_laws(case: Case) -> Iterator[Issue]:
+    """Check that rolling resistance and cohesion have material properties, and that no property is left unused."""
+    laws = case.laws
+    if laws.cohesion != "none" and case.has_films:
+        yield Issue(
+            "error", "laws.cohesion", f"{laws.cohesion} holds for dry solids, but films form between particles",
+            'set laws.lubrication = "none", or laws.cohesion = "none"',
+        )  # fmt: skip
+    if laws.cohesion != "none" and laws.contact != "hertz":
+        yield Issue(
+            "error", "laws.cohesion", f"{laws.cohesion} needs Hertz contacts, but the contact is {laws.contact}",
+            'set laws.contact = "hertz"',
+        )  # fmt: skip
+    for key, law, needed in (
+        ("rolling_resistance", laws.rolling_resistance, "rolling_friction"),
+        ("cohesion", laws.cohesion, "surface_energy"),
+    ):
+        given = [name for name, each in case.material.items() if getattr(each, needed) > 0.0]
+        if law != "none" and not given:
+            yield Issue(
+                "warning", f"laws.{key}", f"{law} has no effect, because {needed} is 0 in every material",
+                f"set material.NAME.{needed}",
+            )  # fmt: skip
+        if law == "none" and given:
+            yield Issue(
+                "warning", f"material.{given[0]}.{needed}", f'unused, because laws.{key} is "none"', f"set laws.{key}"
+            )
+
+
+def check_steps(case: Case, steps: StepEstimate) -> Iterator[Issue]:
+    """Check that the time step is stable and resolves a collision, and that averages begin before the end."""
+    given, scales = case.run.particle_step, steps.time_scales
+    remedy = f"use {scales.recommended:.2g} s, or leave it out"
+    if given is not None and given > scales.limit and not case.bed.fixed:
+        yield Issue(
+            "error", "run.particle_step",
+            f"{given:.3g} s is above the stability limit {scales.limit:.3g} s of the {scales.limiting} criterion",
+            remedy,
+        )  # fmt: skip
+    elif given is not None and given > 1.5 * scales.recommended:
+        yield Issue(
+            "warning", "run.particle_step",
+            f"{given:.3g} s is stable, but more than 1.5 times the recommended {scales.recommended:.2g} s, "
+            "2 % of the Hertz time",
+            remedy,
+        )  # fmt: skip
+    if case.run.average_from is not None and case.run.average_from >= case.run.until:
+        yield Issue(
+            "warning", "run.average_from",
+            f"{case.run.average_from:g} s is not before the end of the run, {case.run.until:g} s: "
+            "averages hold the last value only",
+            "start averages earlier",
+        )  # fmt: skip
+
+
+def check_cost(case: Case, cost: CostEstimate) -> Iterator[Issue]:
+    """Check that the run fits into the memory of this machine and takes less than a day."""
+    available = available_memory()
+    if cost.memory > 0.5 * available:
+        yield Issue(
+            "error" if cost.memory > available else "warning",
+            "column.cell" if cost.cells_dominate else bed_key(case, "count"),
+            f"needs about {cost.memory / 1e9:.3g} GB of memory; this machine has {available / 1e9:.3g} GB",
+            "use fewer particles, or larger cells",
+        )  # fmt: skip
+    if cost.seconds > DAY:
+        yield Issue(
+            "error" if cost.seconds > YEAR else "warning", "run.until",
+            f"takes about {cost.seconds / DAY:.2g} days on one core",
+            "lower material.NAME.contact_modulus, use fewer particles, or a shorter run",
+        )  # fmt: skip
+    if cost.disk > 50e9 or cost.snapshots > 100_000:
+        yield Issue(
+            "warning", "run.every", f"writes {cost.snapshots:.3g} snapshots, together about {cost.disk / 1e9:.2g} GB",
+            "write snapshots less often",
+        )  # fmt: skip

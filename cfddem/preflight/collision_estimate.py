@@ -1,0 +1,88 @@
+"""Estimates of a typical collision: Stokes number, minimum gap, overlap."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.backend.law_choice import GAP_ARGUMENTS, called_by_name
+from cfddem.case.bed import Species
+from cfddem.case.schema import Case
+from cfddem.particles.material_pairs import pair_table
+from cfddem.preflight.bed_estimate import BedEstimate
+from closures import contact, minimum_gap, numbers
+
+
+@dataclass(frozen=True)
+class CollisionEstimate:
+    """Collision of two particles of mean size of one species at the reference speed."""
+
+    species: str
+    speed: float  # [m/s]
+    stokes: float
+    roughness_gap: float  # h_sigma [m]
+    film_gap: float  # elastohydrodynamic gap with the real modulus [m]
+    softened_film_gap: float  # the same, if the film used the contact modulus [m]
+    overlap: float  # largest overlap of a dry collision [m]
+    real_overlap: float  # the same with the real modulus [m]
+    resting_overlap: float  # under the weight of the bed [m]
+    softening: float  # contact modulus over real modulus
+
+    @property
+    def gap(self) -> float:
+        """Minimum gap: the larger of roughness and film gap [m]."""
+        return max(self.roughness_gap, self.film_gap)
+
+    @property
+    def softened_gap(self) -> float:
+        """Minimum gap if the film used the contact modulus [m]."""
+        return max(self.roughness_gap, self.softened_film_gap)
+
+
+def estimate_collision(case: Case, bed: BedEstimate) -> CollisionEstimate:
+    """Estimate a typical collision; in a mixture, for the species with the largest overlap over diameter."""
+    each = (_of_species(case, bed, name, species) for name, species in case.species.items())
+    return max(each, key=lambda found: found.overlap / case.species[found.species].diameter)
+
+
+def pair_row(case: Case, species: Species) -> np.void:
+    """Entry of the pair table for two particles of a species."""
+    row: np.void = pair_table([case.material_of(species)])[0, 0]
+    return row
+
+
+def reduced(case: Case, species: Species, diameter: float) -> tuple[float, float]:
+    """Reduced mass [kg] and reduced radius [m] of two particles of a species with a diameter [m]."""
+    return 0.5 * math.pi / 6.0 * diameter**3 * case.material_of(species).density, 0.25 * diameter
+
+
+def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> CollisionEstimate:
+    row = pair_row(case, species)
+    mass, radius = reduced(case, species, species.diameter)
+    speed = max(case.reference_speed, 1e-12)
+    real, soft = float(row["film_modulus"]), float(row["contact_modulus"])
+    stiffness, real_stiffness = contact.hertz_stiffness(soft, radius), contact.hertz_stiffness(real, radius)
+    load = bed.weight * species.diameter**2
+    viscosity = 0.0 if case.fluid is None else case.fluid.viscosity
+    roughness_gap = float(row["roughness_gap"])
+    films = case.has_films
+    return CollisionEstimate(
+        species=name,
+        speed=speed,
+        stokes=numbers.stokes(mass, speed, viscosity, radius) if viscosity > 0.0 else math.inf,
+        roughness_gap=roughness_gap if films else 0.0,
+        film_gap=_film_gap(case, (roughness_gap, speed, viscosity, real, radius)) if films else 0.0,
+        softened_film_gap=_film_gap(case, (roughness_gap, speed, viscosity, soft, radius)) if films else 0.0,
+        overlap=contact.hertz_largest_overlap(mass, stiffness, speed),
+        real_overlap=contact.hertz_largest_overlap(mass, real_stiffness, speed),
+        resting_overlap=(load / stiffness) ** (2.0 / 3.0),
+        softening=soft / real,
+    )
+
+
+def _film_gap(case: Case, values: tuple[float, float, float, float, float]) -> float:
+    """Minimum gap by the law of the case [m]; `values` are those of GAP_ARGUMENTS."""
+    law = case.laws.pair_laws.get("minimum_gap")
+    return called_by_name(law.function if law else minimum_gap.elastohydrodynamic, GAP_ARGUMENTS, values)

@@ -1,0 +1,147 @@
+"""Checks of cell size, filter kernel, inlet flow and drag law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.issue import Issue
+from cfddem.preflight.step_estimate import StepEstimate
+
+SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
+"""Width of a box of the same variance as the kernel, over the diameter.
+
+Below the first, a sphere has more volume than its kernel can hold; below the second, the voidage is poor [-].
+"""
+
+FINEST = 6.0
+"""More cells than this per standard deviation of the kernel cost time and resolve nothing more [-]."""
+
+UNEQUAL = 1.2
+"""Ratio of species diameters from which a drag law should depend on the diameter ratio [-]."""
+
+PROFILE_RANGE = 2.0
+"""Ratio of `viscosity_profile` to `viscosity` inside the bed from which estimates mislead [-]."""
+
+
+def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
+    """Check that the filter kernel is wide enough for a particle, and the cells not needlessly small."""
+    assert steps.cells is not None
+    spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
+    smallest, diameter = min(spacing, default=min(case.column.size)), case.bed.largest_diameter
+    divided, kernel = case.laws.mapping == "divided", case.laws.kernel_width * diameter
+    own = 0.0 if divided else 1.0 / math.sqrt(6.0)
+    sphere = diameter / math.sqrt(20.0) if divided else 0.0
+    deviation = max(kernel, own * smallest, math.hypot(sphere, smallest / math.sqrt(12.0)))
+    width = math.sqrt(12.0) * deviation / diameter
+    if width < NARROW_KERNEL:
+        yield Issue(
+            "error" if width < SMALLEST_KERNEL else "warning", "column.cell",
+            f"{smallest:.3g} m distributes a particle over {width:.2g} diameters; use at least {NARROW_KERNEL:g}",
+            f"use cells of {3.0 * diameter:.2g} m, or laws.kernel_width = 1.5",
+        )  # fmt: skip
+    if kernel > FINEST * smallest:
+        yield Issue(
+            "warning", "column.cell",
+            f"{smallest:.3g} m is less than 1/{FINEST:g} of the kernel width {kernel:.3g} m, which costs time",
+            f"use cells of {2.0 * diameter:.2g} m or more",
+        )  # fmt: skip
+
+
+def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
+    """Check fluid, gravity and boundaries, and that the inlet flow fluidises the bed and keeps it in the column."""
+    yield from _check_viscosity(case, bed)
+    ends, downward = case.column.ends, case.laws.gravity[2]
+    if case.bed.start == "poured" and downward >= 0.0:
+        yield Issue(
+            "error", "laws.gravity", f"z component {downward:g} m/s2 is not negative, but the bed is poured",
+            'point gravity down, or set bed.start = "suspended"',
+        )  # fmt: skip
+    if ends != "flow" and case.bed.fastest_inflow > 0.0:
+        yield Issue(
+            "warning", "bed.inlet_velocity", f'unused, because column.ends is "{ends}"', 'set column.ends = "flow"'
+        )
+    if ends == "periodic" and math.hypot(*case.laws.gravity) > 0.0:
+        yield Issue(
+            "warning", "column.ends", "periodic along gravity: particles and fluid accelerate without limit",
+            "set laws.gravity = [0.0, 0.0, 0.0]",
+        )  # fmt: skip
+    if not (case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or downward == 0.0):
+        yield from _check_inlet(case, bed)
+
+
+def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:
+    """Check that drag has a viscosity, and that `viscosity` represents the profile inside the bed."""
+    fluid = case.fluid
+    assert fluid is not None
+    if fluid.viscosity == 0.0 and case.laws.drag_law is not None:
+        yield Issue(
+            "error", "fluid.viscosity", "0 Pa s, but drag laws need a viscosity above 0",
+            'set the viscosity, or laws.drag = "none"',
+        )  # fmt: skip
+    if not fluid.viscosity_profile:
+        return
+    inside = fluid.viscosity_at(np.linspace(0.0, min(bed.height, case.column.height), 50))
+    if not fluid.viscosity / PROFILE_RANGE < inside.min() <= inside.max() < PROFILE_RANGE * fluid.viscosity:
+        yield Issue(
+            "warning", "fluid.viscosity",
+            f"estimates use {fluid.viscosity:.3g} Pa s, but viscosity_profile is {inside.min():.3g} to "
+            f"{inside.max():.3g} Pa s in the bed",
+            "set it to the mean over the bed; the run uses the profile",
+        )  # fmt: skip
+
+
+def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
+    """Check the inlet velocity against minimum fluidisation and terminal velocity."""
+    assert case.fluid is not None
+    inlet = case.bed.inlet_velocity
+    if case.laws.gravity[2] * (case.solid_density - case.fluid.density) > 0.0:
+        names = {case.material_name_of(each) for each in case.species.values()}
+        yield Issue(
+            "warning", f"material.{names.pop() if len(names) == 1 else 'NAME'}.density",
+            f"particles float (mean {case.solid_density:.4g} kg/m3, fluid {case.fluid.density:.4g} kg/m3), "
+            "and the flow carries them to the lid",
+            "reverse laws.gravity",
+        )  # fmt: skip
+    elif bed.inlet > bed.terminal:
+        yield Issue(
+            "error" if isinstance(inlet, float) else "warning", "bed.inlet_velocity",
+            f"{bed.inlet:.3g} m/s is above the terminal velocity {bed.terminal:.3g} m/s: the flow carries the "
+            "particles to the lid",
+            f"use less; fluidisation begins at {bed.onset:.2g} m/s. Or set bed.fixed = true",
+        )  # fmt: skip
+    elif bed.inlet < bed.onset and case.bed.start == "poured":
+        yield Issue(
+            "warning", "bed.inlet_velocity",
+            f"{bed.inlet:.3g} m/s is below minimum fluidisation, {bed.onset:.3g} m/s: the bed stays packed",
+            "use more, or set bed.fixed = true, which runs much faster",
+        )  # fmt: skip
+
+
+def check_drag(case: Case, bed: BedEstimate) -> Iterator[Issue]:
+    """Check that the drag law is used within its range, and suits unequal particles."""
+    law = case.laws.drag_law
+    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+        return
+    voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
+    ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
+    values = [("reynolds", bed.reynolds), ("voidage", voidage), *(("diameter_ratio", each) for each in ratios)]
+    for name, value in values:
+        low, high = law.ranges.get(name, (-math.inf, math.inf))
+        if not low <= value <= high:
+            yield Issue(
+                "warning", "laws.drag",
+                f"{law.name} was fitted to {name} {low:g} to {high:g}, but the bed has {value:.3g}",
+                "choose another law; cfddem explain lists all with their ranges",
+            )  # fmt: skip
+    if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
+        yield Issue(
+            "warning", "laws.drag",
+            f"{law.name} is for equal spheres, but species diameters differ by a factor of "
+            f"{max(ratios) / min(ratios):.3g}",
+            'use "beetstra_polydisperse": the drag on each size decides which species sinks',
+        )  # fmt: skip

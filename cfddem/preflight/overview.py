@@ -1,0 +1,166 @@
+"""The numbers of the pre-run check, group by group."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import BedEstimate, bubbles
+from cfddem.preflight.collision_estimate import CollisionEstimate
+from cfddem.preflight.cost_estimate import CostEstimate
+from cfddem.preflight.issue import WIDTH
+from cfddem.preflight.mixture import bed_drag, net_downward_forces
+from cfddem.preflight.step_estimate import StepEstimate
+from closures import timescales
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of the overview."""
+
+    group: str
+    name: str
+    value: float
+    unit: str = ""
+    note: str = ""
+
+    def line(self) -> str:
+        """The number as a line of text, at most 100 columns wide."""
+        text = f"  {self.name:<34} {_number(self.value):>10} {self.unit:<5} {self.note}".rstrip()
+        return text if len(text) <= WIDTH else f"{text[: WIDTH - 4]} ..."
+
+
+def overview(
+    case: Case, bed: BedEstimate, collision: CollisionEstimate, steps: StepEstimate, cost: CostEstimate
+) -> tuple[Row, ...]:
+    """All rows of the overview in order."""
+    return (
+        *_particles_and_flow(case, bed),
+        *_species(case, bed),
+        *_collisions_and_film(case, collision),
+        *_time_scales(case, bed, steps),
+        *_expected(case, bed),
+        *_cost(cost),
+    )
+
+
+def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
+    group = "particles and flow"
+    yield Row(group, "particles", bed.count)
+    if case.fluid is None:
+        return
+    cell = case.column.cell if isinstance(case.column.cell, float) else min(case.column.cell)
+    several = bool(case.bed.species)
+    yield Row(group, "cell / diameter", cell / case.bed.largest_diameter, "", "of the largest species" * several)
+    yield Row(group, "density ratio", case.solid_density / case.fluid.density, "", "solid over fluid")
+    if math.isnan(bed.archimedes):
+        return
+    yield Row(group, "Re_p", bed.reynolds, "", f"Reynolds number at {'inlet' if bed.inlet else 'terminal'} velocity")
+    yield Row(group, "Ar", bed.archimedes, "", "Archimedes number")
+    yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {bed_drag(case).__name__}")
+    single = "slowest species alone" if several else "single particle"
+    yield Row(group, "u_t", bed.terminal, "m/s", f"{single}, Brown and Lawler")
+    if bed.inlet and bed.onset and bed.terminal:
+        yield Row(group, "u / u_mf", bed.inlet / bed.onset)
+        yield Row(group, "u / u_t", bed.inlet / bed.terminal)
+
+
+def _species(case: Case, bed: BedEstimate) -> Iterator[Row]:
+    if not case.bed.species:
+        return
+    group, total = "species", sum(case.volumes.values())
+    forces = net_downward_forces(case, bed.inlet, bed.voidage) if bed.inlet > bed.onset else {}
+    for name, each in case.species.items():
+        yield Row(group, f"{name}: particles", case.counts[name])
+        yield Row(group, f"{name}: volume share", case.volumes[name] / total)
+        yield Row(group, f"{name}: diameter / mean", each.sauter_diameter / case.bed.diameter, "", "Sauter means")
+        if name in forces:
+            note = f"{'sinks' if forces[name] > 0.0 else 'rises'} in the homogeneous mixture"
+            yield Row(group, f"{name}: net force / weight", forces[name], "", note)
+
+
+def _collisions_and_film(case: Case, collision: CollisionEstimate) -> Iterator[Row]:
+    if case.bed.fixed:
+        return
+    group, diameter = "collisions and film", case.species[collision.species].diameter
+    note = f"between particles of {collision.species}" if case.bed.species else ""
+    yield Row(group, "collision speed", collision.speed, "m/s", note)
+    if collision.gap > 0.0:
+        law = case.laws.pair_laws.get("minimum_gap")
+        film = "elastic deformation of the solids" if law is None else law.name
+        source = film if collision.film_gap > collision.roughness_gap else "roughness"
+        yield Row(group, "St", collision.stokes, "", "Stokes number, inertia over film resistance")
+        yield Row(group, "minimum gap", collision.gap, "m", f"set by {source}")
+        yield Row(group, "minimum gap / roughness", collision.gap / collision.roughness_gap)
+        if collision.softening < 1.0:
+            note = "if films used the contact modulus"
+            yield Row(group, "minimum gap, softened", collision.softened_gap, "m", note)
+    yield Row(group, "contact modulus / real", collision.softening)
+    yield Row(group, "overlap / diameter", collision.overlap / diameter, "", "largest, dry collision")
+    if collision.softening < 1.0:
+        yield Row(group, "overlap / diameter, real", collision.real_overlap / diameter, "", "with the real modulus")
+    resting = collision.resting_overlap / diameter
+    yield Row(group, "overlap / diameter, at rest", resting, "", "under the weight of the bed")
+
+
+def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Row]:
+    group, scales = "time scales", steps.time_scales
+    if not case.bed.fixed:
+        chosen = "given" if case.run.particle_step else "2 % of the Hertz time, at most half the limit"
+        yield Row(group, "particle step", steps.particle, "s", chosen)
+        yield Row(group, "2 % of the Hertz time", scales.hertz, "s")
+        for name, limit in (("impact", scales.impact), ("crossing", scales.crossing)):
+            yield Row(group, f"{name} criterion", limit, "s", "stability limit" * (name == scales.limiting))
+    if case.fluid is None or math.isinf(steps.fluid):
+        return
+    yield Row(group, "fluid step", steps.fluid, "s", f"set by the {steps.limiting} criterion")
+    for name, limit in sorted(steps.limits.items(), key=lambda each: each[1]):
+        yield Row(group, f"{name} criterion", limit, "s", "limits the fluid step" * (name == steps.limiting))
+    if not case.bed.fixed:
+        yield Row(group, "particle steps per fluid step", steps.substeps)
+    if not math.isnan(bed.drag_factor) and 0.0 < bed.voidage < 1.0:
+        fluid, density = case.fluid, case.solid_density
+        relaxation = timescales.drag_time(case.bed.diameter, density, fluid.viscosity, bed.voidage, bed.drag_factor)
+        load = (1.0 - bed.voidage) * density / (bed.voidage * fluid.density)
+        stiffness = load * steps.fluid / relaxation
+        yield Row(group, "beta dt / (eps rho)", stiffness, "", "stiffness of the drag, which is implicit")
+
+
+def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
+    group = "expected result"
+    if case.fluid is not None and not math.isnan(bed.archimedes) and (case.bed.start == "poured" or bed.inlet):
+        note = ""
+        if bubbles(case, bed):
+            note = "at least; the bed bubbles"
+        elif bed.inlet > bed.onset:
+            note = "by the balance of weight and drag"
+        yield Row(group, "bed height", bed.height, "m", note)
+        yield Row(group, "bed voidage", bed.voidage)
+        if bed.inlet:
+            note = "Ergun" if case.bed.fixed or bed.inlet < bed.onset else "buoyant weight over the floor area"
+            yield Row(group, "pressure drop", bed.pressure_drop, "Pa", note)
+    elif case.bed.start == "poured":
+        yield Row(group, "bed height", bed.height, "m", "poured")
+
+
+def _cost(cost: CostEstimate) -> Iterator[Row]:
+    group = "cost"
+    amount, unit = _duration(cost.seconds)
+    yield Row(group, "time on one core", amount, unit, "within a factor of three, without compilation")
+    yield Row(group, "memory", cost.memory / 1e9, "GB")
+    yield Row(group, "snapshots", cost.snapshots, "", f"{cost.disk / 1e6:.3g} MB on disk")
+
+
+def _duration(seconds: float) -> tuple[float, str]:
+    for length, unit in ((86_400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds > 2.0 * length:
+            return seconds / length, unit
+    return seconds, "s"
+
+
+def _number(value: float) -> str:
+    if not math.isfinite(value):
+        return "-"
+    return f"{value:.0f}" if float(value).is_integer() and abs(value) < 1e7 else f"{value:.4g}"

@@ -1,0 +1,72 @@
+"""Estimates of the time steps at the start of a run. All time scales of preflight are read here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from cfddem.case.bed import Species
+from cfddem.case.schema import Case
+from cfddem.coupling.time_scales import courant_step, fluid_step_limits
+from cfddem.fluid.cell_counts import VISCOUS, cell_counts
+from cfddem.particles.step_limits import TimeScales, crossing_step, hertz_steps, linear_steps
+from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.collision_estimate import pair_row, reduced
+
+
+@dataclass(frozen=True)
+class StepEstimate:
+    """Time steps of a run and what limits them."""
+
+    time_scales: TimeScales  # of the particles
+    particle: float  # particle step [s]; infinite for fixed particles
+    limits: dict[str, float]  # of the fluid step, by criterion [s]
+    cells: tuple[int, int, int] | None  # number of cells; None without a fluid
+
+    @property
+    def limiting(self) -> str:
+        """Criterion that sets the fluid step."""
+        return min(self.limits, key=self.limits.__getitem__)
+
+    @property
+    def fluid(self) -> float:
+        """Fluid step; without a fluid, the interval at which the particle time scales are read again [s]."""
+        return self.limits[self.limiting]
+
+    @property
+    def substeps(self) -> int:
+        """Particle steps in a fluid step; 0 for fixed particles."""
+        return 0 if math.isinf(self.particle) else max(1, math.ceil(self.fluid / self.particle - 1e-9))
+
+
+def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
+    """Estimate the time steps of a case at its start."""
+    run, speed = case.run, max(case.reference_speed, 1e-12)
+    every = [_time_scales(case, each, speed) for each in case.species.values()]
+    shortest = min(every, key=lambda each: each.recommended)
+    particle = math.inf if case.bed.fixed else run.particle_step or shortest.recommended
+    if case.fluid is None:
+        return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, {}), None)
+    cells = cell_counts(case.column.size, case.column.cell)
+    spacing = [length / count for length, count in zip(case.column.size, cells)]
+    fastest, flow = max(bed.inlet / bed.voidage, case.bed.fastest_inflow), {}
+    if fastest > 0.0:
+        flow["Courant"] = courant_step(fastest, spacing)
+    rates = [width**-2 for width, count in zip(spacing, cells) if count > 1]
+    if rates and case.fluid.viscosity > 0.0:
+        flow["viscous"] = VISCOUS * case.fluid.density / (2.0 * case.fluid.viscosity * sum(rates))
+    if not case.bed.fixed:
+        flow["particle Courant"] = courant_step(speed, spacing)
+    return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, flow), cells)
+
+
+def _time_scales(case: Case, species: Species, speed: float) -> TimeScales:
+    """Time scales of two of the smallest particles of a species."""
+    mass, radius = reduced(case, species, species.smallest_diameter)
+    laws = case.laws
+    if laws.contact == "linear" and max(laws.normal_stiffness, laws.tangential_stiffness) > 0.0:
+        hertz, impact = linear_steps(mass, laws.normal_stiffness, laws.tangential_stiffness)
+    else:
+        modulus = float(pair_row(case, species)["contact_modulus"])
+        hertz, impact = hertz_steps(mass, radius, modulus, speed)
+    return TimeScales(hertz, impact, math.inf, math.inf, crossing_step(2.0 * radius, speed))

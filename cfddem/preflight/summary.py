@@ -1,0 +1,111 @@
+"""The pre-run check: what a run will be, in numbers, and its errors and warnings.
+
+It uses correlations only: nothing is compiled, poured or allocated, so that it takes a fraction of a second.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from cfddem.backend.errors import CfddemError, InputError
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.checks import find_issues
+from cfddem.preflight.collision_estimate import estimate_collision
+from cfddem.preflight.cost_estimate import estimate_cost
+from cfddem.preflight.issue import WIDTH, Issue
+from cfddem.preflight.overview import Row, overview
+from cfddem.preflight.step_estimate import estimate_steps
+
+
+class PreflightError(CfddemError):
+    """A case with errors in its pre-run check."""
+
+    exit_code = 2
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """Result of the pre-run check: numbers, errors and warnings."""
+
+    title: str
+    rows: tuple[Row, ...]
+    issues: tuple[Issue, ...]
+
+    @property
+    def status(self) -> Literal["ok", "warning", "error"]:
+        """Severity of the worst issue; ok if there is none."""
+        severities = {each.severity for each in self.issues}
+        return "error" if "error" in severities else "warning" if severities else "ok"
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values: status, issues, and the numbers by group and name."""
+        groups: dict[str, dict[str, Any]] = {}
+        for row in self.rows:
+            value = row.value if math.isfinite(row.value) else None
+            groups.setdefault(row.group, {})[row.name] = {"value": value, "unit": row.unit, "note": row.note}
+        issues = [asdict(each) for each in self.issues]
+        return {"case": self.title, "status": self.status, "issues": issues, "numbers": groups}
+
+    def lines(self) -> list[str]:
+        """The whole result as text, at most 100 columns wide."""
+        out, group = [textwrap.shorten(self.title, WIDTH, placeholder=" ...")], ""
+        for row in self.rows:
+            if row.group != group:
+                group = row.group
+                out += ["", group.capitalize()]
+            out.append(row.line())
+        return [*out, "", *self.issue_lines()]
+
+    def issue_lines(self) -> list[str]:
+        """Errors and warnings as text, at most 100 columns wide."""
+        if not self.issues:
+            return ["ok: no errors, no warnings"]
+        return [line for each in self.issues for line in each.lines()]
+
+
+def preflight(case: Case) -> Preflight:
+    """Check a case before it runs.
+
+    >>> result = preflight(Case(
+    ...     fluid=dict(density=998.0, viscosity=1e-3),
+    ...     material=dict(glass=dict(density=2540.0, youngs_modulus=60e9, contact_modulus=1e7, poisson=0.23)),
+    ...     column=dict(width=0.02, height=0.12, cell=0.005),
+    ...     bed=dict(diameter=2e-3, count=2000, inlet_velocity=0.05),
+    ...     run=dict(until=2.0),
+    ... ))
+    >>> result.status, [round(row.value, 3) for row in result.rows if row.name.startswith("u / ")]
+    ('ok', [1.867, 0.185])
+    """
+    title = case.title or "case without a title"
+    try:
+        bed = estimate_bed(case)
+        collision = estimate_collision(case, bed)
+        steps = estimate_steps(case, bed)
+        cost = estimate_cost(case, bed, steps)
+        issues = find_issues(case, bed, collision, steps, cost)
+        return Preflight(title, overview(case, bed, collision, steps, cost), tuple(issues))
+    except InputError as failure:
+        reason = f"{'' if failure.value is None else f'{failure.value!r} '}must be {failure.limit}"
+        key = failure.field.replace("grid.", "column.")
+        return Preflight(title, (), (Issue("error", key, reason, failure.remedy or "change it"),))
+    except (ArithmeticError, ValueError):
+        reason = "some values are too large or too small for the correlations"
+        return Preflight(title, (), (Issue("error", "case", reason, "give all values in SI units: m, kg, s, Pa"),))
+
+
+def refuse_errors(case: Case) -> Preflight:
+    """Result of the pre-run check of a case without errors.
+
+    Raises PreflightError with all errors otherwise.
+    """
+    result = preflight(case)
+    if result.status == "error":
+        raise PreflightError("\n".join(str(each) for each in result.issues if each.severity == "error"))
+    return result

@@ -1,0 +1,191 @@
+"""The energy ledger: stored energy, energy gained and lost, and the remainder.
+
+Gains and losses are the work of each force, counted as the force acts. Stored energy is computed from the state,
+independently. The remainder is the change of the stored energy that gains and losses do not explain.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cfddem.coupling.exchange import CouplingTerms, Exchange
+from cfddem.coupling.work import CouplingWork
+from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import kinetic_energy
+from cfddem.particles.work import CHANNELS
+
+STORED = {
+    "kinetic": "of the particles' motion",
+    "potential": "of the particles' weight, less buoyancy",
+    "normal_springs": "of normal springs",
+    "tangential_springs": "of tangential springs",
+    "fluid_kinetic": "of the fluid's motion",
+    "added_mass": "of the fluid that moves with the particles, the added mass",
+    "deferred_momentum": "that the pressure has given to particles and the fluid loses in the next two steps",
+}
+"""Forms of stored energy; a line of the ledger is the change since the start."""
+
+GAINED = {
+    "inflow": "brought in at inlets and outlets",
+    "driving": "by the mean pressure gradient of periodic sides",
+    "walls": "by moving walls",
+    "stiffening": "by tangential springs whose stiffness changes with the overlap",
+    "fed": "by inserted particles, less that of removed ones",
+    "model_b": "by the pressure on the volume of the particles, which model B gives to the fluid",
+}
+"""Energy gained; a negative line is a loss."""
+
+LOST = {
+    "drag": "by drag, at the slip of the particles",
+    "drag_in_cells": "by drag, in velocity differences within the kernel and the cell",
+    "pressure_in_cells": "where the pressure gradient at the particles differs from that of the cells",
+    "implicit_drag": "by the implicit drag step",
+    "viscous": "by viscous stress",
+    "convection": "by the convection scheme",
+    "lift_and_added_mass": "between fluid and particles by lift, viscous stress, added mass and agitation",
+    "torque": "by the torque of the fluid on spin",
+    "film": "by films",
+    "contact_damping": "by the dashpots of contacts",
+    "friction": "by sliding",
+    "rolling": "by rolling resistance",
+}
+"""Energy lost."""
+
+PASSED = {
+    "drag_from_fluid": "by the fluid to drag",
+    "drag_to_particles": "by drag to the particles",
+    "pressure_from_fluid": "by the pressure of the fluid that moves the volume of particles",
+    "pressure_to_particles": "by the pressure to the particles",
+}
+"""Energy that passes between the phases; the difference of two lines is lost."""
+
+_OF_FLUID = {
+    "fluid_kinetic", "added_mass", "deferred_momentum", "inflow", "driving", "model_b", "drag", "drag_in_cells",
+    "pressure_in_cells", "implicit_drag", "viscous", "convection", "lift_and_added_mass", "torque", *PASSED,
+}  # fmt: skip
+"""Lines of runs with a fluid."""
+
+FIELDS = {
+    **{f"energy_{name}": ("J", f"energy {text}, since the start") for name, text in STORED.items()},
+    **{f"energy_{name}": ("J", f"energy gained {text}") for name, text in GAINED.items()},
+    **{f"energy_{name}": ("J", f"energy lost {text}") for name, text in LOST.items()},
+    **{f"energy_{name}": ("J", f"energy given {text}") for name, text in PASSED.items()},
+    "energy_put_in": ("J", "energy at the start in motion and springs, gained since then, and lost by falling"),
+    "energy_remainder": ("J", "change of the stored energy that gains and losses do not explain"),
+}
+"""Columns of history."""
+
+
+class EnergyLedger:
+    """Sums the energy of a simulation: every force returns its work, and the ledger adds it to a line.
+
+    particle_solver  counts its own work, `energies=True`
+    fluid, exchange  of a run with a fluid
+    gravity          (3,) [m/s2]
+    """
+
+    def __init__(
+        self, particle_solver: ParticleSolver, fluid: FluidSolver | None, exchange: Exchange | None, gravity: Array
+    ) -> None:
+        self.particle_solver, self.fluid, self.exchange = particle_solver, fluid, exchange
+        self._coupling = None if exchange is None else CouplingWork(particle_solver.particles, exchange, gravity)
+        self._recent = (0.0, 0.0)  # work of the pressure on the displaced volume in the last two fluid steps [J]
+        self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
+        self.start = self._stored()
+
+    def after_fluid_step(self, terms: CouplingTerms) -> None:
+        """Add the work on the fluid, after `Exchange.apply` and before the particles move."""
+        assert self.fluid is not None and self.exchange is not None and self._coupling is not None
+        fluid, sums, done = self.fluid, self.sums, self.fluid.work()
+        sums["inflow"] += done.inflow + done.held
+        sums["driving"] += done.driving
+        sums["model_b"] += done.model_b + (done.solids if fluid.model == "B" else 0.0)
+        sums["viscous"] -= done.viscous
+        sums["convection"] -= done.convection
+        sums["implicit_drag"] -= done.implicit
+        sums["drag_in_cells"] -= done.drag - done.held
+        sums["lift_and_added_mass"] -= done.source
+        sums["torque"] -= self.exchange.spin_work
+        sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
+        sums["pressure_from_fluid"] -= done.solids
+        self._coupling.begin(self.particle_solver.particles, terms)
+
+    def after_particle_steps(self) -> None:
+        """Add the work of the fluid on the particles."""
+        if self._coupling is None:
+            return
+        sums, done = self.sums, self._coupling.end(self.particle_solver.particles)
+        sums["drag"] += done.drag_on_fluid - done.drag
+        sums["drag_to_particles"] += done.drag
+        sums["drag_in_cells"] -= done.drag_on_fluid
+        sums["lift_and_added_mass"] -= done.explicit
+        sums["fallen"] += done.weight
+        sums["driving"] += done.driving
+        sums["pressure_to_particles"] += done.pressure
+        sums["pressure_in_cells"] += done.displaced - done.pressure
+        self._recent = (done.displaced, self._recent[0])
+
+    def row(self) -> dict[str, float]:
+        """The ledger now: a value for each column of `FIELDS` that applies to the run [J]."""
+        stored, sums = self._stored(), self._totals()
+        lines = {name: stored[name] - self.start[name] for name in stored}
+        names = [name for name in [*GAINED, *LOST, *PASSED] if self.fluid is not None or name not in _OF_FLUID]
+        lines |= {name: sums[name] for name in names}
+        put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
+        put_in += self.start.get("fluid_kinetic", 0.0) + max(-lines["potential"], 0.0)
+        put_in += sum(max(lines[name], 0.0) for name in GAINED if name in lines)
+        explained = sum(lines[name] for name in GAINED if name in lines)
+        explained -= sum(lines[name] for name in LOST if name in lines)
+        lines["put_in"] = put_in
+        lines["remainder"] = sum(lines[name] for name in stored) - explained
+        return {f"energy_{name}": value for name, value in lines.items()}
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Sums so far, stored energy at the start, and recent pressure work."""
+        return {
+            "sums": dict(self.sums),
+            "start": dict(self.start),
+            "recent": list(self._recent),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self.sums = {name: float(value) for name, value in state["sums"].items()}
+        self.start = {name: float(value) for name, value in state["start"].items()}
+        self._recent = (float(state["recent"][0]), float(state["recent"][1]))
+
+    def _totals(self) -> dict[str, float]:
+        """All sums, those of the particle solver included."""
+        count = self.particle_solver.energies
+        assert count is not None
+        sums = dict(self.sums)
+        for name, total in zip(CHANNELS, count.totals):
+            if name in sums:
+                sums[name] += float(total)
+        sums["fed"] += count.fed
+        return sums
+
+    def _stored(self) -> dict[str, float]:
+        """Stored energy now [J]; the potential energy is relative to the start."""
+        particle_solver, count = self.particle_solver, self.particle_solver.energies
+        assert count is not None
+        particles = particle_solver.particles
+        normal, tangential = count.springs(particle_solver)
+        fallen = self.sums["fallen"] + float(count.totals[CHANNELS.index("fall")])
+        stored = {
+            "kinetic": kinetic_energy(particles),
+            "potential": -fallen,
+            "normal_springs": normal,
+            "tangential_springs": tangential,
+        }
+        if self.fluid is None or self.exchange is None:
+            return stored
+        added = self.exchange.added_mass.mass(particles)
+        return stored | {
+            "fluid_kinetic": self.fluid.kinetic_energy(),
+            "added_mass": 0.5 * self.fluid.communicator.sum(added[:, None] * particles.velocity**2),
+            # the fluid has used the voidage before the last step and a half
+            "deferred_momentum": -(self._recent[0] + 0.5 * self._recent[1]),
+        }

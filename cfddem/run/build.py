@@ -1,0 +1,205 @@
+"""Build the parts of a run from a case: grid, boundaries, walls, materials, particles, solvers and coupling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.case.bed import Jet
+from cfddem.case.column_grid import grid_of
+from cfddem.case.schema import Case, Column
+from cfddem.coupling.exchange import Exchange
+from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
+from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import Particles
+from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
+from cfddem.run.initial_particles import SPECIES, particles_of, periodic_box, periodic_directions
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The solvers of a run and their coupling; no fluid and no exchange for a case of particles only."""
+
+    particle_solver: ParticleSolver
+    fluid: FluidSolver | None
+    exchange: Exchange | None
+
+
+def assemble(
+    case: Case,
+    progress: Callable[[str], None] = lambda _: None,
+    particles: Particles | None = None,
+    communicator: Communicator = SERIAL,
+) -> Parts:
+    """Build the parts of a run.
+
+    progress      receives a line of text on what is being done
+    particles     of an earlier part of the run; made from the case if None
+    communicator  path to sums, extremes and decisions over all ranks
+    """
+    table, walls, laws = materials_of(case), walls_of(case), laws_of(case)
+    spheres = particles
+    if spheres is None:
+        if case.bed.start == "poured":
+            progress(f"pouring {case.particle_count} particles")
+        spheres = particles_of(case, table, walls, laws)
+    if case.bed.species:
+        spheres.declare(SPECIES)
+    solver = ParticleSolver(
+        spheres,
+        table,
+        walls=walls,
+        laws=laws,
+        gravity=case.laws.gravity if case.fluid is None else (0.0, 0.0, 0.0),
+        box=periodic_box(case),
+        domain=_domain(case),
+        record=case.run.record_collisions,
+        energies=case.run.energy_budget,
+    )
+    return Parts(solver, None, None) if case.fluid is None else Parts(solver, *flow_of(case, spheres, communicator))
+
+
+def flow_of(case: Case, spheres: Particles, communicator: Communicator = SERIAL) -> tuple[FluidSolver, Exchange]:
+    """The fluid of a case around its particles, and their coupling."""
+    assert case.fluid is not None
+    grid = grid_of(case.column)
+    fluid = FluidSolver(
+        grid,
+        boundaries_of(case),
+        density=case.fluid.density,
+        viscosity=case.fluid.viscosity_at(grid.centres()[2]),
+        gravity=case.laws.gravity,
+        model=case.laws.model,
+        convection=case.laws.convection,
+        communicator=communicator,
+    )
+    kernel = FilterKernel(
+        grid,
+        periodic_directions(case),
+        mapping=case.laws.mapping,
+        smoothing=case.laws.kernel_width * case.bed.largest_diameter,
+        communicator=communicator,
+    )
+    fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(spheres.position, spheres.radius)))
+    exchange = Exchange(
+        spheres,
+        fluid,
+        kernel,
+        case.laws.drag_law,
+        added_mass=case.laws.added_mass,
+        self_disturbance=case.laws.self_disturbance_correction,
+        lift=case.laws.lift,
+        torque=case.laws.torque,
+        viscous_stress=case.laws.viscous_stress,
+        agitation=agitation_of(case, fluid, kernel),
+    )
+    return fluid, exchange
+
+
+def agitation_of(case: Case, fluid: FluidSolver, kernel: FilterKernel) -> PseudoTurbulence | FluctuatingForce | None:
+    """Agitation of the particles by the disturbed flow around their neighbours."""
+    if case.laws.agitation == "pseudo_turbulence":
+        return PseudoTurbulence(fluid, kernel, case.bed.seed, case.laws.added_mass)
+    return FluctuatingForce(fluid, kernel, case.bed.seed) if case.laws.agitation == "lattanzi" else None
+
+
+def materials_of(case: Case) -> np.ndarray:
+    """Pair table of the case's materials, in the order of the case."""
+    return pair_table(list(case.material.values()))
+
+
+def walls_of(case: Case) -> list[Wall]:
+    """Walls of the column: floor and lid unless the ends are periodic, sides unless they are periodic."""
+    width, depth, height = case.column.size
+    names, first = list(case.material), next(iter(case.species.values()))
+    solid = names.index(case.column.material or first.material or names[0])
+    walls: list[Wall] = []
+    if case.column.ends != "periodic":
+        walls.append(Plane(material=solid))
+        walls.append(Plane(point=(0.0, 0.0, height), normal=(0.0, 0.0, -1.0), material=solid))
+    if case.column.shape == "cylinder":
+        walls.append(Cylinder(point=(0.5 * width, 0.5 * width, 0.0), radius=0.5 * width, material=solid))
+        return walls
+    for axis, length, repeats in zip((0, 1), (width, depth), periodic_directions(case)):
+        if not repeats:
+            inward = np.eye(3)[axis]
+            walls.append(Plane(normal=tuple(inward), material=solid))
+            walls.append(Plane(point=tuple(length * inward), normal=tuple(-inward), material=solid))
+    return walls
+
+
+def laws_of(case: Case) -> Laws:
+    """Laws between particles."""
+    laws = case.laws
+    own: dict[str, Any] = {kind: law.function for kind, law in laws.pair_laws.items()} if case.has_films else {}
+    return Laws(
+        film=case.has_films,
+        friction_onset=laws.friction_onset,
+        contact=laws.contact,
+        normal_stiffness=laws.normal_stiffness,
+        tangential_stiffness=laws.tangential_stiffness,
+        rolling=laws.rolling_resistance,
+        rolling_damping=laws.rolling_damping,
+        cohesion=laws.cohesion,
+        **own,
+    )
+
+
+def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Corners of the box that no centre may leave; infinite along periodic directions [m]."""
+    repeats, size = periodic_directions(case), case.column.size
+    low = tuple(-math.inf if each else 0.0 for each in repeats)
+    high = tuple(math.inf if each else length for each, length in zip(repeats, size))
+    return low, high  # type: ignore[return-value]
+
+
+# ---------------------------------------------------------------- fluid
+
+
+def boundaries_of(case: Case) -> dict[str, Condition | list[Condition]]:
+    """Boundary conditions of the fluid on the six sides."""
+    kinds = {"no_slip": NoSlip, "free_slip": FreeSlip, "periodic": Periodic}
+    column = case.column
+    sides, front = kinds[column.sides](), kinds[column.front or column.sides]()
+    conditions: dict[str, Condition | list[Condition]] = {
+        "x_low": sides, "x_high": sides, "y_low": front, "y_high": front,
+    }  # fmt: skip
+    if column.ends == "periodic":
+        conditions |= {"z_low": Periodic(), "z_high": Periodic()}
+    elif column.ends == "closed":
+        conditions |= {"z_low": NoSlip(), "z_high": NoSlip()}
+    else:
+        conditions |= {"z_low": _inlet(case), "z_high": Outlet()}
+    return conditions
+
+
+def _inlet(case: Case) -> list[Condition]:
+    """Inlets in the floor: the whole floor, and a jet in its middle."""
+    velocity = case.bed.inlet_velocity
+    if isinstance(velocity, float):
+        inlets: list[Condition] = [Inlet(velocity)]
+    else:
+        times, speeds = np.array(velocity).T
+        inlets = [Inlet(1.0, in_time=lambda t: float(np.interp(t, times, speeds)))]
+    if case.bed.jet is not None:
+        inlets.append(Inlet(case.bed.jet.velocity, where=_hole(case.bed.jet, case.column)))
+    return inlets
+
+
+def _hole(jet: Jet, column: Column) -> Callable[..., np.ndarray]:
+    width, depth, height = column.size
+    if jet.round:
+        return discs([(0.5 * width, 0.5 * depth)], diameter=jet.width)
+    half_x, half_y = 0.5 * jet.width, 0.5 * (jet.depth or depth)
+    low = (0.5 * width - half_x, 0.5 * depth - half_y, -height)
+    return rectangle(low, (0.5 * width + half_x, 0.5 * depth + half_y, height))

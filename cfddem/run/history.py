@@ -1,0 +1,315 @@
+"""The history of a run: measures of the simulation, one column each, one row at each recorded time.
+
+A measure is one function of a simulation. `@measure(unit)` declares it: the name of the function becomes the name of
+the column, the first line of its docstring the meaning. The column then appears in the history, and its mean with an
+error in the report.
+
+>>> from cfddem import measure
+>>> @measure("m/s")
+... def mean_speed(simulation):
+...     \"\"\"Mean speed of the particles.\"\"\"
+...     return np.linalg.norm(simulation.particles.velocity, axis=1).mean()
+>>> forget("mean_speed")  # only needed to keep this example out of later runs
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.analysis import measures, mixing
+from cfddem.backend.errors import InputError
+from cfddem.case.column_grid import grid_of
+from cfddem.case.schema import Case
+from cfddem.io.quantities import TIME, Quantity
+from cfddem.particles.state import kinetic_energy as kinetic_energy_of
+from cfddem.run.budgets import conservation, energy
+from cfddem.run.simulation import Simulation
+
+Function = Callable[[Simulation], float]
+"""A measure: a number for the present state of a simulation."""
+
+MEAN_HEIGHT = "mean_height_"
+"""Prefix of the columns with the mean height of each species."""
+
+BED = (0.2, 0.8)
+"""Part of the bed height, away from floor and surface, over which the pressure gradient is taken."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Columns of the history that one function gives.
+
+    columns   name -> quantity, for a case; empty if the case has no such columns
+    values    name -> value, for a simulation
+    """
+
+    columns: Callable[[Case], Mapping[str, Quantity]]
+    values: Callable[[Simulation], Mapping[str, float]]
+
+
+MEASURES: dict[str, Measure] = {}
+"""All declared measures, by the name of their function."""
+
+_BUILT_IN: set[str] = set()
+
+
+def measure(
+    unit: str, *, group: str = "measure", when: Callable[[Case], bool] = lambda case: True
+) -> Callable[[Function], Function]:
+    """Declare a function of a simulation as a measure.
+
+    unit     SI, `1` for a plain number
+    group    how the report shows it: `measure` (mean with an error), `imbalance` (largest value), `recorded` (not)
+    when     of a case: whether the history has this column
+    returns  decorator
+    errors   InputError if a built-in measure has the name of the function
+    """
+
+    def declare(function: Function) -> Function:
+        name = function.__name__
+        meaning = (inspect.getdoc(function) or name.replace("_", " ")).split("\n")[0].rstrip(".")
+        quantity = Quantity(unit, meaning[:1].lower() + meaning[1:], group)
+
+        def columns(case: Case) -> Mapping[str, Quantity]:
+            return {name: quantity} if when(case) else {}
+
+        _declare(name, Measure(columns, lambda simulation: {name: float(function(simulation))}))
+        return function
+
+    return declare
+
+
+def forget(name: str) -> None:
+    """Remove a measure; runs that have begun are not affected."""
+    del MEASURES[name]
+
+
+def all_columns(case: Case) -> dict[str, Quantity]:
+    """Unit and meaning of every column of the history of a case."""
+    found = {"time": TIME}
+    for each in MEASURES.values():
+        found |= each.columns(case)
+    return found
+
+
+def row(simulation: Simulation) -> dict[str, float]:
+    """One row of the history: the time, and every measure of the present state."""
+    found = {"time": simulation.time}
+    for each in MEASURES.values():
+        if each.columns(simulation.case):
+            found |= each.values(simulation)
+    return found
+
+
+def _declare(name: str, made: Measure) -> None:
+    if name in _BUILT_IN:
+        raise InputError("measure", name, "a new name", "a built-in measure has this name")
+    MEASURES[name] = made
+
+
+# ---------------------------------------------------------------- kinds of cases
+
+
+def _has_fluid(case: Case) -> bool:
+    return case.fluid is not None
+
+
+def _is_bed(case: Case) -> bool:
+    return case.particle_count > 1
+
+
+def _is_fluid_bed(case: Case) -> bool:
+    return _has_fluid(case) and _is_bed(case)
+
+
+def _is_mixture(case: Case) -> bool:
+    return bool(case.bed.species)
+
+
+# ---------------------------------------------------------------- the bed
+
+
+@measure("1", group="recorded")
+def fluid_steps(simulation: Simulation) -> float:
+    """Number of fluid steps so far."""
+    return simulation.steps
+
+
+@measure("m")
+def bed_height(simulation: Simulation) -> float:
+    """Height below which 99 % of the particle volume lies."""
+    return measures.bed_height(simulation.particles.position, simulation.particles.radius)
+
+
+@measure("1", when=_is_fluid_bed)
+def bed_voidage(simulation: Simulation) -> float:
+    """Mean voidage of the bed, from its height."""
+    solids = 0.99 * simulation.communicator.sum(simulation.particles.volume)
+    return 1.0 - solids / (_open_area(simulation.case) * bed_height(simulation))
+
+
+@measure("1", when=_is_fluid_bed)
+def bed_voidage_from_pressure(simulation: Simulation) -> float:
+    """Mean voidage of the bed, from the pressure gradient within it."""
+    particles, fluid, grid = simulation.particles, simulation.fluid, grid_of(simulation.case.column)
+    assert fluid is not None
+    carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
+    total, volume = simulation.communicator.sum, particles.volume
+    weight = (total(particles.density * volume) / total(volume) - fluid.density) * carried
+    low, high = (share * bed_height(simulation) for share in BED)
+    return measures.voidage_from_pressure(fluid.pressure, grid.spacing, float(weight), low, high, open_cells=grid.open)
+
+
+@measure("Pa", when=_is_fluid_bed)
+def pressure_drop(simulation: Simulation) -> float:
+    """Pressure drop from below the floor to the top, without the hydrostatic part."""
+    fluid, column = simulation.fluid, simulation.case.column
+    assert fluid is not None
+    grid = grid_of(column)
+    drop = measures.pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open)
+    inflow, voidage = fluid.volume_flux(2)[0], fluid.mean_voidage[0]
+    return drop + measures.entrance_pressure_drop(inflow, voidage, fluid.density, grid.open[0])
+
+
+@measure("Pa", when=_has_fluid)
+def wall_load(simulation: Simulation) -> float:
+    """Vertical contact force on floor and sides, per floor area."""
+    return -float(simulation.communicator.sum(simulation.particle_solver.wall_force[:, 2])) / _open_area(
+        simulation.case
+    )
+
+
+@measure("m2/s2", when=_is_bed)
+def granular_temperature(simulation: Simulation) -> float:
+    """Granular temperature, a third of the mean square of the velocity fluctuations."""
+    return measures.granular_temperature(simulation.particles.velocity, _cells(simulation)).mean
+
+
+@measure("J", group="recorded")
+def kinetic_energy(simulation: Simulation) -> float:
+    """Kinetic energy of the particles, with rotation."""
+    return kinetic_energy_of(simulation.particles)
+
+
+@measure("m/s")
+def largest_speed(simulation: Simulation) -> float:
+    """Speed of the fastest particle."""
+    return math.sqrt(simulation.communicator.largest((simulation.particles.velocity**2).sum(axis=1), default=0.0))
+
+
+@measure("1")
+def contact_count(simulation: Simulation) -> float:
+    """Number of contacts."""
+    return simulation.communicator.count((simulation.particle_solver.edges.force != 0.0).any(axis=1))
+
+
+@measure("1", group="recorded")
+def particle_count(simulation: Simulation) -> float:
+    """Number of particles."""
+    return simulation.particles.count
+
+
+@measure("1", group="recorded", when=_has_fluid)
+def out_of_range_count(simulation: Simulation) -> float:
+    """How often laws were evaluated outside of their fitted ranges so far."""
+    assert simulation.exchange is not None
+    return simulation.exchange.outside + simulation.particle_solver.outside
+
+
+# ---------------------------------------------------------------- mixtures
+
+
+@measure("1", when=_is_mixture)
+def mixing_index(simulation: Simulation) -> float:
+    """Mixing index of nearest neighbours, 0 segregated, 1 randomly mixed."""
+    return mixing.neighbour_mixing_index(simulation.particles.species, simulation.particles.position)
+
+
+@measure("1", when=_is_mixture)
+def lacey_index(simulation: Simulation) -> float:
+    """Mixing index of Lacey for the first species, in cells of the fluid grid."""
+    return mixing.lacey_index(simulation.particles.species == 0, _cells(simulation))
+
+
+def _mean_height_columns(case: Case) -> dict[str, Quantity]:
+    return {
+        f"{MEAN_HEIGHT}{name}": Quantity("m", f"mean height of {name}, by volume", "measure")
+        for name in case.bed.species
+    }
+
+
+def mean_heights(simulation: Simulation) -> dict[str, float]:
+    """Mean height of each species of a mixture, by volume [m]."""
+    particles, names, total = simulation.particles, list(simulation.case.bed.species), simulation.communicator.sum
+
+    def by_species(weights: np.ndarray) -> np.ndarray:
+        here = np.bincount(particles.species, weights, len(names))  # local: summed over the ranks below
+        return np.asarray(total(here, axis=()))
+
+    mean = by_species(particles.volume * particles.position[:, 2]) / by_species(particles.volume)
+    return {f"{MEAN_HEIGHT}{name}": float(height) for name, height in zip(names, mean)}
+
+
+_declare("mean_heights", Measure(_mean_height_columns, mean_heights))
+
+
+# ---------------------------------------------------------------- conservation
+
+
+@measure("1", group="imbalance", when=_has_fluid)
+def momentum_imbalance(simulation: Simulation) -> float:
+    """Momentum that the fluid gave and particles did not receive, over that given."""
+    assert simulation.fluid is not None
+    return conservation.momentum_imbalance(simulation.fluid, simulation.particles)
+
+
+@measure("1", group="imbalance", when=_has_fluid)
+def volume_imbalance(simulation: Simulation) -> float:
+    """Volume gained by a cell against the flux through its faces, over the largest flux."""
+    assert simulation.fluid is not None
+    return conservation.volume_imbalance(simulation.fluid)
+
+
+_ENERGY_GROUPS = {"stored": energy.STORED, "gained": energy.GAINED, "lost": energy.LOST, "exchanged": energy.PASSED}
+
+
+def _energy_columns(case: Case) -> dict[str, Quantity]:
+    if not case.run.energy_budget:
+        return {}
+    group_of = {f"energy_{name}": group for group, names in _ENERGY_GROUPS.items() for name in names}
+    return {
+        name: Quantity(unit, meaning, f"energy: {group_of.get(name, 'balance')}")
+        for name, (unit, meaning) in energy.FIELDS.items()
+    }
+
+
+def energy_budget(simulation: Simulation) -> dict[str, float]:
+    """The energy budget since the start [J]."""
+    return {} if simulation.energy is None else simulation.energy.row()
+
+
+_declare("energy_budget", Measure(_energy_columns, energy_budget))
+
+
+# ---------------------------------------------------------------- shared
+
+
+def _open_area(case: Case) -> float:
+    """Floor area of the open cells [m2]."""
+    column = case.column
+    open_part = float(grid_of(column).open.mean())  # local: every rank knows the whole grid
+    return open_part * column.size[0] * column.size[1]
+
+
+def _cells(simulation: Simulation) -> measures.Cells:
+    """The cell of every particle."""
+    grid = grid_of(simulation.case.column)
+    return measures.cells_of(simulation.particles.position, grid.shape, grid.spacing)
+
+
+_BUILT_IN.update(MEASURES)

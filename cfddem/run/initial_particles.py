@@ -1,0 +1,121 @@
+"""The initial particles of a case: where they lie at the start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from cfddem.backend.errors import InputError
+from cfddem.case.particle_properties import ParticleProperties, particle_properties
+from cfddem.case.schema import Case
+from cfddem.data.fields import Field
+from cfddem.fluid.grid import Array
+from cfddem.particles.initial.filling import loose_places
+from cfddem.particles.initial.packing import lattice, random_packing
+from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, pour_into
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.state import Particles
+from cfddem.particles.state import make_particles as make_bodies
+from cfddem.particles.walls.shapes import Wall
+
+SPECIES = Field("species", dtype=np.int32, snapshot=True, meaning="number of the species, in the order of the case")
+"""Declared on the particles of a mixture."""
+
+
+def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Laws) -> Particles:
+    """The particles of a case at the start."""
+    bed, properties = case.bed, particle_properties(case)
+    diameters = properties.diameter
+    if bed.start == "poured":
+        spheres = pour_into(
+            table, diameters, properties.density, walls, *_filling_box(case, float(diameters.max())),
+            box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
+            gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
+            at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
+        )  # fmt: skip
+        places, diameters = spheres.position, 2.0 * spheres.radius
+    elif bed.start == "packed":
+        share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(case.column.size)
+        places, _ = random_packing(diameters, share, bed.seed, shape=case.column.size)
+    elif bed.start == "placed":
+        places = np.array(bed.positions, float)
+    elif bed.species:
+        places = _spread_evenly(case, properties, walls)
+    else:
+        places = _suspended(len(diameters), float(diameters.max()), case.column.size, bed.seed)
+    made = make_bodies(
+        places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
+        material=properties.material,
+        viscosity=case.fluid.viscosity_at(places[:, 2]) if case.fluid else 0.0, fixed=bed.fixed,
+    )  # fmt: skip
+    if case.fluid is not None:
+        made.inverse_mass[:] /= 1.0 + case.laws.added_mass * case.fluid.density / properties.density
+    if bed.species:
+        made.declare(SPECIES, properties.species)
+    _must_be_inside(made.position, case.column.size)
+    return made
+
+
+def _suspended(count: int, largest: float, size: tuple[float, float, float], seed: int) -> Array:
+    """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m]."""
+    volume = size[0] * size[1] * size[2]
+    pitch = (volume / count) ** (1.0 / 3.0)
+    for _ in range(200):
+        if pitch < 1.02 * largest:
+            break
+        places = lattice(largest, ((0.0, 0.0, 0.0), size), spacing=pitch / largest, seed=seed)
+        if len(places) >= count:
+            chosen = np.random.default_rng(seed).permutation(len(places))[:count]
+            return np.ascontiguousarray(places[np.sort(chosen)])
+        pitch *= 0.99
+    fraction = count * math.pi / 6.0 * largest**3 / volume
+    raise InputError("bed.count", count, f"below what a lattice holds; the solid fraction would be {fraction:.2f}")
+
+
+def _spread_evenly(case: Case, properties: ParticleProperties, walls: Sequence[Wall]) -> Array:
+    """Places of particles of unequal size: a loose filling, stretched to the height of the column (N, 3) [m]."""
+    corner, size = _filling_box(case, float(properties.diameter.max()))
+    places = loose_places(properties.diameter, walls, corner, size, case.bed.seed, _layer(case, properties))
+    top, largest = float((places[:, 2] + 0.5 * properties.diameter).max()), float(properties.diameter.max())
+    if top > size[2]:
+        raise InputError(
+            "bed.species", None, f"fewer particles: spread loosely they reach to {top:.3g} m, above the lid",
+            f"the lid is at {size[2]:.3g} m",
+        )  # fmt: skip
+    places[:, 2] *= max(1.0, (size[2] - 0.6 * largest) / top)
+    return places
+
+
+def _layer(case: Case, properties: ParticleProperties) -> np.ndarray | None:
+    return properties.species if case.bed.arrangement == "layers" else None
+
+
+def _must_be_inside(position: Array, size: tuple[float, float, float]) -> None:
+    outside = ~((position >= 0.0) & (position <= np.array(size))).all(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise InputError(f"position of particle {row}", position[row].tolist(), f"inside the column, 0 to {size} m")
+
+
+def _filling_box(case: Case, largest: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Corner and size of the box that particles are poured into [m]."""
+    width, depth, height = case.column.size
+    if case.column.shape == "box":
+        return (0.0, 0.0, 0.0), (width, depth, height)
+    side = width / math.sqrt(2.0)
+    corner = 0.5 * (width - side)
+    return (corner, corner, 0.0), (side, side, height)
+
+
+def periodic_directions(case: Case) -> tuple[bool, bool, bool]:
+    """Whether x, y, z are periodic."""
+    column = case.column
+    return column.sides == "periodic", (column.front or column.sides) == "periodic", column.ends == "periodic"
+
+
+def periodic_box(case: Case) -> tuple[float | None, float | None, float | None]:
+    """Lengths of the periodic directions [m], None along the others."""
+    x, y, z = (length if repeats else None for length, repeats in zip(case.column.size, periodic_directions(case)))
+    return x, y, z

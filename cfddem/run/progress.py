@@ -1,0 +1,127 @@
+"""Progress of a run: a live line on the terminal, and a log file if one is given.
+
+Both show the time, the remaining wall time, the criterion that limits the step, and a few measures. Nothing is printed
+if standard error is not a terminal.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from cfddem.backend.compile import announce_compilation
+from cfddem.backend.errors import CfddemError, InputError
+
+_log = logging.getLogger("cfddem.run.progress")
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a run is."""
+
+    time: float  # simulated time [s]
+    end: float  # of the run [s]
+    remaining: float  # wall time, from the pace so far; NaN before the first step [s]
+    criterion: str  # that limits the fluid step; empty before the first step
+    steps: int  # particle steps so far
+    row: Mapping[str, float]  # last row of the history
+
+    def __str__(self) -> str:
+        row = self.row
+        return (
+            f"{self.time:.4g}/{self.end:g} s  {_duration(self.remaining)} left  limit: {self.criterion or '-'}  "
+            f"{self.steps} steps  bed {1e3 * row['bed_height']:.3g} mm  {row['largest_speed']:.2g} m/s  "
+            f"{row['contact_count']:.0f} contacts"
+        )
+
+
+class ProgressLine:
+    """The live line, and the log if there is one."""
+
+    def __init__(self, bar: Progress) -> None:
+        self._bar = bar
+        self._task = bar.add_task("preparing", total=1.0, status="")
+        self._logged = -math.inf
+
+    def progress(self, text: str) -> None:
+        """Show which part of the preparation is under way."""
+        self._bar.update(self._task, description=text)
+        _log.info(text)
+
+    def compiling(self, text: str) -> None:
+        """Show which loop is being compiled; an empty text when it is done."""
+        self._bar.update(self._task, status=text, refresh=True)
+
+    def update(self, status: Status) -> None:
+        """Show how far the run is; the log gets one line for each row of the history."""
+        self._bar.update(self._task, description="", completed=status.time / status.end, status=str(status))
+        if status.row["time"] > self._logged:
+            self._logged = status.row["time"]
+            _log.info(str(status))
+
+
+@contextmanager
+def live_line(log: Path | None = None) -> Iterator[ProgressLine]:
+    """Show a progress line inside a `with` block.
+
+    log     file to which one line per row of history, and every warning, is appended
+    errors  InputError if the log cannot be written
+    """
+    console = Console(stderr=True, quiet=not sys.stderr.isatty(), width=min(Console(stderr=True).width, 120))
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=10),
+        TextColumn("{task.fields[status]}"),
+        console=console,
+        transient=True,
+    )
+    with _logged(log), bar:
+        line = ProgressLine(bar)
+        announce_compilation(line.compiling)
+        try:
+            yield line
+        finally:
+            announce_compilation()
+
+
+@contextmanager
+def _logged(path: Path | None) -> Iterator[None]:
+    """Append the messages of the package to a file; warnings still go to the terminal."""
+    if path is None:
+        yield
+        return
+    try:
+        handler = logging.FileHandler(path)
+    except OSError as failure:
+        raise InputError("log", str(path), "a writable file", (failure.strerror or "").lower()) from None
+    handler.setFormatter(logging.Formatter("%(asctime)s  %(message)s", "%Y-%m-%d %H:%M:%S"))
+    package = logging.getLogger("cfddem")
+    before = package.level
+    terminal = logging.StreamHandler()
+    terminal.setLevel(logging.WARNING)
+    for each in (handler, terminal):
+        package.addHandler(each)
+    package.setLevel(logging.INFO)
+    try:
+        yield
+    except CfddemError as failure:
+        _log.info(failure)
+        raise
+    finally:
+        package.setLevel(before)
+        for each in (handler, terminal):
+            package.removeHandler(each)
+        handler.close()
+
+
+def _duration(seconds: float) -> str:
+    return "-" if math.isnan(seconds) else str(timedelta(seconds=round(seconds)))

@@ -1,0 +1,285 @@
+"""Run a case into a folder: history, snapshots and checkpoints; stop, fail and resume cleanly."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
+
+from cfddem.backend.errors import InputError, RunFailed, RunStopped, UnstableStep
+from cfddem.case.schema import Case
+from cfddem.data.fields import Field
+from cfddem.fluid.fields import FLUID_FIELDS
+from cfddem.io import checkpoint
+from cfddem.io.folder import make_folder, read_about, require_free
+from cfddem.io.provenance import provenance
+from cfddem.io.quantities import Quantities, of_fields
+from cfddem.io.writer import RunFolder
+from cfddem.particles.collision_record import COLLISION_FIELDS
+from cfddem.particles.guard import guard
+from cfddem.run import history
+from cfddem.run.progress import Status
+from cfddem.run.simulation import Callback, Simulation
+from cfddem.run.stopping import StopRequest
+
+CHECKPOINT_SHARE = 0.02
+"""A checkpoint is written with every snapshot, unless checkpoints would take more than this share of the wall time."""
+
+REPORT_EVERY = 0.5
+"""Wall time between two reports within an interval of the history [s]."""
+
+_SAME = 1.0 - 1e-12
+"""Two times whose ratio is closer to 1 than this are the same."""
+
+RECORDED = ("voidage", "velocity", "pressure")
+"""Fields of the fluid in snapshots, at cell centres."""
+
+Report = Callable[[Status], None]
+
+
+class Run:
+    """A simulation that writes a run folder. Make one with `Run.begin` or `Run.resume`, then call `go`.
+
+    simulation  the simulation
+    folder      that is written
+    report      called after every row of history, and every half second of wall time
+    """
+
+    def __init__(self, simulation: Simulation, folder: RunFolder, report: Report = lambda _: None) -> None:
+        self.simulation, self.folder, self.report = simulation, folder, report
+        plan = simulation.case.run
+        self.end = plan.until
+        self.every = plan.every or plan.until / 50.0
+        self.rows_per_snapshot = max(1, round(self.every / (plan.history_every or self.every / 10.0)))
+        self.interval = self.every / self.rows_per_snapshot
+        self.row = folder.last_row
+        self._stop = StopRequest()
+        self._pace_from: tuple[float, float] | None = None  # wall time and simulated time after the first step [s]
+        self._reported_at = clock.monotonic()
+        self._checkpoint_at, self._checkpoint_cost = clock.monotonic(), 0.0
+
+    # ------------------------------------------------------------ begin and resume
+
+    @classmethod
+    def begin(
+        cls,
+        case: Case,
+        folder: Path,
+        *,
+        text: str | None = None,
+        report: Report = lambda _: None,
+        progress: Callable[[str], None] = lambda _: None,
+        fields: Sequence[Field] = (),
+        callbacks: Sequence[Callback] = (),
+    ) -> Run:
+        """Prepare a case in a new folder, and write its initial state.
+
+        text               the case file as the user wrote it
+        report             called after every row of history
+        progress           called with a line of text for each part of the preparation
+        fields, callbacks  of the simulation, see `Simulation`
+        errors             InputError if the folder holds a run or cannot be written
+        """
+        folder, text = Path(folder), case.to_toml() if text is None else text
+        require_free(folder, text)
+        make_folder(folder)
+        begun = clock.monotonic()
+        simulation = Simulation(case, progress, fields=fields, callbacks=callbacks)
+        simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # initial packing, compilation for it
+        grid = None if simulation.fluid is None else simulation.fluid.grid
+        written = RunFolder.create(folder, text, provenance(case.bed.seed), grid, quantities_of(simulation))
+        run = cls(simulation, written, report)
+        run._write_initial_state()
+        return run
+
+    @classmethod
+    def resume(
+        cls,
+        folder: Path,
+        *,
+        until: float | None = None,
+        report: Report = lambda _: None,
+        progress: Callable[[str], None] = lambda _: None,
+        fields: Sequence[Field] = (),
+        callbacks: Sequence[Callback] = (),
+    ) -> Run:
+        """Continue from the newest undamaged checkpoint of a folder, bit for bit; later snapshots and rows are dropped.
+
+        A run that was killed before its first checkpoint starts again.
+
+        until   new end [s]
+        others  as in `begin`
+        errors  InputError if the folder holds no run, or one that cannot be continued
+        """
+        folder = Path(folder)
+        state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
+        before = read_about(folder)
+        if state is not None and until is not None and until < state["time"]:
+            limit = f"at least {state['time']:.6g} s, the time of the run"
+            raise InputError("until", until, limit, "a run only continues forward")
+        written = RunFolder.reopen(folder)
+        overrides = ({} if state is None else state["overrides"]) | ({} if until is None else {"run.until": until})
+        case = Case.from_text(written.case_text, str(folder / "case.toml"), overrides)
+        if state is None:
+            written.drop_after(-1.0)
+            run = cls(Simulation(case, progress, fields=fields, callbacks=callbacks), written, report)
+            run._write_initial_state()
+            return run
+        try:
+            _require_measures(written, case)
+            simulation = Simulation.restored(case, state["simulation"], fields=fields, callbacks=callbacks)
+        except (KeyError, IndexError, TypeError, InputError) as failure:
+            if before["status"] != "running":
+                written.finish(before["status"], before["message"])
+            if isinstance(failure, InputError):
+                raise
+            remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
+            raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
+        simulation.wall.seconds.update(written.about.get("wall_time", {}))
+        if simulation.particle_solver.collisions is not None:
+            simulation.particle_solver.collisions.put_back(state["collisions"])
+        written.drop_after(simulation.time)
+        return cls(simulation, written, report)
+
+    # ------------------------------------------------------------ run
+
+    def go(self) -> None:
+        """Run to the end.
+
+        errors  RunStopped after SIGINT or SIGTERM; RunFailed if the simulation fails. Both leave a folder that can be
+                resumed
+        """
+        with self._status_recorded(), self._stop:
+            for time, with_snapshot in self._rows():
+                self._advance(time)
+                if self.simulation.time < time * _SAME:  # stopped before the next row
+                    break
+                self._write_row()
+                if with_snapshot:
+                    self._write_snapshot()
+                self._report()
+            self._write_checkpoint()
+            self._finish()
+
+    def _rows(self) -> Iterator[tuple[float, bool]]:
+        """Time of each row of history that is left [s], and whether a snapshot is due."""
+        number = math.floor(self.simulation.time / self.interval / (_SAME * _SAME))
+        while not self._stop and self.simulation.time < self.end * _SAME:
+            number += 1
+            time = min(number * self.interval, self.end)
+            yield time, number % self.rows_per_snapshot == 0 or time == self.end
+
+    def _advance(self, target: float) -> None:
+        """Step to a time [s], or until the run is stopped."""
+        while not self._stop and self.simulation.time < target * _SAME:
+            try:
+                self.simulation.step(target)
+            except (InputError, UnstableStep) as failure:
+                self._fail(failure)
+            if self._pace_from is None:  # the first step loads or compiles loops and does not count
+                self._pace_from = clock.monotonic(), self.simulation.time
+            if clock.monotonic() - self._reported_at > REPORT_EVERY:
+                self._report()
+
+    def _fail(self, failure: Exception) -> NoReturn:
+        """Report a failed step; name the particle that caused it if there is one."""
+        solver = self.simulation.particle_solver
+        guard(solver.particles, solver.edges, solver.gap, solver.domain, solver.time, math.nan, solver.walls.wall)
+        raise RunFailed(f"t = {solver.time:.6g} s: {failure}") from failure
+
+    def _report(self) -> None:
+        simulation = self.simulation
+        steps = simulation.particle_solver.steps
+        self.report(Status(simulation.time, self.end, self.remaining, simulation.limiting, steps, self.row))
+        self._reported_at = clock.monotonic()
+
+    @property
+    def remaining(self) -> float:
+        """Wall time to the end, from the pace so far [s]; NaN before the first step."""
+        if self._pace_from is None or self.simulation.time == self._pace_from[1]:
+            return math.nan
+        wall, time = self._pace_from
+        return (clock.monotonic() - wall) * (self.end - self.simulation.time) / (self.simulation.time - time)
+
+    def _finish(self) -> None:
+        """Record that the run finished; or that it was stopped, and raise RunStopped."""
+        if self.simulation.time >= self.end * _SAME:
+            self.folder.finish("finished")
+            return
+        self.folder.finish("stopped", self._stop.name)
+        where = f"at t = {self.simulation.time:.6g} s"
+        message = f"stopped by {self._stop.name} {where}; continue with: cfddem resume {self.folder.folder}"
+        raise RunStopped(message, self._stop.signal)
+
+    @contextmanager
+    def _status_recorded(self) -> Iterator[None]:
+        """Record in the folder why the run ended early."""
+        try:
+            yield
+        except RunStopped:
+            raise
+        except KeyboardInterrupt:
+            self.folder.finish("stopped", "within a step")
+            raise
+        except BaseException as failure:
+            self.folder.finish("failed", str(failure) or type(failure).__name__)
+            raise
+
+    # ------------------------------------------------------------ write
+
+    def _write_initial_state(self) -> None:
+        """The first row, snapshot and checkpoint."""
+        self._write_row()
+        self._write_snapshot()
+
+    def _write_row(self) -> None:
+        with self.simulation.wall.part("measures"):
+            self.row = history.row(self.simulation)
+            self.folder.append_history(self.row)
+
+    def _write_snapshot(self) -> None:
+        simulation, solver = self.simulation, self.simulation.particle_solver
+        with simulation.wall.part("snapshots"):
+            fluid = None
+            if simulation.fluid is not None:
+                fluid = {name: getattr(simulation.fluid, name) for name in RECORDED}
+            collisions = None if solver.collisions is None else solver.collisions.take()
+            particles = simulation.particles.snapshot()
+            self.folder.write_snapshot(simulation.time, solver.steps, fluid, particles, collisions)
+        if clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE:
+            self._write_checkpoint()
+
+    def _write_checkpoint(self) -> None:
+        """Write the full state, with the intervals, which would otherwise follow from a new end."""
+        begin, simulation = clock.monotonic(), self.simulation
+        with simulation.wall.part("checkpoints"):
+            plan = {"run.until": self.end, "run.every": self.every, "run.history_every": self.interval}
+            state: dict[str, Any] = {"time": simulation.time, "overrides": plan, "simulation": simulation.checkpoint()}
+            if simulation.particle_solver.collisions is not None:
+                state["collisions"] = simulation.particle_solver.collisions.table
+            self.folder.write_checkpoint(state)
+        self.folder.note("wall_time", dict(simulation.wall.seconds))
+        self._checkpoint_at = clock.monotonic()
+        self._checkpoint_cost = self._checkpoint_at - begin
+
+
+def quantities_of(simulation: Simulation) -> Quantities:
+    """Unit and meaning of everything that a run of a simulation writes."""
+    case = simulation.case
+    return {
+        "history": history.all_columns(case),
+        "particles": of_fields(field for field in simulation.particles.fields.values() if field.snapshot),
+        "fluid": of_fields(field for field in FLUID_FIELDS if field.name in RECORDED),
+        "collisions": of_fields(COLLISION_FIELDS) if case.run.record_collisions else {},
+    }
+
+
+def _require_measures(written: RunFolder, case: Case) -> None:
+    """Refuse to continue a history with other measures than it began with."""
+    before, now = {*written.last_row}, {*history.all_columns(case)}
+    if before and (odd := sorted((before - now) | (now - {*written.quantities["history"]}))):
+        remedy = "resume the run from the script that declares them"
+        raise InputError("measures", odd, "the same as when the run began", remedy)

@@ -1,0 +1,143 @@
+"""A case in time: particles, fluid and their coupling, advanced step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.case.schema import Case
+from cfddem.data.fields import Field
+from cfddem.particles.state import Particles, particles_in
+from cfddem.run.budgets.energy import EnergyLedger
+from cfddem.run.build import assemble
+from cfddem.run.time_steps import TimeSteps
+
+Callback = Callable[["Simulation"], None]
+"""Function that is called after every fluid step, with the simulation."""
+
+
+class Simulation:
+    """A case in time.
+
+    case          the case
+    progress      receives a line of text on what is being prepared
+    fields        more fields of the particles, for example a temperature; sorted, inserted, removed and stored in
+                  checkpoints with the others, and in snapshots if they ask for it
+    callbacks     functions to call after every fluid step, in this order
+    state         `checkpoint()` to continue from
+    communicator  path to sums, extremes and decisions over all ranks
+    """
+
+    def __init__(
+        self,
+        case: Case,
+        progress: Callable[[str], None] = lambda _: None,
+        *,
+        fields: Iterable[Field] = (),
+        callbacks: Iterable[Callback] = (),
+        state: dict[str, Any] | None = None,
+        communicator: Communicator = SERIAL,
+    ) -> None:
+        self.case, self.gravity, self.communicator = case, np.array(case.laws.gravity), communicator
+        self.callbacks, fields = list(callbacks), list(fields)
+        particles = None if state is None else particles_in(state["particles"]["particles"])
+        parts = assemble(case, progress, particles, communicator)
+        self.particle_solver, self.fluid, self.exchange = parts.particle_solver, parts.fluid, parts.exchange
+        self.wall = self.particle_solver.wall
+        self.steps, self.last_step = 0, 0.0
+        particle_step = None if state is None else self._restore(state, fields)
+        for field in fields:
+            self.particles.declare(field)
+        self.energy = self._ledger(state)
+        self.time_steps = TimeSteps(case, self.particle_solver, self.fluid, particle_step, communicator)
+
+    @property
+    def particles(self) -> Particles:
+        """The particles."""
+        return self.particle_solver.particles
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.particle_solver.time
+
+    @property
+    def limiting(self) -> str:
+        """Criterion that limited the last fluid step."""
+        return self.time_steps.limiting
+
+    def step(self, until: float = math.inf) -> None:
+        """Make one fluid step and the particle steps within it; some step ends exactly at `until` [s]."""
+        part = self.wall.part
+        with part("time steps"):
+            step, substeps = self.time_steps.choose(until, self.steps)
+        if self.fluid is not None and self.exchange is not None:
+            with part("voidage and drag"):
+                terms = self.exchange.prepare(self.particles, step)
+            with part("fluid"):
+                self.fluid.step(step, *terms.fields)
+            with part("forces of the fluid"):
+                self.exchange.apply(self.particles, terms, self.gravity)
+            if self.energy is not None:
+                with part("energies"):
+                    self.energy.after_fluid_step(terms)
+        self.particle_solver.advance(step / substeps, substeps)
+        if self.energy is not None:
+            with part("energies"):
+                self.energy.after_particle_steps()
+        self.steps, self.last_step = self.steps + 1, step
+        for callback in self.callbacks:
+            with part(f"callback {getattr(callback, '__name__', 'without a name')}"):
+                callback(self)
+
+    def until(self, time: float) -> None:
+        """Continue until a time [s]."""
+        while self.time < time * (1.0 - 1e-12):
+            self.step(time)
+
+    # ------------------------------------------------------------ checkpoints
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Everything that the next step depends on."""
+        parts: dict[str, Any] = {
+            "steps": self.steps,
+            "particle_step": self.time_steps.particle_step,
+            "particles": self.particle_solver.checkpoint(),
+        }
+        if self.fluid is not None and self.exchange is not None:
+            parts |= {"fluid": self.fluid.checkpoint(), "exchange": self.exchange.checkpoint()}
+        if self.energy is not None:
+            parts |= {"energy": self.energy.checkpoint()}
+        return parts
+
+    @classmethod
+    def restored(
+        cls, case: Case, state: dict[str, Any], *, fields: Iterable[Field] = (), callbacks: Iterable[Callback] = ()
+    ) -> Simulation:
+        """The simulation of a case as it was at a `checkpoint()`; it continues with the same bits."""
+        return cls(case, fields=fields, callbacks=callbacks, state=state)
+
+    def _restore(self, state: dict[str, Any], fields: list[Field]) -> float:
+        """Take over a checkpoint; returns the particle step [s]."""
+        for field in fields:
+            if field.name in state["particles"]["particles"]:
+                self.particles.declare(field)
+        self.particle_solver.restore(state["particles"])
+        if self.fluid is not None and self.exchange is not None:
+            self.fluid.restore(state["fluid"])
+            self.exchange.restore(state["exchange"])
+        self.steps = int(state["steps"])
+        return float(state["particle_step"])
+
+    def _ledger(self, state: dict[str, Any] | None = None) -> EnergyLedger | None:
+        """The energy ledger, where the case asks for one."""
+        if not self.case.run.energy_budget:
+            return None
+        ledger = EnergyLedger(self.particle_solver, self.fluid, self.exchange, self.gravity)
+        if state is not None:
+            ledger.restore(state["energy"])
+        return ledger

@@ -1,0 +1,70 @@
+"""Kernel warm-up: another process compiles the loops of the fluid while this one compiles those of the particles.
+
+Compiled loops are cached, so this shortens the first run on a machine. The other process makes two steps of the case's
+fluid around two of its spheres and discards the result. Loops that it does not finish are compiled when needed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import numpy as np
+
+from cfddem.case.schema import Case
+from closures.compiled import cache_folder
+
+
+def is_new() -> bool:
+    """Whether the loops of the fluid are missing in the cache; one of them is checked."""
+    return not any(cache_folder().rglob("momentum.transport*.nbi"))
+
+
+def _cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def warmup(case: Case) -> Iterator[None]:
+    """Warm up while the block runs, for a case with a fluid, an empty cache and more than one core."""
+    if case.fluid is None or _cores() == 1 or not is_new():
+        yield
+        return
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cfddem.run.warmup"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        assert process.stdin is not None
+        with suppress(OSError):  # the process may have ended already
+            process.stdin.write(case.to_toml().encode())
+            process.stdin.close()
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def warm_up(case: Case) -> None:
+    """Make two steps of a case's fluid around two spheres; the second uses what the first has stored."""
+    from cfddem.particles.state import make_particles
+    from cfddem.run.build import flow_of
+
+    width, depth, height = case.column.size
+    radius = 0.5 * case.bed.largest_diameter
+    places = np.array([[0.5 * width + side * radius, 0.5 * depth, 0.5 * height] for side in (-1.2, 1.2)])
+    spheres = make_particles(places, radius, case.solid_density)
+    fluid, exchange = flow_of(case, spheres)
+    for _ in range(2):
+        step = min(fluid.largest_step().step, 1e-6)  # nothing limits the step of a fluid at rest
+        terms = exchange.prepare(spheres, step)
+        fluid.step(step, *terms.fields)
+        exchange.apply(spheres, terms, np.array(case.laws.gravity))
+
+
+if __name__ == "__main__":
+    warm_up(Case.from_text(sys.stdin.read()))

@@ -1,0 +1,112 @@
+"""Registry of laws: kind, source and fitted range of every law.
+
+A law is a plain Python function; call it, plot it or differentiate it like any other. Compiled loops call the same
+function by its name; :mod:`closures.compiled` makes that possible.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TypeVar
+
+Function = TypeVar("Function", bound=Callable[..., float])
+
+
+@dataclass(frozen=True)
+class Law:
+    """Entry of a law in the registry: its function and metadata."""
+
+    name: str
+    kind: str
+    reference: str
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    function: Callable[..., float] = field(repr=False, default=lambda: 0.0)
+
+    def outside(self, **arguments: float) -> list[str]:
+        """Names of the arguments outside their fitted range."""
+        return [name for name, (low, high) in self.ranges.items() if not low <= arguments[name] <= high]
+
+    @property
+    def fitted_for(self) -> str:
+        """The fitted ranges as text: `reynolds 0.01 to 300, voidage 0.5 to 0.9`."""
+        return ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in self.ranges.items())
+
+
+REGISTRY: dict[str, dict[str, Law]] = {}
+"""All laws that have been imported, by kind and name."""
+
+
+def law(kind: str, reference: str, **ranges: tuple[float, float]) -> Callable[[Function], Function]:
+    """Decorator: register a scalar function as a law and let compiled loops call it.
+
+    kind       "drag", "minimum_gap", "lubrication" ...
+    reference  source of the equation: authors, journal, DOI, equation number
+    ranges     argument=(low, high) for which the law was derived or fitted
+    returns    the function, unchanged
+    """
+
+    def register(function: Function) -> Function:
+        entry = Law(function.__name__, kind, reference, dict(ranges), function)
+        REGISTRY.setdefault(kind, {})[function.__name__] = entry
+        compiled = sys.modules.get("closures.compiled")
+        if compiled is not None:
+            compiled.expose(function)
+        return function
+
+    return register
+
+
+def law_of(function: Callable[..., float]) -> Law:
+    """The registry entry of a function. Raises KeyError for a function that is not registered.
+
+    >>> from closures.minimum_gap import elastohydrodynamic
+    >>> law_of(elastohydrodynamic).kind
+    'minimum_gap'
+    """
+    for laws in REGISTRY.values():
+        for entry in laws.values():
+            if entry.function is function:
+                return entry
+    name = repr(getattr(function, "__name__", function))
+    raise KeyError(f"{name} is not a registered law; decorate it with @closures.law(kind, reference, ...)")
+
+
+GROUP = "cfddem.closures"
+"""Group of entry points through which an installed package provides laws."""
+
+_WITHOUT_LAWS = ("check", "compiled", "registry")
+
+
+@cache
+def load_built_in_laws() -> None:
+    """Import all modules of this package, so that the registry holds their laws. Does not import numba.
+
+    >>> load_built_in_laws()
+    >>> "di_felice" in REGISTRY["drag"], "asperities" in REGISTRY["minimum_gap"]
+    (True, True)
+    """
+    for module in pkgutil.iter_modules([str(Path(__file__).parent)]):
+        if module.name not in _WITHOUT_LAWS:
+            import_module(f"closures.{module.name}")
+
+
+@cache
+def load_package_laws() -> dict[str, str]:
+    """Import the laws that installed packages provide through entry points.
+
+    returns  {entry point: error} for those that could not be imported
+    """
+    failures = {}
+    for point in entry_points(group=GROUP):
+        try:
+            point.load()
+        except Exception as failure:
+            failures[point.name] = f"{type(failure).__name__}: {failure}"
+    return failures

@@ -1,0 +1,1 @@
+"""Fluidised, packed, settling and spouted beds: one folder a case, each with a case file and a page."""

@@ -1,0 +1,102 @@
+"""A bed is fluidised and defluidised: minimum fluidisation on the way up and on the way down.
+
+Minimum fluidisation is where the extrapolated pressure drop of the packed bed equals the weight of the bed. It is
+compared with the balance of weight and drag by the drag law, layer by layer, at the voidage of each layer. A bed twenty
+spheres high is loose at its floor and at its top: one voidage for the whole bed, computed from its height, is wrong by
+0.01, which changes the velocity by a tenth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.analysis.bed_laws import buoyant_weight
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.io.reading import Run as Written
+from closures.balance import Drag, fluidising_velocity
+
+PACKED = (0.2, 0.8)
+"""Range of pressure drop over weight in which the bed counts as packed."""
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Minimum fluidisation on one branch of the ramp."""
+
+    velocity: float  # superficial, where the pressure drop of the packed bed equals the weight [m/s]
+    voidage: float  # of the packed bed, mean over its particles
+    balance: float  # velocity by the drag law at the voidages of its layers [m/s]
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Voidage profiles of a bed over time."""
+
+    time: np.ndarray  # (n,) [s]
+    voidage: np.ndarray  # (n, levels) mean over the column at each level
+
+
+def layers(run: Written) -> Layers:
+    """Voidage profiles of a run, from its snapshots."""
+    places = range(len(run.times))
+    return Layers(run.times, np.array([run.fluid("voidage", place).mean(axis=(1, 2)) for place in places]))
+
+
+def onsets(case: Case, history: Mapping[str, np.ndarray], bed: Layers) -> tuple[Onset, Onset]:
+    """Minimum fluidisation on the way up and on the way down.
+
+    case     whose inlet velocity is a list of [time, velocity] that rises and falls
+    history  of its run
+    bed      its voidage profiles, at least one with a packed bed on each branch
+    """
+    inlet = case.bed.inlet_velocity
+    if isinstance(inlet, float):
+        raise InputError("bed.inlet_velocity", inlet, "a list of [time, velocity] that rises and falls")
+    times, speeds = np.array(inlet).T
+    velocity = np.interp(history["time"], times, speeds)
+    share = history["pressure_drop"] * case.column.floor_area / buoyant_weight(case)
+    turn = times[int(np.argmax(speeds))]
+    ways = []
+    for rising in (True, False):
+        packed = (share > PACKED[0]) & (share < PACKED[1]) & ((history["time"] < turn) == rising)
+        if packed.sum() < 4:
+            raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
+        begin, end = history["time"][packed][[0, -1]]
+        seen = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
+        if len(seen) == 0:
+            raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
+        ways.append(_onset(case, velocity[packed], share[packed], seen.mean(axis=0)))
+    return ways[0], ways[1]
+
+
+def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndarray) -> Onset:
+    powers = np.stack([velocity, velocity**2], axis=1)
+    (viscous, inertial), *_ = np.linalg.lstsq(powers, share, rcond=None)
+    found = 2.0 / (viscous + np.sqrt(viscous**2 + 4.0 * inertial))
+    assert case.fluid is not None and case.laws.drag_law is not None
+    own = float(np.average(voidage, weights=1.0 - voidage))
+    balance = fluidising_velocity(
+        case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, own,
+        in_layers(case.laws.drag_law.function, voidage), abs(case.laws.gravity[2]),
+    )  # fmt: skip
+    return Onset(float(found), own, balance)
+
+
+def in_layers(drag: Drag, voidages: np.ndarray) -> Drag:
+    """A drag law for a bed in layers: all layers see the same stream, each particle the voidage of its own layer.
+
+    drag      F(reynolds, voidage)
+    voidages  (levels,) of layers of the same thickness
+    returns   F such that F / voidage is the mean over all particles, for any voidage that is passed
+    """
+    solids = 1.0 - voidages
+    filled = [(share, own) for share, own in zip(solids / solids.sum(), voidages.tolist()) if share > 0.0]
+
+    def mean(reynolds: float, voidage: float) -> float:
+        return voidage * sum(share * drag(reynolds, own) / own for share, own in filled)
+
+    return mean

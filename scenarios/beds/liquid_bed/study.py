@@ -1,0 +1,101 @@
+"""A liquid-fluidised bed: its pressure drop carries its weight, and it expands as published laws predict.
+
+Beads of alumina and of alginate in water, after Ferreira et al. (2023), between frictionless sides. The default
+case is a short demonstration; the studies here run longer, at several velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.analysis.bed_laws import buoyant_weight, expansion_exponents, expansion_laws
+from cfddem.case.gallery import gallery
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.run import history
+from cfddem.run.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Study:
+    """A bed at several superficial velocities."""
+
+    case: Callable[[float], Case]  # of a velocity [m/s]
+    velocities: tuple[float, ...]  # [m/s]
+    starting: float  # start of the averages [s]
+    averaged: float  # length of the averages [s]
+
+
+@dataclass(frozen=True)
+class FluidisedBed:
+    """Means of a fluidised bed."""
+
+    velocity: float  # [m/s]
+    drop_over_weight: float
+    voidage: float
+    balance: float  # at which the drag law carries a uniform bed
+    expected: float  # mean of the published laws
+    exponent: float  # of Richardson and Zaki
+    height: float  # [m]
+
+
+def alumina(velocity: float) -> Case:
+    """The case of the gallery at another velocity [m/s], in a column high enough."""
+    return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.24})
+
+
+def alginate(velocity: float) -> Case:
+    """The lighter beads of the same experiments at a velocity [m/s]; they start suspended, so that no plug rises."""
+    beads = {
+        "density": 1029.0, "youngs_modulus": 1e7, "contact_modulus": 2e5, "poisson": 0.3, "restitution": 0.9,
+        "friction": 0.1, "friction_lubricated": 0.05, "roughness": 1e-6,
+    }  # fmt: skip
+    return alumina(velocity).with_(
+        **{
+            "title": "Liquid-fluidised bed of alginate beads",
+            "material": {"alginate": beads},
+            "column.height": 0.08,
+            "bed.diameter": 2.66e-3,
+            "bed.count": 2500,
+            "bed.start": "suspended",
+            "laws.drag": "di_felice",
+            "run.reference_speed": 0.02,
+        }
+    )
+
+
+STUDIES = {
+    "alumina": Study(alumina, (0.12, 0.157033, 0.20, 0.26), 2.0, 2.0),
+    "alginate": Study(alginate, (0.006, 0.009, 0.012), 6.0, 4.0),
+}
+"""Voidage 0.55 to 0.8 by Richardson and Zaki."""
+
+
+def fluidise(study: Study, velocity: float) -> FluidisedBed:
+    """Run a bed at one of its velocities [m/s], and average."""
+    described = study.case(velocity)
+    simulation = Simulation(described)
+    simulation.until(study.starting)
+    rows = []
+    for instant in study.starting + np.linspace(0.0, study.averaged, 101)[1:]:
+        simulation.until(float(instant))
+        rows.append(history.row(simulation))
+    weight = buoyant_weight(described) / described.column.floor_area
+    laws = expansion_laws(described)
+    return FluidisedBed(
+        velocity=velocity,
+        drop_over_weight=float(np.mean([row["pressure_drop"] for row in rows])) / weight,
+        voidage=float(np.mean([row["bed_voidage"] for row in rows])),
+        balance=estimate_bed(described).voidage,
+        expected=float(np.mean(list(laws.values()))),
+        exponent=expansion_exponents(described)["Richardson-Zaki"][0],
+        height=float(np.mean([row["bed_height"] for row in rows])),
+    )
+
+
+def exponent(beds: list[FluidisedBed]) -> float:
+    """Slope of log U over log voidage."""
+    return float(np.polyfit(np.log([bed.voidage for bed in beds]), np.log([bed.velocity for bed in beds]), 1)[0])

@@ -1,0 +1,121 @@
+"""Hindered settling: the settling velocity falls with the solid fraction by the power law of Richardson and Zaki.
+
+In a periodic box, a mean pressure gradient carries the weight of the suspension, as the floor of a vessel would, and
+the spheres fall relative to the rising fluid. In a closed vessel, the fall of the upper boundary is measured. The
+velocities at several solid fractions give the exponent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.analysis.measures import bed_height
+from cfddem.case.gallery import gallery
+from cfddem.case.schema import Case
+from cfddem.run.simulation import Simulation
+from closures.balance import terminal_velocity
+
+SOLID_FRACTIONS = (0.05, 0.1, 0.2, 0.3, 0.4)
+SYRUP = 1.4e-2
+"""Viscosity at which the spheres of the case settle with a Reynolds number below one [Pa s]."""
+
+EDGE, HEIGHT = 16, 32
+"""Width and height of the periodic box, in diameters; its cells have an edge of two."""
+
+BOUNDARY = 0.95
+"""Share of the spheres below the upper boundary; above, the suspension is too diffuse."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """How fast a suspension settles."""
+
+    solid_fraction: float
+    velocity: float  # against the mixture, downward [m/s]
+    terminal: float  # of a sphere alone, by the drag law of the run [m/s]
+
+
+def vessel() -> Case:
+    """The closed vessel of the case file."""
+    return Case.from_toml(gallery()["sedimentation"])
+
+
+def alone(case: Case) -> float:
+    """Terminal velocity of one sphere by the case's drag law [m/s]."""
+    assert case.fluid is not None and case.laws.drag_law is not None
+    fluid = case.fluid
+    drag, gravity = case.laws.drag_law.function, abs(case.laws.gravity[2])
+    return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, drag, gravity)
+
+
+def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, way: float = 40.0) -> Settling:
+    """Let the spheres of the case settle in a periodic box.
+
+    solid_fraction  of the box [-]
+    viscosity       of the fluid; the case's if not given [Pa s]
+    way             approximate settling distance in diameters; the first half is not averaged
+    """
+    case = vessel()
+    assert case.fluid is not None
+    diameter = case.bed.diameter
+    count = round(solid_fraction * EDGE**2 * HEIGHT * 6.0 / math.pi)
+    case = case.with_(
+        **{
+            "fluid.viscosity": viscosity or case.fluid.viscosity,
+            "column": {
+                "width": EDGE * diameter, "height": HEIGHT * diameter, "cell": 2.0 * diameter,
+                "sides": "periodic", "ends": "periodic",
+            },
+            "bed.count": count,
+        }
+    )  # fmt: skip
+    speed = alone(case)
+    case = case.with_(**{"run.reference_speed": 0.5 * speed})
+    assert case.fluid is not None
+    simulation = Simulation(case)
+    fluid, particles = simulation.fluid, simulation.particles
+    assert fluid is not None
+    solids = count * math.pi / 6.0 * diameter**3 / math.prod(fluid.grid.size)
+    fluid.boundaries.driving[2] = solids * (case.solid.density - fluid.density) * abs(case.laws.gravity[2])
+    end, rows = way * diameter / (speed * (1.0 - solids) ** 3), 100
+    falls = []
+    for row in range(rows):
+        simulation.until(end * (row + 1) / rows)
+        rising = float((fluid.voidage * fluid.velocity[..., 2]).mean())
+        falling = -float(particles.velocity[:, 2].mean())
+        falls.append(falling - (solids * falling - rising))  # relative to the mixture, which moves in the box
+    return Settling(solids, float(np.mean(falls[rows // 2 :])), speed)
+
+
+def between_walls(solid_fraction: float, *, way: float = 0.45) -> Settling:
+    """Let the spheres of the case settle in the closed vessel.
+
+    solid_fraction  at the start [-]
+    way             approximate fall of the boundary over the height; the first third is not fitted
+    """
+    case = vessel()
+    volume = math.pi / 6.0 * case.bed.diameter**3
+    count = round(solid_fraction * math.prod(case.column.size) / volume)
+    simulation = Simulation(case.with_(**{"bed.count": count}))
+    particles, speed = simulation.particles, alone(case)
+    solids = count * volume / math.prod(case.column.size)
+    packed = 1.0 - solids / 0.58  # largest fall of the boundary over the height
+    end, rows = min(way, 0.7 * packed) * case.column.height / (speed * (1.0 - solids) ** 3), 90
+    times, heights = [], []
+    for row in range(rows):
+        simulation.until(end * (row + 1) / rows)
+        times.append(simulation.time)
+        heights.append(bed_height(particles.position, particles.radius, BOUNDARY))
+    fall, _ = np.polyfit(times[rows // 3 :], heights[rows // 3 :], 1)
+    return Settling(solids, -float(fall), speed)
+
+
+def exponent(settlings: Sequence[Settling]) -> tuple[float, float]:
+    """Exponent n and velocity at no solids [m/s] of the power law through settling velocities, by least squares."""
+    voidage = np.log([1.0 - each.solid_fraction for each in settlings])
+    slope, intercept = np.polyfit(voidage, np.log([each.velocity for each in settlings]), 1)
+    return float(slope), float(np.exp(intercept))

@@ -1,0 +1,1 @@
+"""Standard runs that measure speed; `cfddem bench` runs them."""

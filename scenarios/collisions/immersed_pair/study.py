@@ -1,0 +1,320 @@
+"""Two spheres, or a sphere and a wall, collide in a fluid.
+
+What you'll learn: how the film, the roughness and the elasticity of two particles set their rebound.
+
+>>> from scenarios.collisions.immersed_pair import MATERIALS, collide
+>>> result = collide(MATERIALS["delrin"], velocity=0.1, stokes=30)
+>>> result.outcome, round(float(result.restitution), 2)
+('rebound', 0.39)
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, UnstableStep, nearest
+from cfddem.backend.law_choice import GAP_ARGUMENTS, called_by_name, chosen
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import Particles
+from closures import contact, lubrication, timescales
+from closures.friction import dry_or_lubricated
+from closures.minimum_gap import elastohydrodynamic
+from scenarios.collisions.immersed_pair.motion import Setting, follow, stage
+from scenarios.collisions.results import plain
+
+MATERIALS = {
+    "steel_smooth": Material(
+        density=7780, youngs_modulus=190e9, poisson=0.27, restitution=0.97,
+        friction=0.11, friction_lubricated=0.02, roughness=24e-9,
+    ),
+    "steel_rough": Material(
+        density=7780, youngs_modulus=190e9, poisson=0.27, restitution=0.97,
+        friction=0.11, friction_lubricated=0.02, roughness=272e-9,
+    ),
+    "glass": Material(
+        density=2540, youngs_modulus=60e9, poisson=0.23, restitution=0.97,
+        friction=0.40, friction_lubricated=0.10, roughness=134e-9,
+    ),
+    "delrin": Material(
+        density=1400, youngs_modulus=2.8e9, poisson=0.35, restitution=0.97,
+        friction=0.20, friction_lubricated=0.10, roughness=796e-9,
+    ),
+}  # fmt: skip
+"""The spheres of Yang & Hunt (2006), as listed in table 1 of Nijssen et al. (2023)."""
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Result of a collision. Rebound speeds are taken where the pair leaves the film, at h = h_co."""
+
+    stokes: float  # of the normal approach at h_co [-]; infinite when dry
+    outcome: str  # "no_touch", "touch_no_rebound" or "rebound"
+    restitution: float  # normal speed out over in [-]
+    restitution_tangential: float  # tangential speed out over in [-]; NaN head-on
+    rebound_angle_striker: float  # of the striker's own velocity against the line of centres at contact [deg]
+    rebound_angle_relative: float  # of the relative velocity against the line of centres at contact [deg]
+    minimum_gap: float  # h_min [m]; 0 when dry
+    mechanism: str  # "roughness" or "elastohydrodynamic", or the name of a user-defined law; "dry" without a film
+    friction_used: float  # [-]
+    stop_gap: float | None  # where a pair that does not separate stops [m]
+    spin: tuple[float, float]  # of striker and target about the plane's normal [rad/s]
+    time: np.ndarray  # [s]
+    gap: np.ndarray  # at these times [m]
+    history: dict[str, np.ndarray] = field(repr=False)  # more columns at these times
+    warnings: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """The result without its histories, ready for JSON."""
+        names = [name for name in self.__dataclass_fields__ if name not in ("time", "gap", "history")]
+        return {name: plain(getattr(self, name)) for name in names}
+
+
+def collide(
+    material: Material | tuple[Material, Material],
+    *,
+    diameter: float | tuple[float, float] = 12.7e-3,
+    velocity: float | None = None,
+    viscosity: float | None = None,
+    stokes: float | None = None,
+    angle: float = 0.0,
+    against: str = "sphere",
+    trajectory: str = "frozen",
+    spin: tuple[float, float] = (0.0, 0.0),
+    integrator: str = "drift",
+    friction_onset: str = "film",
+    spring: str = "total",
+    step_fraction: float | None = None,
+    minimum_gap: Callable[..., float] | None = None,
+    lubrication: Callable[..., float] | None = None,
+) -> Collision:
+    r"""Let one body strike another at rest in a fluid, in the particle engine.
+
+    Two of velocity, viscosity and stokes are given: St = m* v / (6 pi eta R*^2).
+
+    material        of both particles, or (striker, target); with a wall, (sphere, wall)
+    diameter        of both spheres, or (striker, target) [m]
+    velocity        normal approach speed at the cut-off gap h_co = R* [m/s]
+    viscosity       of the fluid; 0 for a dry collision [Pa s]
+    stokes          of the normal approach [-]
+    angle           between velocity and line of centres at contact, 0 <= angle < 90 [deg]
+    against         "sphere" or "wall"
+    trajectory      "frozen" holds the line of centres; "full" starts at a gap of 2 R* aimed at the contact point
+    spin            of striker and target before, about the plane's normal [rad/s]
+    integrator      "drift" (film as a potential difference) or "verlet" (film as a force)
+    friction_onset  "film": at h_min, weighted by 1 - h/h_min; "overlap": at h = 0, as in the published figures
+    spring          "total" tangential displacement, or "rescaled" while loading
+    step_fraction   of the Hertz time; 0.02, or 0.005 for an oblique impact with the sudden onset "overlap" [-]
+    minimum_gap     a user-defined law for h_min, instead of the elastohydrodynamic one
+    lubrication     a user-defined law for the resistance of the film
+    returns         :class:`Collision`
+
+    >>> wall = collide(MATERIALS["glass"], against="wall", velocity=0.2, stokes=50)
+    >>> wall.mechanism, round(float(wall.restitution), 2)
+    ('roughness', 0.53)
+    """
+    materials, diameters = _both(material), _both(diameter)
+    velocity, viscosity = _speed_and_viscosity(materials, diameters, against, velocity, viscosity, stokes)
+    _check("angle", angle, 0.0 <= angle < 90.0, "at least 0 and below 90 degrees")
+    oblique = angle > 0.0 or any(spin)
+    if step_fraction is None:
+        step_fraction = 0.005 if oblique and friction_onset == "overlap" else 0.02
+    _check("step_fraction", step_fraction, 0.0 < step_fraction <= 0.2, "above 0 and at most 0.2")
+    for given in spin:
+        _check("spin", given, math.isfinite(given), "finite")
+    laws = Laws(
+        film=viscosity > 0.0,
+        integrator=integrator,
+        friction_onset=friction_onset,
+        spring=spring,
+        minimum_gap=minimum_gap,
+        lubrication=lubrication,
+    )
+    laws.check()
+    full = _choice("trajectory", trajectory, {"frozen": False, "full": True})
+    table = pair_table(materials)
+    setting = _setting(table, materials, diameters, against, velocity, viscosity, angle, step_fraction, laws)
+    caveats = _check_film_step(setting, laws, step_fraction)
+    simulation = stage(setting, table, materials, laws, full, spin)
+    history = follow(simulation, setting, full)
+    return _result(simulation, setting, table, history, laws, full, caveats)
+
+
+def _both(value: Any) -> tuple[Any, Any]:
+    return value if isinstance(value, tuple) else (value, value)
+
+
+Chosen = TypeVar("Chosen")
+
+
+def _choice(name: str, value: str, choices: dict[str, Chosen]) -> Chosen:
+    if value not in choices:
+        raise InputError(name, value, nearest(str(value), choices))
+    return choices[value]
+
+
+def _check(name: str, value: float, holds: bool, limit: str) -> None:
+    if not holds:
+        raise InputError(name, value, limit)
+
+
+def _masses(materials: tuple[Material, Material], diameters: tuple[float, float], against: str) -> tuple[float, float]:
+    """Reduced radius and reduced mass."""
+    for name, diameter in zip(("diameter", "diameter of the target"), diameters):
+        _check(name, diameter, math.isfinite(diameter) and diameter > 0.0, "above 0 and finite")
+    wall = _choice("against", against, {"sphere": False, "wall": True})
+    mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(materials, diameters)]
+    other = (math.inf, math.inf) if wall else (0.5 * diameters[1], mass[1])
+    return contact.reduced(0.5 * diameters[0], other[0]), contact.reduced(mass[0], other[1])
+
+
+def _speed_and_viscosity(
+    materials: tuple[Material, Material],
+    diameters: tuple[float, float],
+    against: str,
+    velocity: float | None,
+    viscosity: float | None,
+    stokes: float | None,
+) -> tuple[float, float]:
+    """Speed and viscosity, from any two of the three given values."""
+    given = {"velocity": velocity, "viscosity": viscosity, "stokes": stokes}
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) != 2:
+        raise InputError("velocity, viscosity, stokes", names, "two of the three", "the third follows from them")
+    for name in names:
+        value = given[name]
+        zero_allowed = name == "viscosity"
+        sound = math.isfinite(value) and (value >= 0.0 if zero_allowed else value > 0.0)  # type: ignore[arg-type, operator]
+        _check(name, value, sound, "finite and " + ("at least 0" if zero_allowed else "above 0"))  # type: ignore[arg-type]
+    radius, mass = _masses(materials, diameters, against)
+    film_speed_per_viscosity = lubrication.film_strength(1.0, radius) / mass
+    if velocity is None:
+        _check("viscosity", viscosity, viscosity > 0.0, "above 0 where stokes sets the velocity")  # type: ignore[arg-type, operator]
+        velocity = stokes * viscosity * film_speed_per_viscosity  # type: ignore[operator]
+    if viscosity is None:
+        viscosity = velocity / (stokes * film_speed_per_viscosity)  # type: ignore[operator]
+    return velocity, viscosity
+
+
+def _setting(
+    table: np.ndarray,
+    materials: tuple[Material, Material],
+    diameters: tuple[float, float],
+    against: str,
+    velocity: float,
+    viscosity: float,
+    angle: float,
+    step_fraction: float,
+    laws: Laws,
+) -> Setting:
+    reduced_radius, reduced_mass = _masses(materials, diameters, against)
+    row = table[0, 1]
+    stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), reduced_radius)
+    roughness = float(row["roughness_gap"])
+    asked = (roughness, velocity, viscosity, float(row["film_modulus"]), reduced_radius)
+    deformed = called_by_name(laws.minimum_gap or elastohydrodynamic, GAP_ARGUMENTS, asked)
+    return Setting(
+        radius=(0.5 * diameters[0], math.inf if against == "wall" else 0.5 * diameters[1]),
+        reduced_radius=reduced_radius,
+        reduced_mass=reduced_mass,
+        speed=velocity,
+        tangential_speed=velocity * math.tan(math.radians(angle)),
+        viscosity=viscosity,
+        stiffness=stiffness,
+        impact_step=step_fraction * timescales.hertz_time(reduced_mass, stiffness, velocity),
+        minimum_gap=max(roughness, deformed) if viscosity > 0.0 else 0.0,
+        film_speed=lubrication.film_strength(viscosity, reduced_radius) / reduced_mass,
+    )
+
+
+def _check_film_step(setting: Setting, laws: Laws, step_fraction: float) -> tuple[str, ...]:
+    """Refuse or warn where the step is too long for the film as an explicit force."""
+    if not laws.film or laws.integrator == "drift":
+        return ()
+    film_time = timescales.film_time(
+        setting.reduced_mass, setting.film_speed * setting.reduced_mass, setting.minimum_gap
+    )
+    step = setting.impact_step
+    if step >= 2.0 * film_time:
+        raise UnstableStep(
+            step,
+            2.0 * film_time,
+            "film",
+            f'use integrator="drift", or step_fraction below {2.0 * film_time / step * step_fraction:.2g}',
+        )
+    depth = contact.hertz_largest_overlap(setting.reduced_mass, setting.stiffness, setting.speed) / setting.minimum_gap
+    if step < film_time and depth < 15.0:
+        return ()
+    caveat = (
+        f"the film is poorly resolved: step/film time = {step / film_time:.2g} (should be below 1), "
+        f'largest overlap/minimum gap = {depth:.2g} (should be below 15); use integrator="drift"'
+    )
+    warnings.warn(caveat, stacklevel=3)
+    return (caveat,)
+
+
+def _result(
+    simulation: ParticleSolver,
+    setting: Setting,
+    table: np.ndarray,
+    history: dict[str, np.ndarray],
+    laws: Laws,
+    full: bool,
+    caveats: tuple[str, ...],
+) -> Collision:
+    """The result from the end of the history."""
+    body: Particles = simulation.particles
+    target = body.velocity[1] if body.count == 2 else np.zeros(3)
+    parting = target - body.velocity[0]
+    cutoff = setting.cutoff_gap if laws.film else 0.0
+    separated = history["gap"][-1] > cutoff
+    touched = bool(history.pop("touched"))
+    outcome = "rebound" if separated and touched else "touch_no_rebound" if touched else "no_touch"
+    restitution = float(parting[0]) / setting.speed if separated or full else 0.0
+    sideways = -float(parting[1])
+    minimum_gap = _frozen_gap(simulation, setting)
+    row = table[0, 1]
+    friction = dry_or_lubricated(
+        minimum_gap, float(row["roughness_gap"]), float(row["friction"]), float(row["friction_lubricated"])
+    )
+    deformed = "elastohydrodynamic" if laws.minimum_gap is None else chosen("minimum_gap", laws.minimum_gap).name
+    mechanism = deformed if minimum_gap > row["roughness_gap"] else "roughness"
+    return Collision(
+        stokes=setting.speed / setting.film_speed if laws.film else math.inf,
+        outcome=outcome,
+        restitution=restitution,
+        restitution_tangential=sideways / setting.tangential_speed if setting.tangential_speed > 0.0 else math.nan,
+        rebound_angle_striker=_degrees(float(body.velocity[0, 1]), float(body.velocity[0, 0])),
+        rebound_angle_relative=_degrees(sideways, restitution * setting.speed),
+        minimum_gap=minimum_gap,
+        mechanism=mechanism if laws.film else "dry",
+        friction_used=friction if laws.film else float(row["friction"]),
+        stop_gap=None if separated else float(history["gap"][-1]),
+        spin=(float(body.spin[0, 2]), float(body.spin[1, 2]) if body.count == 2 else 0.0),
+        time=history.pop("time"),
+        gap=history.pop("gap"),
+        history=history,
+        warnings=caveats,
+    )
+
+
+def _frozen_gap(simulation: ParticleSolver, setting: Setting) -> float:
+    """Minimum gap of the collision, from its record or, where it has not ended, from the pair."""
+    if not simulation.laws.film:
+        return 0.0
+    assert simulation.collisions is not None
+    ended = simulation.collisions.table
+    return float(ended["minimum_gap"][-1] if len(ended) else simulation.edges.minimum_gap[0])
+
+
+def _degrees(sideways: float, along: float) -> float:
+    """Angle against the line of centres, 0 along it in either direction."""
+    return math.degrees(math.atan2(sideways, abs(along))) if sideways else 0.0

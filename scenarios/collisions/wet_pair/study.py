@@ -1,0 +1,205 @@
+"""Two wet spheres collide obliquely: they bounce, stick, or turn about each other and separate.
+
+What you'll learn: which of the film laws between coated spheres matters, and when.
+
+>>> from scenarios.collisions.wet_pair import collide_wet
+>>> result = collide_wet(stokes=2.0, angle=45.0)
+>>> result.outcome, round(result.restitution, 3)
+('bounce', 0.527)
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.materials import Material
+from cfddem.particles.interactions.bridge_loops import BRIDGE_FILMS, CUTS, PULLS, TANGENTIALS, BridgeLaws
+from closures import contact
+from closures.lubrication import film_strength
+from closures.minimum_gap import glass_transition
+from scenarios.collisions.wet_pair.engine import follow as follow_in_engine
+from scenarios.collisions.wet_pair.motion import Motion, Pair, follow
+
+BRIDGES = {name: BRIDGE_FILMS[name] for name in ("deforming", "static")}
+SOLVERS = ("equations", "particles")
+
+TRANSITION_PRESSURES = {
+    ("static", "constant"): 4.9e6,
+    ("static", "zero"): 23e6,
+    ("deforming", "constant"): 2.6e6,
+    ("deforming", "zero"): 11.6e6,
+}
+"""Glass transition pressure of silicone oil of 10 Pa s, as fitted for each film by Punch et al. (2023, fig. 8) [Pa]."""
+
+
+@dataclass(frozen=True)
+class WetPair:
+    """Result of a wet collision; speeds are taken where the films separate, at h = film."""
+
+    outcome: str  # "bounce", "stick_rotate_separate" or "stick"
+    restitution: float  # normal speed of separation over that of impact; 0 where the pair does not separate [-]
+    spin: float  # of each sphere, positive in the direction in which the pair turns [rad/s]
+    separation_time: float | None  # after the films met [s]
+    minimum_gap: float  # h_min [m]
+    velocity: float  # normal speed of impact [m/s]
+    turned: float  # by the line of centres [deg]
+    history: dict[str, np.ndarray] = field(repr=False)  # time, gap, angle, approach speed, turning, spin
+    warnings: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """The result without its history, ready for JSON."""
+        kept = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "history"}
+        return kept | {"warnings": list(self.warnings)}
+
+
+def collide_wet(
+    stokes: float = 2.0,
+    angle: float = 0.0,
+    bridge: str = "deforming",
+    cut: str = "zero",
+    tangential: str = "davis",
+    friction: float = 0.0,
+    capillary: bool = False,
+    glass_transition_pressure: float | None = None,
+    film: float = 270e-6,
+    viscosity: float = 10.0,
+    radius: float = 12.7e-3,
+    density: float = 7960.0,
+    youngs_modulus: float = 2.0e11,
+    poisson: float = 0.35,
+    restitution: float = 0.9,
+    surface_tension: float = 0.0205,
+    duration: float = 1.0,
+    solver: str = "equations",
+) -> WetPair:
+    r"""Let one wet sphere strike an equal one at rest; the defaults are steel spheres in silicone oil.
+
+    stokes                     St_n = m* v_n0 / (6 pi eta R*^2), of the normal speed of impact [-]
+    angle                      between velocity and line of centres at impact, 0 <= angle < 90 [deg]
+    bridge                     "deforming", which grows with the liquid squeezed out, or "static"
+    cut                        film below h_min: "zero", or "constant" as at h_min
+    tangential                 resistance of the film to sliding: "davis", "nase" or "none"
+    friction                   of the solids [-]
+    capillary                  whether the bridge attracts the spheres
+    glass_transition_pressure  sets h_min; the value fitted for this bridge and cut if not given [Pa]
+    film                       h_max, thickness of the liquid on both spheres together [m]
+    viscosity                  of the film [Pa s]
+    radius                     of the spheres [m]
+    density                    of the spheres [kg/m3]
+    youngs_modulus             of the spheres [Pa]
+    poisson                    Poisson's ratio of the spheres [-]
+    restitution                dry, of the solids [-]
+    surface_tension            of the film [N/m]
+    duration                   after which a pair that has not separated counts as stuck [s]
+    solver                     "equations" in polar coordinates, or the "particles" engine
+    returns                    :class:`WetPair`
+
+    >>> slow = collide_wet(stokes=0.5, angle=60.0)
+    >>> slow.outcome, round(slow.spin, 2), round(slow.turned)
+    ('stick_rotate_separate', 5.44, 47)
+    """
+    given = dict(locals())
+    _check(given)
+    pair = _pair(given)
+    if solver == "equations":
+        motion = follow(pair, angle, duration)
+    else:
+        solid = Material(
+            density=density, youngs_modulus=youngs_modulus, poisson=poisson, restitution=restitution, friction=friction
+        )
+        motion = follow_in_engine(pair, solid, angle, duration)
+    bounces = motion.separated and (angle == 0.0 or follow(pair, 0.0, duration).separated)
+    return WetPair(
+        outcome="bounce" if bounces else "stick_rotate_separate" if motion.separated else "stick",
+        restitution=-float(motion.approach[-1]) / pair.speed if motion.separated else 0.0,
+        spin=float(motion.spin[-1]),
+        separation_time=float(motion.time[-1]) if motion.separated else None,
+        minimum_gap=pair.minimum_gap,
+        velocity=pair.speed,
+        turned=math.degrees(float(motion.angle[-1])),
+        history=_history(motion),
+        warnings=_warn(pair),
+    )
+
+
+def _check(given: Mapping[str, Any]) -> None:
+    """Check the arguments of :func:`collide_wet`."""
+    for name, known in (("bridge", BRIDGES), ("cut", CUTS), ("tangential", TANGENTIALS), ("solver", SOLVERS)):
+        if given[name] not in known:
+            raise InputError(name, given[name], nearest(str(given[name]), known))
+    limits = {
+        "angle": (lambda x: 0.0 <= x < 90.0, "at least 0 and below 90 degrees"),
+        "restitution": (lambda x: 0.0 < x <= 1.0, "above 0 and at most 1"),
+        "poisson": (lambda x: -1.0 < x <= 0.5, "above -1 and at most 0.5"),
+    }
+    for name in ("stokes", "film", "radius", "viscosity", "density", "duration", "youngs_modulus"):
+        limits[name] = (lambda x: 0.0 < x < math.inf, "above 0 and finite")
+    for name in ("friction", "surface_tension"):
+        limits[name] = (lambda x: 0.0 <= x < math.inf, "at least 0 and finite")
+    limits["glass_transition_pressure"] = (lambda x: x is None or 0.0 < x < math.inf, "above 0 and finite")
+    for name, (holds, limit) in limits.items():
+        if not holds(given[name]):
+            raise InputError(name, given[name], limit)
+
+
+def _pair(given: Mapping[str, Any]) -> Pair:
+    """The constants of a pair, from the arguments of :func:`collide_wet`."""
+    viscosity, radius, film = given["viscosity"], given["radius"], given["film"]
+    pressure = given["glass_transition_pressure"]
+    if pressure is None:
+        pressure = TRANSITION_PRESSURES[given["bridge"], given["cut"]]
+    elastic = (given["youngs_modulus"], given["poisson"])
+    mass = given["density"] * 4.0 / 3.0 * math.pi * radius**3
+    speed = given["stokes"] * film_strength(viscosity, 0.5 * radius) / (0.5 * mass)
+    liquid = BridgeLaws(
+        viscosity=viscosity,
+        surface_tension=given["surface_tension"],
+        film=BRIDGES[given["bridge"]],
+        cut=CUTS[given["cut"]],
+        tangential=TANGENTIALS[given["tangential"]],
+        pull=PULLS["constant" if given["capillary"] else "none"],
+        transition_pressure=pressure,
+    )
+    return Pair(
+        speed=speed,
+        film=film,
+        minimum_gap=glass_transition(viscosity, speed, pressure, 0.5 * radius, film),
+        radius=radius,
+        mass=mass,
+        modulus=contact.reduced_modulus(*elastic, *elastic),
+        shear_modulus=contact.reduced_shear_modulus(*elastic, *elastic),
+        damping_ratio=contact.damping_ratio(given["restitution"]),
+        friction=given["friction"],
+        liquid=liquid,
+    )
+
+
+def _warn(pair: Pair) -> tuple[str, ...]:
+    """Warn where the minimum gap is as large as the film."""
+    if pair.minimum_gap < pair.film:
+        return ()
+    warning = (
+        f"at {pair.speed:.3g} m/s the whole film of {pair.film:.3g} m is above its glass transition pressure and does "
+        "not act; the fitted pressure does not hold at so high a Stokes number"
+    )
+    warnings.warn(warning, stacklevel=3)
+    return (warning,)
+
+
+def _history(motion: Motion) -> dict[str, np.ndarray]:
+    """History by name, in SI units with the angle in degrees."""
+    return {
+        "time": motion.time,
+        "gap": motion.gap,
+        "angle": np.degrees(motion.angle),
+        "approach_speed": motion.approach,
+        "turning": motion.turning,
+        "spin": motion.spin,
+    }

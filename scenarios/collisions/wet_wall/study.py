@@ -1,0 +1,283 @@
+"""A sphere strikes a wall under a thin liquid layer, rebounds on a liquid bridge, or sticks.
+
+What you'll learn: how viscous and capillary forces, contact and gravity share the energy of a wet impact.
+
+>>> from scenarios.collisions.wet_wall import impact
+>>> result = impact("glass_1.74", "water", film=100e-6, velocity=1.0)
+>>> result.outcome, round(result.restitution, 3)
+('rebound', 0.844)
+>>> impact("glass_1.74", "water", film=100e-6, velocity=0.3).outcome
+'stick'
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.materials import Material
+from cfddem.particles.material_pairs import pair_table
+from closures import capillary, contact, timescales
+from scenarios.collisions.results import plain
+from scenarios.collisions.wet_wall import motion
+from scenarios.collisions.wet_wall.materials import BALLS, GLASS, LIQUIDS, Ball, Liquid, half_filling, sliding_friction
+from scenarios.collisions.wet_wall.motion import COLUMNS, Path, Wet, follow
+
+PULLED_IN = {"always": ("I", "III", "IV"), "rebound": ("III", "IV"), "bridge": ("IV",)}
+"""Phases with a capillary force, by name; the source does not say whether the first is among them."""
+
+SLENDER = 0.01
+"""Arc of the toroid over the radius of the sphere, below which the suction just before contact decides."""
+
+CUTTING = 1e-4
+"""Relaxation time of the spring of a sliding contact towards Coulomb's limit, over the Hertz time."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """Result of a wet impact. Speeds are taken where the sphere meets the layer and where the bridge ruptures."""
+
+    outcome: str  # "rebound" or "stick"
+    restitution: float  # normal speed out over in; 0 where the sphere sticks [-]
+    restitution_tangential: float  # the same along the wall [-]; NaN head-on or stuck
+    restitution_rotational: float  # spin after over before [-]; NaN without spin or stuck
+    spin: float  # afterwards [rad/s]
+    energy_lost: dict[str, float]  # by contact, viscous, capillary and gravity, over the mass [J/kg]
+    half_filling_angle: float | None  # [deg]; None when dry
+    friction: float | None  # [-]; None where nothing slides
+    contact_speed: float  # towards the wall when the solids meet [m/s]
+    bridge_volume: float | None  # liquid in the bridge when it breaks [m3]
+    rupture_length: float | None  # [m]
+    duration: float  # until the bridge breaks, or the sphere has come to rest [s]
+    time: np.ndarray  # [s]
+    history: dict[str, np.ndarray] = field(repr=False)  # columns of motion.COLUMNS, and the phase, 1 to 4
+    warnings: tuple[str, ...] = ()
+
+    def summary(self) -> dict[str, Any]:
+        """The result without its histories, ready for JSON."""
+        names = [name for name in self.__dataclass_fields__ if name not in ("time", "history")]
+        return {name: plain(getattr(self, name)) for name in names}
+
+
+def impact(
+    particle: str | Ball = "glass_1.74",
+    liquid: str | Liquid | None = "water",
+    film: float = 100e-6,
+    velocity: float = 1.0,
+    *,
+    angle: float = 0.0,
+    spin: float = 0.0,
+    half_filling_angle: float | None = None,
+    friction: float | None = None,
+    wall: Material = GLASS,
+    capillary_phases: str = "always",
+    length_from: str = "surface",
+    film_signs: str = "goldman",
+    spring: str = "kept",
+    smallest_arc: float | None = None,
+    smallest_gap: float = 0.5e-6,
+    gravity: float = 9.81,
+    tolerance: float = 1e-10,
+) -> Impact:
+    """Let a sphere strike a wall that carries a liquid layer, from above.
+
+    particle            "glass_0.91", "glass_1.74" or "alumina_1.74", or a Ball
+    liquid              "water", "tween", "glycerol_35" or "glycerol_51", or a Liquid; None for a dry wall
+    film                thickness of the layer; 0 for a dry wall [m]
+    velocity            normal speed where the sphere meets the layer [m/s]
+    angle               between velocity and normal there, 0 <= angle < 90; tan(angle) = tangential/normal [deg]
+    spin                before; positive where it moves the lowest point the way the sphere goes [rad/s]
+    half_filling_angle  of the bridge; that of table 5 of the source where it lists the case [deg]
+    friction            of the contact; that of table 3 of the source where it lists the case [-]
+    wall                solid of the wall
+    capillary_phases    "always" where there is liquid, on "rebound" only, or on the "bridge" only
+    length_from         where the length of the bridge counts from: the "surface" of the layer, or the "wall"
+    film_signs          of the coupling of sliding and spin in the film: "goldman" (1967), or as "printed"
+    spring              of the contact along the wall while it slides: "kept" as the whole displacement, as printed, or
+                        "cut" to Coulomb's limit, as the particle engine does
+    smallest_arc        floor of r_m for layers in which the toroid is singular; such layers are refused without [m]
+    smallest_gap        below it the film's resistance no longer grows [m]
+    gravity             towards the wall [m/s2]
+    tolerance           of the integration, relative
+    returns             :class:`Impact`
+
+    Raises InputError where the contact line of the bridge lies within the layer while the solids touch.
+
+    >>> sliding = impact("alumina_1.74", None, angle=60)
+    >>> round(sliding.restitution_tangential, 3), round(1 - 0.195 * 1.76 / math.tan(math.radians(60)), 3)
+    (0.802, 0.802)
+    """
+    ball = _named("particle", particle, BALLS)
+    wetted = film > 0.0 and liquid is not None
+    fluid = _named("liquid", liquid, LIQUIDS) if wetted else None
+    _check(film=film, velocity=velocity, angle=angle, spin=spin, gravity=gravity, tolerance=tolerance)
+    oblique = angle != 0.0 or spin != 0.0
+    rubs = sliding_friction(particle, liquid if wetted else None, friction) if oblique or friction is not None else None
+    filled = half_filling(particle, liquid, film, half_filling_angle) if wetted else None
+    along = velocity * math.tan(math.radians(angle))
+    wet = _wet(ball, wall, fluid, film if wetted else 0.0, filled, rubs or 0.0, gravity)._replace(
+        smallest_gap=_above_zero("smallest_gap", smallest_gap),
+        smallest_arc=0.0 if smallest_arc is None else _above_zero("smallest_arc", smallest_arc),
+        pulled_in=_named("capillary_phases", capillary_phases, PULLED_IN),
+        length_from=_named("length_from", length_from, {"surface": film, "wall": 0.0}),
+        printed_signs=_named("film_signs", film_signs, {"goldman": False, "printed": True}),
+    )
+    if wetted and smallest_arc is None and capillary_phases != "bridge":
+        _refuse_the_singular(wet)
+    if _named("spring", spring, {"kept": False, "cut": True}):
+        wet = wet._replace(cutting_time=CUTTING * timescales.hertz_time(wet.mass, wet.stiffness, velocity))
+    path = follow(wet, velocity, along, spin, tolerance)
+    return replace(_result(path, wet, velocity, along, spin, filled, rubs), warnings=_nearly_singular(wet))
+
+
+def sticking_velocity(
+    particle: str | Ball, liquid: str | Liquid, film: float, *, precision: float = 1e-4, **options: Any
+) -> float:
+    """Slowest normal impact that rebounds, by bisection [m/s].
+
+    particle, liquid, film, options  as in :func:`impact`
+    precision                        of the velocity, relative
+
+    >>> round(sticking_velocity("glass_1.74", "water", 100e-6, precision=1e-3, tolerance=1e-8), 3)
+    0.345
+    """
+
+    def sticks(velocity: float) -> bool:
+        return impact(particle, liquid, film, velocity, **options).outcome == "stick"
+
+    low, high = 0.0, 0.1
+    while sticks(high):
+        low, high = high, 2.0 * high
+        if high > 1e3:
+            raise InputError("film", film, "thin enough for a sphere to rebound", "it sticks even at 1000 m/s")
+    while high - low > precision * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sticks(middle) else (low, middle)
+    return high
+
+
+def _wet(
+    ball: Ball,
+    wall: Material,
+    fluid: Liquid | None,
+    film: float,
+    half_filling_angle: float | None,
+    friction: float,
+    gravity: float,
+) -> Wet:
+    """The constants of an impact."""
+    radius, row = 0.5 * ball.diameter, pair_table([ball.material, wall])[0, 1]
+    return Wet(
+        radius=radius,
+        mass=ball.material.density * 4.0 / 3.0 * math.pi * radius**3,
+        gravity=gravity,
+        stiffness=contact.hertz_stiffness(float(row["contact_modulus"]), radius),
+        damping_ratio=float(row["damping_ratio"]),
+        shear_modulus=float(row["shear_modulus"]),
+        friction=friction,
+        film=film,
+        viscosity=fluid.viscosity if fluid else 0.0,
+        liquid_density=fluid.density if fluid else 0.0,
+        surface_tension=fluid.surface_tension if fluid else 0.0,
+        contact_angle=math.radians(fluid.contact_angle) if fluid else 0.0,
+        half_filling_angle=math.radians(half_filling_angle) if half_filling_angle else 0.0,
+        smallest_gap=0.0,
+        smallest_arc=0.0,
+        pulled_in=(),
+        length_from=film,
+        printed_signs=False,
+        cutting_time=0.0,
+    )
+
+
+def _refuse_the_singular(wet: Wet) -> None:
+    """Refuse a toroid whose contact line lies within the layer: its arc has no radius."""
+    height = wet.radius * (1.0 - math.cos(wet.half_filling_angle))
+    if height > wet.film:
+        return
+    least = math.degrees(math.acos(max(1.0 - wet.film / wet.radius, -1.0)))
+    raise InputError(
+        "half_filling_angle",
+        round(math.degrees(wet.half_filling_angle), 3),
+        f"above {least:.1f} degrees in a layer of {wet.film * 1e6:g} um, so that the contact line of the bridge stays "
+        f"above the layer; it lies at {height * 1e6:.0f} um while the solids touch",
+        "smallest_arc=5e-6 runs it with a floor of the toroid's radius, on which the result then depends",
+    )
+
+
+def _nearly_singular(wet: Wet) -> tuple[str, ...]:
+    """Warn where the suction before contact grows so much that the result depends on the arc of the toroid there."""
+    if wet.film == 0.0 or wet.pulled_in == PULLED_IN["bridge"]:
+        return ()
+    arc = motion.bridge(wet, wet.radius).meridional
+    if arc > SLENDER * wet.radius:
+        return ()
+    return (
+        f"the arc of the toroid shrinks to {arc * 1e6:.2g} um at contact (below {SLENDER:g} of the radius): the "
+        "result depends on it; compare with smallest_arc=5e-6",
+    )
+
+
+def _result(
+    path: Path, wet: Wet, velocity: float, along: float, spin: float, filled: float | None, friction: float | None
+) -> Impact:
+    """The result from the end of the path."""
+    end, nan = path.state[:, -1], math.nan
+    rebounds, wetted = not path.stuck, filled is not None
+    height, speed = float(end[motion.HEIGHT]), float(end[motion.SPEED])
+    met = path.state[motion.SPEED, np.argmax(path.phase == 2)] if (path.phase == 2).any() else 0.0
+    broken = motion.volume(wet, height) if wetted and rebounds else None
+    return Impact(
+        outcome="rebound" if rebounds else "stick",
+        restitution=speed / velocity if rebounds else 0.0,
+        restitution_tangential=float(end[motion.ALONG]) / along if rebounds and along else nan,
+        restitution_rotational=float(end[motion.SPIN]) / spin if rebounds and spin else nan,
+        spin=float(end[motion.SPIN]),
+        energy_lost={name[5:]: float(end[row]) for row, name in enumerate(COLUMNS) if name.startswith("lost_")},
+        half_filling_angle=filled,
+        friction=friction,
+        contact_speed=-float(met),
+        bridge_volume=broken,
+        rupture_length=None
+        if broken is None
+        else float(
+            capillary.rupture_length(wet.viscosity * max(speed, 0.0) / wet.surface_tension, wet.contact_angle, broken)
+        ),
+        duration=float(path.time[-1]),
+        time=path.time,
+        history=dict(zip(COLUMNS, path.state)) | {"phase": path.phase},
+    )
+
+
+def _check(**given: float) -> None:
+    """Check the numbers of an impact."""
+    limits = {
+        "film": (given["film"] >= 0.0, "at least 0 and finite"),
+        "velocity": (given["velocity"] > 0.0, "above 0 and finite"),
+        "angle": (0.0 <= given["angle"] < 90.0, "at least 0 and below 90 degrees"),
+        "tolerance": (1e-13 <= given["tolerance"] <= 1e-3, "between 1e-13 and 1e-3"),
+        "gravity": (given["gravity"] >= 0.0, "at least 0 and finite"),
+    }
+    for name, value in given.items():
+        holds, limit = limits.get(name, (True, "finite"))
+        if not (holds and math.isfinite(value)):
+            raise InputError(name, value, limit)
+
+
+def _above_zero(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(name, value, "above 0 and finite")
+    return value
+
+
+def _named(name: str, value: Any, known: dict[str, Any]) -> Any:
+    """The value of a name; anything but a string is returned as it is."""
+    if not isinstance(value, str):
+        return value
+    if value not in known:
+        raise InputError(name, value, nearest(value, known))
+    return known[value]

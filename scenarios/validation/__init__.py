@@ -1,0 +1,1 @@
+"""Comparisons with published results; `cfddem validate` runs them."""

@@ -1,0 +1,193 @@
+"""Particles and fluid together: a sphere that settles, packed beds, conservation, and liquid beds.
+
+References: the terminal velocities and equations of motion of the drag laws; Mordant & Pinton (2000) and
+ten Cate et al. (2002); MFIX DEM06; Ergun; the weight of the bed; published laws of bed expansion.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from cfddem.case.schema import Case
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
+from cfddem.run.simulation import Simulation
+from scenarios.beds.liquid_bed import study as liquid_bed
+from scenarios.beds.packed_bed import study as packed_bed
+from scenarios.beds.settling import study as settling
+from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, reference, worst
+
+REYNOLDS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0)
+CELLS = (2.0, 4.0, 10.0)
+PLACES = (0.5, 0.25, 0.0)
+"""Centre of a cell, a quarter off, and a corner."""
+
+
+def study(folder: Path, progress: Progress) -> list[Row]:
+    """Run all parts, write histories and figures, and return the table."""
+    return in_parts(PARTS, _draw, folder, progress)
+
+
+def terminal_velocities(curves: Curves) -> list[Row]:
+    """One sphere in cells of 2 to 10 diameters, at several positions in the cell: its terminal velocity."""
+    rows = []
+    with_own, without = [], []
+    for reynolds in REYNOLDS:
+        falls = [settling.fall(reynolds, cell, place=place) for cell in CELLS for place in PLACES]
+        limit = 0.05 if reynolds < 0.1 else 0.02
+        points = [(each.cell, each.velocity, 1.0) for each in falls]
+        rows.append(worst(f"one sphere, Re {reynolds:g}: terminal velocity over that of the drag law", points, limit))
+        with_own.append(max((each.velocity for each in falls), key=lambda v: abs(v - 1.0)))
+        without.append(settling.fall(reynolds, 4.0, self_disturbance=False).velocity)
+        rows.append(
+            Row(f"one sphere, Re {reynolds:g}: without self-disturbance correction", without[-1], 1.0, note="cell 4 d")
+        )
+    curves["terminal"] = {
+        "reynolds": (np.array(REYNOLDS), "-"),
+        "velocity": (np.array(with_own), "-"),
+        "uncorrected": (np.array(without), "-"),
+    }
+    return rows
+
+
+def released(curves: Curves) -> list[Row]:
+    """Spheres released in a liquid, against the equation of motion of their drag law and experiments."""
+    rows = []
+    bead, measured = settling.mordant(), numbers("mordant2000_glass_0p5mm")
+    cases = [("Mordant", bead, settling.unbounded(bead, "brown_lawler"), measured["U_terminal"][0])]
+    spheres = reference("tencate2002_cases")
+    for row in (0, 2):
+        density, viscosity, endless, fastest = (
+            float(spheres[name][row]) for name in ("rho_f [kg/m3]", "mu_f [Pa s]", "u_inf [m/s]", "u_max [m/s]")
+        )
+        case = settling.ten_cate(density, viscosity)
+        cases.append((f"ten Cate {spheres['case'][row]}", case, endless, fastest))
+    for name, case, endless, experiment in cases:
+        times, speeds = settling.release(case)
+        exact = settling.equation_of_motion(case, times)
+        curves[f"release/{name.replace(' ', '_')}"] = {
+            "time": (times, "s"), "speed": (speeds, "m/s"), "equation": (exact, "m/s"),
+        }  # fmt: skip
+        gap = float(np.abs(speeds - exact).max()) / exact[-1]
+        rows.append(Row(f"{name}: largest deviation from the equation of motion, over the final speed", gap, 0.0, 0.01))
+        rows.append(Row(f"{name}: terminal velocity over u_inf", speeds[-1] / endless, 1.0, 0.02))
+        note = "no history force, no walls"
+        rows.append(Row(f"{name}: largest speed over measured", float(speeds.max()) / experiment, 1.0, note=note))
+        if name == "Mordant":
+            late = times[np.argmax(speeds >= 0.95 * speeds[-1])]
+            rows.append(Row("Mordant: 95 % time over measured", late / measured["tau95"][0], 1.0, note=note))
+    return rows
+
+
+def dem06(curves: Curves) -> list[Row]:
+    """MFIX DEM06: a particle in a steady gas stream at fixed velocity."""
+    times, velocity, exact = settling.in_held_gas()
+    curves["dem06"] = {"time": (times, "s"), "velocity": (velocity, "m/s"), "exact": (exact, "m/s")}
+    return [Row("DEM06: velocity at 0.35 s over the exact one", velocity[-1] / exact[-1], 1.0, 1e-3)]
+
+
+def packed(curves: Curves) -> list[Row]:
+    """Packed beds over four decades of Re, and the Ergun test of a coupled code."""
+    rows = []
+    for drag in ("ergun", "wen_yu", "di_felice"):
+        case = packed_bed.case(**{"laws.drag": drag})
+        drops = [packed_bed.flow_through(case, velocity) for velocity in np.geomspace(1.5e-3, 15.0, 5)]
+        points = [(each.reynolds, each.measured / each.formula, 1.0) for each in drops]
+        rows.append(worst(f"packed bed, {drag}, Re 0.01 to 100: pressure drop over the formula", points, 0.01))
+    listed = numbers("cfdem_ergun_test_dp")
+    points = []
+    for velocity, expected in list(zip(listed["U_superficial"], listed["dp_ergun"]))[::3]:
+        drop = packed_bed.flow_through(packed_bed.case(), float(velocity), slab=(0.0, 1.0))
+        points.append((velocity, drop.measured * 0.0156 / expected, 1.0))
+    rows.append(worst("Ergun test of a coupled code: pressure drop", points, 0.02))
+    return rows
+
+
+def conserved(curves: Curves) -> list[Row]:
+    """A stirred periodic box over 1000 fluid steps."""
+    simulation = Simulation(STIRRED)
+    particles, fluid = simulation.particles, simulation.fluid
+    assert fluid is not None
+    particles.velocity[:] = np.random.default_rng(7).normal(0.0, 0.02, particles.velocity.shape) + 0.01
+    simulation.particle_solver.refresh()
+    scale = float((particles.mass * np.linalg.norm(particles.velocity, axis=1)).sum())
+    drift = []
+    start = (particles.mass[:, None] * particles.velocity).sum(axis=0) + fluid.momentum()
+    volume = float((4.0 / 3.0 * math.pi * particles.radius**3).sum())
+    for _ in range(1000):
+        simulation.step()
+        particles = simulation.particles
+        now = (particles.mass[:, None] * particles.velocity).sum(axis=0) + fluid.momentum()
+        drift.append(float(np.abs(now - start).max()) / scale)
+    curves["momentum"] = {"drift": (np.array(drift), "-")}
+    solids = float((1.0 - fluid.voidage).sum()) * fluid.grid.cell_volume / volume
+    return [
+        Row("periodic box, 1000 steps: change of momentum over sum of m|v|", max(drift), 0.0, 1e-10),
+        Row("periodic box: deposited volume over that of the particles", solids, 1.0, 1e-12),
+    ]
+
+
+def liquid_beds(curves: Curves) -> list[Row]:
+    """Beads of alumina and of alginate fluidised by water."""
+    rows = []
+    for material, study in liquid_bed.STUDIES.items():
+        beds = [liquid_bed.fluidise(study, velocity) for velocity in study.velocities]
+        for bed in beds:
+            name = f"{material} in water, {bed.velocity:g} m/s"
+            rows.append(Row(f"{name}: pressure drop over buoyant weight", bed.drop_over_weight, 1.0, 0.01))
+            rows.append(Row(f"{name}: voidage against mean of published laws", bed.voidage, bed.expected, 0.03))
+            rows.append(Row(f"{name}: voidage against the drag law's own balance", bed.voidage, bed.balance))
+        exponent = liquid_bed.exponent(beds) / beds[0].exponent
+        rows.append(Row(f"{material} in water: exponent over that of Richardson-Zaki", exponent, 1.0, 0.1))
+        curves[f"liquid_bed/{material}"] = {
+            "velocity": (np.array([bed.velocity for bed in beds]), "m/s"),
+            "voidage": (np.array([bed.voidage for bed in beds]), "-"),
+            "expected": (np.array([bed.expected for bed in beds]), "-"),
+        }
+    return rows
+
+
+STIRRED = Case.from_text(
+    "",
+    overrides={
+        "fluid": {"density": 1000.0, "viscosity": 1e-3},
+        "material.sand": {"density": 2500.0, "youngs_modulus": 1e6, "poisson": 0.25, "friction": 0.3},
+        "column": {"width": 0.01, "height": 0.02, "cell": 0.0025, "sides": "periodic", "ends": "periodic"},
+        "bed": {"diameter": 1e-3, "count": 1200, "start": "suspended"},
+        "laws": {"gravity": (0.0, 0.0, 0.0)},
+        "run": {"until": 1.0, "reference_speed": 0.1, "fluid_step": 1e-4},
+    },
+)
+
+PARTS = (terminal_velocities, released, dem06, packed, conserved, liquid_beds)
+
+
+def _draw(folder: Path, curves: Curves) -> None:
+    """Terminal velocities with and without self-disturbance correction; a release; bed expansion."""
+    figure, axes = panels(3, width=13.0)
+    terminal = curves["terminal"]
+    axes[0].semilogx(
+        terminal["reynolds"][0],
+        terminal["uncorrected"][0],
+        "o-",
+        color=GREY,
+        label="without self-disturbance correction",
+    )
+    axes[0].semilogx(terminal["reynolds"][0], terminal["velocity"][0], "o-", color=BLUE, label="taken out, worst")
+    axes[0].axhline(1.0, color="black", linewidth=0.5)
+    label(axes[0], "Reynolds number", "-", "terminal velocity over that of the drag law", "-")
+    legend(axes[0])
+    fall = curves["release/Mordant"]
+    axes[1].plot(fall["time"][0], fall["speed"][0], color=BLUE, label="run")
+    axes[1].plot(fall["time"][0], fall["equation"][0], ":", color=ORANGE, label="equation of motion")
+    label(axes[1], "time", "s", "speed of fall", "m/s")
+    legend(axes[1])
+    for material, colour in (("alumina", BLUE), ("alginate", ORANGE)):
+        beds = curves[f"liquid_bed/{material}"]
+        axes[2].loglog(beds["voidage"][0], beds["velocity"][0], "o-", color=colour, label=material)
+        axes[2].loglog(beds["expected"][0], beds["velocity"][0], ":", color=colour, label="mean of published laws")
+    label(axes[2], "voidage", "-", "superficial velocity", "m/s")
+    legend(axes[2])
+    save(figure, folder / "coupling.png")

@@ -1,0 +1,1 @@
+"""Resolved reference: free spheres in a periodic box, with the flow around each sphere resolved."""

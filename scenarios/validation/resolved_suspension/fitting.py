@@ -1,0 +1,130 @@
+r"""Free numbers of the agitation closure, fitted to the measured force on resolved spheres.
+
+The closure writes the fluctuating force on a particle as
+
+.. math:: F'' = a_d\,b\,u'' + a_i\,c\,\frac{du''}{dt},\qquad c = \frac{m\,(1+C)\,m_f}{m + C\,m_f},
+
+b the drag coefficient and :math:`u''` the fluctuation of the fluid velocity that the particle sees, with variance R and
+the autocorrelation of a process of two times, :math:`\tau` and :math:`s\tau`,
+
+.. math:: \rho(t) = \frac{e^{-|t|/\tau} - s\,e^{-|t|/(s\tau)}}{1-s} .
+
+The autocovariance of F'' averaged over a window follows without simulation, and :math:`a_d`, :math:`a_i` and
+:math:`\tau` are fitted to it by least squares. The drag on a particle's own fluctuation v' must first be added to the
+measured force: F'' = F' + b v'.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+SMOOTHING = 0.2
+"""Second time of the process over the first, s."""
+
+
+class Fit(NamedTuple):
+    """Free numbers of the closure."""
+
+    drag: float  # a_d
+    inertia: float  # a_i
+    time: float  # tau, in the unit of the lags
+    residual: float  # root mean square of what is left, over the variance
+
+
+def seen_fluctuation(solid_fraction: float, reynolds: float) -> tuple[float, float]:
+    """Variance of the fluid velocity that particles see, along and across, over w^2 (Mehrabadi et al. 2015).
+
+    >>> [round(each, 3) for each in seen_fluctuation(0.36, 45.0)]
+    [0.477, 0.132]
+    """
+    phi, re = solid_fraction, reynolds
+    energy = 0.5 * (2.0 * phi + 2.5 * phi * (1.0 - phi) ** 3 * math.exp(-phi * math.sqrt(re)))
+    along = 0.523 / (1.0 + 0.305 * math.exp(-0.114 * re))
+    along *= math.exp(-3.511 * phi / (1.0 + 1.801 * math.exp(-0.005 * re)))
+    return 2.0 * energy * (along + 1.0 / 3.0), 2.0 * energy * (1.0 / 3.0 - 0.5 * along)
+
+
+def inertia_coefficient(mass: float, displaced: float, solid_fraction: float) -> float:
+    """Coefficient c of the fluid's acceleration, with Zuber's added mass."""
+    added = (1.0 + 2.0 * solid_fraction) / (2.0 * (1.0 - solid_fraction))
+    return mass * (1.0 + added) * displaced / (mass + added * displaced)
+
+
+def autocovariance(
+    lags: np.ndarray, window: float, drag: float, inertia: float, time: float, smoothing: float = SMOOTHING
+) -> np.ndarray:
+    """Autocovariance of the force averaged over a window, for a seen velocity of unit variance.
+
+    drag, inertia  a_d b and a_i c
+    """
+    times = np.array([time, smoothing * time])
+    shares = np.array([1.0, -smoothing]) / (1.0 - smoothing)
+
+    def twice_integrated(t: np.ndarray) -> np.ndarray:
+        t = np.abs(np.asarray(t, float))[:, None]
+        decay = np.exp(-t / times)
+        velocity = (shares * (times**2 * decay + times * t)).sum(axis=1)
+        acceleration = -(shares * decay).sum(axis=1)  # of minus the second derivative of the velocity's
+        return np.asarray(drag**2 * velocity + inertia**2 * acceleration)
+
+    ends = twice_integrated(lags + window) + twice_integrated(lags - window)
+    return (ends - 2.0 * twice_integrated(lags)) / window**2
+
+
+def fit(
+    lags: np.ndarray,
+    covariances: Sequence[np.ndarray],
+    variances: Sequence[float],
+    window: float,
+    drag: float,
+    inertia: float,
+    smoothing: float = SMOOTHING,
+) -> Fit:
+    """Fit a_d, a_i and tau to the autocovariance of the force in several directions at once.
+
+    lags        of the covariances
+    covariances of the force averaged over the window, for each direction
+    variances   R of the seen velocity, for each direction
+    drag        b
+    inertia     c
+    """
+    scale = max(float(each[0]) for each in covariances)
+
+    def model(numbers: np.ndarray, variance: float) -> np.ndarray:
+        a_d, a_i, time = np.exp(numbers)
+        return variance * autocovariance(lags, window, a_d * drag, a_i * inertia, time, smoothing)
+
+    def missed(numbers: np.ndarray) -> np.ndarray:
+        parts = [model(numbers, r) - measured for r, measured in zip(variances, covariances)]
+        return np.concatenate(parts) / scale
+
+    starts = (np.array([0.0, -1.0, math.log(time)]) for time in (0.1, 0.3, 1.0, 3.0))
+    best = min((least_squares(missed, start) for start in starts), key=lambda found: float(found.cost))
+    a_d, a_i, time = np.exp(best.x)
+    return Fit(float(a_d), float(a_i) if inertia else 0.0, float(time), float(np.sqrt(np.mean(best.fun**2))))
+
+
+def fit_row(
+    row: dict[str, Any],
+    ways: Sequence[str] = ("along", "across"),
+    *,
+    inertial: bool = True,
+    smoothing: float = SMOOTHING,
+) -> Fit:
+    """Fit the numbers to a run of the matrix; the time is in d/w.
+
+    With speeds over w, times over d/w and forces over the mean drag, b is 1.
+
+    ways      directions that are fitted at once
+    inertial  fit a_i too, else the force is that of the drag part alone
+    """
+    covariances = [np.array(row[f"seen_covariance_{way}"]) for way in ways]
+    lags = np.array(row["lag"])[: len(covariances[0])]
+    along, across = seen_fluctuation(row["solid_fraction"], row["reynolds"])
+    variances = [along if way == "along" else across for way in ways]
+    return fit(lags, covariances, variances, row["window"], 1.0, row["inertia"] if inertial else 0.0, smoothing)

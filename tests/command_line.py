@@ -1,0 +1,57 @@
+"""Runs `cfddem` commands for tests: in this process, or in a new one."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from cfddem.cli.app import app, main
+
+HOME = Path(__file__).parents[1]
+WIDTH = 100
+
+
+class Done(NamedTuple):
+    """Exit code and output of a command."""
+
+    code: int
+    out: str
+    err: str
+
+
+def call(*words: str) -> Done:
+    """Run a command in this process, in a terminal of 100 columns."""
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(sys, "argv", ["cfddem", *words])
+        patch.setenv("COLUMNS", str(WIDTH))
+        try:
+            main()
+        except SystemExit as end:
+            code = int(end.code or 0)
+    return Done(code, out.getvalue(), err.getvalue())
+
+
+def cfddem(*words: str, folder: Path | None = None, seconds: float = 120) -> subprocess.CompletedProcess[str]:
+    """Run a command in a process of its own, in a terminal of 100 columns."""
+    environment = os.environ | {"COLUMNS": str(WIDTH), "NUMBA_NUM_THREADS": "1", "PYTHONPATH": str(HOME)}
+    return subprocess.run(
+        [sys.executable, "-m", "cfddem", *words],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=seconds,
+    )
+
+
+def commands() -> list[str]:
+    """Names of all commands."""
+    return sorted(name for name in app if not name.startswith("-"))

@@ -1,0 +1,85 @@
+"""Documentation of laws on the command line, checks of the machine, and how the package can be started."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from command_line import HOME, WIDTH, call, cfddem, commands
+
+from cfddem.cli.app import app
+
+
+def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None:
+    from cfddem.cli import law_page as pages
+
+    every = [law for kind in pages.laws().values() for law in kind.values()]
+    assert len(every) > 60
+    listed = call("explain").out
+    assert "for voidage 0.4 to 1, reynolds 0 to 1000\n" in listed
+    for law in every:
+        text = "\n".join(pages.page(law))
+        assert f"  {law.name}" in listed
+        assert max(map(len, text.splitlines())) <= WIDTH
+        assert not re.search(r"\\|\bfrac|varepsilon|:func:|``", text), text
+        assert " ".join(law.reference.split()[:2]) in text
+    done = call("explain", "di_felice", "--plot", str(tmp_path / "law.png"))
+    assert "fitted for voidage from 0.4 to 1" in done.out
+    assert (tmp_path / "law.png").stat().st_size > 10_000
+    assert json.loads(call("explain", "wen-yu", "--json").out)["kind"] == "drag"
+    both = call("explain", "stokes")
+    assert both.code == 2 and "drag.stokes or " in both.err and call("explain", "drag.stokes").code == 0
+    unknown = call("explain", "di_felic")
+    assert unknown.code == 2 and "di_felice" in unknown.err
+
+
+def test_the_doctor_lists_versions_and_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    answers = {each["name"]: each for each in json.loads(call("doctor", "--quick", "--json").out)}
+    assert {"cfddem", "python", "packages", "threads", "compiled loops", "folder"} <= set(answers)
+    assert "numba" in answers["packages"]["text"]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_test_run_of_the_doctor_balances() -> None:
+    from cfddem.cli.doctor import _test_run
+
+    answer = _test_run()
+    assert answer.ok, answer.text
+
+
+def test_piped_output_is_plain_text() -> None:
+    for words in (["--help"], ["check", "liquid-bed"], ["explain"]):
+        done = cfddem(*words)
+        assert done.returncode == 0
+        assert "\x1b" not in done.stdout + done.stderr
+        assert max(map(len, done.stdout.splitlines())) <= WIDTH
+
+
+def test_completion_can_be_installed(tmp_path: Path) -> None:
+    script = app.generate_completion(shell="bash")
+    assert all(name in script for name in commands())
+
+
+def test_python_code_in_the_readme_runs() -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(), re.DOTALL)
+    assert blocks
+    for block in blocks:
+        done = subprocess.run(
+            [sys.executable, "-c", block],
+            env=os.environ | {"PYTHONPATH": str(HOME), "NUMBA_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_package_runs_as_a_module() -> None:
+    done = subprocess.run([sys.executable, "-m", "cfddem", "explain", "wen-yu"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("wen_yu, drag")

@@ -1,0 +1,45 @@
+"""Golden runs: final states agree with stored arrays to 1e-9."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from golden_runs import FOLDER, RUNS
+
+WITHIN = 1e-9
+"""Largest difference, over the largest value of the array."""
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_run_ends_as_it_did(name: str) -> None:
+    """Every array agrees within 1e-9 of its largest value; integers exactly."""
+    state = RUNS[name]()
+    with np.load(FOLDER / f"{name}.npz") as stored:
+        assert sorted(state) == sorted(stored.files)
+        wrong = [said for array in sorted(state) if (said := _difference(array, state[array], stored[array]))]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_stored_state_has_its_run() -> None:
+    """Each stored file belongs to a run."""
+    assert {path.stem for path in FOLDER.glob("*.npz")} == set(RUNS)
+
+
+def _difference(name: str, now: np.ndarray, then: np.ndarray) -> str:
+    """The difference in one line; empty if there is none."""
+    if now.shape != then.shape or now.dtype.kind != then.dtype.kind:
+        return f"{name}: {now.dtype}{now.shape}, was {then.dtype}{then.shape}"
+    if now.dtype.kind != "f":
+        return "" if np.array_equal(now, then) else f"{name}: {int((now != then).sum())} values are others"
+    finite = np.isfinite(then)
+    if not np.array_equal(now[~finite], then[~finite], equal_nan=True) or not np.isfinite(now[finite]).all():
+        return f"{name}: other values are infinite or no numbers"
+    scale = float(np.abs(then[finite]).max(initial=0.0))
+    off = float(np.abs(now[finite] - then[finite]).max(initial=0.0))
+    return "" if off <= WITHIN * scale else f"{name}: off by {off:.3g} where the largest is {scale:.3g}"

@@ -1,0 +1,266 @@
+"""The pre-run check: its numbers equal those of the laws, and each faulty case gets its error or warning."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from example_case import TEXT
+
+from cfddem.case.gallery import gallery
+from cfddem.case.schema import Case
+from cfddem.preflight.summary import Preflight, PreflightError, preflight, refuse_errors
+from closures import bed, numbers
+
+GALLERY = {name: Case.from_toml(path) for name, path in gallery().items()}
+
+
+def made(**given: Any) -> Preflight:
+    return preflight(
+        Case.from_text(TEXT, "bed.toml", {name.replace("__", "."): value for name, value in given.items()})
+    )
+
+
+def number(of: Preflight, name: str) -> float:
+    return next(row.value for row in of.rows if row.name == name)
+
+
+@pytest.mark.parametrize("name", GALLERY)
+def test_no_gallery_case_has_errors(name: str) -> None:
+    assert preflight(GALLERY[name]).status in ("ok", "warning"), preflight(GALLERY[name]).issue_lines()
+
+
+def test_a_gallery_case_with_a_warning_explains_it() -> None:
+    for name in ("liquid-bed", "packed-bed", "sedimentation", "segregation"):
+        assert preflight(GALLERY[name]).status == "ok", preflight(GALLERY[name]).issue_lines()
+    for name in ("settling", "lubrication-study"):
+        assert [each.key for each in preflight(GALLERY[name]).issues] in (
+            ["material.glass.contact_modulus"],
+            ["material.sphere.contact_modulus"],
+        )
+        assert "`cfddem check` warns" in gallery()[name].read_text()
+
+
+def test_a_fluid_without_viscosity_gets_no_profile_warning() -> None:
+    still = made(fluid__viscosity=0.0, laws__drag="none", laws__lubrication="none")
+    assert "fluid.viscosity" not in [each.key for each in still.issues]
+
+
+def test_a_sphere_larger_than_the_column_is_the_only_error() -> None:
+    assert [each.key for each in made(bed__diameter=3.087).issues] == ["bed.diameter"]
+
+
+def test_the_numbers_are_those_of_the_laws() -> None:
+    """Ferreira et al. (2023): alumina of 3.087 mm in water at 0.157 m/s."""
+    result = made()
+    assert result.status == "ok"
+    archimedes = numbers.archimedes(3.087e-3, 3585.9, 997.0, 8.354e-4, 9.81)
+    assert number(result, "Ar") == pytest.approx(archimedes, rel=1e-12)
+    assert number(result, "Re_p") == pytest.approx(997.0 * 0.157033 * 3.087e-3 / 8.354e-4, rel=1e-12)
+    terminal = bed.terminal_reynolds_brown_lawler(archimedes) * 8.354e-4 / (997.0 * 3.087e-3)
+    assert number(result, "u_t") == pytest.approx(terminal, rel=1e-9)
+    assert number(result, "u / u_t") == pytest.approx(0.157033 / terminal, rel=1e-9)
+    weight = 2000 * math.pi / 6 * 3.087e-3**3 * (3585.9 - 997.0) * 9.81 / 0.04**2
+    assert number(result, "pressure drop") == pytest.approx(weight, rel=1e-12)
+    voidage, height = number(result, "bed voidage"), number(result, "bed height")
+    assert height * (1.0 - voidage) * 0.04**2 == pytest.approx(2000 * math.pi / 6 * 3.087e-3**3, rel=1e-12)
+
+
+def test_minimum_fluidisation_with_ergun_drag_equals_the_ergun_correlation() -> None:
+    result = made(laws__drag="ergun")
+    reynolds = bed.fluidisation_reynolds_ergun(number(result, "Ar"), 0.42)
+    assert number(result, "u_mf") == pytest.approx(reynolds * 8.354e-4 / (997.0 * 3.087e-3), rel=1e-9)
+
+
+def test_a_gas_bed_that_bubbles_is_at_least_as_high_as_poured() -> None:
+    """Gas beds do not expand homogeneously; the balance of weight and drag would overestimate their height."""
+    result = made(fluid__density=1.2, fluid__viscosity=1.8e-5, bed__inlet_velocity=3.0, run__reference_speed=0.1)
+    assert number(result, "u_mf") < 3.0 < number(result, "u_t")
+    assert number(result, "bed voidage") == pytest.approx(0.42)
+    assert "bubbles" in next(row.note for row in result.rows if row.name == "bed height")
+
+
+def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None:
+    smooth = {"material__alumina__roughness": 1e-9, "run__reference_speed": 0.3}
+    soft, hard = made(**smooth), made(**smooth, material__alumina__contact_modulus=3e11)
+    assert number(soft, "minimum gap") == number(hard, "minimum gap") > 1e-9
+    assert number(soft, "minimum gap, softened") > 10.0 * number(soft, "minimum gap")
+    assert number(soft, "overlap / diameter") > 10.0 * number(hard, "overlap / diameter")
+    assert number(soft, "overlap / diameter, real") == pytest.approx(number(hard, "overlap / diameter"), rel=1e-12)
+    assert number(soft, "particle step") > 10.0 * number(hard, "particle step")
+
+
+@pytest.mark.parametrize(
+    ("given", "status", "key", "said"),
+    [
+        ({"laws.kernel_width": 0.0, "column.cell": 0.002}, "error", "column.cell", "at least 2"),
+        ({"laws.kernel_width": 0.0, "column.cell": 0.004}, "warning", "column.cell", "at least 2"),
+        ({"column.cell": 0.003}, "error", "column.cell", "0.00307692 m fits 13 times"),
+        ({"column.cell": 0.00025}, "warning", "column.cell", "of the kernel width"),
+        ({"column.cell": 0.0005}, "warning", "column.cell", "of the kernel width"),
+        ({"fluid.density": 0.997}, "warning", "fluid.density", "that of a gas"),
+        ({"fluid.viscosity": 8.4e-7}, "warning", "fluid.viscosity", "give the dynamic viscosity"),
+        (
+            {"fluid.viscosity_profile": [[0.0, 1e-3], [0.04, 5e-3]]},
+            "warning",
+            "fluid.viscosity",
+            "viscosity_profile is 0.001 to 0.005 Pa s in the bed",
+        ),
+        ({"material.alumina.density": 3.5859}, "warning", "material.alumina.density", "are in kg/m3"),
+        (
+            {"material.alumina.youngs_modulus": 300.0, "material.alumina.contact_modulus": 300.0},
+            "warning",
+            "material.alumina.youngs_modulus",
+            "moduli are in Pa",
+        ),
+        ({"run.until": 1e8}, "error", "run.until", "days on one core"),
+        ({"bed.count": 12_000}, "error", "bed.count", "voidage 0.28 is below the limit 0.36 of a random close packing"),
+        ({"bed.count": 9_900}, "error", "bed.count", "above the lid at 0.16 m"),
+        (
+            {"bed.start": "suspended", "bed.count": 9_000},
+            "error",
+            "bed.count",
+            "above the limit 0.49 of a suspended start",
+        ),
+        ({"bed.diameter": 0.05}, "error", "bed.diameter", "larger than the smallest edge of the column, 0.04 m"),
+        ({"bed.inlet_velocity": 0.6}, "error", "bed.inlet_velocity", "above the terminal velocity 0.505 m/s"),
+        ({"bed.inlet_velocity": [[0, 0.1], [1, 0.6]]}, "warning", "bed.inlet_velocity", "above the terminal velocity"),
+        ({"bed.inlet_velocity": 0.03}, "warning", "bed.inlet_velocity", "below minimum fluidisation, 0.0533 m/s"),
+        ({"bed.inlet_velocity": 0.4}, "error", "column.height", "the lid is at 0.16 m"),
+        ({"column.ends": "closed"}, "warning", "bed.inlet_velocity", "unused"),
+        (
+            {"run.particle_step": 1e-3},
+            "error",
+            "run.particle_step",
+            "above the stability limit 0.000143 s of the impact criterion",
+        ),
+        ({"run.particle_step": 5e-5}, "warning", "run.particle_step", "2 % of the Hertz time"),
+        ({"material.alumina.contact_modulus": 1e4}, "error", "material.alumina.contact_modulus", "the limit is 2 %"),
+        (
+            {"material.alumina.contact_modulus": 5e5},
+            "warning",
+            "material.alumina.contact_modulus",
+            "the limit is 2 %",
+        ),
+        ({"laws.contact": "linear"}, "error", "laws.normal_stiffness", "pass through each other"),
+        (
+            {"laws.drag": "ergun", "bed.inlet_velocity": 0.3, "column.height": 0.32},
+            "warning",
+            "laws.drag",
+            "was fitted to",
+        ),
+        ({"fluid.viscosity": 0.0}, "error", "fluid.viscosity", "drag laws need a viscosity above 0"),
+        ({"laws.gravity": [0, 0, 9.81]}, "error", "laws.gravity", "is not negative"),
+        ({"column.width": 40.0, "column.cell": 0.16, "bed.count": 1_000_000_000}, "error", "bed.count", "GB of memory"),
+        ({"run.until": 1e5}, "warning", "run.until", "days on one core"),
+        ({"run.average_from": 5.0}, "warning", "run.average_from", "not before the end"),
+        ({"bed.diameter": 1e-200}, "error", "case", "SI units"),
+        ({"laws.cohesion": "jkr"}, "error", "laws.cohesion", "but films form"),
+        (
+            {"laws.rolling_resistance": "spring_dashpot"},
+            "warning",
+            "laws.rolling_resistance",
+            "set material.NAME.rolling_friction",
+        ),
+        (
+            {"material.alumina.surface_energy": 0.01},
+            "warning",
+            "material.alumina.surface_energy",
+            'laws.cohesion is "none"',
+        ),
+    ],
+    ids=str,
+)
+def test_each_fault_gets_its_error_or_warning(given: dict[str, Any], status: str, key: str, said: str) -> None:
+    result = preflight(Case.from_text(TEXT, "bed.toml", given))
+    found = [each for each in result.issues if each.key == key and said in each.reason + each.remedy]
+    assert [each.severity for each in found] == [status], result.issue_lines()
+    assert result.status == "error" or status == "warning"
+    assert found[0].remedy
+
+
+@pytest.mark.parametrize(
+    ("positions", "said"),
+    [
+        ([[0.02, 0.02, 0.01], [0.02, 0.05, 0.01]], "bed.positions.1: [0.02, 0.05, 0.01] lies outside the column"),
+        (
+            [[0.02, 0.02, 0.01], [0.02, 0.02, 0.012]],
+            "particles 0 and 1 overlap by 35.2 % of their diameter; the limit is 2 %",
+        ),
+    ],
+    ids=["outside", "overlap"],
+)
+def test_wrong_positions_are_reported(positions: list[list[float]], said: str) -> None:
+    case = Case.from_text(TEXT.replace("count = 2000\n", ""), "bed.toml", {"bed.positions": positions})
+    assert said in " ".join(preflight(case).issue_lines())
+    assert preflight(case).status == "error"
+
+
+def test_a_dry_case_is_checked() -> None:
+    text = TEXT.replace("[fluid] ", "[no]").replace("density = 997.0", "").replace("viscosity = 8.354e-4", "")
+    result = preflight(Case.from_text(text.replace("[no]", "#")))
+    assert result.status == "ok", result.issue_lines()
+    assert number(result, "bed height") > 0.03
+
+
+def test_a_case_with_errors_is_refused_with_all_of_them() -> None:
+    case = Case.from_text(TEXT, "bed.toml", {"run.particle_step": 1e-3, "bed.inlet_velocity": 0.6, "bed.count": 12_000})
+    with pytest.raises(PreflightError) as refusal:
+        refuse_errors(case)
+    assert refusal.value.exit_code == 2
+    assert {line.split(":")[0] for line in str(refusal.value).splitlines()} >= {
+        "run.particle_step",
+        "bed.inlet_velocity",
+        "bed.count",
+    }
+
+
+def test_the_estimated_steps_are_those_of_the_run() -> None:
+    """The estimate uses the case alone; the run uses its particles."""
+    from cfddem.run.simulation import Simulation
+
+    given = {"bed.count": 30, "bed.start": "suspended", "column.height": 0.04}
+    case = Case.from_text(TEXT, "bed.toml", given)
+    simulation = Simulation(case)
+    assert number(preflight(case), "particle step") == pytest.approx(simulation.time_steps.particle_step, rel=1e-12)
+    fluid, _ = simulation.time_steps.choose(math.inf, 0)
+    assert number(preflight(case), "fluid step") == pytest.approx(fluid, rel=1e-12)
+
+
+def test_the_estimated_viscous_criterion_is_that_of_the_fluid() -> None:
+    from cfddem.run.simulation import Simulation
+
+    given = {"bed.count": 30, "bed.start": "suspended", "fluid.viscosity": 50.0, "column.height": 0.04}
+    case = Case.from_text(TEXT, "bed.toml", given)
+    simulation = Simulation(case)
+    fluid, _ = simulation.time_steps.choose(math.inf, 0)
+    assert simulation.limiting == "viscous"
+    # the run uses the voidage of neighbouring cells, which thirty spheres change by a few per cent
+    assert 0.95 < fluid / number(preflight(case), "viscous criterion") <= 1.0
+
+
+def test_the_check_takes_less_than_three_seconds_and_compiles_nothing() -> None:
+    code = """
+import json, sys, time
+begun = time.process_time()
+from cfddem.preflight.summary import preflight
+from cfddem.case.schema import Case
+from cfddem.case.gallery import gallery
+made = preflight(Case.from_toml(gallery()["packed-bed"]))
+print(json.dumps([made.status, time.process_time() - begun, "numba" in sys.modules, "vtkmodules" in sys.modules]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    status, seconds, compiler, pictures = json.loads(done.stdout)
+    assert (status, compiler, pictures) == ("ok", False, False)
+    assert seconds < 3.0
+
+
+def test_json_holds_the_whole_result() -> None:
+    summary = json.loads(json.dumps(made(bed__inlet_velocity=0.6).summary(), allow_nan=False))
+    assert summary["status"] == "error"
+    assert summary["issues"][0]["key"] == "bed.inlet_velocity"
+    assert summary["numbers"]["particles and flow"]["u_t"]["unit"] == "m/s"

@@ -1,0 +1,63 @@
+"""The progress of a run: the status line, the log file, and the live line."""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from numba import njit
+from rich.progress import Progress
+
+from cfddem.backend.compile import announce_compilation
+from cfddem.backend.errors import InputError
+from cfddem.run.progress import ProgressLine, Status, live_line
+
+
+def status(time: float, remaining: float = 3725.0) -> Status:
+    row = {"time": time, "bed_height": 0.0456, "largest_speed": 0.123, "contact_count": 789.0}
+    return Status(time, 2.0, remaining, "collision", 12345, row)
+
+
+def test_progress_shows_time_remaining_wall_time_and_measures() -> None:
+    expected = "0.5/2 s  1:02:05 left  limit: collision  12345 steps  bed 45.6 mm  0.12 m/s  789 contacts"
+    assert str(status(0.5)) == expected
+    assert "  - left  " in str(status(0.5, math.nan))
+
+
+def test_the_log_gets_one_line_per_row_and_a_pipe_gets_none(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for time in (0.25, 0.5):  # a second run appends to the same file
+        with live_line(tmp_path / "log.txt") as line:
+            line.progress("pouring 10 particles")
+            for _ in range(3):  # repeated between two rows
+                line.update(status(time))
+            logging.getLogger("cfddem").warning("a checkpoint is damaged")
+    rows = (tmp_path / "log.txt").read_text().splitlines()
+    assert [row[21:28] for row in rows] == ["pouring", "0.25/2 ", "a check", "pouring", "0.5/2 s", "a check"]
+    assert capfd.readouterr().err == 2 * "a checkpoint is damaged\n"
+    with pytest.raises(InputError, match=r"log = .*: must be a writable file"), live_line(tmp_path):
+        pass
+
+
+def test_the_live_line_shows_preparation_and_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
+    bar = Progress(disable=True)
+    line, seen = ProgressLine(bar), []
+
+    def compiling(what: str) -> None:
+        line.compiling(what)
+        seen.append((bar.tasks[0].description, bar.tasks[0].fields["status"]))
+
+    line.progress("pouring 10 particles")
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+    announce_compilation(compiling)
+    try:
+        helper = njit(lambda x: 2.0 * x)
+        njit(lambda x: helper(x) + 1.0)(1.0)
+    finally:
+        announce_compilation()
+    (before, told), (after, nothing) = seen
+    assert before == after == "pouring 10 particles"
+    assert re.fullmatch(r"compiling loop \d+ \(kept for next time\) \.\.\.", told) and nothing == ""

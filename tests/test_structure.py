@@ -1,0 +1,231 @@
+"""The structure of the code: rooms, import directions, sizes of files and functions, words."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+HOME = Path(__file__).parents[1]
+
+ROOMS = (
+    "backend",
+    "data",
+    "particles",
+    "fluid",
+    "coupling",
+    "case",
+    "preflight",
+    "io",
+    "analysis",
+    "plotting",
+    "run",
+    "cli",
+)
+"""Folders of `cfddem`. A room imports rooms before it only; `particles` and `fluid` do not import each other."""
+
+LONGEST_FILE, MARGIN = 350, 10
+"""Lines of a Python file, and how many more are tolerated."""
+
+LONG_FILES = {
+    "cfddem/fluid/solver.py": 380,
+    "cfddem/particles/solver.py": 400,
+    "scenarios/validation/particles_checks.py": 385,
+    "tests/golden_runs.py": 1000,  # a list of runs
+    "tests/test_dry_contact.py": 390,
+}
+"""Longer files that are still to be divided, with the length that they must not exceed."""
+
+MOST_ARGUMENTS, LONGEST_FUNCTION = 8, 80
+"""Positional arguments and lines of a function outside compiled loops."""
+
+WIDE_FUNCTIONS = {
+    "scenarios/collisions/immersed_pair/study.py _setting",
+    "scenarios/collisions/three_spheres/study.py simulate_three_spheres",  # the options of its command
+    "scenarios/collisions/wet_pair/study.py collide_wet",  # the options of its command
+    "scenarios/validation/wet_checks.py cartesian",
+}
+"""Functions with more positional arguments, still to be changed unless a reason is given."""
+
+LONG_FUNCTIONS = {
+    "scenarios/collisions/wet_tumbler/study.py tumble",
+    "scenarios/collisions/wet_wall/checks.py independent",
+}
+"""Longer functions that are still to be divided."""
+
+COMPILED = ("serial", "threaded", "either", "part", "inline", "compiled", "njit", "jit", "overload")
+"""Names of decorators that compile a function."""
+
+LOOP_FILES = re.compile(r"(_loops|/integrate|/neighbours|/filling)\.py$")
+"""Files of functions that are compiled elsewhere, with a law set or when they are first called."""
+
+OLD_WORDS = re.compile(
+    r"own_wind|\bmoisten|\bsqueeze_out|never_faster|\bRedCard\b|\bgrains_of\b|"
+    r"\bFootprint\b|\bPlacement\b|swept_along|left_behind|under_way\b|\bshelf\b|\bnewcomers?\b|\brehears|"
+    r"\bamber\b|law of (?:one's|your|my) own|who is near whom|\bis told\b|hangs? on\b",
+    re.IGNORECASE,
+)
+"""Words that were replaced by the terms of the field."""
+
+OLD_WORDS_ALLOWED = {
+    "cfddem/case/renamed.py",  # lists renamed keys
+    "tests/test_case.py",
+    "tests/test_command_line.py",
+    "tests/test_structure.py",
+}
+
+
+@cache
+def modules() -> dict[str, Path]:
+    """Every module of the three packages and its file."""
+    found = {}
+    for package in ("closures", "cfddem", "scenarios"):
+        for path in sorted((HOME / package).rglob("*.py")):
+            name = ".".join(path.relative_to(HOME).with_suffix("").parts).removesuffix(".__init__")
+            found[name] = path
+    return found
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    """Syntax tree of a file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def run_time_nodes(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes below a node except blocks `if TYPE_CHECKING:`."""
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and isinstance(child.test, ast.Name) and child.test.id == "TYPE_CHECKING"):
+            yield child
+            yield from run_time_nodes(child)
+
+
+@cache
+def imports(name: str) -> frozenset[str]:
+    """Modules of the three packages that a module imports, also inside functions; not those for type checks only."""
+    found = set()
+    for node in run_time_nodes(tree(modules()[name])):
+        if isinstance(node, ast.Import):
+            found |= {each.name for each in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{each.name}" for each in node.names}
+            found |= {each if each in modules() else node.module for each in inner}
+    return frozenset(each for each in found if each in modules())
+
+
+def room(name: str) -> str:
+    """Room of a module of `cfddem`; empty for the package itself."""
+    return name.split(".")[1] if name.startswith("cfddem.") else ""
+
+
+def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
+    """Every function of `closures`, `cfddem` and `scenarios` that is not compiled, with its file."""
+    for path in modules().values():
+        file = str(path.relative_to(HOME))
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.FunctionDef):
+                nodes = [inner for each in node.decorator_list for inner in ast.walk(each)]
+                decorators = {each.id for each in nodes if isinstance(each, ast.Name)}
+                if not decorators & set(COMPILED) and not LOOP_FILES.search(file):
+                    yield file, node
+
+
+# ---------------------------------------------------------------- rooms and imports
+
+
+def test_the_top_level_holds_only_the_rooms() -> None:
+    found = {path.name for path in (HOME / "cfddem").iterdir() if path.name != "__pycache__"}
+    assert found - set(ROOMS) <= {"__init__.py", "__main__.py", "py.typed"}
+    assert set(ROOMS) <= found
+
+
+def test_no_import_runs_back_up() -> None:
+    order = {name: place for place, name in enumerate(ROOMS)}
+    wrong = []
+    for name in modules():
+        for other in imports(name):
+            here, there = room(name), room(other)
+            if here not in order or there not in order:
+                continue
+            if order[there] > order[here] or {here, there} == {"particles", "fluid"}:
+                wrong.append(f"{name} imports {other}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_closures_import_nothing_of_the_machine() -> None:
+    for name in modules():
+        if name.startswith("closures"):
+            assert not [each for each in imports(name) if not each.startswith("closures")], name
+
+
+def test_only_the_command_line_imports_scenarios() -> None:
+    for name in modules():
+        if name.startswith("cfddem") and room(name) != "cli":
+            assert not [each for each in imports(name) if each.startswith("scenarios")], name
+
+
+def test_no_circle_of_imports() -> None:
+    """Depth-first search over the imports of all modules."""
+    finished: set[str] = set()
+
+    def visit(name: str, path: tuple[str, ...]) -> None:
+        assert name not in path, " -> ".join([*path[path.index(name) :], name])
+        if name not in finished:
+            for other in sorted(imports(name)):
+                if other != name:
+                    visit(other, (*path, name))
+            finished.add(name)
+
+    for name in modules():
+        visit(name, ())
+
+
+# ---------------------------------------------------------------- sizes
+
+
+def test_no_file_is_too_long() -> None:
+    files = [*modules().values(), *(HOME / "tests").rglob("*.py")]
+    lengths = {str(path.relative_to(HOME)): len(path.read_text(encoding="utf-8").splitlines()) for path in files}
+    too_long = {file: n for file, n in lengths.items() if n > LONG_FILES.get(file, LONGEST_FILE + MARGIN)}
+    assert not too_long
+
+
+def test_no_function_has_too_many_positional_arguments() -> None:
+    many = []
+    for file, node in functions():
+        arguments = [each.arg for each in (*node.args.posonlyargs, *node.args.args) if each.arg not in ("self", "cls")]
+        if len(arguments) > MOST_ARGUMENTS and f"{file} {node.name}" not in WIDE_FUNCTIONS:
+            many.append(f"{file}:{node.lineno} {node.name}: {len(arguments)}")
+    assert not many, "\n".join(many)
+
+
+def test_no_function_is_too_long() -> None:
+    long = []
+    for file, node in functions():
+        length = (node.end_lineno or node.lineno) - node.lineno + 1
+        if length > LONGEST_FUNCTION and f"{file} {node.name}" not in LONG_FUNCTIONS:
+            long.append(f"{file}:{node.lineno} {node.name}: {length} lines")
+    assert not long, "\n".join(long)
+
+
+# ---------------------------------------------------------------- words
+
+
+def pages() -> list[Path]:
+    """Source files and pages, apart from recorded tables."""
+    folders = [HOME / each for each in ("cfddem", "closures", "scenarios", "tests", "docs")]
+    found = [path for each in folders for ending in ("*.py", "*.md", "*.toml") for path in each.rglob(ending)]
+    return [*found, HOME / "README.md"]
+
+
+def test_replaced_words_are_gone() -> None:
+    found = []
+    for path in pages():
+        file = str(path.relative_to(HOME))
+        if file not in OLD_WORDS_ALLOWED:
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+                if OLD_WORDS.search(line):
+                    found.append(f"{file}:{number}: {line.strip()}")
+    assert not found, "\n".join(found)
