@@ -75,7 +75,7 @@ def test_python_code_in_the_readme_runs() -> None:
             env=os.environ | {"PYTHONPATH": str(HOME), "NUMBA_NUM_THREADS": "1"},
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=300,
         )
         assert done.returncode == 0, done.stderr
 
