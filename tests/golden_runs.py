@@ -359,7 +359,7 @@ def linear_contact_film() -> State:
 
 @golden
 def own_minimum_gap_and_film() -> State:
-    """Laws of one's own in the place of those that are built in."""
+    """User-defined laws in place of the built-in ones."""
 
     def golden_gap(approach_speed: float, reduced_radius: float) -> float:
         return 1e-3 * reduced_radius * (1.0 + 10.0 * approach_speed)
