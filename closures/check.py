@@ -18,6 +18,8 @@ PLAUSIBLE: dict[str, tuple[float, float]] = {
     "voidage": (0.4, 1.0),
     "solid_fraction": (0.01, 0.6),
     "diameter_ratio": (0.5, 2.0),
+    "density_ratio": (1.0, 1e4),
+    "along": (0.0, 1.0),
     "restitution": (0.1, 1.0),
     "wall_ratio": (1e-3, 0.1),
     "viscosity": (1e-5, 1.0),
@@ -50,6 +52,7 @@ def check(law: Callable[..., float]) -> list[str]:
     minimum_gap  positive; not decreasing with viscosity, speed or roughness
     lubrication  not negative; not increasing with the gap; not decreasing with viscosity or radius; 1/3 to 3 times
                  Brenner's law near contact
+    agitation    not negative
     added_mass   1/2 for an isolated sphere; not decreasing with solid fraction
     restitution  between 0 and 1; not decreasing with the Stokes number
     lift         shear lift is zero without shear
@@ -298,6 +301,7 @@ REQUIREMENTS: dict[str, Callable[[Law], Iterator[str]]] = {
     "minimum_gap": _bounded_and_rising((5e-324, math.inf), ("viscosity", "approach_speed", "roughness")),
     "lubrication": _film,
     "restitution": _bounded_and_rising((0.0, 1.0), ("stokes",), takes=frozenset({"stokes", "restitution"})),
+    "agitation": _bounded_and_rising((0.0, math.inf), ()),
     "added_mass": _added_mass,
     "lift": _lift,
 }

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import signature
 from pathlib import Path
 from typing import TypeVar
 
@@ -28,6 +29,11 @@ class Law:
     reference: str
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     function: Callable[..., float] = field(repr=False, default=lambda: 0.0)
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Names of the arguments of the function."""
+        return tuple(signature(self.function).parameters)
 
     def outside(self, **arguments: float) -> list[str]:
         """Names of the arguments outside their fitted range."""

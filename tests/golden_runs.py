@@ -1,4 +1,4 @@
-"""Small runs of everything there is, and their final states: what a change of the code must leave as it was.
+"""Small runs of all features, and their final states: what a change of the code must not alter.
 
 `python -m tests.golden_runs hashes [RUN ...]` prints a hash of the bits of each run, for two versions on one machine;
 `python -m tests.golden_runs freeze [RUN ...]` writes the states to `tests/data/golden`, which `test_golden.py` compares
@@ -29,6 +29,7 @@ from cfddem.particles import feeding
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.interactions.bridge import Bridges
 from cfddem.particles.interactions.bridge_loops import CONSTANT, DAVIS, DEFORMING, EVEN, NASE, STATIC, BridgeLaws
+from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -347,13 +348,13 @@ def collision_sliding_wall() -> State:
 
 @golden
 def linear_contact() -> State:
-    laws = {"contact": "linear", "normal_stiffness": 1e5, "tangential_stiffness": 3e4}
+    laws = {"contact": LINEAR.with_parameters(normal_stiffness=1e5, tangential_stiffness=3e4)}
     return bounced(pair(1.03e-6, 0.1, 0.05, laws=laws))
 
 
 @golden
 def linear_contact_film() -> State:
-    laws = {"contact": "linear", "normal_stiffness": 1e5, "tangential_stiffness": 3e4}
+    laws = {"contact": LINEAR.with_parameters(normal_stiffness=1e5, tangential_stiffness=3e4)}
     return bounced(pair(1.03e-6, 0.1, 0.05, film=1e-3, laws=laws))
 
 
@@ -378,7 +379,7 @@ def own_minimum_gap_and_film() -> State:
 def swarm(
     count: int = 150, materials: Sequence[Material] = (BEAD,), solid: float = 0.5, speed: float = 0.3, **options: Any
 ) -> ParticleSolver:
-    """Unequal spheres close together in a box that move and spin every which way; a periodic box if none is given."""
+    """Unequal spheres close together that move and spin in all directions; in a periodic box if none is given."""
     draw = np.random.default_rng(1)
     size = RADIUS * draw.uniform(0.7, 1.3, count)
     places, box = random_packing(2.0 * size, solid, 1)
@@ -444,7 +445,7 @@ def cohesion() -> State:
     places = places + draw.uniform(-0.01, 0.01, places.shape) * size
     run = particles(
         places, size, [dust], velocity=draw.normal(0.0, 0.05, places.shape), walls=[Plane()],
-        laws={"cohesion": "jkr"}, check_steps=False,
+        laws={"contact": "jkr"}, check_steps=False,
     )  # fmt: skip
     return after(run, 60, 1e-7)
 
@@ -632,9 +633,15 @@ def feed_and_outlet() -> State:
     sizes = np.random.default_rng(5)
     corner, size = (0.0, 0.0, 0.02), (3e-3, 3e-3, 1e-3)
     feed = feeding.Feed(
-        1e5, corner, size, lambda n: sizes.uniform(0.7e-3, 1.2e-3, n), BEAD.density, velocity=(0.0, 0.0, -1.0), seed=1
+        1e5,
+        corner,
+        size,
+        lambda n, _: sizes.uniform(0.7e-3, 1.2e-3, n),
+        BEAD.density,
+        velocity=(0.0, 0.0, -1.0),
+        seed=1,
     )
-    outlet = feeding.Outlet(low=(-np.inf, -np.inf, 0.0195))
+    outlet = feeding.ParticleOutlet(low=(-np.inf, -np.inf, 0.0195))
     for _ in range(12):
         feed(run)
         run.advance(2e-6, 50)
@@ -842,7 +849,7 @@ def liquid_bed_counted() -> State:
 
 @golden
 def closed_box_in_layers() -> State:
-    """No way in or out, and a viscosity that changes with height."""
+    """A closed box and a viscosity that changes with height."""
     layers = [[0.0, 1e-3], [0.024, 5e-3]]
     return state_of(coupled(BEADS, column__ends="closed", bed__inlet_velocity=0.0, fluid__viscosity_profile=layers))
 

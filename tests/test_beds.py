@@ -29,8 +29,8 @@ from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_b
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.beds.spouted_bed import bed as spout
 from scenarios.beds.spouted_bed import profiles
-from scenarios.validation.beds import growing
-from scenarios.validation.refinement import Means, RefinementBed, compared, gas, liquid, variants
+from scenarios.validation.beds.refinement import Means, RefinementBed, compared, gas, liquid, variants
+from scenarios.validation.beds.study import growing
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_species_sink_on_the_side_of_the_published_threshold(velocity: float, ab
 @pytest.mark.slow
 def test_hindered_settling_follows_richardson_and_zaki() -> None:
     """Exponent within 10 % between solid fractions of 0.1 and 0.3, in water (Trans. Inst. Chem. Eng. 32, 35)."""
-    found = [in_periodic_box(share, way=20.0) for share in (0.1, 0.3)]
+    found = [in_periodic_box(share, distance=20.0) for share in (0.1, 0.3)]
     reynolds = 1000.0 * found[0].terminal * 5e-4 / 8.9e-4
     assert exponent(found)[0] == pytest.approx(exponent_richardson_zaki(reynolds, 0.0), rel=0.1)
 

@@ -84,6 +84,8 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
         ({"bed.diametr": 1e-3}, "must be one of diameter and 15 more (did you mean 'diameter'?)"),
         ({"laws.drag": "wenyu"}, "(did you mean 'wen_yu'?); cfddem explain lists all laws"),
         ({"laws.lubrication": "nijsen"}, "must be one of nijssen, none"),  # and laws that other tests have registered
+        ({"laws.added_mass": "zubr"}, "(did you mean 'zuber'?); cfddem explain lists all laws"),
+        ({"laws.added_mass": -0.5}, "laws.added_mass = -0.5: must be zero or positive, or the name of a law"),
         ({"column.viscosity": 1e-3}, "viscosity belongs to fluid"),
         ({"column.cell": [0.1, 0.2]}, "column.cell = [0.1, 0.2]: must be a number or a longer list"),
         ({"bed.inlet_velocity": [[1.0, 0.1], [0.5, 0.2]]}, "bed.inlet_velocity: must be a number, or [time, velocity]"),
@@ -124,7 +126,7 @@ def test_a_renamed_key_or_value_is_refused_in_one_line_with_the_new_one(old: str
 
 def test_every_renamed_key_leads_to_a_valid_one() -> None:
     for old, new in KEYS.items():
-        table, name = new.split(".")
+        table, name, *_ = new.split(".")
         section = sections_of(Case.model_fields[table])[0]
         assert name in section.model_fields and old.split(".")[1] not in section.model_fields
         with pytest.raises(InputError, match=f"must be written as {new}; the key has been renamed"):

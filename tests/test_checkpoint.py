@@ -132,7 +132,7 @@ def test_a_checkpoint_of_a_newer_format_is_refused_and_not_skipped(tmp_path, mon
     with monkeypatch.context() as later:
         later.setattr(checkpoint, "FORMAT", 9)
         write(tmp_path, state(1))
-    with pytest.raises(InputError, match=r"00000001\.h5: format = 9: must be 3; .*newer version"):
+    with pytest.raises(InputError, match=rf"00000001\.h5: format = 9: must be {checkpoint.FORMAT}; .*newer version"):
         newest(tmp_path)
 
 
@@ -140,7 +140,8 @@ def test_a_checkpoint_of_an_earlier_format_is_refused_with_a_remedy(tmp_path, mo
     with monkeypatch.context() as earlier:
         earlier.setattr(checkpoint, "FORMAT", 1)
         write(tmp_path, state(0))
-    with pytest.raises(InputError, match=r"format = 1: must be 3; .*earlier version; run .*case\.toml again"):
+    remedy = r"earlier version; run .*case\.toml again"
+    with pytest.raises(InputError, match=rf"format = 1: must be {checkpoint.FORMAT}; .*{remedy}"):
         newest(tmp_path)
 
 

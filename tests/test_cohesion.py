@@ -10,14 +10,17 @@ from impacts import Pair, kinetic_energy, normal_speed
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.particles.interactions.contact_law import contact_named
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.shapes import Plane
 from closures.cohesion import jkr_contact_radius, jkr_force, jkr_pull_off, jkr_sticking_speed, jkr_stretch
 
 DUST = Material(density=2500, youngs_modulus=1e8, poisson=0.3, restitution=1.0, surface_energy=0.02)
 RADIUS = 50e-6
-LAWS = Laws(cohesion="jkr")
+LAWS = Laws(contact="jkr")
 
 
 def scales(material: Material = DUST) -> tuple[float, float, float]:
@@ -109,7 +112,21 @@ def test_adhesive_pair_keeps_its_momentum() -> None:
     assert float(kinetic_energy(made).sum()) < energy
 
 
+def test_a_solid_without_surface_energy_touches_as_in_hertz_law() -> None:
+    """Dust on a wall that nothing adheres to: finite forces, equal to those of Hertz."""
+    smooth = Material(density=2500, youngs_modulus=1e8, poisson=0.3)
+    row, jkr, hertz = pair_table([DUST, smooth])[0, 1], contact_named("jkr"), contact_named("hertz")
+    assert row["work_of_adhesion"] == 0.0
+    for overlap in (1e-12, 1e-9, 1e-6):
+        expected = hertz.evaluate(hertz.force, overlap, 1e-12, RADIUS, row)
+        assert jkr.evaluate(jkr.force, overlap, 1e-12, RADIUS, row) == pytest.approx(expected, rel=1e-9)
+    falling = make_particles([[0.0, 0.0, 1.001 * RADIUS]], RADIUS, 2500.0, velocity=[[0.0, 0.0, -0.05]])
+    run = ParticleSolver(falling, pair_table([DUST, smooth]), walls=[Plane(material=1)], laws=LAWS)
+    run.advance(run.recommended_step(0.05), 400)
+    assert run.particles.velocity[0, 2] == pytest.approx(0.05, rel=1e-3)
+
+
 def test_cohesion_with_films_is_refused() -> None:
     """Adhesion is that of dry solids."""
-    with pytest.raises(InputError, match="cohesion"):
-        Pair((DUST, DUST), (RADIUS, RADIUS), 0.1).simulation(Laws(film=True, cohesion="jkr"))
+    with pytest.raises(InputError, match="contact = 'jkr'"):
+        Pair((DUST, DUST), (RADIUS, RADIUS), 0.1).simulation(Laws(film=True, contact="jkr"))

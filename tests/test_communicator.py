@@ -35,17 +35,13 @@ LOCAL_FILES = {
     "fluid/conditions.py": "regions of the whole box",
     "fluid/boundaries.py": "every rank knows the conditions of the whole box",
     "particles/walls/": "every rank knows all walls",
+    "particles/initial/": "every rank makes all particles before the run starts",
     "coupling/self_disturbance_tables.py": "every rank computes the tables of the whole lattice",
     "run/initial_particles.py": "every rank makes all particles before the run starts",
     "fluid/viscosity.py": "every rank knows the solid cells of the whole box",
 }
 """Files and folders that reduce only arrays that every rank knows whole: the input of a run, and what is made before it
 starts."""
-
-STILL_TO_DO = {
-    "particles": "solver, neighbours, feeding, bridges, time scales, initial packings: no communicator yet",
-}
-"""Rooms that do not comply yet. Remove a room here once it does; a room that complies must not be listed."""
 
 
 def reductions(path: Path) -> Iterator[tuple[int, str]]:
@@ -81,9 +77,6 @@ def other_routes(room: str) -> list[str]:
 @pytest.mark.parametrize("room", ROOMS)
 def test_arrays_of_particles_and_cells_are_reduced_by_the_communicator_only(room):
     found = other_routes(room)
-    if room in STILL_TO_DO:
-        assert found, f"the room {room} complies: remove it from STILL_TO_DO"
-        pytest.xfail(f"{STILL_TO_DO[room]}: {len(found)} lines")
     assert not found, "\n".join(["use the communicator, or mark the line with `# local: reason`:", *found])
 
 
@@ -134,6 +127,12 @@ def test_serial_reductions_have_the_bits_of_numpy(values):
     assert np.array_equal(one.sum(values, axis=0), values.sum(axis=0))
     assert np.array_equal(one.largest(values, axis=(0, 1)), values.max(axis=(0, 1)))
     assert np.array_equal(one.sum(values, axis=()), values)
+
+
+def test_rows_of_all_ranks_are_joined_in_their_order():
+    mine, other = np.arange(6.0).reshape(3, 2), np.full((1, 2), 7.0)
+    assert np.array_equal(Communicator().joined(mine), mine)
+    assert np.array_equal(WithOther(other).joined(mine), np.concatenate([mine, other]))
 
 
 def test_results_are_plain_numbers():

@@ -139,9 +139,7 @@ def test_particles_that_are_fed_bring_their_energy() -> None:
     run.advance(2e-5, 10)
 
 
-@pytest.mark.parametrize(
-    "laws", [Laws(cohesion="jkr"), Laws(film=True, integrator="verlet")], ids=["cohesion", "verlet"]
-)
+@pytest.mark.parametrize("laws", [Laws(contact="jkr"), Laws(film=True, integrator="verlet")], ids=["jkr", "verlet"])
 def test_laws_whose_energy_is_not_counted_are_refused(laws: Laws) -> None:
     with pytest.raises(InputError, match="energies: must be"):
         box(laws=laws, viscosity=1e-3 if laws.film else 0.0)

@@ -9,8 +9,9 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
-from cfddem.particles.feeding import Feed, Outlet
-from cfddem.particles.initial.packing import random_packing
+from cfddem.io import checkpoint
+from cfddem.particles.feeding import Feed, ParticleOutlet
+from cfddem.particles.initial.packing import normal, random_packing
 from cfddem.particles.initial.tables import read_particles
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -65,8 +66,8 @@ def test_feed_brings_its_rate_and_nothing_overlaps() -> None:
     """1 000 a second for 0.05 s; none is inserted into another, and the outlet counts all that fell out."""
     sphere = make_particles([[0.0, 0.0, 0.02]], 0.5 * DIAMETER, 2500.0)
     run = ParticleSolver(sphere, pair_table([GRAIN]), gravity=(0.0, 0.0, -9.81))
-    feed = Feed(1000.0, (0.0, 0.0, 0.02), (3e-3, 3e-3, 0.0), lambda n: np.full(n, DIAMETER), 2500.0, seed=1)
-    outlet = Outlet(low=(-np.inf, -np.inf, 0.015))
+    feed = Feed(1000.0, (0.0, 0.0, 0.02), (3e-3, 3e-3, 0.0), lambda n, _: np.full(n, DIAMETER), 2500.0, seed=1)
+    outlet = ParticleOutlet(low=(-np.inf, -np.inf, 0.015))
     step = run.recommended_step(1.0)
     feed(run)
     while run.time < 0.05:
@@ -79,6 +80,40 @@ def test_feed_brings_its_rate_and_nothing_overlaps() -> None:
     assert outlet.left > 0
     assert outlet.left + run.particles.count == feed.entered + 1
     assert outlet.mass == pytest.approx(outlet.left * 2500.0 * np.pi / 6.0 * DIAMETER**3)
+
+
+def test_a_resumed_feed_and_outlet_continue_with_the_same_bits(tmp_path: Path) -> None:
+    """Random diameters and positions, particles that wait, and counts, through a file."""
+
+    def parts() -> tuple[ParticleSolver, Feed, ParticleOutlet]:
+        sphere = make_particles([[0.0, 0.0, 0.02]], 0.5 * DIAMETER, 2500.0)
+        run = ParticleSolver(sphere, pair_table([GRAIN]), gravity=(0.0, 0.0, -9.81))
+        feed = Feed(
+            8e4, (0.0, 0.0, 0.02), (3e-3, 3e-3, 0.0), lambda n, draw: normal(n, 1e-3, 2e-4, draw), 2500.0, seed=1
+        )
+        return run, feed, ParticleOutlet(low=(-np.inf, -np.inf, 0.0199))
+
+    def go_on(parts: tuple[ParticleSolver, Feed, ParticleOutlet]) -> None:
+        run, feed, outlet = parts
+        for _ in range(10):
+            feed(run)
+            run.advance(1e-5, 30)
+            outlet(run)
+
+    straight, again = parts(), parts()
+    go_on(straight)
+    names = ("run", "feed", "outlet")
+    checkpoint.write(tmp_path, {name: part.checkpoint() for name, part in zip(names, straight)})
+    kept = checkpoint.newest(tmp_path)
+    for name, part in zip(names, again):
+        part.restore(kept[name])
+    for each in (straight, again):
+        go_on(each)
+    assert straight[1].entered > 20 and straight[2].left > 0 and len(straight[1].waiting) > 0
+    assert (again[1].entered, again[2].left, again[2].mass) == (straight[1].entered, straight[2].left, straight[2].mass)
+    assert np.array_equal(again[1].waiting, straight[1].waiting)
+    for name, array in straight[0].particles.arrays.items():
+        assert np.array_equal(again[0].particles[name], array), name
 
 
 def test_an_earlier_run_is_remembered_by_the_next() -> None:

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from scenarios.validation.fluid_checks import order, rms
-from scenarios.validation.fluid_manufactured import error
+from scenarios.validation.fluid.flows import order, rms
+from scenarios.validation.fluid.manufactured import error
 
 
 @pytest.mark.parametrize("model", ["A", "B"])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.velocity_gradient import velocity_gradient
 from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid, outside_cone, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
@@ -78,3 +80,22 @@ def test_flow_through_a_cone_keeps_its_flux():
     flux = fluid.volume_flux(2).sum(axis=(1, 2))
     assert flux == pytest.approx(flux[0], rel=1e-6)
     assert not fluid.velocity[grid.solid].any()
+
+
+def test_velocity_gradient_has_no_seam_at_periodic_sides() -> None:
+    """A shear wave: the gradient is the same sine everywhere; beside a wall it is one-sided, zero along one cell."""
+    count, height = 24, 0.024
+    grid = Grid((4, 1, count), (1e-3, 1e-3, height / count))
+    fluid = FluidSolver(grid, {"x_low": Periodic(), "x_high": Periodic(), "z_low": Periodic(), "z_high": Periodic()},
+                        density=1000.0, viscosity=0.0)  # fmt: skip
+    number = 2.0 * np.pi / height
+    fluid.set_velocity((lambda x, y, z: np.sin(number * z) + 0.0 * x * y, 0.0, 0.0))
+    slope = velocity_gradient(fluid, FilterKernel(grid, (True, False, True)))
+    z = grid.centres()[2]
+    expected = np.cos(number * z) * np.sin(number * grid.spacing[2]) / grid.spacing[2] + 0.0 * slope[0, 2]
+    assert slope[0, 2] == pytest.approx(expected, abs=1e-9 * number)
+    slope[0, 2] = 0.0
+    assert np.abs(slope).max() < 1e-9 * number
+    walls = velocity_gradient(fluid, FilterKernel(grid, (True, False, False)))[0, 2, :, 0, 0]
+    velocity = fluid.velocity[:, 0, 0, 0]
+    assert walls == pytest.approx(np.gradient(velocity, grid.spacing[2]), rel=1e-12)

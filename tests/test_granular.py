@@ -11,17 +11,8 @@ import numpy as np
 import pytest
 from impacts import rows
 
-from scenarios.validation.particles_checks import (
-    BALL_RADIUS,
-    DROP_HEIGHT,
-    drop,
-    drop_exactly,
-    hopper,
-    rest,
-    slide,
-    slope,
-    strike,
-)
+from scenarios.validation.particles.granular_beds import hopper, rest, slope
+from scenarios.validation.particles.single_sphere import BALL_RADIUS, DROP_HEIGHT, drop, drop_exactly, slide, strike
 
 
 @pytest.mark.parametrize("restitution", [0.6, 0.8, 1.0])

@@ -19,7 +19,7 @@ from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.mixture import net_downward_forces
 from cfddem.preflight.summary import preflight
-from cfddem.run.build import assemble
+from cfddem.run.build import parts_of
 from cfddem.run.runner import Run
 from closures.drag_resolved import beetstra, beetstra_polydisperse
 
@@ -143,7 +143,7 @@ def test_a_mixture_of_one_species_equals_a_bed_of_one_kind() -> None:
     )
     text = MIXTURE.replace('[bed.species.beads]\nmaterial = "glass"\ndiameter = 1e-3\ncount = 200\n', "")
     named = Case.from_text(text, "bed.toml", {"bed.start": "packed"})
-    one, other = assemble(alone).particle_solver.particles, assemble(named).particle_solver.particles
+    one, other = parts_of(alone).particle_solver.particles, parts_of(named).particle_solver.particles
     for name in one.fields:
         assert np.array_equal(one[name], other[name]), name
     assert np.array_equal(other.species, np.zeros(40))
@@ -153,12 +153,12 @@ def test_a_mixture_of_one_species_equals_a_bed_of_one_kind() -> None:
 @pytest.mark.parametrize("start", ["suspended", "poured"])
 def test_layers_lie_one_above_the_other_at_the_start(start: str) -> None:
     case = mixture(bed__arrangement="layers", bed__start=start, fluid=None)
-    particles = assemble(case).particle_solver.particles
+    particles = parts_of(case).particle_solver.particles
     species = particle_properties(case).species[particles.id]
     height = [float(np.median(particles.position[species == kind, 2])) for kind in (0, 1)]
     assert height[1] > height[0] + 1.5e-3
     assert np.array_equal(particles.density, np.where(species == 0, 2500.0, 1500.0))
-    mixed = assemble(case.with_(**{"bed.arrangement": "mixed"})).particle_solver.particles
+    mixed = parts_of(case.with_(**{"bed.arrangement": "mixed"})).particle_solver.particles
     means = [mixed.position[particle_properties(case).species[mixed.id] == kind, 2].mean() for kind in (0, 1)]
     assert abs(means[1] - means[0]) < 0.25 * mixed.position[:, 2].max()
 
@@ -168,7 +168,7 @@ def test_drag_uses_the_diameter_over_the_local_sauter_mean() -> None:
     case = mixture(
         column__sides="periodic", column__ends="periodic", column__height=0.012, bed__species__pellets__spread=0
     )
-    parts = assemble(case.with_(**{"bed.species.beads.count": 300}))
+    parts = parts_of(case.with_(**{"bed.species.beads.count": 300}))
     particles, exchange = parts.particle_solver.particles, parts.exchange
     assert exchange is not None
     place = exchange.kernel.map_particles(particles.position, particles.radius)

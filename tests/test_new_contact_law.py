@@ -11,15 +11,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import call
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.case.schema import Case
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.contact_law import ContactLaw
+from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
+from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
+from cfddem.preflight.summary import preflight
+from cfddem.run.simulation import Simulation
+from closures import contact
 
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "contact-law.md"
 GLASS = Material(density=2500, youngs_modulus=1e7, poisson=0.25, restitution=0.9, friction=0.3)
@@ -65,7 +71,7 @@ def test_restitution_is_the_root_of_the_ratio_of_stiffnesses(ratio: float, speed
 
 
 def test_a_pair_remembers_its_largest_overlap() -> None:
-    """Through a new list and a checkpoint, to the same bits; not beyond the end of the contact."""
+    """Bit for bit through a new neighbour list and a checkpoint, but not beyond the end of the contact."""
     run = pair(slide=0.05)
     step = run.recommended_step(0.2)
     while not (run.edges.largest_overlap > 0.0).any() or run.particles.velocity[0, 0] > 0.0:
@@ -91,6 +97,87 @@ def test_time_scales_come_from_the_law() -> None:
     assert scales.hertz == pytest.approx(math.pi * math.sqrt(mass / 4e4) / 50.0)
 
 
+CASE = """
+[material.glass]
+density = 2500
+youngs_modulus = 1e7
+poisson = 0.25
+
+[column]
+width = 0.006
+height = 0.02
+cell = 0.002
+
+[bed]
+diameter = 1e-3
+count = 40
+start = "suspended"
+
+[laws]
+contact = "walton_braun"
+contact_parameters = { unloading_stiffness = 500.0, loading_stiffness = 400.0 }
+
+[run]
+until = 0.001
+"""
+
+
+def test_a_registered_law_is_chosen_by_its_name_in_a_case() -> None:
+    """Checks, time steps, loops and `explain` use it without another change."""
+    case = Case.from_text(CASE, "bed.toml")
+    found = preflight(case)
+    numbers = found.summary()["numbers"]
+    swing = math.sqrt(0.5 * 2500.0 * math.pi / 6.0 * 1e-9 / 500.0)
+    assert found.status == "ok"
+    assert numbers["time scales"]["impact criterion"]["value"] == pytest.approx(swing)
+    depth = case.reference_speed * swing * math.sqrt(500.0 / 400.0)  # loading is softer than unloading
+    assert numbers["collisions and film"]["overlap / diameter"]["value"] == pytest.approx(depth / 1e-3, rel=1e-4)
+    assert "contact modulus / real" not in numbers["collisions and film"]
+    simulation = Simulation(case)
+    simulation.until(1e-3)
+    assert "largest_overlap" in simulation.particle_solver.edges.fields
+    assert simulation.particle_solver.laws.parameters[:2] == (400.0, 500.0)
+    assert Case.from_text(case.to_toml()) == case
+    page = call("explain", "walton_braun").out
+    assert "Walton and Braun" in page and "unloading_stiffness = 40000" in page and "largest_overlap [m]" in page
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"laws.contact": "walton"}, "--set laws.contact = 'walton': must be one of .*did you mean 'walton_braun'"),
+        ({"laws.contact": "hertz"}, "laws.contact_parameters.*left out; hertz has no parameters"),
+        ({"laws.contact_parameters.stiffness": 1.0}, "one of loading_stiffness, unloading_stiffness"),
+        ({"laws.contact_parameters.loading_stiffness": -1.0}, "loading_stiffness.*at least 0"),
+        ({"laws.normal_stiffness": 1.0}, "written as laws.contact_parameters.normal_stiffness; the key has been"),
+        ({"laws.cohesion": "jkr"}, "written as laws.contact; the key"),
+    ],
+    ids=str,
+)
+def test_wrong_words_for_a_contact_law_are_refused(changed: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        Case.from_text(CASE, "bed.toml", changed)
+
+
+def test_a_run_that_counts_energy_needs_a_law_that_gives_it() -> None:
+    found = preflight(Case.from_text(CASE, "bed.toml", {"run.energy_budget": True}))
+    assert [each.key for each in found.issues] == ["run.energy_budget"]
+
+
+@pytest.mark.parametrize("speed", [0.01, 1.0])
+def test_the_estimated_overlap_is_that_of_the_law(speed: float) -> None:
+    """Hertz in closed form; a spring v sqrt(m/k)."""
+    row, mass, radius = pair_table([GLASS])[0, 0], 1e-6, 2.5e-4
+    stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), radius)
+    hertz = contact_named("hertz")
+    assert hertz.largest_overlap(mass, radius, row, speed) == pytest.approx(
+        contact.hertz_largest_overlap(mass, stiffness, speed), rel=1e-5
+    )
+    assert hertz.resting_overlap(mass, radius, row, 0.01) == pytest.approx((0.01 / stiffness) ** (2 / 3), rel=1e-5)
+    spring = contact_named("linear").with_parameters(normal_stiffness=1e4)
+    assert spring.largest_overlap(mass, radius, row, speed) == pytest.approx(speed * math.sqrt(mass / 1e4), rel=1e-5)
+
+
 def test_what_a_law_cannot_do_is_refused() -> None:
     def odd(temperature: float) -> float:
         return temperature
@@ -101,7 +188,7 @@ def test_what_a_law_cannot_do_is_refused() -> None:
     with pytest.raises(InputError, match=r"argument of odd = 'temperature'"):
         pair(ContactLaw(name="odd", force=odd, damping=odd, stiffness=odd, tangential_stiffness=odd))
     with pytest.raises(InputError, match=r"laws.contact = 'worded'.*compiled"):
-        replace(LAW, energy=worded).check()
+        check_contact_law(replace(LAW, energy=worded))
     with pytest.raises(InputError, match=r"energies.*'walton_braun'"):
         ParticleSolver(pair().particles, pair_table([GLASS]), laws=Laws(contact=LAW), energies=True)
     with pytest.raises(InputError, match=r"contact = 'herz'.*did you mean 'hertz'"):
@@ -112,7 +199,7 @@ def test_what_a_law_cannot_do_is_refused() -> None:
 def test_memory_may_begin_at_a_number_that_is_not_finite(initial: float) -> None:
     law = replace(LAW, memory=(Field("largest_overlap", "m", role="memory", initial=initial),))
     memory = SimpleNamespace(largest_overlap=[0.0])
-    write = law.choices()["write_memory"].py_func
+    write = contact_choices(law)["write_memory"].py_func
     write(memory, 0, (1e-6,), True)
     assert memory.largest_overlap == [1e-6]
     write(memory, 0, (1e-6,), False)

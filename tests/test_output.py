@@ -24,8 +24,7 @@ from cfddem.io.provenance import provenance
 from cfddem.io.quantities import TIME, Quantity, of_fields
 from cfddem.io.reading import open_run
 from cfddem.io.writer import RunFolder
-from cfddem.particles.collision_events import COLLISION
-from cfddem.particles.collision_record import COLLISION_FIELDS
+from cfddem.particles.collision_events import COLLISION, COLLISION_FIELDS
 from cfddem.particles.state import PARTICLE_FIELDS
 
 GRID = SimpleNamespace(cells=(4, 3, 5), spacing=(0.1, 0.2, 0.3), origin=(0.0, -1.0, 0.0))

@@ -16,6 +16,7 @@ import numpy as np
 from numba import config
 from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import CHOICES, Laws
 from cfddem.particles.initial.packing import lattice
 from cfddem.particles.state import make_particles
@@ -23,7 +24,7 @@ from cfddem.particles.walls.shapes import Plane
 from cfddem.particles.solver import ParticleSolver
 
 film, integrator, onset, spring, contact, plain, path = *(int(word) for word in sys.argv[1:7]), sys.argv[7]
-words = zip(("integrator", "friction_onset", "spring", "contact"), (integrator, onset, spring, contact))
+words = zip(("integrator", "friction_onset", "spring"), (integrator, onset, spring))
 assert bool(config.DISABLE_JIT) == bool(plain)
 glass = Material(density=2500, youngs_modulus=1e7, poisson=0.25, restitution=0.7, friction=0.4, roughness=2e-6,
                  friction_lubricated=0.1)
@@ -34,7 +35,7 @@ size = 0.5e-3 * draw.uniform(0.97, 1.03, len(places))
 spheres = make_particles(places, size, 2500.0, velocity=draw.normal(0, 0.05, places.shape),
                  spin=draw.normal(0, 50.0, places.shape), viscosity=0.01 * film)
 laws = Laws(film=bool(film), **{name: CHOICES[name][number] for name, number in words},
-            normal_stiffness=500.0, tangential_stiffness=300.0)
+            contact=LINEAR.with_parameters(normal_stiffness=500.0, tangential_stiffness=300.0) if contact else "hertz")
 table = pair_table([glass])
 run = ParticleSolver(spheres, table.view(np.recarray) if plain else table, walls=[Plane()], laws=laws,
                  gravity=(0.0, 0.0, -9.81), box=(4.0e-3, 4.0e-3, None))

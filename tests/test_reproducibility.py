@@ -76,7 +76,7 @@ def test_bits_do_not_depend_on_the_number_of_threads(film: bool, steps: int) -> 
     for name, values in states[0].items():
         assert np.array_equal(values, states[1][name]), name
     assert run.edges.between_particles > 500
-    assert run._lists > 5
+    assert run.lists.made > 5
 
 
 @pytest.mark.parametrize("film", [False, True])

@@ -15,6 +15,7 @@ from impacts import STEP, Pair, kinetic_energy
 from cfddem import Case, Simulation
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -34,7 +35,11 @@ def on_a_floor(speed: float, laws: Laws, lean: float = 0.0) -> ParticleSolver:
     """
     weight = BALL.density * 4.0 / 3.0 * math.pi * RADIUS**3 * GRAVITY * math.cos(lean)
     stiffness = contact.hertz_stiffness(float(pair_table([BALL])[0, 0]["contact_modulus"]), RADIUS)
-    overlap = weight / laws.normal_stiffness if laws.contact == "linear" else (weight / stiffness) ** (2.0 / 3.0)
+    overlap = (
+        weight / laws.contact_law.values[0]
+        if laws.contact_law.name == "linear"
+        else (weight / stiffness) ** (2.0 / 3.0)
+    )
     sphere = make_particles(
         [[0.0, 0.0, RADIUS - overlap]],
         RADIUS,
@@ -55,8 +60,8 @@ def yield_angle(run: ParticleSolver) -> float:
 @pytest.mark.parametrize("choice", CHOICES.values(), ids=CHOICES)
 def test_rolling_sphere_slows_down_at_five_sevenths(choice: str, linear: bool) -> None:
     """Torque mu_r R m g against rolling without sliding: 7/5 m a = mu_r m g, so a = 5/7 mu_r g, within 0.1 %."""
-    springs = {"contact": "linear", "normal_stiffness": 1e4, "tangential_stiffness": 1e4} if linear else {}
-    run = on_a_floor(0.05, Laws(rolling=choice, **springs))  # type: ignore[arg-type]
+    springs = LINEAR.with_parameters(normal_stiffness=1e4, tangential_stiffness=1e4) if linear else "hertz"
+    run = on_a_floor(0.05, Laws(rolling=choice, contact=springs))
     step = 0.5 * run.time_scales(0.05).recommended
     run.advance(step, math.ceil(0.02 / step))
     begin, before = run.time, float(run.particles.velocity[0, 0])

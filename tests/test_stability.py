@@ -1,4 +1,4 @@
-"""Linear stability of uniform beds, against the same equations solved in another way.
+"""Linear stability of uniform beds, against another solution of the same equations.
 
 Reference: the linear equations of both phases as a generalised eigenvalue problem of four unknowns, without the
 elimination of `closures.stability`.

@@ -30,9 +30,6 @@ LONGEST_FILE, MARGIN = 350, 10
 """Lines of a Python file, and how many more are tolerated."""
 
 LONG_FILES = {
-    "cfddem/fluid/solver.py": 380,
-    "cfddem/particles/solver.py": 400,
-    "scenarios/validation/particles_checks.py": 385,
     "tests/golden_runs.py": 1000,  # a list of runs
     "tests/test_dry_contact.py": 390,
 }
@@ -40,20 +37,6 @@ LONG_FILES = {
 
 MOST_ARGUMENTS, LONGEST_FUNCTION = 8, 80
 """Positional arguments and lines of a function outside compiled loops."""
-
-WIDE_FUNCTIONS = {
-    "scenarios/collisions/immersed_pair/study.py _setting",
-    "scenarios/collisions/three_spheres/study.py simulate_three_spheres",  # the options of its command
-    "scenarios/collisions/wet_pair/study.py collide_wet",  # the options of its command
-    "scenarios/validation/wet_checks.py cartesian",
-}
-"""Functions with more positional arguments, still to be changed unless a reason is given."""
-
-LONG_FUNCTIONS = {
-    "scenarios/collisions/wet_tumbler/study.py tumble",
-    "scenarios/collisions/wet_wall/checks.py independent",
-}
-"""Longer functions that are still to be divided."""
 
 COMPILED = ("serial", "threaded", "either", "part", "inline", "compiled", "njit", "jit", "overload")
 """Names of decorators that compile a function."""
@@ -196,7 +179,7 @@ def test_no_function_has_too_many_positional_arguments() -> None:
     many = []
     for file, node in functions():
         arguments = [each.arg for each in (*node.args.posonlyargs, *node.args.args) if each.arg not in ("self", "cls")]
-        if len(arguments) > MOST_ARGUMENTS and f"{file} {node.name}" not in WIDE_FUNCTIONS:
+        if len(arguments) > MOST_ARGUMENTS:
             many.append(f"{file}:{node.lineno} {node.name}: {len(arguments)}")
     assert not many, "\n".join(many)
 
@@ -205,7 +188,7 @@ def test_no_function_is_too_long() -> None:
     long = []
     for file, node in functions():
         length = (node.end_lineno or node.lineno) - node.lineno + 1
-        if length > LONGEST_FUNCTION and f"{file} {node.name}" not in LONG_FUNCTIONS:
+        if length > LONGEST_FUNCTION:
             long.append(f"{file}:{node.lineno} {node.name}: {length} lines")
     assert not long, "\n".join(long)
 

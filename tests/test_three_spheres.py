@@ -17,7 +17,7 @@ from scenarios.collisions.three_spheres import centres, figures, outcomes, simul
 from scenarios.collisions.three_spheres import events as three_sphere_events
 from scenarios.collisions.three_spheres import validation as study
 from scenarios.validation.table import Row
-from scenarios.validation.wet_checks import cartesian
+from scenarios.validation.wet.cartesian import cartesian
 
 
 def failed(rows: list[Row]) -> list[object]:
@@ -135,14 +135,14 @@ def test_the_outcomes_have_their_names() -> None:
     assert simulate_three_spheres(3.0, 0.0, spheres=2).outcome == "FA"
 
 
-def test_a_map_equals_single_runs() -> None:
+def test_a_map_equals_single_runs_within_its_tolerance() -> None:
     table = outcomes([3.0, 9.0], [10.0, 50.0], friction=0.1)
     for row, angle in enumerate((10.0, 50.0)):
         for column, stokes in enumerate((3.0, 9.0)):
             run = simulate_three_spheres(stokes, angle, friction=0.1)
             assert table["outcome"][row, column] == run.outcome
-            assert table["restitution12"][row, column] == run.restitution12
-            assert table["restitution23"][row, column] == run.restitution23
+            assert table["restitution12"][row, column] == pytest.approx(run.restitution12, abs=1e-7)
+            assert table["restitution23"][row, column] == pytest.approx(run.restitution23, abs=1e-7)
 
 
 def test_a_map_shows_each_outcome_in_its_colour(tmp_path: Path) -> None:

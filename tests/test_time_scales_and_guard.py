@@ -10,6 +10,7 @@ import pytest
 
 from cfddem.backend.errors import RunFailed, UnstableStep
 from cfddem.case.materials import Material
+from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -48,7 +49,9 @@ def test_fastest_particle_sets_the_clock() -> None:
 def test_linear_spring_has_a_clock_of_its_own() -> None:
     """Half a period of the spring, pi sqrt(m*/k), whatever the speed."""
     mass = 0.5 * GLASS.density * 4.0 / 3.0 * math.pi * RADIUS**3
-    time_scales = pair(Laws(contact="linear", normal_stiffness=1e3, tangential_stiffness=5e2)).time_scales()
+    time_scales = pair(
+        Laws(contact=LINEAR.with_parameters(normal_stiffness=1e3, tangential_stiffness=5e2))
+    ).time_scales()
     assert time_scales.hertz == pytest.approx(0.02 * math.pi * math.sqrt(mass / 1e3), rel=1e-12)
 
 

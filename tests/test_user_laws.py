@@ -15,6 +15,7 @@ from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.particles.initial.packing import random_packing
+from cfddem.particles.interactions.contact_law import contact_named
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -199,13 +200,14 @@ def test_a_case_names_laws_of_the_shelf_and_of_packages(monkeypatch: pytest.Monk
     registry.load_package_laws.cache_clear()
     try:
         case = Case.from_text(TEXT, "bed.toml", {"laws.lubrication": "coated"})
-        assert laws_of(case) == Laws(film=True, lubrication=coated)
+        hertz = contact_named("hertz")
+        assert laws_of(case) == Laws(film=True, contact=hertz, lubrication=coated)
         from_python = case.with_(**{"laws.minimum_gap": register("minimum_gap", thick)})
         assert laws_of(from_python).minimum_gap is thick
         assert 'minimum_gap = "thick"' in from_python.to_toml()
-        assert laws_of(Case.from_text(TEXT)) == Laws(film=True)
+        assert laws_of(Case.from_text(TEXT)) == Laws(film=True, contact=hertz)
         dry = case.with_(fluid=None)
-        assert laws_of(dry) == Laws()
+        assert laws_of(dry) == Laws(contact=hertz)
     finally:
         registry.load_package_laws.cache_clear()
     for key, value, said in [

@@ -14,6 +14,7 @@ import pytest
 from impacts import STEP, Pair, until_apart
 
 from cfddem.case.materials import Material
+from cfddem.particles.interactions.contacts.linear import LINEAR
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -25,7 +26,7 @@ GRAIN = 0.25e-3
 """Radius of the small grain [m]; it is of glass."""
 
 SOLID = Material(density=2500, youngs_modulus=5e8, poisson=0.3, restitution=0.5)
-STIFF = Laws(contact="linear", normal_stiffness=1e4, tangential_stiffness=8235.0)
+STIFF = Laws(contact=LINEAR.with_parameters(normal_stiffness=1e4, tangential_stiffness=8235.0))
 """The springs of the case of Vyas et al., as it stands in the examples of LAMMPS [N/m]."""
 
 
@@ -68,7 +69,7 @@ def test_grain_rolls_out_of_a_groove(ratio: float, laws: Laws) -> None:
             assert (1.0 + 0.4 / upright**2) * speed**2 == pytest.approx(energy, rel=2e-4)
             assert -run.particles.spin[0, 0] * upright * GRAIN == pytest.approx(speed, rel=5e-5)
     push = 0.5 * run.particles.mass[0] * (GRAVITY * math.cos(angle) - speed**2 / reach) / upright
-    overlap = push / laws.normal_stiffness if laws.contact == "linear" else hertz_overlap(push, ratio)
+    overlap = push / laws.contact_law.values[0] if laws.contact_law.name == "linear" else hertz_overlap(push, ratio)
     assert 0.0 < reach - math.hypot(y, z) <= 1.05 * overlap / upright
 
 

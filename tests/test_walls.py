@@ -80,7 +80,7 @@ def test_a_plane_from_a_file_is_a_plane(tmp_path: Path) -> None:
 @pytest.mark.parametrize("fold", [-0.3, -0.02, -0.002, 0.002, 0.02, 0.3])
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.8, 0.6)], ids=["straight", "slant"])
 def test_force_does_not_jump_at_a_fold(fold: float, way: tuple[float, float]) -> None:
-    """Over ridges and grooves of any angle: the force changes in proportion to the way, however short the steps."""
+    """Over ridges and grooves of any angle: the force changes with the distance, however short the steps."""
     wall, depth = sheet(6, fold), overlap(MASS * GRAVITY)
     run = sphere([0.0, 0.0, RADIUS], [wall], solid=SOLID.model_copy(update={"friction": 0.0}))
 

@@ -15,7 +15,7 @@ from closures.bridge import deforming_potential, deforming_share, static_potenti
 from closures.registry import law_of
 from closures.restitution import davis_sitison, singh
 from scenarios.collisions.wet_pair import TRANSITION_PRESSURES, collide_wet
-from scenarios.validation import wet as study
+from scenarios.validation.wet import study
 
 
 @pytest.mark.parametrize("part", [study.pairs, study.engine_pairs, study.thick_films], ids=lambda part: part.__name__)

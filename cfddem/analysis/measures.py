@@ -1,10 +1,11 @@
 """Measures of a bed at one instant: height, profiles, pressure drop, solids flux, granular temperature.
 
-Pure functions of arrays. Cell fields have the shape (nz, ny, nx), vectors at cells (nz, ny, nx, 3), particles (N, 3)
-with columns x, y, z; z points up. `open_cells` is true where a cell holds fluid, `spacing` is (hx, hy, hz) and `origin`
-the lowest corner of the box, as in :class:`cfddem.fluid.grid.Grid`. Values that do not exist, in an empty cell or slab,
-are NaN. Mixing indices are in :mod:`cfddem.analysis.mixing`, bubbles in :mod:`cfddem.analysis.bubbles`, statistics of
-time series in :mod:`cfddem.analysis.series`.
+Pure functions of whole arrays: files are read whole, and a run joins the particles of all ranks before it calls them
+(:meth:`cfddem.run.simulation.Simulation.whole`). Cell fields have the shape (nz, ny, nx), vectors at cells
+(nz, ny, nx, 3), particles (N, 3) with columns x, y, z; z points up. `open_cells` is true where a cell holds fluid,
+`spacing` is (hx, hy, hz) and `origin` the lowest corner of the box, as in :class:`cfddem.fluid.grid.Grid`. Values that
+do not exist, in an empty cell or slab, are NaN. Mixing indices are in :mod:`cfddem.analysis.mixing`, bubbles in
+:mod:`cfddem.analysis.bubbles`, statistics of time series in :mod:`cfddem.analysis.series`.
 """
 
 from __future__ import annotations
@@ -62,6 +63,32 @@ def _volume(radius: ArrayLike) -> Array:
 def _volume_below(height: float, centre: Array, radius: Array) -> Array:
     depth = np.clip(height - centre + radius, 0.0, 2.0 * radius)
     return np.pi / 3.0 * depth * depth * (3.0 * radius - depth)
+
+
+def layer_solid_fraction(position: Array, radius: Array, edges: Array, area: float) -> Array:
+    """Solid fraction of horizontal layers. Spheres are cut at the edges of the layers.
+
+    position  (N, 3) [m]
+    radius    (N,) [m]
+    edges     (n + 1,) of the layers, evenly spaced, ascending [m]
+    area      of the cross-section [m2]
+    returns   (n,) [-]
+
+    >>> layer_solid_fraction(np.array([[0.0, 0.0, 1.0]]), np.array([0.5]), np.array([0.0, 1.0, 2.0]), np.pi / 6.0)
+    array([0.5, 0.5])
+    """
+    centre, radius, edges = np.asarray(position)[:, 2], np.asarray(radius, float), np.asarray(edges, float)
+    step, count = edges[1] - edges[0], len(edges) - 1
+    first = np.floor((centre - radius - edges[0]) / step).astype(np.intp)
+    reached = int(np.ceil(2.0 * float(np.max(radius, initial=0.0)) / step)) + 1  # layers that a sphere can touch
+    volume = np.zeros(count)
+    for place in range(reached):
+        layer = first + place
+        lower = edges[0] + layer * step
+        part = _volume_below(lower + step, centre, radius) - _volume_below(lower, centre, radius)
+        inside = (layer >= 0) & (layer < count)
+        volume += np.bincount(layer[inside], part[inside], count)
+    return np.asarray(volume / (area * step))
 
 
 def profile(field: Array, along: str = "z", open_cells: Mask | None = None, weight: Array | None = None) -> Array:
@@ -246,6 +273,8 @@ class GranularTemperature(NamedTuple):
     cells: Array  # (nz, ny, nx), of each cell
     freedoms: Array  # (nz, ny, nx), particles of each cell less one; weights of the mean
     mean: float
+    components: Array  # (3,) mean square of the fluctuation along x, y, z; their mean is `mean`
+    layers: Array  # (nz, 3) the same for each layer of cells; NaN where no cell has two particles
 
 
 def granular_temperature(velocity: Array, cells: Cells) -> GranularTemperature:
@@ -261,13 +290,17 @@ def granular_temperature(velocity: Array, cells: Cells) -> GranularTemperature:
     The divisor n - 1 makes the value independent of the number of particles per cell.
     """
     count = np.bincount(cells.cell, minlength=int(np.prod(cells.shape)))
-    apart = np.zeros(len(count))
-    for component in np.asarray(velocity)[cells.inside].T:
+    squares = np.zeros((3, len(count)))
+    for square, component in zip(squares, np.asarray(velocity)[cells.inside].T):
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = np.bincount(cells.cell, component, len(count)) / count
-        apart += np.bincount(cells.cell, (component - mean[cells.cell]) ** 2, len(count))
+        square[:] = np.bincount(cells.cell, (component - mean[cells.cell]) ** 2, len(count))
     free = np.maximum(count - 1, 0)
+    apart, total = squares[0] + squares[1] + squares[2], free.sum()
+    by_layer = free.reshape(cells.shape[0], -1).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         by_cell = apart / (3.0 * free)
-    whole = float(apart.sum() / (3.0 * free.sum())) if free.any() else float("nan")
-    return GranularTemperature(by_cell.reshape(cells.shape), free.reshape(cells.shape), whole)
+        layers = squares.reshape(3, cells.shape[0], -1).sum(axis=2).T / by_layer[:, None]
+        components = squares.sum(axis=1) / total
+    whole = float(apart.sum() / (3.0 * total)) if free.any() else float("nan")
+    return GranularTemperature(by_cell.reshape(cells.shape), free.reshape(cells.shape), whole, components, layers)

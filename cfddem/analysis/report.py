@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison
+from cfddem.analysis.fluctuations import impacts
 from cfddem.analysis.regimes import RegimeMap, regime_map
 from cfddem.analysis.run_warnings import last_value, warnings_of
 from cfddem.analysis.series import block_average, stationarity
@@ -28,7 +29,7 @@ def report(folder: Path) -> dict[str, Any]:
     folder   of the run
     returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
              (law, computed, expected, ratio), `ledger` (largest imbalances), `energy` and `energy_lines` (energy budget
-             at the end [J], if the case asks for it), `collisions` (of the window, if recorded with films),
+             at the end [J], if the case asks for it), `collisions` and `impacts` (of the window, if recorded),
              `warnings`, `wall_time`, `preflight`, `provenance`
     errors   InputError if the run has no history
     """
@@ -53,7 +54,8 @@ def report(folder: Path) -> dict[str, Any]:
         "energy": energy,
         "energy_lines": _energy_lines(run, energy),
         "collisions": _collisions(run, begin),
-        "warnings": warnings_of(run, case, measures, laws),
+        "impacts": _impacts(run, begin, end),
+        "warnings": warnings_of(run, case, begin, measures, laws),
         "wall_time": run.about.get("wall_time", {}),
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
         "preflight": preflight(case).summary(),
@@ -149,3 +151,11 @@ def _collisions(run: Run, begin: float) -> dict[str, float]:
         "contact_fraction": found.contact_fraction,
         "deformed_fraction": found.deformed_fraction,
     }
+
+
+def _impacts(run: Run, begin: float, end: float) -> dict[str, float]:
+    """Rate [1/s] and mean speed [m/s] of the collisions between particles in the window; empty if not recorded."""
+    if "weight" not in run.collisions or not end > begin:
+        return {}
+    found = impacts(run.collisions, begin, end, int(run.history["particle_count"][-1]))
+    return {"rate": found.rate, "contact_rate": found.contact_rate, "mean_speed": found.mean_speed}

@@ -13,6 +13,8 @@ from cfddem.io.quantities import shown_unit
 WIDTH = 98
 """Columns of wrapped lines."""
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
 
 def lines(result: dict[str, Any]) -> list[str]:
     """The report as text, at most 100 columns wide.
@@ -24,6 +26,7 @@ def lines(result: dict[str, Any]) -> list[str]:
         *_laws(result["laws"]),
         *_ledger(result["ledger"]),
         *_collisions(result["collisions"]),
+        *_impacts(result["impacts"]),
         *_energy(result),
         *_wall_time(result["wall_time"]),
         *_warnings(result["warnings"]),
@@ -98,6 +101,14 @@ def _collisions(found: dict[str, float]) -> Iterator[str]:
         )
 
 
+def _impacts(found: dict[str, float]) -> Iterator[str]:
+    if found:
+        yield ""
+        touching = f"{found['contact_rate']:.3g} of them with solid contact"
+        yield f"  {found['rate']:.3g} collisions of a particle per second, {touching}"
+        yield f"  mean speed of approach {found['mean_speed']:.3g} m/s"
+
+
 def _energy(result: dict[str, Any]) -> Iterator[str]:
     if result["energy"]:
         yield ""
@@ -112,8 +123,9 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
     if not total:
         return []
     parts = sorted(seconds.items(), key=lambda each: -each[1])
-    shares = ", ".join(f"{name} {100 * each / total:.0f} %" for name, each in parts[:6])
-    return ["", *textwrap.wrap(f"  wall time {total:.3g} s: {shares}", WIDTH, subsequent_indent="    ")]
+    shares = ", ".join(f"{name} {100 * each / total:.0f}{NO_BREAK}%" for name, each in parts[:6])
+    lines = textwrap.wrap(f"  wall time {total:.3g} s: {shares}", WIDTH, subsequent_indent="    ")
+    return ["", *(line.replace(NO_BREAK, " ") for line in lines)]
 
 
 def _warnings(found: list[str]) -> Iterator[str]:

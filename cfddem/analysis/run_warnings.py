@@ -9,18 +9,24 @@ import numpy as np
 
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
+from closures.registry import Law
 
 REMEDY = "choose a law with a wider range (cfddem explain)"
 
 
-def warnings_of(run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> list[str]:
+LEAST_SHARE = 0.01
+"""Share of the uses of a law outside of its range from which a warning is given."""
+
+
+def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], laws: list[dict[str, Any]]) -> list[str]:
     """All warnings, one line each.
 
+    begin           start of the averaging window [s]
     measures, laws  of the report
     """
     return [
         *_status_warnings(run),
-        *_range_warnings(run, case),
+        *_range_warnings(run, case, begin),
         *(f"{row['law']}: {row['outside_range']}" for row in laws if row["outside_range"]),
         *_series_warnings(measures),
     ]
@@ -44,22 +50,36 @@ def _status_warnings(run: Run) -> Iterator[str]:
         yield f"{len(run.missing)} snapshots are missing"
 
 
-def _range_warnings(run: Run, case: Case) -> Iterator[str]:
-    """How often laws were evaluated outside of their fitted ranges."""
-    outside = last_value(run, "out_of_range_count")
-    if not outside:
-        return
-    pair_laws = list(case.laws.pair_laws.values())
-    laws = [law for law in (case.laws.drag_law, *pair_laws) if law is not None]
-    ranges = "; ".join(f"{law.name} {law.fitted_for}" for law in laws if law.ranges)
-    evaluations = last_value(run, "fluid_steps") * float(run.history["particle_count"].mean())
-    if pair_laws or not evaluations:
-        yield f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}; {REMEDY}"
-        return
-    yield (
-        f"the drag law {laws[0].name} was evaluated outside of its fitted range {outside} times, "
-        f"{100.0 * outside / evaluations:.2g} % of all: {laws[0].fitted_for}; {REMEDY}"
-    )
+def _range_warnings(run: Run, case: Case, begin: float) -> Iterator[str]:
+    """How often laws were evaluated outside of their fitted ranges after a time [s], if it is more than LEAST_SHARE."""
+    steps = _gained(run, "fluid_steps", begin)
+    evaluations = steps * float(run.history["particle_count"].mean())
+    drag, agitation, pair_laws = case.laws.drag_law, case.agitation, list(case.laws.pair_laws.values())
+    if pair_laws:
+        if outside := _gained(run, "out_of_range_count", begin):
+            laws = [law for law in (drag, *pair_laws) if law is not None and law.ranges]
+            ranges = "; ".join(f"{law.name} {law.fitted_for}" for law in laws)
+            yield f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}; {REMEDY}"
+    elif drag is not None:
+        yield from _beyond("drag law", drag, _gained(run, "out_of_range_count", begin), evaluations)
+    if isinstance(agitation, Law):
+        outside = _gained(run, "agitation_out_of_range_count", begin)
+        yield from _beyond("law of agitation", agitation, outside, evaluations)
+
+
+def _gained(run: Run, name: str, begin: float) -> int:
+    """Increase of a counting column of the history after a time [s]; 0 if there is none."""
+    column = run.history.get(name, np.zeros(0))
+    return int(column[-1] - column[np.searchsorted(run.history["time"], begin)]) if len(column) else 0
+
+
+def _beyond(kind: str, law: Law, outside: int, evaluations: float) -> Iterator[str]:
+    """Warning that a law was used outside of its range too often."""
+    if evaluations and outside > LEAST_SHARE * evaluations:
+        yield (
+            f"the {kind} {law.name} was evaluated outside of its fitted range in {100.0 * outside / evaluations:.2g} % "
+            f"of its uses: {law.fitted_for}; {REMEDY}"
+        )
 
 
 def _series_warnings(measures: dict[str, Any]) -> Iterator[str]:

@@ -45,7 +45,7 @@ def compared_with_drag_law(run: Run, case: Case) -> Iterator[tuple[str, float, f
         return
     exact = [float(speeds[0])]
     for begin, end in pairwise(times):
-        exact.append(speed_after(end - begin, exact[-1], *sphere, added_mass=case.laws.added_mass))
+        exact.append(speed_after(end - begin, exact[-1], *sphere, added_mass=case.laws.added_mass_at(1.0)))
     worst = int(np.abs(speeds - exact).argmax())
     if worst:
         name = f"equation of motion, largest deviation at {times[worst]:.3g} s"

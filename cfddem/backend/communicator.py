@@ -2,7 +2,7 @@
 
 A run on a cluster divides cells and particles among ranks. A rank then knows only a part of every array, so a sum, an
 extreme value or a decision over the whole array must go through a communicator. `Communicator` is that of a run in one
-process. A parallel communicator replaces `_combine` and `broadcast`, and nothing else.
+process. A parallel communicator replaces `_combine`, `broadcast` and `exchange`, and nothing else.
 
 Each method first reduces the array of this rank with NumPy, in NumPy's order, and then combines the ranks in the order
 of their numbers. All ranks get the same bits. All ranks must make the same calls in the same order.
@@ -10,7 +10,7 @@ of their numbers. All ranks get the same bits. All ranks must make the same call
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -41,21 +41,21 @@ class Communicator:
                  stay must be equally long on all ranks
         returns  a number, or an array of the axes that stay
         """
-        return self._combine(_plain(np.sum(values, axis=axis)), np.add)
+        return _plain(self._combine(np.sum(values, axis=axis), np.add))
 
     def largest(self, values: ArrayLike, axis: Axis = None, *, default: float = -np.inf) -> Any:
         """Largest element of the arrays of all ranks; NaN if any element is NaN.
 
         default  contribution of a rank without elements
         """
-        return self._combine(_plain(_extreme(np.max, values, axis, default)), np.maximum)
+        return _plain(self._combine(_extreme(np.max, values, axis, default), np.maximum))
 
     def smallest(self, values: ArrayLike, axis: Axis = None, *, default: float = np.inf) -> Any:
         """Smallest element of the arrays of all ranks; NaN if any element is NaN.
 
         default  contribution of a rank without elements
         """
-        return self._combine(_plain(_extreme(np.min, values, axis, default)), np.minimum)
+        return _plain(self._combine(_extreme(np.min, values, axis, default), np.minimum))
 
     def any(self, condition: ArrayLike) -> bool:
         """Whether a condition holds for any element on any rank; False without elements."""
@@ -71,8 +71,12 @@ class Communicator:
 
     def mean(self, values: ArrayLike) -> float:
         """Mean of the elements on all ranks; NaN without elements."""
-        total, count = self.sum(values), self._combine(int(np.size(values)), np.add)
+        total, count = self.sum(values), self._combine(np.size(values), np.add)
         return float(total / count) if count else float("nan")
+
+    def joined(self, rows: np.ndarray) -> np.ndarray:
+        """The rows of the arrays of all ranks, in the order of the ranks."""
+        return np.asarray(self._combine(rows, lambda first, second: np.concatenate([first, second])))
 
     def first(self, value: Value | None) -> Value | None:
         """The value of the lowest rank that passes one; None if all pass None."""
@@ -81,6 +85,10 @@ class Communicator:
     def broadcast(self, value: Value, root: int = 0) -> Value:
         """The value that rank `root` passes, on all ranks."""
         return value
+
+    def exchange(self, parcels: Sequence[Value]) -> list[Value]:
+        """Give parcel n to rank n, for every rank; returns what the ranks gave to this one, in their order."""
+        return list(parcels)
 
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         """Combine the values of all ranks, in the order of the ranks; the value of this rank if it is the only one."""

@@ -15,34 +15,48 @@ GAP_ARGUMENTS = ("roughness", "approach_speed", "viscosity", "reduced_modulus", 
 FILM_ARGUMENTS = ("gap", "viscosity", "reduced_radius", "minimum_gap", "cutoff_gap")
 """Arguments that a film law may take, by name: [m], [Pa s], [m], [m], [m]; it must take the first three."""
 
-BUILT_IN = {"drag": ("none",), "minimum_gap": ("elastohydrodynamic",), "lubrication": ("nijssen", "none")}
+AGITATION_ARGUMENTS = ("solid_fraction", "reynolds", "along", "density_ratio")
+"""Arguments that a law of agitation may take, by name: of the mean slip, in the direction with this squared cosine."""
+
+BUILT_IN: dict[str, tuple[str, ...]] = {
+    "drag": ("none",),
+    "minimum_gap": ("elastohydrodynamic",),
+    "lubrication": ("nijssen", "none"),
+    "added_mass": (),
+    "agitation": ("auto", "none", "lattanzi"),
+}
 """Names that a case may use besides those of registered laws: no law, or the built-in one."""
 
-OF_THE_PAIR_LOOP: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+ARGUMENTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "minimum_gap": (GAP_ARGUMENTS, ()),
     "lubrication": (FILM_ARGUMENTS, FILM_ARGUMENTS[:3]),
+    "agitation": (AGITATION_ARGUMENTS, AGITATION_ARGUMENTS[:1]),
 }
-"""Kinds of law that the pair loop calls: arguments that a law may take, and those that it must take."""
+"""Arguments that a law of a kind may take, and those that it must take."""
+
+OF_THE_PAIR_LOOP = ("minimum_gap", "lubrication")
+"""Kinds of law that the pair loop calls."""
 
 
 def chosen(kind: str, law: str | Callable[..., float]) -> Law:
     """Registry entry of a law chosen by its name or passed as a function.
 
-    kind  "drag", "minimum_gap" or "lubrication"
+    kind  a key of `BUILT_IN`
     """
     entry = _named(kind, law) if isinstance(law, str) else _user_defined(kind, law)
     if not _can_be_called(kind, entry):
-        may, must = OF_THE_PAIR_LOOP[kind]
+        may, must = ARGUMENTS[kind]
         asked = f"it may take {', '.join(may)}" + (f", and must take {', '.join(must)}" if must else "")
-        raise InputError(kind, entry.name, f"a law of kind {kind!r} that the pair loop can call", asked)
+        loop = "pair loop" if kind in OF_THE_PAIR_LOOP else "coupling"
+        raise InputError(kind, entry.name, f"a law of kind {kind!r} that the {loop} can call", asked)
     return entry
 
 
 def _can_be_called(kind: str, entry: Law) -> bool:
     """Whether the caller of laws of this kind has all arguments that this one takes."""
-    if kind not in OF_THE_PAIR_LOOP:
+    if kind not in ARGUMENTS:
         return True
-    may, must = OF_THE_PAIR_LOOP[kind]
+    may, must = ARGUMENTS[kind]
     return entry.kind == kind and set(must) <= set(inspect.signature(entry.function).parameters) <= set(may)
 
 

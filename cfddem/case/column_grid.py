@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from cfddem.case.schema import Column
-from cfddem.fluid.grid import Grid, outside_cylinder
+from cfddem.fluid.grid import Grid, Region, outside_cylinder
 
 
 def grid_of(column: Column) -> Grid:
     """Cells of the column; those outside a cylinder are solid."""
-    width, _, _ = column.size
-    solid = None
-    if column.shape == "cylinder":
-        solid = outside_cylinder((0.5 * width, 0.5 * width, 0.0), 0.5 * width)
-    return Grid.of_size(column.size, column.cell, solid=solid)
+    return Grid.of_size(column.size, column.cell, solid=outside_column(column))
+
+
+def outside_column(column: Column) -> Region | None:
+    """Region of the box of cells that is outside the column; None if the column is the box."""
+    if column.shape == "box":
+        return None
+    return outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width)

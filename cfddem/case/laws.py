@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import BUILT_IN, chosen
 from cfddem.case.bed import Point
 from cfddem.case.materials import Checked
+from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
+from closures.agitation import INERTIA_SHARE
 from closures.registry import Law
+
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class AgitationFactors(NamedTuple):
+    """Factors of a law of agitation."""
+
+    along: float  # of the fluctuation along the mean slip in the drag
+    across: float  # across it
+    inertia: float  # of the force by the acceleration of the fluctuation
+    time: float  # of the correlation time
 
 
 class CaseLaws(Checked):
@@ -31,9 +46,12 @@ class CaseLaws(Checked):
         "elastohydrodynamic",
         description="smallest gap that a film allows, unless roughness is larger: a law's name, or a function",
     )
-    contact: Literal["hertz", "linear"] = Field("hertz", description="contact law")
-    normal_stiffness: float = Field(0.0, ge=0, description="normal stiffness of the linear contact [N/m]")
-    tangential_stiffness: float = Field(0.0, ge=0, description="tangential stiffness of the linear contact [N/m]")
+    contact: str = Field(
+        "hertz", description="contact law: a name from `cfddem explain`; jkr is not allowed with films"
+    )
+    contact_parameters: dict[str, NonNegative] = Field(
+        {}, description="parameters of the contact law: normal_stiffness of linear [N/m], ..."
+    )
     friction_onset: Literal["film", "overlap"] = Field(
         "film", description="friction begins at the minimum gap of the film, or at overlap of the solids"
     )
@@ -41,17 +59,30 @@ class CaseLaws(Checked):
         "none", description="rolling resistance model; uses rolling_friction of the materials"
     )
     rolling_damping: float = Field(0.3, ge=0, description="damping of the rolling dashpot over critical damping [-]")
-    cohesion: Literal["none", "jkr"] = Field(
-        "none", description="adhesion of dry solids; uses surface_energy of the materials, not allowed with films"
-    )
-    added_mass: float = Field(
-        0.0, ge=0, description="added-mass coefficient C_m in C_m rho_f V; 0.5 for a single sphere [-]"
+    added_mass: float | str | Callable[..., float] = Field(
+        0.0,
+        description="added-mass coefficient C_m in C_m rho_f V, 0.5 for a single sphere [-]; "
+        "or a law of the voidage: zuber, another name, or a function",
     )
     lift: bool = Field(False, description="Saffman-Mei shear lift and Magnus spin lift")
     torque: bool = Field(False, description="hydrodynamic torque against spin relative to the fluid")
     viscous_stress: bool = Field(False, description="force V div(tau) on particles; model A only")
-    agitation: Literal["none", "pseudo_turbulence", "lattanzi"] = Field(
-        "none", description="fluctuating force on each particle from the flow around its neighbours"
+    agitation: str | Callable[..., float] = Field(
+        "auto",
+        description="fluctuating force on each particle from the flow around its neighbours: auto (free_spheres where "
+        "it was measured, else none), none, free_spheres, pseudo_turbulence, lattanzi, a law's name, or a function",
+    )
+    agitation_drag_along: float | None = Field(
+        None, ge=0, description="factor of the fluctuation along the mean slip in the drag; default: of the law [-]"
+    )
+    agitation_drag_across: float | None = Field(
+        None, ge=0, description="factor of the fluctuation across the mean slip in the drag; default: of the law [-]"
+    )
+    agitation_inertia: float = Field(
+        INERTIA_SHARE, ge=0, description="factor of the force by the acceleration of the fluctuation [-]"
+    )
+    agitation_time: float | None = Field(
+        None, gt=0, description="factor of the correlation time of the fluctuation, d/w; default: of the law [-]"
     )
     mapping: Literal["linear", "centroid", "divided"] = Field(
         "linear", description="distribution of particle volume over cells, before the filter kernel"
@@ -65,13 +96,47 @@ class CaseLaws(Checked):
     convection: Literal["limited", "central"] = Field("limited", description="convection scheme of the fluid")
     gravity: Point = Field((0.0, 0.0, -9.81), description="gravitational acceleration g [m/s2]")
 
-    @field_validator("drag", "minimum_gap", "lubrication")
+    @field_validator("drag", "minimum_gap", "lubrication", "agitation")
     @classmethod
     def _laws_exist(cls, value: Any, about: ValidationInfo) -> Any:
         kind = about.field_name or ""
         if value not in BUILT_IN.get(kind, ()) and (isinstance(value, str) or kind != "drag"):
             chosen(kind, value)
         return value
+
+    @field_validator("added_mass")
+    @classmethod
+    def _added_mass_is_a_number_or_a_law(cls, value: Any) -> Any:
+        if isinstance(value, str) or callable(value):
+            chosen("added_mass", value)
+        elif not (value >= 0.0 and math.isfinite(value)):
+            raise InputError("added_mass", value, "zero or positive, or the name of a law")
+        return value
+
+    @model_validator(mode="after")
+    def _contact_exists(self) -> CaseLaws:
+        known = contact_named(self.contact).parameters
+        for name, value in self.contact_parameters.items():
+            if name not in known:
+                limit = nearest(name, known) if known else f"left out; {self.contact} has no parameters"
+                raise InputError(f"contact_parameters.{name}", value, limit)
+        return self
+
+    @property
+    def contact_law(self) -> ContactLaw:
+        """Contact law with the parameters of the case."""
+        return contact_named(self.contact).with_parameters(**self.contact_parameters)
+
+    @property
+    def added_mass_law(self) -> float | Law:
+        """Added-mass coefficient, or the law that gives it."""
+        given = self.added_mass
+        return chosen("added_mass", given) if isinstance(given, str) or callable(given) else given
+
+    def added_mass_at(self, voidage: float) -> float:
+        """Added-mass coefficient at a voidage [-]."""
+        law = self.added_mass_law
+        return law.function(voidage) if isinstance(law, Law) else law
 
     @property
     def drag_law(self) -> Law | None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 KEYS = {
     "bed.velocity": "bed.initial_velocity",
+    "laws.cohesion": "laws.contact",
+    "laws.normal_stiffness": "laws.contact_parameters.normal_stiffness",
     "laws.own_wind": "laws.self_disturbance_correction",
     "laws.rolling": "laws.rolling_resistance",
     "laws.smoothing": "laws.kernel_width",
+    "laws.tangential_stiffness": "laws.contact_parameters.tangential_stiffness",
     "run.collisions": "run.record_collisions",
     "run.energy": "run.energy_budget",
     "run.step": "run.particle_step",

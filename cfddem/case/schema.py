@@ -14,12 +14,14 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfddem.backend.errors import InputError, nearest, shown
-from cfddem.backend.law_choice import BUILT_IN
+from cfddem.backend.law_choice import BUILT_IN, chosen
 from cfddem.case.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
-from cfddem.case.laws import CaseLaws
+from cfddem.case.laws import AgitationFactors, CaseLaws
 from cfddem.case.materials import Checked, Fluid, Material
 from cfddem.case.toml_text import parse, read_text, set_value
+from closures.agitation import SHARES, TIMES, free_spheres
+from closures.registry import Law, law_of
 
 
 class Column(Checked):
@@ -90,6 +92,10 @@ class CaseRun(Checked):
     )
 
 
+HEAVY = 2.0
+"""Density ratio from which agitation is a default: lighter beads expand too far with it (voidage 0.03 too high)."""
+
+
 class Case(Checked):
     """The complete description of a run.
 
@@ -124,6 +130,12 @@ class Case(Checked):
         named = {f"bed.species.{name}": each.material for name, each in self.bed.species.items()}
         for error in _unknown_materials(list(self.material), named or {"bed": self.bed.material}, self.column.material):
             raise error
+        return self
+
+    @model_validator(mode="after")
+    def _a_random_packing_fills_a_box(self) -> Case:
+        if self.bed.start == "packed" and self.column.shape == "cylinder":
+            raise InputError("bed.start", "packed", '"poured" or "suspended" in a cylinder', "a packing fills a box")
         return self
 
     @property
@@ -176,6 +188,51 @@ class Case(Checked):
     def has_films(self) -> bool:
         """Whether lubrication films form between close spheres."""
         return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.lubrication != "none"
+
+    @property
+    def agitation(self) -> str | Law:
+        """Law of agitation that the run uses, or "none" or "lattanzi".
+
+        `laws.agitation = "auto"` is `free_spheres` if density ratios and Re_m = rho U d / eta, with the inlet velocity
+        U, are within its range and the density ratios at least HEAVY, and "none" otherwise. The solid fraction is
+        compared with the range during the run.
+        """
+        given = self.laws.agitation
+        if given == "auto":
+            return law_of(free_spheres) if self._agitation_is_measured else "none"
+        return given if isinstance(given, str) and given in BUILT_IN["agitation"] else chosen("agitation", given)
+
+    @property
+    def agitation_factors(self) -> AgitationFactors:
+        """Factors of the law of agitation: those of the case, or those of the law where the case has none."""
+        laws, law = self.laws, self.agitation
+        name = law.name if isinstance(law, Law) else law
+        along, across = SHARES.get(name, (1.0, 1.0))
+        return AgitationFactors(
+            along if laws.agitation_drag_along is None else laws.agitation_drag_along,
+            across if laws.agitation_drag_across is None else laws.agitation_drag_across,
+            laws.agitation_inertia,
+            TIMES.get(name, 1.0) if laws.agitation_time is None else laws.agitation_time,
+        )
+
+    @property
+    def _agitation_is_measured(self) -> bool:
+        """Whether the law of free spheres was measured for all species at the highest inlet velocity."""
+        fluid, ranges = self.fluid, law_of(free_spheres).ranges
+        if fluid is None or fluid.viscosity <= 0.0 or self.laws.drag_law is None:
+            return False
+        numbers = [
+            {
+                "density_ratio": self.material_of(each).density / fluid.density,
+                "reynolds": fluid.density * self.bed.fastest_inflow * each.diameter / fluid.viscosity,
+            }
+            for each in self.species.values()
+        ]
+        return all(
+            ranges[name][0] <= value <= ranges[name][1] and each["density_ratio"] >= HEAVY
+            for each in numbers
+            for name, value in each.items()
+        )
 
     @property
     def particle_count(self) -> int:

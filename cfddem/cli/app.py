@@ -11,7 +11,7 @@ from cyclopts import App, CycloptsError, Group
 
 from cfddem import __version__
 from cfddem.backend.errors import CfddemError
-from cfddem.cli import cases, laws, results, validation
+from cfddem.cli import cases, information, results, validation
 
 WIDTH = 100
 """Widest line on a terminal [characters]."""
@@ -31,11 +31,11 @@ Exit codes: 0 success; 1 a limit is exceeded (validate), warnings with --strict 
 )
 
 COMMANDS = {
-    "Cases": (cases.new, cases.check, cases.run, cases.resume, cases.sweep),
+    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, cases.sweep),
     "Results": (results.report, results.view, results.export),
     "Collisions of a few spheres": ("collide", "wet-wall", "three-spheres", "wet-pair"),
     "Validation": (validation.validate, validation.bench),
-    "Information": (laws.explain, laws.doctor),
+    "Information": (information.explain, information.doctor),
 }
 """Commands by the panel of the help that lists them; those given by name are in :data:`COLLISIONS`."""
 

@@ -51,7 +51,7 @@ def check(
 
     Exit code: 0 without errors, 2 with errors.
 
-    Example: cfddem check liquid-bed --set bed.inlet_velocity=0.1
+    Example: cfddem check liquid-bed --set bed.inlet_velocity=0.04
     """
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
@@ -60,6 +60,40 @@ def check(
     result = preflight(Case.from_toml(find_case(case), overrides(set or [])))
     print(_json.dumps(result.summary()) if json else "\n".join(with_colour(result.lines())))
     sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
+
+
+def stability(
+    case: Annotated[Path | None, Parameter(help=CASE)] = None,
+    *,
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    plot: Annotated[Path | None, Parameter(help="PNG file for growth and speed against wavelength")] = None,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Show which waves grow in a liquid bed, by linear theory: growth and speed against wavelength. Nothing is run.
+
+    The theory has the drag law, kernel, added mass and agitation of the case, and the damping of its cells.
+
+    Example: cfddem stability liquid-bed --set agitation=free_spheres
+    """
+    from cfddem.backend.errors import InputError
+    from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.schema import Case
+    from cfddem.io.files import require_folder
+    from cfddem.preflight.bed_estimate import estimate_bed
+    from cfddem.preflight.bed_waves import lines, summary, waves_of
+
+    require_folder(plot)
+    described = Case.from_toml(find_case(case), overrides(set or []))
+    found = waves_of(described, estimate_bed(described))
+    if found is None:
+        remedy = "waves are computed for free particles above minimum fluidisation, denser than their liquid"
+        raise InputError("case", described.title or None, "a fluidised liquid bed", remedy)
+    print(_json.dumps(summary(found)) if json else "\n".join(lines(found)))
+    if plot is not None:
+        from cfddem.plotting.wave_figures import growth_curves
+
+        growth_curves(found, plot)
+        print(f"figure: {plot}", file=sys.stderr if json else sys.stdout)
 
 
 def run(

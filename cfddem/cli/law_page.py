@@ -11,6 +11,7 @@ from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.equation_text import equation_text
+from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named
 from closures import registry
 from closures.registry import Law
 
@@ -19,15 +20,21 @@ WIDTH = 100
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
+CONTACT_LAW = "contact_law"
+"""Kind of the contact laws that a run can use."""
+
 CURVES = 4
 """Curves in a plot, one for each value of the second argument."""
 
 
 def laws() -> dict[str, dict[str, Law]]:
-    """All laws by kind and name, including those of installed packages."""
+    """All laws by kind and name, including those of installed packages; a contact law by its force."""
     registry.load_built_in_laws()
     registry.load_package_laws()
-    return registry.REGISTRY
+    contacts = {
+        each.name: Law(each.name, CONTACT_LAW, each.reference, function=each.force) for each in all_contact_laws()
+    }
+    return {**registry.REGISTRY, CONTACT_LAW: contacts}
 
 
 def find(name: str) -> Law:
@@ -84,10 +91,22 @@ def page(law: Law) -> list[str]:
         else:
             out += textwrap.wrap(" ".join(plain_words(paragraph).split()), WIDTH)
         out.append("")
+    if law.kind == CONTACT_LAW:
+        out += _contact_lines(contact_named(law.name))
     for name, (low, high) in law.ranges.items():
         out.append(f"fitted for {name} from {low:g} to {high:g}")
     out += textwrap.wrap(f"reference: {law.reference}", WIDTH, subsequent_indent="  ")
     return out
+
+
+def _contact_lines(law: ContactLaw) -> list[str]:
+    """Parameters and memory of a contact law."""
+    parameters = ", ".join(f"{name} = {value:g}" for name, value in law.parameters.items())
+    memory = ", ".join(f"{each.name} [{each.unit}]" for each in law.memory)
+    lines = [f"in a case: [laws] contact = {law.name!r}".replace("'", '"')]
+    lines += [f"parameters, in [laws.contact_parameters]: {parameters}"] * bool(parameters)
+    lines += [f"memory of a pair: {memory}"] * bool(memory)
+    return [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
 
 
 def _equation_lines(equation: str) -> list[str]:

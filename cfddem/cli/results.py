@@ -53,6 +53,7 @@ def view(
     movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .mp4 or .gif")] = None,
     history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
     collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,
+    waves: Annotated[bool, Parameter(help="solid fraction over height and time instead", negative="")] = False,
     window: Annotated[bool, Parameter(help="interactive window instead of a file", negative="")] = False,
 ) -> None:
     """Make a picture or movie of a run, or curves over time.
@@ -62,7 +63,7 @@ def view(
     from cfddem.io.files import require_folder
     from cfddem.io.reading import newest_run
     from cfddem.plotting import curves as plots
-    from cfddem.plotting import pictures
+    from cfddem.plotting import pictures, wave_figures
     from cfddem.plotting.window import window as on_screen
 
     folder, panels = folder or newest_run(Path()), show or ()
@@ -74,6 +75,8 @@ def view(
         print(pictures.movie(folder, movie, show=panels, colour=colour))
     elif collisions:
         print(plots.collisions(folder, output))
+    elif waves:
+        print(wave_figures.wave_map(folder, output))
     elif history:
         print(plots.history(folder, output))
     else:

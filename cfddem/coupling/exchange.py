@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import (
     AgitationTerms,
@@ -24,7 +25,7 @@ from cfddem.coupling.forces.agitation import (
     neighbourhood_mean,
 )
 from cfddem.coupling.forces.drag import Drag
-from cfddem.coupling.forces.lift import lift_force, vorticity
+from cfddem.coupling.forces.lift import lift_force
 from cfddem.coupling.forces.pressure import PressureForce
 from cfddem.coupling.forces.torque import turn_with_fluid
 from cfddem.coupling.forces.viscous_stress import viscous_force
@@ -33,6 +34,7 @@ from cfddem.coupling.sampled_flow import FlowSampler, SampledFlow
 from cfddem.coupling.self_disturbance import SelfDisturbance
 from cfddem.coupling.time_scales import COURANT, crossing_rate
 from cfddem.coupling.transfer import ImplicitCoefficients, Transfer
+from cfddem.coupling.velocity_gradient import change_along, vorticity_at
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
@@ -42,7 +44,7 @@ SAME_STEP = 1e-6
 """Fluid steps that differ by less than this part are equal."""
 
 STEP_RELAXATION = 0.01
-"""Part of its distance to the present step by which the usual fluid step moves in every step."""
+"""Weight of the present step in the running mean of the fluid step."""
 
 
 class CouplingTerms(NamedTuple):
@@ -51,9 +53,11 @@ class CouplingTerms(NamedTuple):
     cell_map: ParticleCellMap
     flow: SampledFlow
     drag: ImplicitCoefficients
-    explicit: Array  # forces known before the fluid's step: lift, viscous stress, added mass, agitation (N, 3) [N]
+    explicit: Array  # forces known before the fluid's step: lift, viscous stress, added mass (N, 3) [N]
+    added: Array  # change of the added mass of every particle at the start of the step (N,) [kg]
     voidage: Array  # of the cells (nz, ny, nx)
     source: Array | None  # force on the fluid (nz, ny, nx, 3) [N/m3]
+    agitation: AgitationTerms | None = None
 
     @property
     def step(self) -> float:
@@ -61,9 +65,33 @@ class CouplingTerms(NamedTuple):
         return self.drag.step
 
     @property
+    def fluctuating_force(self) -> Array:
+        """Explicit force of agitation on every particle (N, 3) [N]."""
+        force = None if self.agitation is None else self.agitation.force
+        return np.zeros_like(self.explicit) if force is None else force
+
+    @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
         """Arguments of `FluidSolver.step` after the length of the step."""
         return self.voidage, self.drag.cell_conductance, self.drag.cell_product, self.source
+
+
+class FluidForces(NamedTuple):
+    """Forces of the fluid on every particle, constant over a fluid step (N, 3) [N]."""
+
+    drag: Array
+    pressure: Array  # of model A, without buoyancy
+    weight: Array  # less buoyancy
+    explicit: Array  # lift, viscous stress, added mass
+    agitation: Array  # by the acceleration of the fluctuation, or the fluctuating force; without that in the drag
+
+
+class DragWork(NamedTuple):
+    """Work of drag in a fluid step at the velocity with which the fluid acts on every particle."""
+
+    whole: float  # [J]
+    fluctuating: Array  # drag of the fluctuation of the fluid velocity (N, 3) [N]
+    of_fluctuation: float  # work of that part [J]
 
 
 class Exchange:
@@ -73,7 +101,7 @@ class Exchange:
     fluid            the fluid solver; its model, "A" or "B", holds for the coupling
     kernel           deposits on cells and gathers from them
     drag             drag law; None for no drag
-    added_mass       coefficient C of the added mass C rho V; 0 for none
+    added_mass       of the particles; None for none
     lift             of shear (Saffman-Mei) and of spin (Magnus)
     torque           of the fluid against spin relative to half its vorticity
     viscous_stress   V div(tau), in model A only
@@ -88,7 +116,7 @@ class Exchange:
         kernel: FilterKernel,
         drag: Law | None,
         *,
-        added_mass: float = 0.0,
+        added_mass: AddedMass | None = None,
         self_disturbance: bool = True,
         lift: bool = False,
         torque: bool = False,
@@ -100,13 +128,17 @@ class Exchange:
         self.drag, self.agitation = Drag(drag, fluid.model), agitation
         self.self_disturbance = SelfDisturbance(kernel) if self_disturbance else None
         self.flow = FlowSampler(fluid, kernel, self.self_disturbance, self.drag.needs_sizes)
-        self.pressure, self.added_mass = PressureForce(fluid, kernel), AddedMass(added_mass)
+        self.pressure, self.added_mass = PressureForce(fluid, kernel), added_mass or AddedMass(0.0, fluid.density)
         self.momentum = Transfer(
             kernel, "velocity", ("drag_impulse", "N s"), self.drag.conductance, inertia, lambda each: each.force
         )
         self.spin_work = 0.0  # kinetic energy that the last torque of the fluid has given to the particles [J]
-        self._usual_step = 0.0
+        self._mean_step = 0.0
         self._declare(particles)
+        if self.added_mass:
+            cell_map = kernel.map_particles(particles.position, particles.radius)
+            flow = self.flow.sample(particles, cell_map, kernel.solid_fraction(cell_map))
+            self.added_mass.update(particles, flow.voidage)
 
     def _declare(self, particles: Particles) -> None:
         """Declare the fields of all forces."""
@@ -129,19 +161,28 @@ class Exchange:
         cell_map = kernel.map_particles(self._mapped_position(particles, step), particles.radius)
         solid = kernel.solid_fraction(cell_map)
         flow = self.flow.sample(particles, cell_map, solid)
+        deferred = self._deferred_force(particles, step)
+        heavier = self.added_mass.update(particles, flow.voidage)
         transverse = self._transverse_force(particles, cell_map, flow.slip)
         not_seen = flow.disturbance  # part of the cells' velocity that does not act on the particle
+        around = agitation = None
         if self.agitation is not None:
-            flow, agitation = self._agitate(particles, cell_map, flow, solid, step)
-            transverse += agitation.force
+            around = self._neighbourhood(particles, cell_map, flow, solid)
+            flow, agitation = around.flow, self.agitation.terms(particles, around, step)
             not_seen = not_seen - agitation.velocity
-        drag = self.momentum.prepare(particles, cell_map, flow, step, not_seen)
-        added = self.added_mass.force(particles, flow, last_step)
-        lost = self._deferred_force(particles, added, step) - transverse
-        return CouplingTerms(cell_map, flow, drag, transverse + added, 1.0 - solid, self._source(cell_map, lost))
+        known = None if around is None else around.conductance
+        drag = self.momentum.prepare(particles, cell_map, flow, step, not_seen, known)
+        added = np.zeros_like(transverse)
+        if self.added_mass and last_step > 0.0:
+            added = self.added_mass.force(particles, flow, change_along(fluid, kernel, cell_map, flow.slip), last_step)
+        source, fluctuating = None, None if agitation is None else agitation.force
+        if self.added_mass or self.lift or self.viscous_stress or fluctuating is not None:
+            lost = deferred - added - transverse
+            source = self._source(cell_map, lost if fluctuating is None else lost - fluctuating)
+        return CouplingTerms(cell_map, flow, drag, transverse + added, heavier, 1.0 - solid, source, agitation)
 
-    def apply(self, particles: Particles, terms: CouplingTerms, gravity: Array) -> None:
-        """Store in `particles.applied` the force on every particle until the next fluid step.
+    def apply(self, particles: Particles, terms: CouplingTerms, gravity: Array) -> FluidForces:
+        """Store in `particles.applied` the force on every particle until the next fluid step; returns its parts.
 
         The fluid has made its step with `terms`.
 
@@ -149,32 +190,39 @@ class Exchange:
         """
         fluid, cell_map, step = self.fluid, terms.cell_map, terms.step
         weight, seen, _ = fluid.drag_exchange()
-        drag = self.momentum.apply(particles, cell_map, terms.drag, weight, seen)
-        force = (
-            drag
-            + self.pressure.force(particles, cell_map)
-            + (particles.mass - fluid.density * cell_map.volume)[:, None] * gravity
-            + terms.explicit
+        forces = FluidForces(
+            drag=self.momentum.apply(particles, cell_map, terms.drag, weight, seen),
+            pressure=self.pressure.force(particles, cell_map),
+            weight=(particles.mass - fluid.density * cell_map.volume)[:, None] * gravity,
+            explicit=terms.explicit,
+            agitation=terms.fluctuating_force,
         )
-        particles.force += force - particles.applied
-        particles.applied = force
+        force = forces.drag + forces.pressure
+        for each in (forces.weight, forces.explicit, *(() if terms.agitation is None else (forces.agitation,))):
+            force += each
+        _replace(particles.applied, force, particles.force)
         self.pressure.store(particles, cell_map)
         self.added_mass.store(particles, terms.flow.slip)
         if self.torque and fluid.viscous:
-            gained = turn_with_fluid(particles, self._vorticity(cell_map), fluid.density, step)
+            gained = turn_with_fluid(particles, vorticity_at(fluid, self.kernel, cell_map), fluid.density, step)
             self.spin_work = fluid.communicator.sum(gained)
         if self.self_disturbance is not None and fluid.viscous:
             screening = terms.drag.conductance * terms.flow.others / (fluid.density * terms.flow.voidage)
-            self.self_disturbance.advance(particles, cell_map, terms.flow.slip, drag, screening, fluid.density, step)
+            self.self_disturbance.advance(
+                particles, cell_map, terms.flow.slip, forces.drag, screening, fluid.density, step
+            )
+        return forces
 
-    def drag_work(self, particles: Particles, terms: CouplingTerms) -> float:
-        """Work of the last drag impulse at the velocity with which the fluid acts on every particle [J]."""
-        kernel, drag = self.kernel, particles.drag_impulse / terms.step
+    def drag_work(self, particles: Particles, terms: CouplingTerms) -> DragWork:
+        """Work of the last drag impulse at the velocity with which the fluid acts on every particle."""
+        kernel, drag, total = self.kernel, particles.drag_impulse / terms.step, self.fluid.communicator.sum
         weight = kernel.smooth(np.moveaxis(self.fluid.drag_exchange()[0], -1, 0))
-        gathered = kernel.gather(terms.cell_map.stencil, weight)
-        acting = terms.drag.target + drag / np.maximum(gathered * terms.drag.implicit[:, None], 1e-300)
-        work: float = terms.step * self.fluid.communicator.sum(drag * acting)
-        return work
+        conductance = kernel.gather(terms.cell_map.stencil, weight) * terms.drag.implicit[:, None]
+        acting = terms.drag.target + drag / np.maximum(conductance, 1e-300)
+        if terms.agitation is None:
+            return DragWork(terms.step * total(drag * acting), np.zeros_like(drag), 0.0)
+        fluctuating = conductance * terms.agitation.velocity
+        return DragWork(terms.step * total(drag * acting), fluctuating, terms.step * total(fluctuating * acting))
 
     @property
     def outside(self) -> int:
@@ -185,50 +233,49 @@ class Exchange:
         """What the next step depends on beside fluid and particles."""
         return {
             "last_step": self.momentum.last_step,
-            "usual_step": self._usual_step,
+            "mean_step": self._mean_step,
             "outside": self.drag.outside,
-            **({} if self.agitation is None else {"agitation_steps": self.agitation.steps}),
+            **({} if self.agitation is None else {"agitation": [self.agitation.steps, self.agitation.outside]}),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
-        self.momentum.last_step, self._usual_step = float(state["last_step"]), float(state["usual_step"])
+        self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
         self.drag.outside = int(state["outside"])
         if self.agitation is not None:
-            self.agitation.steps = int(state["agitation_steps"])
+            self.agitation.steps, self.agitation.outside = (int(each) for each in state["agitation"])
 
     # ------------------------------------------------------------ terms
 
     def _mapped_position(self, particles: Particles, step: float) -> Array:
-        r"""Positions from which the voidage is computed, :math:`x + (h - h_u)\,v` (N, 3) [m], h_u the usual step.
+        r"""Positions from which the voidage is computed, :math:`x + (h - \bar h)\,v` (N, 3) [m].
 
-        The voidage moves over a step from where particles were mapped in the last to where they are mapped in this
-        one. Between the two lies the last step of the particles, h_l, but h for the fluid. Mapped at the time of the
-        particles plus h less the usual step, both intervals are h. Otherwise particles would displace the fluid at
-        h_l/h of their rate, a pressure shock in a liquid. The usual step follows the present one slowly.
+        h is the length of this step and :math:`\bar h` a running mean of it, which follows h slowly. Over a step the
+        voidage moves from where the particles were mapped in the step before to where they are mapped now. The
+        particles took the last step, h_l, between the two; the fluid takes h. The shift makes both intervals h. Without
+        it particles would displace the fluid at h_l/h of their rate, a pressure shock in a liquid.
         """
-        fluid, usual = self.fluid, self._usual_step or step
-        self._usual_step = usual
-        if abs(step - usual) < SAME_STEP * step:
+        fluid, mean = self.fluid, self._mean_step or step
+        self._mean_step = mean
+        if abs(step - mean) < SAME_STEP * step:
             return particles.position
         crossing = crossing_rate(particles.velocity, fluid.grid.spacing, fluid.communicator)
-        usual = min(usual, step + COURANT / max(crossing, 1e-300))  # particles are not moved by more than a cell
-        self._usual_step = usual + STEP_RELAXATION * (step - usual)
-        return self.kernel.wrapped(particles.position + (step - usual) * particles.velocity)
+        mean = min(mean, step + COURANT / max(crossing, 1e-300))  # particles are not moved by more than a cell
+        self._mean_step = mean + STEP_RELAXATION * (step - mean)
+        return self.kernel.wrapped(particles.position + (step - mean) * particles.velocity)
 
-    def _agitate(
-        self, particles: Particles, cell_map: ParticleCellMap, flow: SampledFlow, solid: Array, step: float
-    ) -> tuple[SampledFlow, AgitationTerms]:
-        """The flow with the Reynolds number of the mean slip of each neighbourhood, and the agitation of this step.
+    def _neighbourhood(
+        self, particles: Particles, cell_map: ParticleCellMap, flow: SampledFlow, solid: Array
+    ) -> Neighbourhood:
+        """The surroundings of the particles, with the Reynolds number and the drag of the mean slip around each.
 
         Drag laws are fits to mean slips: with individual, fluctuating slips the drag would grow with the fluctuation.
         """
-        assert self.agitation is not None
         mean_slip = neighbourhood_mean(self.kernel, cell_map, solid, flow.slip)
         speed = np.sqrt((mean_slip**2).sum(axis=1))  # local: components of a row
         scale = 2.0 * self.fluid.density * particles.radius * flow.voidage
         flow = flow._replace(reynolds=scale * speed / np.maximum(particles.viscosity, 1e-300))
-        return flow, self.agitation.terms(particles, Neighbourhood(cell_map, flow, mean_slip, solid), step)
+        return Neighbourhood(cell_map, flow, mean_slip, self.drag.conductance(particles, flow), solid)
 
     def _transverse_force(self, particles: Particles, cell_map: ParticleCellMap, slip: Array) -> Array:
         """Viscous stress and lift on every particle (N, 3) [N]."""
@@ -236,31 +283,32 @@ class Exchange:
         if self.viscous_stress:
             force += viscous_force(fluid, self.kernel, cell_map)
         if self.lift and fluid.viscous:
-            curl = self._vorticity(cell_map)
+            curl = vorticity_at(fluid, self.kernel, cell_map)
             force += lift_force(slip, curl, particles.spin, particles.radius, fluid.density, particles.viscosity)
         return force
 
-    def _vorticity(self, cell_map: ParticleCellMap) -> Array:
-        """Vorticity of the fluid around every particle (N, 3) [1/s]."""
-        curl = vorticity(np.moveaxis(self.fluid.velocity, -1, 0), self.fluid.grid.spacing)
-        return self.kernel.gather(cell_map.stencil, self.kernel.smooth(curl))
+    def _deferred_force(self, particles: Particles, step: float) -> Array:
+        """Momentum that the particles lost to their added mass over the last step, per time of this one (N, 3) [N].
 
-    def _deferred_force(self, particles: Particles, added: Array, step: float) -> Array:
-        """Force of the added mass on the fluid in the coming step (N, 3) [N].
-
-        The fluid gets the momentum that the particles lost to their added mass over the last step, less the part
-        that the fluid's own acceleration gives them now.
+        The fluid gets it in this step, less the force that its own acceleration exerts on the particles now.
         """
-        if self.added_mass.coefficient == 0.0 or self.momentum.last_step == 0.0:
-            return np.zeros_like(added)
-        return self.added_mass.deferred_momentum(particles) / step - added
+        if not self.added_mass or self.momentum.last_step == 0.0:
+            return np.zeros((particles.count, 3))
+        return self.added_mass.deferred_momentum(particles) / step
 
-    def _source(self, cell_map: ParticleCellMap, force: Array) -> Array | None:
-        """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]; None where there is none."""
-        if not (self.added_mass.coefficient or self.lift or self.viscous_stress or self.agitation):
-            return None
+    def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
+        """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
         source = self.kernel.smooth(self.kernel.deposit(cell_map, force)) / self.fluid.grid.cell_volume
         return np.ascontiguousarray(np.moveaxis(source, 0, -1))
+
+
+@threaded
+def _replace(applied, new, force):
+    """Replace the force from outside, as part of the sum of all forces."""
+    for n in prange(len(new)):
+        for d in range(3):
+            force[n, d] += new[n, d] - applied[n, d]
+            applied[n, d] = new[n, d]
 
 
 def inertia(particles: Particles) -> Array:

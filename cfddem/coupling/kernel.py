@@ -25,6 +25,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, nearest
 from cfddem.coupling import kernel_loops as loops
 from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.halo import Halo
 
 MAPPINGS = ("linear", "centroid", "divided")
 """First stage: a cube as large as a cell around the centre; the cell of the centre; equal pieces of the sphere, each in
@@ -83,8 +84,10 @@ class FilterKernel:
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
         self._origin, self._inverse = np.array(grid.origin), 1.0 / np.array(grid.spacing)
-        self._home = _homes(grid, self._periodic)
-        self._gates = _gates(grid, self._periodic)
+        self.halo = Halo(grid.cells, periodic, 1, 1)
+        self._buffers: dict[int, Array] = {}
+        self._home = _homes(grid, self.halo)
+        self._gates = _gates(grid, self.halo)
         self.sweeps, self.strength = self._diffusion()
 
     def _diffusion(self) -> tuple[int, Array]:
@@ -135,12 +138,22 @@ class FilterKernel:
 
     def smooth(self, fields: Array) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""
-        now = np.array(fields, float)
-        other = np.empty_like(now)
+        if self.sweeps == 0:
+            return np.array(fields, float)
+        now, other = self._scratch(len(fields))
+        self.halo.inner(now)[:] = fields
         for _ in range(self.sweeps):
+            self.halo.fill(now)
             loops.sweep(now, other, self.strength, *self._gates)
             now, other = other, now
-        return now
+        return self.halo.inner(now).copy()
+
+    def _scratch(self, count: int) -> tuple[Array, Array]:
+        """Two arrays for so many padded fields, the same in every call."""
+        if count not in self._buffers:
+            shape = 2, count, *(n + 2 for n in self.grid.shape)
+            self._buffers[count] = np.zeros(shape)
+        return self._buffers[count][0], self._buffers[count][1]
 
     def solid_fraction(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction of the cells (nz, ny, nx) [-]."""
@@ -167,7 +180,9 @@ class FilterKernel:
         moved -= self._periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
         farthest = self.communicator.largest(np.abs(moved * self._inverse), default=0.0)
         if farthest >= 1.0:
-            raise InputError("way of the fastest particle", farthest, "below one cell", "take a smaller fluid step")
+            raise InputError(
+                "distance moved by the fastest particle", farthest, "below one cell", "take a smaller fluid step"
+            )
         if grid.solid is not None:
             raise InputError("solid_flux", None, "computed on a grid without solid cells")
         flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
@@ -176,24 +191,27 @@ class FilterKernel:
             old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
             self._periodic, *flux,
         )  # fmt: skip
-        change = self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None])
-        passed = np.zeros_like(change)
+        change = self.halo.padded(self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None]))
+        other, passed = np.empty_like(change), np.zeros_like(change)
         for _ in range(self.sweeps):
             passed += change
-            other = np.empty_like(change)
             loops.sweep(change, other, self.strength, *self._gates)
-            change = other
+            self.halo.fill(other)
+            change, other = other, change
         for axis in range(3):
             self._add_diffused(flux[axis], passed[0], axis)
             flux[axis] /= grid.face_area(axis) * step
         return flux
 
     def _add_diffused(self, flux: Array, passed: Array, axis: int) -> None:
-        """Add the flux of the second stage through the faces normal to an axis: strength times difference."""
-        at, gate = 2 - axis, np.moveaxis(self._gates[axis], 2 - axis, 0)
-        field, out = np.moveaxis(passed, at, 0), np.moveaxis(flux, at, 0)
-        fall = np.roll(field, 1, axis=0) - field
-        out[:-1] += self.strength[axis] * gate * fall
+        """Add the flux of the second stage through the faces normal to an axis: strength times difference.
+
+        passed  sum of the padded fields before each sweep (nz, ny, nx)
+        """
+        at = 2 - axis
+        through = self.strength[axis] * self._gates[axis] * (np.roll(passed, 1, axis=at) - passed)
+        out = np.moveaxis(flux, at, 0)
+        out[:-1] += np.moveaxis(self.halo.inner(through), at, 0)
         out[-1] = out[0] if self._periodic[axis] else out[-1]
 
 
@@ -207,28 +225,20 @@ def _pieces(count: int) -> Array:
     return np.ascontiguousarray(points - points.mean(axis=0))  # local: pieces of one sphere
 
 
-def _homes(grid: Grid, periodic: np.ndarray) -> np.ndarray:
+def _homes(grid: Grid, halo: Halo) -> np.ndarray:
     """Flat index of the cell that receives a deposit, for every cell and a layer around the grid.
 
-    It is the cell itself, its periodic image, or the nearest open cell.
+    It is the cell itself, the nearest open cell of a solid one, or that of the cell whose value a ghost takes.
     """
-    inside = np.pad(grid.open, [(0, 0) if periodic[2 - d] else (1, 1) for d in range(3)])
-    nearest_open = distance_transform_edt(~inside, sampling=grid.spacing[::-1], return_indices=True)[1]
-    flat = np.zeros(inside.shape, np.int64)
-    for d in range(3):
-        low = 0 if periodic[2 - d] else 1
-        flat = flat * grid.shape[d] + nearest_open[d] - low
-    wrapped = np.pad(flat, [(1, 1) if periodic[2 - d] else (0, 0) for d in range(3)], mode="wrap")
-    return np.ascontiguousarray(wrapped)
+    nearest_open = distance_transform_edt(~grid.open, sampling=grid.spacing[::-1], return_indices=True)[1]
+    return halo.padded(np.ravel_multi_index(tuple(nearest_open), grid.shape)).astype(np.int64)
 
 
-def _gates(grid: Grid, periodic: np.ndarray) -> tuple[Array, Array, Array]:
-    """1 on the low face of every cell where the second stage may pass, 0 at walls and solid cells; for x, y, z."""
-    gates = []
-    for axis in range(3):
-        at = 2 - axis
-        gate = (grid.open & np.roll(grid.open, 1, axis=at)).astype(float)
-        if not periodic[axis]:
-            np.moveaxis(gate, at, 0)[0] = 0.0
-        gates.append(gate)
+def _gates(grid: Grid, halo: Halo) -> tuple[Array, Array, Array]:
+    """1 on the low face of every cell where the second stage may pass, 0 at walls and solid cells; for x, y, z; padded.
+
+    The low face of the first layer of ghosts is not used.
+    """
+    fluid = halo.padded(grid.open, outside=0.0)
+    gates = [fluid * np.roll(fluid, 1, axis=2 - axis) for axis in range(3)]
     return gates[0], gates[1], gates[2]

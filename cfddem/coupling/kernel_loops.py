@@ -21,7 +21,7 @@ def cell_and_share(coordinate, linear):
 
 @threaded
 def stencils(position, radius, offsets, linear, origin, inverse, home, cells, weights):
-    """Cells of every particle, eight for each of its pieces, and the weight of each (N, m)."""
+    """Cells of every particle, eight for each of its pieces, and the weight of each (N, m); home is padded by one."""
     pz, py, px = home.shape
     for n in prange(len(position)):
         for s in range(len(offsets)):
@@ -103,24 +103,24 @@ def gather(cells, weights, field, values):
 
 @threaded
 def sweep(fields, out, strength, gate_x, gate_y, gate_z):
-    """One sweep of diffusion through the open faces of all cells."""
-    fold = fields.shape[0] * fields.shape[1]
-    nz, ny, nx = fields.shape[1:]
-    for plane in prange(fold):
-        m, k = plane // nz, plane % nz
-        below, above = k - 1 if k > 0 else nz - 1, k + 1 if k < nz - 1 else 0
-        for j in range(ny):
-            front, back = j - 1 if j > 0 else ny - 1, j + 1 if j < ny - 1 else 0
-            for i in range(nx):
-                left, right = i - 1 if i > 0 else nx - 1, i + 1 if i < nx - 1 else 0
-                here = fields[m, k, j, i]
+    """One sweep of diffusion through the open faces of all cells; all arrays are padded by one layer.
+
+    Ghosts of `fields` are current; those of `out` are not written.
+    """
+    nz, ny, nx = fields.shape[1] - 2, fields.shape[2] - 2, fields.shape[3] - 2
+    for plane in prange(fields.shape[0] * nz):
+        m, k = plane // nz, plane % nz + 1
+        field = fields[m]
+        for j in range(1, ny + 1):
+            for i in range(1, nx + 1):
+                here = field[k, j, i]
                 out[m, k, j, i] = here + (
-                    strength[0] * gate_x[k, j, i] * (fields[m, k, j, left] - here)
-                    + strength[0] * gate_x[k, j, right] * (fields[m, k, j, right] - here)
-                    + strength[1] * gate_y[k, j, i] * (fields[m, k, front, i] - here)
-                    + strength[1] * gate_y[k, back, i] * (fields[m, k, back, i] - here)
-                    + strength[2] * gate_z[k, j, i] * (fields[m, below, j, i] - here)
-                    + strength[2] * gate_z[above, j, i] * (fields[m, above, j, i] - here)
+                    strength[0] * gate_x[k, j, i] * (field[k, j, i - 1] - here)
+                    + strength[0] * gate_x[k, j, i + 1] * (field[k, j, i + 1] - here)
+                    + strength[1] * gate_y[k, j, i] * (field[k, j - 1, i] - here)
+                    + strength[1] * gate_y[k, j + 1, i] * (field[k, j + 1, i] - here)
+                    + strength[2] * gate_z[k, j, i] * (field[k - 1, j, i] - here)
+                    + strength[2] * gate_z[k + 1, j, i] * (field[k + 1, j, i] - here)
                 )
 
 
@@ -138,7 +138,7 @@ def _window(coordinate, linear, first, cells, periodic, weights):
 
 @serial
 def carry_all(position, moved, radius, volume, offsets, linear, origin, inverse, periodic, flux_x, flux_y, flux_z):
-    """Volume [m3] that every particle carries through every face on a straight path.
+    """Volume [m3] that every particle carries through every face along a straight path.
 
     Esirkepov's split: along each axis the change of the one-dimensional weights, times the mean of the weights of the
     two other axes at both ends. The three fluxes together give exactly the change of the product.

@@ -99,13 +99,17 @@ class Transfer:
         flow: SampledFlow,
         step: float,
         disturbance: Array | None = None,
+        conductance: Array | None = None,
     ) -> ImplicitCoefficients:
         """Coefficients of the coming step [s].
 
         disturbance  part of the fluid's value that the particle causes itself, not part of u (N, m); zero if None
+        conductance  b, where the law has been evaluated already (N,)
         """
         kernel, value = self.kernel, _columns(particles[self.value])
-        conductance, disturbance = self.conductance(particles, flow), _or_zero(disturbance, value)
+        if conductance is None:
+            conductance = self.conductance(particles, flow)
+        disturbance = _or_zero(disturbance, value)
         implicit, target = np.empty(particles.count), np.empty(value.shape)
         carried = np.empty((particles.count, 1 + value.shape[1]))
         _implicit_coefficients(

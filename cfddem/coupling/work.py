@@ -1,7 +1,7 @@
 """Work of the fluid's forces on the particles over a fluid step.
 
-The forces are constant while the particles move. Each does the force times the way of its particle, which the particle
-solver counts (`energies=True`).
+The forces are constant while the particles move. The work of each one is the force times the displacement of its
+particle, which the particle solver counts (`energies=True`).
 """
 
 from __future__ import annotations
@@ -10,21 +10,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.coupling.exchange import CouplingTerms, Exchange
+from cfddem.coupling.exchange import CouplingTerms, Exchange, FluidForces
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
 
-EXPLICIT = Field("explicit_force", "N", 3, "scratch", meaning="lift, viscous stress, added mass, agitation")
+FORCES = tuple(
+    Field(f"work_of_{name}", "N", 3, "scratch", meaning=f"force of the fluid on the particle: {name}")
+    for name in FluidForces._fields
+)
+FLUCTUATING = Field("work_of_fluctuation", "N", 3, "scratch", meaning="drag of the fluctuation of the fluid velocity")
 PRESSURE = Field("pressure_before", "Pa", role="scratch", meaning="fluid pressure before the particles moved")
 
 
 class ParticleWork(NamedTuple):
-    """Work of each force of the fluid on the particles [J]."""
+    """Work on the particles in a fluid step [J]."""
 
-    drag: float  # along the way of the particles
+    drag: float
     drag_on_fluid: float  # of the same force at the velocity with which the fluid acts
-    explicit: float  # lift, viscous stress, added mass and agitation
+    fluctuating: float  # part of the drag by the fluctuation of the fluid velocity
+    fluctuating_on_fluid: float  # of the same part at the velocity with which the fluid acts
+    explicit: float  # lift, viscous stress and added mass
+    agitation: float  # other forces of agitation
+    added: float  # kinetic energy that a change of the added mass has given to the particles
     weight: float  # less buoyancy
     driving: float  # mean pressure gradient of periodic sides
     pressure: float  # all other pressure
@@ -41,35 +49,41 @@ class CouplingWork:
 
     def __init__(self, particles: Particles, exchange: Exchange, gravity: Array) -> None:
         self.exchange, self.gravity = exchange, gravity
-        for field in (EXPLICIT, PRESSURE):
+        for field in (*FORCES, FLUCTUATING, PRESSURE):
             particles.declare(field)
-        self._step = self._drag_on_fluid = 0.0
+        self._step = self._drag_on_fluid = self._fluctuating_on_fluid = self._added = 0.0
         self._pressure = np.zeros(0)  # of the cells, smoothed by the kernel (1, nz, ny, nx) [Pa]
 
-    def begin(self, particles: Particles, terms: CouplingTerms) -> None:
+    def begin(self, particles: Particles, terms: CouplingTerms, forces: FluidForces) -> None:
         """After `Exchange.apply`, before the particles move."""
+        total = self.exchange.fluid.communicator.sum
         pressure = np.ascontiguousarray(self.exchange.fluid.pressure)[None]
         self._step, self._pressure = terms.step, self.exchange.kernel.smooth(pressure)
-        self._drag_on_fluid = self.exchange.drag_work(particles, terms)
-        particles.explicit_force = terms.explicit
+        self._drag_on_fluid, fluctuating, self._fluctuating_on_fluid = self.exchange.drag_work(particles, terms)
+        particles[FLUCTUATING.name][:] = fluctuating
+        self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
+        for field, force in zip(FORCES, forces):
+            particles[field.name][:] = force
         particles.pressure_before = self._pressure_at(particles)
 
     def end(self, particles: Particles) -> ParticleWork:
         """After the particles have moved."""
         fluid, total = self.exchange.fluid, self.exchange.fluid.communicator.sum
-        model_a, volume = float(fluid.model == "A"), particles.volume[:, None]
-        drag = particles.drag_impulse / self._step
-        weight = (particles.mass[:, None] - fluid.density * volume) * self.gravity
-        driving = model_a * volume * fluid.boundaries.driving
-        pressure = particles.applied - drag - weight - particles.explicit_force - driving
+        model_a = float(fluid.model == "A")
+        drag, pressure, weight, explicit, agitation = (particles[field.name] for field in FORCES)
+        driving = model_a * particles.volume[:, None] * fluid.boundaries.driving
         rise = self._pressure_at(particles) - particles.pressure_before
         return ParticleWork(
             drag=total(drag * particles.way),
             drag_on_fluid=self._drag_on_fluid,
-            explicit=total(particles.explicit_force * particles.way),
+            fluctuating=total(particles[FLUCTUATING.name] * particles.way),
+            fluctuating_on_fluid=self._fluctuating_on_fluid,
+            explicit=total(explicit * particles.way),
+            agitation=total(agitation * particles.way),
+            added=self._added,
             weight=total(weight * particles.path),
             driving=total(driving * particles.way),
-            pressure=total(pressure * particles.way),
+            pressure=total((pressure - driving) * particles.way),
             displaced=-total(model_a * particles.volume * rise),
         )
 

@@ -24,6 +24,9 @@ Role = Literal["state", "memory", "scratch"]
 """`state` describes the row itself, `memory` is what a law stores from step to step, `scratch` is valid within a step.
 Checkpoints hold state and memory, not scratch."""
 
+Phase = Literal["start", "film", "motion"]
+"""When ghost rows receive values: at the start of an advance, before the film impulses, after the drift."""
+
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]
 """Value in new rows: a number, or a function of the table and the new rows (k,) that returns their values."""
 
@@ -39,9 +42,7 @@ class Field:
     initial     value in new rows, see `Initial`; a field whose initial value is a function is declared after the fields
                 that the function reads
     dtype       of the numbers
-    flips       pairs only: the sign changes when the two particles of the pair are exchanged
-    halo        when ghost rows receive the values of their owners: "motion" after the drift, "film" before the film
-                impulses, "never"
+    halo        when ghost rows receive the values of their owners, see `Phase`; only when they are made if empty
     snapshot    whether snapshots contain the field
     meaning     long name in snapshots and tables
     """
@@ -52,8 +53,7 @@ class Field:
     role: Role = "state"
     initial: Initial = 0.0
     dtype: type = float
-    flips: bool = False
-    halo: Literal["motion", "film", "never"] = "never"
+    halo: tuple[Phase, ...] = ()
     snapshot: bool = False
     meaning: str = ""
 
@@ -139,13 +139,13 @@ class Table:
                 raise InputError("Field.name", field.name, f"a name that {type(self).__name__} does not use itself")
             self.fields[field.name] = field
             self.arrays[field.name] = field.empty(self.rows)
-            self._fill(field, np.arange(self.rows), values)
+            self._fill(field, values)
         return self.arrays[field.name]
 
     def reset(self, *names: str) -> None:
         """Set fields to their initial values in all rows."""
         for name in names:
-            self._fill(self.fields[name], np.arange(self.rows))
+            self._fill(self.fields[name])
 
     # ------------------------------------------------------------ rows
 
@@ -169,8 +169,16 @@ class Table:
                 joined[old:] = fresh[name]
         for name, field in self.fields.items():
             if name not in fresh:
-                self._fill(field, rows)
+                self._fill(field, rows=rows)
         return rows
+
+    def keep(self, rows: np.ndarray) -> None:
+        """Remove all rows but these.
+
+        rows  mask (n,) or row numbers (k,)
+        """
+        self.arrays = {name: array[rows] for name, array in self.arrays.items()}
+        self.rows = len(np.arange(self.rows)[rows])
 
     def copy(self, rows: Any = slice(None)) -> Self:
         """A table with copies of all rows, or of some.
@@ -206,14 +214,16 @@ class Table:
         self.rows = len(next(iter(kept.values()))) if kept else 0
         self.arrays = {name: field.empty(self.rows) for name, field in self.fields.items()}
         for name, field in self.fields.items():
-            self._fill(field, np.arange(self.rows), kept.get(name))
+            self._fill(field, kept.get(name))
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The arrays that a snapshot contains, not copied."""
         return {name: self.arrays[name] for name, field in self.fields.items() if field.snapshot}
 
-    def _fill(self, field: Field, rows: np.ndarray, values: Any = None) -> None:
-        """Give rows of a field these values, or the initial ones."""
+    def _fill(self, field: Field, values: Any = None, rows: np.ndarray | None = None) -> None:
+        """Give all rows of a field, or some, these values; the initial ones if None."""
         if values is None:
-            values = field.initial(self, rows) if callable(field.initial) else field.initial
-        self.arrays[field.name][rows] = values
+            values = field.initial
+        if callable(values):
+            values = values(self, np.arange(self.rows) if rows is None else rows)
+        self.arrays[field.name][slice(None) if rows is None else rows] = values

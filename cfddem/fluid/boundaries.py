@@ -37,7 +37,7 @@ class Boundaries:
     Sides not named are no-slip walls, or free-slip walls where the box is one cell thick.
 
     halo      fills ghosts from the cells themselves
-    periodic  (3,) whether the box repeats along x, y, z
+    periodic  (3,) whether x, y, z are periodic
     driving   (3,) mean fall of the pressure along x, y, z [Pa/m]
     """
 
@@ -62,7 +62,7 @@ class Boundaries:
                     several.insert(0, plain)
                 pair.append(Side(name, axis, high, several))
             self._pair_up(axis, pair)
-        self.halo = Halo(grid, self.periodic)
+        self.halo = Halo(grid.cells, self.periodic)
         for side in self.sides:
             self._lay_out(side)
         self.has_outlet = any(bool(side.outlet.any()) for side in self.sides)

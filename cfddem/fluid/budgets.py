@@ -52,7 +52,7 @@ class FluidBudgets(FluidState):
         fields, total = self.fields, self.communicator.sum
         h, volume = self.last_step, self.grid.cell_volume
         before = self._momentum(fields.other_velocity, fields.other_voidage)
-        share = self._open if self.model == "B" else self._open * fields.owned("centred_voidage")
+        share = self.open_cells if self.model == "B" else self.open_cells * fields.owned("centred_voidage")
         lines = {
             "change": self.momentum() - before,
             "drag": total(self.drag_exchange()[2], axis=(0, 1, 2)),
@@ -89,5 +89,5 @@ class FluidBudgets(FluidState):
             low = np.where(solved[d] > 0.0, on_faces(own, d), own)
             high = np.where(np.roll(solved[d], -1, axis) > 0.0, 0.5 * (own + np.roll(own, -1, axis)), own)
             pushed = self.communicator.sum(self.pressure * self.grid.inner(high - low))
-            given[d] = self.last_step * self._areas[d] * pushed
+            given[d] = self.last_step * self.face_areas[d] * pushed
         return given

@@ -29,15 +29,12 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.budgets import FluidBudgets
-from cfddem.fluid.cell_counts import VISCOUS
-from cfddem.fluid.checks import checked_field, checked_voidage, refuse_nan, refuse_trapped_inflow
+from cfddem.fluid.checks import checked_field, checked_voidage, refuse_trapped_inflow
 from cfddem.fluid.conditions import Condition
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.momentum import predict, transport
-from cfddem.fluid.pressure.multigrid import PressureEquation
-from cfddem.fluid.pressure.projection import correct, gather
-from cfddem.fluid.pressure.regions import ClosedRegions
-from cfddem.fluid.stability import Rates, StepLimit, largest_rates
+from cfddem.fluid.pressure.projection import Projection
+from cfddem.fluid.stability import FlowRates, Rates, StepLimit, step_limit
 from cfddem.fluid.state import FluidProperties
 
 LOOSE = 1e-6
@@ -107,10 +104,7 @@ class FluidSolver(FluidBudgets):
         super().__init__(grid, sides, FluidProperties(density, gravity, model, smagorinsky), communicator)
         self.tolerance, self.passes = float(tolerance), int(passes)
         self._central = float(convection == "central")
-        self._equation = PressureEquation(grid, ClosedRegions.of(grid, sides, communicator), communicator)
-        self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
-        self._inverse_where_varied = self.inverse_spacing * [sides.varies_along(d) for d in range(3)]
-        self._by_plane = np.zeros((3, grid.shape[0]))
+        self._project, self._rates = Projection(self).correct, FlowRates(self)
         self.set_viscosity(viscosity)
         self.set_voidage(voidage)
         self.set_velocity((0.0, 0.0, 0.0))
@@ -167,7 +161,7 @@ class FluidSolver(FluidBudgets):
         """Rate of change, mean and centre of the voidage of this step; returns the voidage at its end (nz, ny, nx)."""
         fields, old = self.fields, self.voidage
         new = old if voidage is None else checked_voidage(self.grid, voidage, self.communicator)
-        self._set_cells(fields.new_voidage_rate, (new - old) / step * self._open)
+        self._set_cells(fields.new_voidage_rate, (new - old) / step * self.open_cells)
         self._set_cells(fields.other_voidage, 0.5 * (old + new))
         np.add(fields.mean_voidage, fields.other_voidage, out=fields.centred_voidage)
         np.multiply(fields.centred_voidage, 0.5, out=fields.centred_voidage)
@@ -225,39 +219,13 @@ class FluidSolver(FluidBudgets):
         """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or
         displaced by the change of voidage in a cell."""
         fields, rate = self.fields, self.fields.owned("new_voidage_rate")
-        old = self._rates(fields.velocity, fields.mean_voidage).flux
-        predicted = self._rates(fields.stage_velocity, fields.other_voidage).flux
+        old = self._rates.of(fields.velocity, fields.mean_voidage).flux
+        predicted = self._rates.of(fields.stage_velocity, fields.other_voidage).flux
         fastest = max(self.communicator.largest(rate), -self.communicator.smallest(rate))
         displaced = self.grid.cell_volume * fastest
         # a voidage is known to its last digits only, and so is its rate
         displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * math.prod(self.grid.cells) ** 0.5 / step)
-        return max(float(max(self._areas)) * max(old, 0.01 * predicted), displaced)
-
-    def _project(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
-        """Find the pressure with which a velocity satisfies continuity; returns the iterations it took.
-
-        limit  largest residual of a cell [m3/s]
-        scale  largest volume flux [m3/s]
-        fresh  whether the mobility is new, and with it the coefficients of the equation
-        """
-        fields, finest = self.fields, self._equation.finest
-        gather(
-            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, fresh, self.boundaries.periodic,
-            self._areas, self.inverse_spacing, finest.ax, finest.ay, finest.az, finest.anchor, self._missing,
-        )  # fmt: skip
-        if fresh:
-            self._equation.prepare()
-        refuse_nan(self.grid, self._missing, self.time, self.communicator)
-        if self._equation.closed_regions is not None:
-            self._equation.closed_regions.refuse_imbalance(self._missing, scale, self.time)
-        correction, iterations = self._equation.solve(self._missing, limit)
-        if iterations:
-            self.grid.inner(fields.correction)[:] = correction
-            self.boundaries.fill_pressure(fields.correction, correction=True)
-            correct(velocity, fields.mobility, fields.correction, self.inverse_spacing)
-            self.boundaries.fill_velocity(velocity)
-            self.pressure[:] += correction
-        return iterations
+        return max(float(max(self.face_areas)) * max(old, 0.01 * predicted), displaced)
 
     def _still_moves(self, step: float) -> bool:
         """Whether drag is stiff and the last pass has changed the velocity."""
@@ -281,35 +249,18 @@ class FluidSolver(FluidBudgets):
     # ------------------------------------------------------------ step size
 
     def largest_step(self, courant: float = 0.5) -> StepLimit:
-        r"""The largest step that is stable now, and why.
+        """The largest step that is stable now, and why; infinite with the criterion "none" where nothing limits it.
 
-        .. math:: h \le C / \sum_d |u_d|/h_d, \qquad h \le 0.8 / (2\nu \sum_d h_d^{-2})
-
-        courant  C; Heun's scheme with the limiter is bounded up to 1. A direction one cell thick without walls
-                 that stick does not count
-        returns  StepLimit; infinite with the criterion "none" where nothing moves and nothing is viscous
+        courant  C of :func:`cfddem.fluid.stability.step_limit`; Heun's scheme with the limiter is bounded up to 1. A
+                 direction one cell thick without walls that stick does not count
         """
-        rates = self.rates()
-        limits = {
-            "Courant": courant / rates.advection if rates.advection > 0.0 else np.inf,
-            "viscous": VISCOUS / rates.viscous if rates.viscous > 0.0 else np.inf,
-        }
-        criterion = min(limits, key=limits.__getitem__)
-        return StepLimit(limits[criterion], criterion if np.isfinite(limits[criterion]) else "none")
+        return step_limit(self.rates(), courant)
 
     def rates(self) -> Rates:
         """Largest rates of the flow as it is."""
         fields = self.fields
         self._effective.update(fields.velocity, fields.mean_voidage, fields.viscosity, fields.effective_viscosity)
-        return self._rates(fields.velocity, fields.mean_voidage)
-
-    def _rates(self, velocity: Array, voidage: Array) -> Rates:
-        """Largest rates of a velocity, with the effective viscosity as it is."""
-        largest_rates(
-            velocity, voidage, self.fields.effective_viscosity, self._open, self.density, self._inverse_where_varied,
-            *self._by_plane,
-        )  # fmt: skip
-        return Rates(*(float(rate) for rate in self.communicator.largest(self._by_plane, axis=1)))
+        return self._rates.of(fields.velocity, fields.mean_voidage)
 
     def run_until(self, time: float, *, courant: float = 0.5, largest: float = np.inf, **fields: Any) -> dict[str, int]:
         """Step to `time` [s] with the largest stable steps; returns how often each criterion set the step.
@@ -346,7 +297,7 @@ class FluidSolver(FluidBudgets):
                 raise InputError("step", step, "the time between the two voidages, in s")
             earlier = checked_voidage(self.grid, before, self.communicator)
             mean = 0.5 * (new + earlier)
-            rate = (new - earlier) / step * self._open
+            rate = (new - earlier) / step * self.open_cells
         self._set_cells(self.fields.voidage, new)
         self._set_cells(self.fields.mean_voidage, mean)
         self._set_cells(self.fields.voidage_rate, rate)

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from cfddem.backend.compile import prange, threaded
-from cfddem.fluid.grid import LOW, UNIT
+from cfddem.fluid.cell_counts import VISCOUS
+from cfddem.fluid.grid import LOW, UNIT, Array
+from cfddem.fluid.state import FluidState
 
 
 @dataclass(frozen=True)
@@ -23,6 +27,42 @@ class Rates(NamedTuple):
     advection: float  # |u|/h summed over directions [1/s]
     viscous: float  # 2 mu/(rho eps) times the sum of 1/h^2 over directions [1/s]
     flux: float  # eps |u| [m/s]
+
+
+class FlowRates:
+    """Finds the largest rates of a fluid.
+
+    fluid  with its effective viscosity
+    """
+
+    def __init__(self, fluid: FluidState) -> None:
+        self.fluid = fluid
+        self._inverse_where_varied = fluid.inverse_spacing * [fluid.boundaries.varies_along(d) for d in range(3)]
+        self._by_plane = np.zeros((3, fluid.grid.shape[0]))
+
+    def of(self, velocity: Array, voidage: Array) -> Rates:
+        """Largest rates of a padded velocity and voidage, with the effective viscosity as it is."""
+        fluid = self.fluid
+        largest_rates(
+            velocity, voidage, fluid.fields.effective_viscosity, fluid.open_cells, fluid.density,
+            self._inverse_where_varied, *self._by_plane,
+        )  # fmt: skip
+        return Rates(*(float(rate) for rate in fluid.communicator.largest(self._by_plane, axis=1)))
+
+
+def step_limit(rates: Rates, courant: float) -> StepLimit:
+    r"""The largest stable step at these rates.
+
+    .. math:: h \le C / \sum_d |u_d|/h_d, \qquad h \le 0.8 / (2\nu \sum_d h_d^{-2})
+
+    courant  C
+    """
+    limits = {
+        "Courant": courant / rates.advection if rates.advection > 0.0 else np.inf,
+        "viscous": VISCOUS / rates.viscous if rates.viscous > 0.0 else np.inf,
+    }
+    criterion = min(limits, key=limits.__getitem__)
+    return StepLimit(limits[criterion], criterion if np.isfinite(limits[criterion]) else "none")
 
 
 @threaded

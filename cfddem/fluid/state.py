@@ -38,8 +38,9 @@ class FluidState:
     properties    density, gravity, model and sub-grid viscosity
     communicator  path to sums, extremes and decisions over all ranks
 
-    Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `time` [s];
-    `last_step`, length of the step just made [s].
+    Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
+    area of a face normal to x, y, z [m2]; `open_cells` (nz, ny, nx), 1 where a cell is open, 0 where it is solid;
+    `time` [s]; `last_step`, length of the step just made [s].
     """
 
     def __init__(
@@ -52,8 +53,8 @@ class FluidState:
         self.fields, self.faces = CellFields(grid, FLUID_FIELDS), boundaries.faces()
         self.model_b = float(self.model == "B")
         self.inverse_spacing = 1.0 / np.array(grid.spacing)
-        self._areas = np.array([grid.face_area(d) for d in range(3)])
-        self._open = grid.open.astype(float)
+        self.face_areas = np.array([grid.face_area(d) for d in range(3)])
+        self.open_cells = grid.open.astype(float)
         self._effective = EffectiveViscosity(grid, boundaries.halo, self.density, float(properties.smagorinsky))
 
     # ------------------------------------------------------------ fields
@@ -117,8 +118,8 @@ class FluidState:
         """V d(eps)/dt + outflow of every open cell (nz, ny, nx) [m3/s], summed face by face, not by the solver."""
         total: Array = self.fields.owned("voidage_rate") * self.grid.cell_volume
         for d in range(3):
-            total = total + np.diff(self.volume_flux(d), axis=2 - d) * self._areas[d]
-        residual: Array = total * self._open
+            total = total + np.diff(self.volume_flux(d), axis=2 - d) * self.face_areas[d]
+        residual: Array = total * self.open_cells
         return residual
 
     # ------------------------------------------------------------ checkpoint
@@ -128,7 +129,7 @@ class FluidState:
         return {"time": np.array(self.time)} | self.fields.checkpoint()
 
     def restore(self, stored: Mapping[str, Any]) -> None:
-        """Go on from a `checkpoint()` of a fluid with the same grid and boundaries, to the same bits."""
+        """Go on from a `checkpoint()` of a fluid with the same grid and boundaries; gives the same bits."""
         self.fields.restore(stored)
         self.time = float(stored["time"])
         fields, halo = self.fields, self.boundaries.halo

@@ -28,7 +28,7 @@ class Works(NamedTuple):
     inflow: float  # of the pressure at inlets and outlets, and kinetic energy carried through them
     held: float  # of the inlets, which hold their velocity against the drag of particles beside them
     driving: float  # of the mean pressure gradient of periodic sides
-    solids: float  # of the pressure, where the volume of the particles makes room or takes it
+    solids: float  # of the pressure on the volume that moving particles displace
     model_b: float  # of the pressure on the particles' share of the volume, which model B gives to the fluid
     viscous: float  # of viscous stress
     convection: float  # of the convection scheme

@@ -19,7 +19,7 @@ import numpy as np
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.io.files import disk_error, hdf5_in_memory, reason, write_whole
 
-FORMAT = 3
+FORMAT = 4
 """Format of checkpoints. Checkpoints of any other format are refused."""
 
 KEPT = 2

@@ -24,7 +24,7 @@ POINTS = "Points"
 
 
 @dataclass(frozen=True)
-class Box:
+class GridBox:
     """The grid of the fluid, as far as files and pictures need it."""
 
     cells: tuple[int, int, int]
@@ -79,7 +79,7 @@ class Layout:
 
 
 def index(
-    snapshots: Sequence[Snapshot], layout: Layout, box: Box | None, quantities: Quantities, texts: Mapping[str, str]
+    snapshots: Sequence[Snapshot], layout: Layout, box: GridBox | None, quantities: Quantities, texts: Mapping[str, str]
 ) -> bytes:
     """The bytes of `run.vtkhdf`.
 
@@ -129,7 +129,7 @@ def describe(dataset: Any, quantity: Quantity) -> None:
     dataset.attrs["unit"], dataset.attrs["long_name"] = quantity.unit, quantity.meaning
 
 
-def _fluid(group: Any, snapshots: Sequence[Snapshot], layout: Layout, box: Box, quantities: Quantities) -> None:
+def _fluid(group: Any, snapshots: Sequence[Snapshot], layout: Layout, box: GridBox, quantities: Quantities) -> None:
     """An ImageData with one row of each cell field per snapshot."""
     _stamp(group, "ImageData")
     group.attrs["WholeExtent"] = np.array([0, box.cells[0], 0, box.cells[1], 0, box.cells[2]], np.int64)

@@ -18,7 +18,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed, nearest
 from cfddem.io.folder import read_about, read_columns, read_snapshot_header
-from cfddem.io.index import Box, Snapshot, field_name, listed
+from cfddem.io.index import GridBox, Snapshot, field_name, listed
 from cfddem.io.quantities import Quantity, from_json
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Run:
         self.about = read_about(folder)
         self.quantities = from_json(self.about["quantities"])
         grid = self.about["grid"]
-        self.grid = None if grid is None else Box(**{key: tuple(each) for key, each in grid.items()})
+        self.grid = None if grid is None else GridBox(**{key: tuple(each) for key, each in grid.items()})
         self.snapshots, self.missing = self._find()
         if self.missing:
             shown = ", ".join(self.missing[:3]) + (" ..." if len(self.missing) > 3 else "")

@@ -29,7 +29,7 @@ from cfddem.backend.errors import InputError, RunFailed
 from cfddem.io import checkpoint
 from cfddem.io.files import hdf5_in_memory, remove_partial, write_whole
 from cfddem.io.folder import FORMAT, lock, make_folder, read_about, read_columns, require_free, scan
-from cfddem.io.index import POINTS, Box, Layout, Snapshot, describe, field_name, index
+from cfddem.io.index import POINTS, GridBox, Layout, Snapshot, describe, field_name, index
 from cfddem.io.quantities import Quantities, declared, from_json
 
 _ALWAYS_INDEXED = 200
@@ -43,7 +43,9 @@ class RunFolder:
     def __init__(self, folder: Path, about: dict[str, Any], case_text: str) -> None:
         self.folder, self.case_text, self.about = folder, case_text, about
         self.quantities = from_json(about["quantities"])
-        self.box = None if about["grid"] is None else Box(**{key: tuple(each) for key, each in about["grid"].items()})
+        self.box = (
+            None if about["grid"] is None else GridBox(**{key: tuple(each) for key, each in about["grid"].items()})
+        )
         self.snapshots: list[Snapshot] = []
         self._layout: Layout | None = None
         self._real = np.dtype("f4" if about["precision"] == "single" else "f8")
@@ -296,8 +298,8 @@ class RunFolder:
         return values.astype(kind, copy=False)
 
 
-def _box(grid: Any) -> Box:
-    return Box(
+def _box(grid: Any) -> GridBox:
+    return GridBox(
         tuple(int(n) for n in grid.cells),  # type: ignore[arg-type]
         tuple(float(h) for h in grid.spacing),  # type: ignore[arg-type]
         tuple(float(x) for x in grid.origin),  # type: ignore[arg-type]

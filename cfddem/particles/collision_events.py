@@ -20,36 +20,36 @@ from closures.friction import dry_or_lubricated
 from closures.minimum_gap import elastohydrodynamic
 from closures.numbers import stokes
 
-COLLISION = np.dtype(
-    [
-        ("first", "i8"),  # id of the first body
-        ("second", "i8"),  # id of the second body; -1 - w for wall w
-        ("begin", "f8"),  # time when the pair came within reach [s]
-        ("end", "f8"),  # time when it left again [s]
-        ("place", "f8", (3,)),  # where the first body was at the end [m]
-        ("stokes", "f8"),  # of the approach, normal; infinite without a film [-]
-        ("approach_speed", "f8"),  # normal speed at the start [m/s]
-        ("minimum_gap", "f8"),  # h_min [m]
-        ("roughness_gap", "f8"),  # h_sigma, the smallest that h_min can be [m]
-        ("elastohydrodynamic_gap", "f8"),  # h_eps at the approach speed; above h_sigma it is h_min [m]
-        ("deformed", "?"),  # the film's pressure, not the asperities, set h_min
-        ("friction", "f8"),  # coefficient in force [-]
-        ("restitution", "f8"),  # normal speed out over in [-]
-        ("restitution_tangential", "f8"),  # tangential speed out over in; NaN for a head-on collision [-]
-        ("closest_gap", "f8"),  # smallest gap of the collision; below h_min the solids touched [m]
-        ("lost_to_film", "f8"),  # energy, NaN where energies are not counted [J]
-        ("lost_to_contact", "f8"),  # energy, by the dashpot of the solids; likewise [J]
-        ("lost_to_friction", "f8"),  # energy, by sliding; likewise [J]
-        ("weight", "f8"),  # how many collisions the row stands for: 1 unless the record is sampled [-]
-    ],
-    align=True,
+COLLISION_FIELDS = (
+    Field("first", dtype=np.int64, meaning="id of the first body"),
+    Field("second", dtype=np.int64, meaning="id of the second body; -1 - w for wall w"),
+    Field("begin", "s", meaning="time when the pair came within range"),
+    Field("end", "s", meaning="time when the pair left the range"),
+    Field("place", "m", 3, meaning="position of the first body at the end"),
+    Field("stokes", meaning="Stokes number of the normal approach; infinite without a film"),
+    Field("approach_speed", "m/s", meaning="normal speed when the pair came within range"),
+    Field("minimum_gap", "m", meaning="minimum gap of the film"),
+    Field("roughness_gap", "m", meaning="gap at which asperities touch"),
+    Field("elastohydrodynamic_gap", "m", meaning="gap at which the film pressure deforms the solids"),
+    Field("deformed", dtype=bool, meaning="1 if the film pressure, not the asperities, sets the minimum gap"),
+    Field("friction", meaning="coefficient of friction that applies"),
+    Field("restitution", meaning="normal speed after over before"),
+    Field("restitution_tangential", meaning="tangential speed after over before; NaN for a head-on collision"),
+    Field("closest_gap", "m", meaning="smallest gap of the pair; below the minimum gap the solids touched"),
+    Field("lost_to_film", "J", meaning="energy dissipated by the film; NaN without an energy budget"),
+    Field("lost_to_contact", "J", meaning="energy dissipated by contact damping"),
+    Field("lost_to_friction", "J", meaning="energy dissipated by sliding"),
+    Field("weight", meaning="number of collisions that the row represents"),
 )
+"""Columns of the record."""
 
+COLLISION = np.dtype([(field.name, field.dtype, field.shape) for field in COLLISION_FIELDS], align=True)
+"""One row of the record."""
 
 FIELDS = (
     Field("begin", "s", role="memory", initial=np.nan, meaning="time at which the collision began; NaN outside one"),
     Field("begin_speed", "m/s", role="memory", meaning="normal speed at the start"),
-    Field("begin_slip", "m/s", 3, "memory", flips=True, meaning="tangential velocity at the start"),
+    Field("begin_slip", "m/s", 3, "memory", meaning="tangential velocity at the start"),
     Field("closest_gap", "m", role="memory", meaning="smallest gap since the start"),
     Field("lost", "J", 3, "memory", initial=np.nan, meaning="energy lost to film, dashpot, friction since the start"),
 )
@@ -117,4 +117,4 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
     row.lost_to_film, row.lost_to_contact, row.lost_to_friction = at(memory.lost, k)
     row.closest_gap, row.weight = memory.closest_gap[k], 1.0
     memory.begin[k] = np.nan
-    return count + 1
+    return count + 1 if i < particles.owned else count  # the owner of the first body keeps the row

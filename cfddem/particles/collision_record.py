@@ -4,31 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.data.fields import Field
 from cfddem.particles.collision_events import COLLISION
-
-COLLISION_FIELDS = (
-    Field("first", meaning="id of the first body"),
-    Field("second", meaning="id of the second body; -1 - w for wall w"),
-    Field("begin", "s", meaning="time when the pair came within range"),
-    Field("end", "s", meaning="time when the pair left the range"),
-    Field("place", "m", meaning="position of the first body at the end"),
-    Field("stokes", meaning="Stokes number of the normal approach; infinite without a film"),
-    Field("approach_speed", "m/s", meaning="normal speed when the pair came within range"),
-    Field("minimum_gap", "m", meaning="minimum gap of the film"),
-    Field("roughness_gap", "m", meaning="gap at which asperities touch"),
-    Field("elastohydrodynamic_gap", "m", meaning="gap at which the film pressure deforms the solids"),
-    Field("deformed", meaning="1 if the film pressure, not the asperities, sets the minimum gap"),
-    Field("friction", meaning="coefficient of friction that applies"),
-    Field("restitution", meaning="normal speed after over before"),
-    Field("restitution_tangential", meaning="tangential speed after over before"),
-    Field("closest_gap", "m", meaning="smallest gap of the pair; below the minimum gap the solids touched"),
-    Field("lost_to_film", "J", meaning="energy dissipated by the film; NaN without an energy budget"),
-    Field("lost_to_contact", "J", meaning="energy dissipated by contact damping"),
-    Field("lost_to_friction", "J", meaning="energy dissipated by sliding"),
-    Field("weight", meaning="number of collisions that the row represents"),
-)
-"""Unit and meaning of the columns of the record."""
 
 MOST = 500_000
 """Rows kept between two snapshots; where there are more, every second row is dropped, repeatedly if needed."""
@@ -84,7 +60,7 @@ class CollisionRecord:
         """Put earlier rows back, as after a restart."""
         kept = np.array(rows, COLLISION)
         self._kept, self._count = [kept], len(kept)
-        self._share = int(kept["weight"].max(initial=1.0))
+        self._share = int(kept["weight"].max(initial=1.0))  # local: record of this rank
 
 
 def _thinned(rows: np.ndarray, share: int) -> np.ndarray:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,16 +25,18 @@ class Feed:
     """Inserts particles in a box at a constant rate.
 
     Call it with the run from time to time; it inserts the particles due since its first call. A particle that finds no
-    free position in the box waits for the next call.
+    free position in the box waits for the next call. A run that is resumed with the `checkpoint()` of its feeds and
+    outlets continues with the same bits.
 
     rate          [1/s]
     corner, size  of the box in which centres appear; a size may be 0 [m]
-    diameters     number -> diameters (number,) [m], as the functions of :mod:`cfddem.particles.initial.packing`
+    diameters     (number, generator) -> diameters (number,) [m], drawn from the random generator of the feed, for
+                  instance `lambda number, draw: normal(number, 1e-3, 1e-4, draw)`
     density       [kg/m3]
     velocity      of inserted particles [m/s]
     material      row of the pair table
     viscosity     of the fluid around them [Pa s]
-    seed          of the random positions
+    seed          of the random positions and diameters
     """
 
     def __init__(
@@ -40,7 +44,7 @@ class Feed:
         rate: float,
         corner: Vector,
         size: Vector,
-        diameters: Callable[[int], np.ndarray],
+        diameters: Callable[[int, np.random.Generator], np.ndarray],
         density: float,
         *,
         velocity: Vector = (0.0, 0.0, 0.0),
@@ -55,19 +59,20 @@ class Feed:
         self.velocity, self.material, self.viscosity = velocity, material, viscosity
         self.entered = 0
         self.waiting = np.zeros(0)  # diameters of particles that are due [m]
-        self._begin: float | None = None
+        self._begin = math.nan  # time of the first call [s]
         self._generator = np.random.default_rng(seed)
 
     def __call__(self, run: ParticleSolver) -> int:
         """Insert the particles that are due; returns their number."""
-        if self._begin is None:
+        if math.isnan(self._begin):
             self._begin = run.time
         due = int(self.rate * (run.time - self._begin) * (1.0 + 1e-12)) - self.entered - len(self.waiting)
         if due > 0:
-            self.waiting = np.append(self.waiting, self.diameters(due))
+            self.waiting = np.append(self.waiting, self.diameters(due, self._generator))
         radius = 0.5 * self.waiting
         place, free = self._places(run, radius)
-        if free.any():
+        entered = len(radius[free])
+        if entered:
             run.insert(
                 make_particles(
                     place[free],
@@ -79,30 +84,45 @@ class Feed:
                 )
             )
         self.waiting = self.waiting[~free]
-        self.entered += int(free.sum())
-        return int(free.sum())
+        self.entered += entered
+        return entered
 
     def _places(self, run: ParticleSolver, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A position for each sphere, and whether it is free."""
-        largest = float(max(run.particles.radius.max(), radius.max(initial=0.0)))
-        near = (run.particles.position >= self.corner - 2.0 * largest).all(axis=1)
-        near &= (run.particles.position <= self.corner + self.size + 2.0 * largest).all(axis=1)
+        """A position for each sphere, and whether it is free; the same on all ranks."""
+        largest = run.communicator.largest(np.append(run.particles.radius, radius))
+        low, high = self.corner - 2.0 * largest, self.corner + self.size + 2.0 * largest
+        near = _inside(run.particles.position, low, high)
         there, sizes = run.particles.position[near], run.particles.radius[near]
         place, free = np.zeros((len(radius), 3)), np.zeros(len(radius), bool)
         tree = cKDTree(there) if len(there) else None
         for n in range(len(radius)):
             for _ in range(_TRIES):
                 spot = self.corner + self._generator.uniform(0.0, 1.0, 3) * self.size
-                others = [] if tree is None else tree.query_ball_point(spot, radius[n] + largest)
-                apart = np.linalg.norm(there[others] - spot, axis=1) > sizes[others] + radius[n]
-                new = np.linalg.norm(place[:n][free[:n]] - spot, axis=1) > radius[:n][free[:n]] + radius[n]
-                if apart.all() and new.all():
+                near_by = [] if tree is None else tree.query_ball_point(spot, radius[n] + largest)
+                others = np.concatenate([there[near_by], place[:n][free[:n]]])
+                reach = np.concatenate([sizes[near_by], radius[:n][free[:n]]]) + radius[n]
+                if run.communicator.all(np.einsum("nd,nd->n", others - spot, others - spot) > reach**2):
                     place[n], free[n] = spot, True
                     break
         return place, free
 
+    def checkpoint(self) -> dict[str, Any]:
+        """Everything that the next particles depend on."""
+        return {
+            "entered": self.entered,
+            "waiting": self.waiting.copy(),
+            "begin": self._begin,
+            "generator": self._generator.bit_generator.state,
+        }
 
-class Outlet:
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()` of the same feed."""
+        self.entered, self.waiting = int(state["entered"]), np.array(state["waiting"])
+        self._begin = float(state["begin"])
+        self._generator.bit_generator.state = state["generator"]
+
+
+class ParticleOutlet:
     """Removes and counts particles outside a region.
 
     low, high  opposite corners of the region; infinite in directions without an outlet [m]
@@ -114,8 +134,21 @@ class Outlet:
 
     def __call__(self, run: ParticleSolver) -> int:
         """Remove the particles that have left; returns their number."""
-        place = run.particles.position
-        gone = run.remove(np.any((place < self.low) | (place > self.high), axis=1))
-        self.left += gone.count
-        self.mass += float(gone.mass.sum())
-        return gone.count
+        gone = run.remove(~_inside(run.particles.position, self.low, self.high))
+        left = run.communicator.sum(gone.count)
+        self.left += left
+        self.mass += run.communicator.sum(gone.mass)
+        return left
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What has left so far."""
+        return {"left": self.left, "mass": self.mass}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()` of the same outlet."""
+        self.left, self.mass = int(state["left"]), float(state["mass"])
+
+
+def _inside(position: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Which positions lie between two corners (N,) bool."""
+    return np.logical_and.reduce((position >= low) & (position <= high), axis=1)  # local: three coordinates of a row

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import RunFailed
 from cfddem.particles.pair_graph import Edges
@@ -25,8 +26,9 @@ def guard(
     time: float,
     step: float,
     owner: np.ndarray,
+    communicator: Communicator = SERIAL,
 ) -> None:
-    """Stop the run if a particle is lost, and name it.
+    """Stop the run, on all ranks, if a particle is lost, and name it.
 
     gap     (n,) of every edge [m]; None skips the check of overlaps
     domain  (2, 3) opposite corners of the region that no centre may leave; None if unlimited [m]
@@ -34,28 +36,45 @@ def guard(
     step    last time step [s]
     owner   wall that each piece of a wall belongs to
     """
-    lost, gone = _first_lost(particles.position, particles.velocity, np.array(EVERYWHERE) if domain is None else domain)
+    if failure := communicator.first(_failure(particles, edges, gap, domain, time, step, owner)):
+        raise RunFailed(failure)
+
+
+def _failure(
+    particles: Particles,
+    edges: Edges,
+    gap: np.ndarray | None,
+    domain: np.ndarray | None,
+    time: float,
+    step: float,
+    owner: np.ndarray,
+) -> str | None:
+    """What has happened to a particle of this rank; None if none is lost."""
+    own = slice(particles.owned)
+    allowed = np.array(EVERYWHERE) if domain is None else domain
+    lost, gone = _first_lost(particles.position[own], particles.velocity[own], allowed)
     if lost >= 0:
-        raise RunFailed(
+        return (
             f"{_place(particles, lost, time, step)} is NaN; "
             "the step is too large or an applied force is NaN: halve the step, check the forces"
         )
     if gone >= 0 and domain is not None:
-        raise RunFailed(
+        return (
             f"{_place(particles, gone, time, step)} has left the domain {domain[0]} to {domain[1]} m"
             f"{_last_wall(gone, edges, owner)}; close the walls there, enlarge the domain, or take a smaller step"
         )
     if gap is None:
-        return
+        return None
     split = edges.between_particles
     deepest, overlap = _deepest(gap, edges.first, edges.second, split, particles.radius)
     if overlap > CRUSHED:
         row, other = int(edges.first[deepest]), int(edges.second[deepest])
         what = f"particle {particles.id[other]}" if deepest < split else f"wall {owner[other]}"
-        raise RunFailed(
+        return (
             f"{_place(particles, row, time, step)} is pressed into {what} by {overlap:.2g} "
             f"radii (limit {CRUSHED:g}); take a smaller step or a stiffer contact, or start without overlaps"
         )
+    return None
 
 
 @serial
@@ -86,7 +105,7 @@ def _deepest(gap, first, second, between_particles, radius):
 
 def _place(particles: Particles, row: int, time: float, step: float) -> str:
     x, y, z = particles.position[row]
-    speed = float(np.linalg.norm(particles.velocity[row]))
+    speed = math.hypot(*particles.velocity[row])
     name = f"particle {particles.id[row]} at ({x:.4g}, {y:.4g}, {z:.4g}) m"
     return f"{name}, t = {time:.6g} s, speed {speed:.3g} m/s, step {step:.3g} s,"
 

@@ -2,20 +2,20 @@
 
 A step consists of these phases:
 
-    kick                 half a step by the forces at hand
+    kick                 half a step by the forces of the last step
+    [halo: velocity, film rate]
     film impulses        of every pair, then of every particle
     drift                new positions; walls move
     [halo: position, velocity, spin]
     walls                geometry of every particle and wall
     pairs                films, contacts and rolling of every edge
     sum                  force and torque of every particle over its own edges, in a fixed order
-    [halo: film rate]
     kick                 the other half
 
 A loop over edges writes what each pair does, a loop over particles sums its edges: no two threads write the same
-number, and the result does not depend on their number. Each phase is a function of its own; `integrate` compiles all of
-them into one loop over many steps, and does not return between phases. The halos in the list mark where ghost particles
-would need new values; nothing exchanges them yet.
+number, and the result does not depend on their number. In one process `integrate` makes all phases of many steps in
+one compiled loop. Where processes share the particles, :class:`cfddem.particles.ghosts.StepsWithGhosts` makes the same
+phases one by one, and ghosts receive the values of their owners in between.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
-from cfddem.particles.interactions.contact import NOTHING
 from cfddem.particles.interactions.film import film_force, film_impulse, update_edge_film
 from cfddem.particles.interactions.kinematics import wall_kinematics
 from cfddem.particles.interactions.pair_loops import edge_contact
@@ -39,7 +38,7 @@ from cfddem.particles.interactions.slots import (
     pair_forces,
     update_films,
 )
-from cfddem.particles.vectors import at, dot, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
 from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
 
@@ -75,7 +74,7 @@ def gather_forces(i, particles, edges, memory, gravity, near):
 
 @inline
 def kick(i, particles, step):
-    """Half a kick by the forces at hand."""
+    """Half a kick by the forces of the last step."""
     gain = times(0.5 * step * particles.inverse_mass[i], at(particles.force, i))
     put(particles.velocity, i, plus(at(particles.velocity, i), gain))
     gain = times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i))
@@ -93,11 +92,17 @@ def apply_film_impulses(i, particles, edges, memory):
 
 
 @inline
+def larger(a, b):
+    """The larger of two numbers; NaN if one of them is NaN."""
+    return b if b > a or b != b else a
+
+
+@inline
 def drift(i, particles, free, step, origin):
     """Move particle i along the free directions; returns its squared distance from its origin."""
     velocity = at(particles.velocity, i)
-    way = (step * free[0] * velocity[0], step * free[1] * velocity[1], step * free[2] * velocity[2])
-    put(particles.position, i, plus(at(particles.position, i), way))
+    change = (step * free[0] * velocity[0], step * free[1] * velocity[1], step * free[2] * velocity[2])
+    put(particles.position, i, plus(at(particles.position, i), change))
     moved = minus(at(particles.position, i), at(origin, i))
     return dot(moved, moved)
 
@@ -106,9 +111,9 @@ def drift(i, particles, free, step, origin):
 
 
 @part
-def kick_particles(count, particles, step):
-    """Half a kick of the first `count` particles."""
-    for i in prange(count):
+def kick_particles(particles, step):
+    """Half a kick of all particles."""
+    for i in prange(particles.owned):
         kick(i, particles, step)
 
 
@@ -129,22 +134,19 @@ def find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_rat
 
 
 @part
-def drift_particles(count, particles, edges, memory, free, step, origin):
-    """Apply the impulses of films and move the first `count` particles; returns the largest squared way from origin."""
-    farthest = np.zeros(CHUNKS)
+def drift_particles(particles, edges, memory, free, step, origin):
+    """Apply the impulses of films and move the particles; returns the largest squared distance from the origin."""
+    farthest, count = np.zeros(CHUNKS), particles.owned
     for chunk in prange(CHUNKS):
         far = 0.0
         for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             if DRIFTING:
                 apply_film_impulses(i, particles, edges, memory)
-            moved = drift(i, particles, free, step, origin)
-            if not moved <= far:
-                far = moved
+            far = larger(far, drift(i, particles, free, step, origin))
         farthest[chunk] = far
     largest = 0.0
     for chunk in range(CHUNKS):
-        if not farthest[chunk] <= largest:
-            largest = farthest[chunk]
+        largest = larger(largest, farthest[chunk])
     return largest
 
 
@@ -197,13 +199,46 @@ def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, 
 
 
 @part
-def sum_forces(count, particles, edges, memory, gravity, step):
-    """Sum the forces on the first `count` particles, and kick them by half a step."""
+def sum_forces(particles, edges, memory, gravity, step):
+    """Sum the forces on the particles, and kick them by half a step."""
     near = edges.near if DRIFTING else edges.between_particles
-    for i in prange(count):
+    for i in prange(particles.owned):
         gather_forces(i, particles, edges, memory, gravity, near)
         if step > 0.0:
             kick(i, particles, step)
+
+
+# ---------------------------------------------------------------- between the halos
+
+
+@serial
+def move(particles, edges, memory, walls, shift, table, cutoff_ratio, free, step, origin):
+    """Film impulses and drift, and the motion of walls; returns the square of the largest displacement."""
+    if DRIFTING:
+        find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+    largest = drift_particles(particles, edges, memory, free, step, origin)
+    if WALLS:
+        largest = larger(largest, advance_walls(walls, step) ** 2)
+        if len(walls.cell_member) > 0:
+            share_memory(edges, memory, walls)
+    return largest
+
+
+@inline
+def act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step):
+    """Walls, pairs and sums at the present positions, and the second half of the kick."""
+    if WALLS:
+        wall_contacts(particles, edges, memory.minimum_gap, walls, free, cutoff_ratio)
+    find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step)
+    sum_forces(particles, edges, memory, gravity, step)
+
+
+@inline
+def record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted):
+    """Write the collisions that have ended to `log`, after the rows there are; returns their number."""
+    for k in range(len(edges.first)):
+        noted = record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted)
+    return noted
 
 
 # ---------------------------------------------------------------- all phases of many steps
@@ -215,35 +250,41 @@ def integrate(
 ):
     """Find the forces at the present positions, then advance by up to `steps` steps.
 
-    With `steps` = 0 nothing moves. With `steps` > 0 the forces at hand are taken as they are. The loop stops early when
-    a particle has moved by `reach` from `origin`, or when `log`, the record of collisions ended since `time`, could
-    overflow. Returns the number of steps made, the largest squared displacement (NaN if a position is NaN) and the
-    number of rows written.
+    With `steps` = 0 nothing moves. With `steps` > 0 the first kick uses the forces of the last step. The loop stops
+    early when a particle has moved by `reach` from `origin`, or when `log`, the record of collisions ended since
+    `time`, could overflow. Returns the number of steps made, the largest squared displacement (NaN if a position is
+    NaN) and the number of rows written.
     """
-    count, largest = len(particles.radius), 0.0
-    done, noted, full = 0, 0, False
+    largest, done, noted, full = 0.0, 0, 0, False
     half = step if steps > 0 else 0.0
     while True:
         if steps > 0:
-            kick_particles(count, particles, step)
-            if DRIFTING:
-                find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-            way = drift_particles(count, particles, edges, memory, free, step, origin)
-            largest = way if not way <= largest else largest
+            kick_particles(particles, step)
+            moved = move(particles, edges, memory, walls, shift, table, cutoff_ratio, free, step, origin)
+            largest = larger(largest, moved)
             done += 1
-            if WALLS:
-                way = advance_walls(walls, step)
-                largest = max(largest, way * way)
-                if len(walls.cell_member) > 0:
-                    share_memory(edges, memory, walls)
-        if WALLS:
-            wall_contacts(particles, edges, memory.minimum_gap, walls, free, cutoff_ratio)
-        find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, half)
-        sum_forces(count, particles, edges, memory, gravity, half)
+        act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, half)
         if RECORD:
             now = time + done * step
-            for k in range(len(edges.first)):
-                noted = record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio, now, log, noted)
+            noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, now, log, noted)
             full = len(log) - noted < len(edges.first)
         if done >= steps or full or not largest < reach * reach:
             return done, largest, noted
+
+
+# ---------------------------------------------------------------- one phase after the other
+
+
+@serial
+def start_step(particles, step):
+    """The first half of the kick."""
+    kick_particles(particles, step)
+
+
+@serial
+def finish_step(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, time, log, noted):
+    """See `act` and `record`; returns the number of rows written."""
+    act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step)
+    if RECORD:
+        noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted)
+    return noted

@@ -43,7 +43,7 @@ _OVERRIDABLE = (
 
 
 class Solid(Protocol):
-    """What the particle room needs from a material; :class:`cfddem.case.materials.Material` describes each value."""
+    """What particles need from a material; :class:`cfddem.case.materials.Material` describes each value."""
 
     @property
     def density(self) -> float: ...

@@ -7,11 +7,13 @@ neighbours in later rows; lists are sorted, and the same for any number of threa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
@@ -25,7 +27,7 @@ FEW = 64
 """Up to this many particles every pair is checked."""
 
 USUAL_PAIRS = 8
-"""Listed pairs per particle for which room is made before they are counted."""
+"""Listed pairs per particle for which memory is allocated before they are counted."""
 
 CLASS_RATIO = 2.0
 """Radii within this factor are in one size class."""
@@ -51,6 +53,7 @@ def list_edges(
     box: np.ndarray,
     fields: Iterable[Field] = (),
     roughness: float = 0.0,
+    communicator: Communicator = SERIAL,
 ) -> Edges:
     """A new pair graph of all pairs closer than the reach of the film plus a skin.
 
@@ -59,9 +62,9 @@ def list_edges(
     box           (3,) length of the periodic box; infinite along axes that are open [m]
     fields        of each pair
     roughness     largest gap at which asperities hold a pair apart [m]
+    communicator  of the run
     """
-    largest = float(particles.radius.max())
-    reach = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
+    reach = pair_reach(communicator.largest(particles.radius, default=0.0), cutoff_ratio, skin)
     for axis in range(3):
         if box[axis] < 2.0 * reach:
             raise InputError("box", float(box[axis]), f"at least {2.0 * reach:.3g} m, twice the reach of a pair")
@@ -76,7 +79,15 @@ def list_edges(
     if len(wall):
         first, second = np.concatenate([first, particle]), np.concatenate([second, wall])
         image = np.concatenate([image, np.full(len(wall), HOME, np.uint8)])
-    return make_edges(fields, first, second, image, pairs, particles.count, near)
+    return make_edges(fields, first, second, image, pairs, particles.id, near)
+
+
+def pair_reach(largest: float, cutoff_ratio: float, skin: float) -> float:
+    """Largest distance of the centres of a listed pair [m].
+
+    largest  radius [m]
+    """
+    return 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
 
 
 _Pieces = list[tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -85,13 +96,13 @@ _Pieces = list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 def _among_few(particles: Particles, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
     """Pairs within reach, by checking every pair; nothing is compiled."""
     i, j = np.triu_indices(particles.count, 1)
-    loose = particles.inverse_mass[i] + particles.inverse_mass[j] > 0.0
+    loose = (particles.inverse_mass[i] + particles.inverse_mass[j] > 0.0) & (i < particles.owned)
     i, j = i[loose], j[loose]
     touch = particles.radius[i] + particles.radius[j]
     near = touch + cutoff_ratio * particles.radius[i] * particles.radius[j] / touch + skin
     apart = (particles.position[i] - particles.position[j])[:, None, :] + shifts(box)[None, :, :]
-    within = (apart**2).sum(axis=2) < near[:, None] ** 2
-    if not np.isfinite(box).any():
+    within = np.einsum("pid,pid->pi", apart, apart) < near[:, None] ** 2
+    if np.isinf(box).all():  # local: three lengths
         within[:, :HOME] = within[:, HOME + 1 :] = False
     pair, image = np.nonzero(within)
     return [(i[pair].astype(np.uint32), j[pair].astype(np.uint32), image.astype(np.uint8))]
@@ -100,7 +111,7 @@ def _among_few(particles: Particles, cutoff_ratio: float, skin: float, box: np.n
 def _among_many(particles: Particles, cutoff_ratio: float, skin: float, box: np.ndarray) -> _Pieces:
     """Pairs within reach, searched cell by cell, in pieces one after the other.
 
-    Each piece has room for a usual number of pairs; if that is too small, the search is repeated with enough room.
+    Memory is allocated for a usual number of pairs in each piece; if that is too small, the search is repeated.
     """
     cells = bin_particles(particles.position, particles.radius, cutoff_ratio, skin, box)
     room = USUAL_PAIRS * (particles.count // CHUNKS + 1)
@@ -108,10 +119,11 @@ def _among_many(particles: Particles, cutoff_ratio: float, skin: float, box: np.
     while True:
         first, second, image = (np.empty(CHUNKS * room, kind) for kind in (np.uint32, np.uint32, np.uint8))
         _search(particles.view, cells, cutoff_ratio, skin, box, found, first, second, image)
-        if found.max() <= room:
+        needed = int(found.max())  # local: pairs found by this rank
+        if needed <= room:
             begins = room * np.arange(CHUNKS)
             return [(first[a:b], second[a:b], image[a:b]) for a, b in zip(begins, begins + found)]
-        room = int(found.max())
+        room = needed
 
 
 def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float, skin: float, box: np.ndarray) -> Cells:
@@ -120,23 +132,24 @@ def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float,
     position  (N, 3), inside the box along periodic axes [m]
     radius    (N,) [m]
     """
-    smallest = float(radius.min())
-    if float(radius.max()) < CLASS_RATIO * smallest:
-        size_class, largest = np.zeros(len(radius), np.int64), np.array([radius.max()])
+    smallest, widest = float(radius.min()), float(radius.max())  # local: cells of this rank
+    if widest < CLASS_RATIO * smallest:
+        size_class, largest = np.zeros(len(radius), np.int64), np.array([widest])
     else:
         size_class = np.floor(np.log(radius / smallest) / np.log(CLASS_RATIO) + 1e-9).astype(np.int64)
         kinds, size_class = np.unique(size_class, return_inverse=True)
-        largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])
+        largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])  # local: cells
     periodic = np.isfinite(box)
-    low = np.where(periodic, 0.0, position.min(axis=0))
-    span = np.where(periodic, box, np.maximum(position.max(axis=0) - low, smallest))
+    bottom, top = position.min(axis=0), position.max(axis=0)  # local: cells of this rank
+    low = np.where(periodic, 0.0, bottom)
+    span = np.where(periodic, box, np.maximum(top - low, smallest))
     wanted = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
     most = max(64.0, 4.0 * len(radius)) ** (1.0 / 3.0)
-    wanted = np.maximum(wanted, np.prod(span) ** (1.0 / 3.0) / most)
+    wanted = np.maximum(wanted, math.prod(span) ** (1.0 / 3.0) / most)
     number = np.clip(np.floor(span / wanted[:, None]).astype(np.int64), 1, 1 << 20)
-    cells = np.prod(number, axis=1)
-    offset = np.cumsum(cells) - cells
-    start, member = np.zeros(int(cells.sum()) + 1, np.int64), np.empty(len(radius), np.int32)
+    ends = np.cumsum(number[:, 0] * number[:, 1] * number[:, 2])
+    offset = np.append(0, ends[:-1])
+    start, member = np.zeros(int(ends[-1]) + 1, np.int64), np.empty(len(radius), np.int32)
     _sort_into_cells(position, size_class, low, span / number, number, offset, start, member)
     return Cells(largest, low, span / number, number, offset, start, member)
 
@@ -165,8 +178,8 @@ def _sort_into_cells(position, size_class, low, width, number, offset, start, me
 
 @threaded
 def _search(particles, cells, cutoff_ratio, skin, box, found, first, second, image):
-    """Write the neighbours of each particle in later rows, ascending; count them also where room is missing."""
-    count, room = len(particles.radius), len(first) // CHUNKS
+    """Write the neighbours of each owned particle in later rows, ascending; count all, store what fits."""
+    count, room = particles.owned, len(first) // CHUNKS
     for chunk in prange(CHUNKS):
         base = chunk * room
         end, total = base + room, base
@@ -256,9 +269,10 @@ def locality_order(position: np.ndarray, width: float) -> np.ndarray:
     width     of a cell [m]
     returns   (N,) int32
     """
-    cell = np.minimum(((position - position.min(axis=0)) / width).astype(np.int64), (1 << 20) - 1)
-    key = np.zeros(len(position), np.int64)
-    for bit in range(int(cell.max()).bit_length()):
+    low = position.min(axis=0)  # local: the order of rows concerns this rank
+    cell = np.minimum(((position - low) / width).astype(np.int64), (1 << 20) - 1)
+    key, most = np.zeros(len(position), np.int64), int(cell.max())  # local: likewise
+    for bit in range(most.bit_length()):
         for axis in range(3):
             key |= ((cell[:, axis] >> bit) & 1) << (3 * bit + axis)
     return np.argsort(key, kind="stable").astype(np.int32)

@@ -1,8 +1,11 @@
 """The pair graph: which bodies are near each other, and what each pair remembers.
 
-An edge joins two particles, or a particle and a piece of a wall. Edges of particles come first, sorted by their first
-particle and then their second; edges of walls follow. Each pair has one edge. With films, pairs too far apart to touch
-before the next list follow those that may touch.
+An edge joins two particles, or a particle and a piece of a wall. Edges of particles come first, edges of walls follow.
+Each pair has one edge. With films, pairs too far apart to touch before the next list follow those that may touch.
+
+The first body of a pair is the particle with the lower id. The list of the edges of a particle is sorted by the ids of
+the other particles; walls follow, by wall and then by triangle. So forces, and their sum over the edges of a particle,
+have the same bits for any order of the rows.
 
 What a pair remembers is declared by the laws of a run as fields (:mod:`cfddem.data.fields`). New lists, checkpoints and
 the arrays of compiled loops are made from the declarations.
@@ -43,7 +46,9 @@ class Graph(NamedTuple):
     near: int  # edges of particles that may touch before the next list; those after it have films alone
     touch: np.ndarray  # (particle-wall edges, 18) geometry of sphere and wall: columns in `nearest_point`
     start: np.ndarray  # (N + 1,) int64, where the edges of a particle begin in `incident`
-    incident: np.ndarray  # int32, edge k where the particle is first, -1 - k where it is second
+    incident: (
+        np.ndarray
+    )  # int32, by id of the other body: edge k where the particle is first, -1 - k where it is second
 
 
 class Edges(Table):
@@ -72,33 +77,31 @@ class Edges(Table):
     @property
     def uses_outside(self) -> int:
         """Uses of laws outside of their range that have been counted for these edges."""
-        return int(self.outside.sum()) if "outside" in self else 0
+        return int(self.outside.sum()) if "outside" in self else 0  # local: of the pairs of this rank
 
     def checkpoint(self) -> dict[str, Any]:
         """Copies of the graph and of everything that pairs remember."""
         graph = {name: np.copy(each) if np.ndim(each) else each for name, each in self.graph._asdict().items()}
-        return graph | {name: array.copy() for name, array in self.arrays.items()}
+        return graph | super().checkpoint()
 
     def restored(self, kept: Mapping[str, Any]) -> Edges:
         """Edges with the same fields and the graph and values of a `checkpoint()`."""
         values: dict[str, Any] = {
             name: int(kept[name]) if np.ndim(kept[name]) == 0 else np.array(kept[name]) for name in Graph._fields
         }
-        remembered = {name: kept[name] for name in self.fields if name in kept}
-        return Edges(Graph(**values), self.fields.values(), remembered)
+        made = Edges(Graph(**values), self.fields.values())
+        made.restore({name: each for name, each in kept.items() if name not in Graph._fields})
+        return made
 
-    def remember(self, old: Edges, old_row: np.ndarray, new_row: np.ndarray, start: np.ndarray | None = None) -> None:
+    def remember(self, old: Edges, old_row: np.ndarray) -> None:
         """Take over what each pair remembers from an earlier list.
 
-        old_row  (N,) row that the particle of each new row had in the old list
-        new_row  the inverse; -1 for particles that are gone
-        start    of the old graph, where it has one row more
+        old_row  (N,) int32, row that the particle of each new row had in the old list; -1 for new particles
         """
-        source, sign = np.empty(self.rows, np.int64), np.ones(self.rows)
-        before = old.flat_graph if start is None else old.flat_graph._replace(start=start)
-        _find(before, self.flat_graph, old_row, new_row, source, sign)
+        source = np.empty(self.rows, np.int64)
+        _find(old.flat_graph, self.flat_graph, old_row, source)
         known = source >= 0
-        every, turned = bool(known.all()), bool((sign < 0.0).any())
+        every = bool(known.all())  # local: edges of this rank
         for name, field in self.fields.items():
             if field.role == "scratch" or name not in old:
                 continue
@@ -106,9 +109,50 @@ class Edges(Table):
                 np.take(old[name], source, axis=0, out=self[name])
             else:
                 self[name][known] = old[name][source[known]]
-            if field.flips and turned:
-                self[name][:] *= sign[:, None] if field.components else sign
 
+    def ends(self, ids: np.ndarray) -> np.ndarray:
+        """Names of the two bodies of each edge: ids of particles, -1 - w for piece w of the walls (n, 2).
+
+        ids  of the particles (N,)
+        """
+        second = -1 - self.second.astype(np.int64)
+        second[: self.between_particles] = ids[self.second[: self.between_particles]]
+        return np.stack([ids[self.first], second], axis=1)
+
+    def of(self, rows: np.ndarray, ids: np.ndarray) -> Table:
+        """What the pairs of some particles remember, with the names of the two bodies, for another list.
+
+        rows  of the particles; negative numbers are left out
+        ids   of all particles (N,)
+        """
+        chosen = np.zeros(len(ids), bool)
+        chosen[rows[rows >= 0]] = True
+        mine = chosen[self.first]
+        mine[: self.between_particles] |= chosen[self.second[: self.between_particles]]
+        kept = {name: array[mine] for name, array in super().checkpoint().items()}
+        pairs = Table([BODIES, *(self.fields[name] for name in kept)], int(np.count_nonzero(mine)))  # local: pairs
+        pairs.restore({"bodies": self.ends(ids)[mine]} | kept)
+        return pairs
+
+    def recall(self, pairs: Table, ids: np.ndarray) -> None:
+        """Take over what pairs remembered in another list; see `of`.
+
+        ids  of the particles (N,)
+        """
+        ends = self.ends(ids)
+        rows = np.flatnonzero(np.isin(ends[:, 0], pairs.bodies) | np.isin(ends[:, 1], pairs.bodies))
+        _, name = np.unique(np.concatenate([pairs.bodies, ends[rows]]), axis=0, return_inverse=True)
+        source = np.full(len(name), -1)
+        source[name.reshape(-1)[: pairs.rows]] = np.arange(pairs.rows)
+        source = source[name.reshape(-1)[pairs.rows :]]
+        for each, field in self.fields.items():
+            if field.role != "scratch":
+                self[each][rows[source >= 0]] = pairs[each][source[source >= 0]]
+
+
+BODIES = Field(
+    "bodies", components=2, role="memory", dtype=np.int64, meaning="names of the two bodies, see `Edges.ends`"
+)
 
 _MEMORY = "Memory__"
 
@@ -148,21 +192,22 @@ def make_edges(
     second: np.ndarray,
     image: np.ndarray,
     between_particles: int,
-    count: int,
+    ids: np.ndarray,
     near: int | None = None,
 ) -> Edges:
     """Edges with their fields at initial values.
 
     fields                of each pair
-    first, second, image  (n,) as in :class:`Graph`
+    first, second, image  (n,) as in :class:`Graph`; pairs are turned so that the lower id is first
     between_particles     number of edges that join two particles
-    count                 number of particles
+    ids                   of the particles (N,)
     near                  leading edges between particles that may touch; all of them if not given
     """
     pairs = int(between_particles)
     touch = np.zeros((len(first) - pairs, TOUCH))
-    incidence = _incidence(first, second, pairs, count)
-    graph = Graph(first, second, image, pairs, pairs if near is None else int(near), touch, *incidence)
+    near = pairs if near is None else int(near)
+    incidence = _incidence(first, second, image, near, pairs, ids)
+    graph = Graph(first, second, image, pairs, near, touch, *incidence)
     return Edges(graph, fields)
 
 
@@ -183,50 +228,65 @@ def near_first(
     gap = np.sqrt(np.einsum("ij,ij->i", apart, apart)) - radii
     far = gap >= allowance + THICKEST * particles.radius[first] * particles.radius[second] / radii
     order = np.argsort(far, kind="stable")
-    return first[order], second[order], image[order], int(np.count_nonzero(~far))
+    return first[order], second[order], image[order], int(np.count_nonzero(~far))  # local: edges
 
 
 @serial
-def _incidence(first, second, between_particles, count):
-    """List the edges of each particle in ascending order."""
+def _incidence(first, second, image, near, between_particles, ids):
+    """Let the lower id of each pair be first, and list the edges of each particle by the id of the other body."""
+    count = len(ids)
     start = np.zeros(count + 1, np.int64)
     for k in range(len(first)):
         start[first[k] + 1] += 1
         if k < between_particles:
             start[second[k] + 1] += 1
+            if ids[first[k]] > ids[second[k]]:
+                first[k], second[k] = second[k], first[k]
+                image[k] = 2 * HOME - image[k]
     for i in range(count):
         start[i + 1] += start[i]
-    incident = np.empty(start[count], np.int32)
+    incident, key = np.empty(start[count], np.int32), np.empty(start[count], np.int64)
     filled = start[:-1].copy()
-    for k in range(len(first)):
+    for begin, end in ((0, near), (near, between_particles)):
+        sorted_from = filled.copy()
+        for k in range(begin, end):
+            i, j = first[k], second[k]
+            _place(incident, key, sorted_from[i], filled[i], k, ids[j])
+            _place(incident, key, sorted_from[j], filled[j], -1 - k, ids[i])
+            filled[i] += 1
+            filled[j] += 1
+    for k in range(between_particles, len(first)):  # already by wall and triangle
         i = first[k]
         incident[filled[i]] = k
         filled[i] += 1
-        if k < between_particles:
-            j = second[k]
-            incident[filled[j]] = -1 - k
-            filled[j] += 1
     return start, incident
 
 
+@inline
+def _place(incident, key, begin, end, edge, other):
+    """Insert an edge into the sorted list of a particle; `key` holds the ids of the other bodies."""
+    place = end
+    while place > begin and key[place - 1] > other:
+        incident[place], key[place] = incident[place - 1], key[place - 1]
+        place -= 1
+    incident[place], key[place] = edge, other
+
+
 @serial
-def _find(old, new, old_row, new_row, source, sign):
-    """Find the old edge of each new one, -1 for new pairs, and -1 as the sign where its two bodies changed places."""
+def _find(old, new, old_row, source):
+    """Find the old edge of each new one; -1 for new pairs."""
     for k in range(len(new.first)):
-        i, j = new.first[k], new.second[k]
+        wall = k >= new.between_particles
+        i, j = old_row[new.first[k]], new.second[k] if wall else old_row[new.second[k]]
         source[k] = -1
-        a = old_row[i]
-        for place in range(old.start[a], old.start[a + 1]):
+        if i < 0 or j < 0:
+            continue
+        for place in range(old.start[i], old.start[i + 1]):
             edge = old.incident[place]
-            before = edge if edge >= 0 else -1 - edge
-            if k < new.between_particles:
-                other = old.second[before] if edge >= 0 else old.first[before]
-                same = before < old.between_particles and new_row[other] == j
-            else:
-                same = before >= old.between_particles and old.second[before] == j
-            if same:
-                source[k] = before
-                sign[k] = 1.0 if edge >= 0 else -1.0
+            # the lower id is first in both lists
+            if edge >= 0 and old.second[edge] == j and (edge >= old.between_particles) == wall:
+                source[k] = edge
+                break
 
 
 def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> np.ndarray:
@@ -266,7 +326,7 @@ def geometry(k, particles, edges, shift):
     if k < edges.between_particles:
         separation = between(i, j, edges.image[k], particles.position, shift)
         distance = math.sqrt(dot(separation, separation))
-        return separation, distance, distance - particles.radius[i] - particles.radius[j]
+        return separation, distance, distance - (particles.radius[i] + particles.radius[j])
     distance = touched_distance(edges, k)
     return times(distance, touched(edges, k, NORMAL)), distance, distance - particles.radius[i]
 

@@ -1,4 +1,9 @@
-"""The particles: plain arrays in SI units, one row a particle; ids name particles, rows do not."""
+"""The particles: plain arrays in SI units, one row for each particle; ids name particles, rows do not.
+
+Where several processes share a run, each owns some of the particles. The rows of a process are [owned | ghosts]: ghosts
+are copies of particles that other processes own, as far as the owned ones may meet them. Loops over particles run over
+the owned rows; loops over pairs run over all pairs with an owned member.
+"""
 
 from __future__ import annotations
 
@@ -8,47 +13,75 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
-from cfddem.data.fields import Field, Table
+from cfddem.data.fields import Field, Phase, Table
 
 PARTICLE_FIELDS = (
-    Field("position", "m", 3, halo="motion", snapshot=True, meaning="position of the centre"),
-    Field("velocity", "m/s", 3, halo="motion", snapshot=True, meaning="velocity"),
-    Field("spin", "rad/s", 3, halo="motion", snapshot=True, meaning="angular velocity"),
-    Field("radius", "m", snapshot=True, meaning="radius"),
+    Field("position", "m", 3, halo=("start", "motion"), snapshot=True, meaning="position of the centre"),
+    Field("velocity", "m/s", 3, halo=("start", "film", "motion"), snapshot=True, meaning="velocity"),
+    Field("spin", "rad/s", 3, halo=("start", "motion"), snapshot=True, meaning="angular velocity"),
+    Field("radius", "m", halo=("start",), snapshot=True, meaning="radius"),
     Field("density", "kg/m3", meaning="density"),
-    Field("inverse_mass", "1/kg", meaning="1/m, 0 for a particle that nothing moves"),
+    Field("inverse_mass", "1/kg", halo=("start",), meaning="1/m, 0 for a particle that nothing moves"),
     Field("inverse_inertia", "1/(kg m2)", meaning="1/I, 0 for a particle that nothing moves"),
-    Field("material", "1", dtype=np.int32, meaning="row of the pair table"),
+    Field("material", "1", dtype=np.int32, halo=("start",), meaning="row of the pair table"),
     Field("id", "1", dtype=np.int64, snapshot=True, meaning="name of the particle, which never changes"),
-    Field("viscosity", "Pa s", meaning="viscosity of the fluid around the particle, for its films"),
-    Field("applied", "N", 3, meaning="force from outside: gravity, fluid, a hand"),
+    Field("viscosity", "Pa s", halo=("start",), meaning="viscosity of the fluid around the particle, for its films"),
+    Field("applied", "N", 3, meaning="applied force: of gravity, the fluid, the user"),
     Field("force", "N", 3, snapshot=True, meaning="sum of all forces at the last step"),
     Field("torque", "N m", 3, meaning="sum of all torques at the last step"),
-    Field("film_rate", "1/s", halo="film", meaning="resistance of all films of the particle over its mass"),
+    Field("film_rate", "1/s", halo=("film",), meaning="resistance of all films of the particle over its mass"),
 )
 """Fields of every particle; laws and users may declare more."""
 
-ParticleArrays = namedtuple("ParticleArrays", [field.name for field in PARTICLE_FIELDS])  # type: ignore[misc]
-"""The arrays of these fields, as compiled loops take them."""
+ParticleArrays = namedtuple("ParticleArrays", [*(field.name for field in PARTICLE_FIELDS), "owned"])  # type: ignore[misc]
+"""The arrays of these fields, as compiled loops take them, and the number of owned rows."""
 
 
 class Particles(Table):
     """The particles: one array for each declared field, one row for each particle; ids name particles, rows do not."""
 
+    _ghosts = 0
+
     @property
     def count(self) -> int:
-        """Number of particles."""
+        """Number of rows: of the particles that this process owns, and of its ghosts."""
         return self.rows
+
+    @property
+    def owned(self) -> int:
+        """Number of particles that this process owns; their rows come first."""
+        return self.rows - self._ghosts
+
+    def add_ghosts(self, copies: Particles) -> None:
+        """Append copies of particles that other processes own."""
+        self.append(copies)
+        self.set_ghosts(self._ghosts + copies.rows)
+
+    def set_ghosts(self, number: int) -> None:
+        """Declare that the last rows are ghosts."""
+        object.__setattr__(self, "_ghosts", number)
+
+    def drop_ghosts(self) -> None:
+        """Remove the rows of all ghosts."""
+        if self._ghosts:
+            self.keep(np.arange(self.owned))
+            self.set_ghosts(0)
+
+    def halo_fields(self, phase: Phase) -> list[str]:
+        """Names of the fields that ghosts receive in a phase of the step."""
+        return [name for name, field in self.fields.items() if phase in field.halo]
 
     @property
     def view(self) -> Any:
         """The arrays of `PARTICLE_FIELDS` as loops take them: vectors one after the other; nothing is copied."""
-        return ParticleArrays(*(self.arrays[field.name].reshape(-1) for field in PARTICLE_FIELDS))
+        return ParticleArrays(*(self[field.name].reshape(-1) for field in PARTICLE_FIELDS), owned=self.owned)  # type: ignore[call-arg]
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """Rows of the particles (N, ...) in the order of their ids; zero for ids that are gone."""
-        placed = np.zeros((int(self.id.max(initial=-1)) + 1, *values.shape[1:]), values.dtype)
+        most = int(self.id.max(initial=-1))  # local: rows of this rank
+        placed = np.zeros((most + 1, *values.shape[1:]), values.dtype)
         placed[self.id] = values
         return placed
 
@@ -97,9 +130,9 @@ def make_particles(
 
     radius, density = scalars(radius), scalars(density)
     for field, values in (("radius", radius), ("density", density)):
-        bad = ~((values > 0) & np.isfinite(values))
-        if bad.any():
-            raise InputError(f"{field} of particle {int(np.argmax(bad))}", float(values[bad][0]), "above 0")
+        refused = np.flatnonzero(~((values > 0) & np.isfinite(values)))
+        if len(refused):
+            raise InputError(f"{field} of particle {refused[0]}", float(values[refused[0]]), "above 0")
     mass = density * (4.0 / 3.0) * np.pi * radius**3
     free = ~scalars(fixed, bool)
     return Particles(
@@ -127,9 +160,10 @@ def particles_in(kept: Mapping[str, np.ndarray]) -> Particles:
     return particles
 
 
-def kinetic_energy(spheres: Particles) -> float:
+def kinetic_energy(spheres: Particles, communicator: Communicator = SERIAL) -> float:
     """Kinetic energy of all particles, spin included [J]."""
-    mass = spheres.mass
-    linear = np.sum(mass[:, None] * spheres.velocity**2)
-    turning = np.sum(0.4 * mass[:, None] * spheres.radius[:, None] ** 2 * spheres.spin**2)
+    own = slice(spheres.owned)
+    mass, radius = spheres.mass[own, None], spheres.radius[own, None]
+    linear = communicator.sum(mass * spheres.velocity[own] ** 2)
+    turning = communicator.sum(0.4 * mass * radius**2 * spheres.spin[own] ** 2)
     return 0.5 * float(linear + turning)

@@ -66,13 +66,15 @@ def hertz_steps(reduced_mass: float, reduced_radius: float, modulus: float, spee
     )
 
 
-def linear_steps(reduced_mass: float, normal_stiffness: float, tangential_stiffness: float) -> tuple[float, float]:
-    """Default step and stability limit of an impact on a linear spring [s].
+def stiffness_steps(reduced_mass: float, stiffness: float) -> tuple[float, float]:
+    """Default step and stability limit of an impact on a spring [s]; infinite without a stiffness.
 
     reduced_mass  m* [kg]
-    ..._stiffness of the springs [N/m]
+    stiffness     largest of the impact, normal or tangential [N/m]
     """
-    swing = math.sqrt(reduced_mass / max(normal_stiffness, tangential_stiffness))
+    if stiffness <= 0.0:
+        return math.inf, math.inf
+    swing = math.sqrt(reduced_mass / stiffness)
     return math.pi * swing / STEPS_PER_HERTZ_TIME, STABLE * swing
 
 

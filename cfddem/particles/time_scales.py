@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import serial
 from cfddem.backend.law_choice import FILM_ARGUMENTS, called_by_name
 from cfddem.backend.law_set import specialise
@@ -29,26 +30,30 @@ def time_scales(
     table: np.ndarray,
     laws: Laws,
     reference_speed: float,
+    communicator: Communicator = SERIAL,
 ) -> TimeScales:
-    """Time scales of the particles in their present state.
+    """Time scales of the particles of all ranks in their present state.
 
     gap              (n,) of every edge [m]
     reference_speed  expected fastest approach; the fastest particle counts, too [m/s]
     """
-    speed = max(reference_speed, float(np.linalg.norm(particles.velocity, axis=1).max(initial=0.0)))
+    fastest = communicator.largest(np.einsum("nd,nd->n", particles.velocity, particles.velocity), default=0.0)
+    speed = max(reference_speed, math.sqrt(fastest))
+    viscosity = communicator.largest(particles.viscosity, default=0.0)
     hertz, impact, film = math.inf, math.inf, math.inf
     for mass, radius, row in _lightest_pairs(particles, table):
         steps = laws.contact_law.impact_steps(mass, radius, row, speed)
         hertz, impact = min(hertz, steps[0]), min(impact, steps[1])
         if laws.film and laws.integrator == "verlet":
-            strongest = _film_strength(laws, float(particles.viscosity.max()), radius, float(row["roughness_gap"]))
+            strongest = _film_strength(laws, viscosity, radius, float(row["roughness_gap"]))
             film = min(film, 2.0 * timescales.film_time(mass, strongest, float(row["roughness_gap"])))
     largest_rate = specialise(_largest_rate, laws.choices())
     remembered = ("minimum_gap", *(field.name for field in laws.contact_law.memory))
     memory = memory_class(remembered)(*(edges[name] for name in remembered))
     rate = largest_rate(particles.view, edges.flat_graph, memory, walls, gap, table, laws.parameters)
     overlap = STABLE / math.sqrt(max(rate, 1e-300))
-    return TimeScales(hertz, impact, overlap, film, crossing_step(float(particles.radius.min()), speed))
+    crossing = crossing_step(communicator.smallest(particles.radius), speed)
+    return TimeScales(*communicator.smallest(np.array([[hertz, impact, overlap, film, crossing]]), axis=0).tolist())
 
 
 def _film_strength(laws: Laws, viscosity: float, reduced_radius: float, gap: float) -> float:
@@ -64,7 +69,7 @@ def _lightest_pairs(particles: Particles, table: np.ndarray) -> list[tuple[float
     found = []
     for kind in np.unique(particles.material):
         own = np.flatnonzero(particles.material == kind)
-        smallest = own[np.argmin(particles.radius[own])]
+        smallest = own[np.argmin(particles.radius[own])]  # local: of this rank
         for row in table[kind]:
             found.append((0.5 * float(particles.mass[smallest]), 0.5 * float(particles.radius[smallest]), row))
     return found
@@ -90,6 +95,6 @@ def _largest_rate(particles, edges, memory, walls, gap, table, p):
         if pair:
             stiffness[j] += stiff
     largest = 0.0
-    for i in range(len(stiffness)):
+    for i in range(particles.owned):
         largest = max(largest, 2.0 * stiffness[i] * particles.inverse_mass[i])
     return largest

@@ -15,6 +15,10 @@ from cfddem.backend.compile import inline
 Vector = tuple[float, float, float]
 Arrays = TypeVar("Arrays", bound=tuple[Any, ...])
 
+NOTHING = (0.0, 0.0, 0.0)
+LEAST = 1e-300
+"""Keeps divisions finite where the result is dropped."""
+
 _1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
 
 

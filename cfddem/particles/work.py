@@ -18,7 +18,6 @@ from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.contact import NOTHING
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.slots import (
     FILM,
@@ -35,7 +34,7 @@ from cfddem.particles.interactions.slots import (
 )
 from cfddem.particles.pair_graph import geometry
 from cfddem.particles.state import kinetic_energy
-from cfddem.particles.vectors import across, at, cross, dot, flat, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, across, at, cross, dot, flat, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
 from closures.blend import contact_share
 from closures.friction import coulomb_limit, dry_or_lubricated
@@ -74,7 +73,7 @@ class Energies:
 
     totals  energy of each of `CHANNELS` since the count began [J]
 
-    Fields of the particles, set anew in every `advance`: `way`, the distance over which the forces on each particle
+    Fields of the particles, set in every `advance`: `way`, the distance over which the forces on each particle
     have acted (N, 3) [m], and `path`, its displacement; they differ by the impulses of films.
     """
 
@@ -113,11 +112,12 @@ class Energies:
         if self._edges is not solver.edges:
             self._edges, self._count = solver.edges, _room(solver)
             self._pass(solver, 0.0, 0.0, 0.0)
-        return float(self._count.held.sum()), 0.5 * float((self._count.stiffness * self._count.spring).sum())
+        total = solver.communicator.sum
+        return total(self._count.held), 0.5 * total(self._count.stiffness * self._count.spring)
 
     def mechanical(self, solver: ParticleSolver) -> float:
         """Kinetic energy and that of the springs [J]."""
-        return kinetic_energy(solver.particles) + sum(self.springs(solver))
+        return kinetic_energy(solver.particles, solver.communicator) + sum(self.springs(solver))
 
     def checkpoint(self) -> dict[str, Any]:
         """What has been counted."""
@@ -136,7 +136,7 @@ class Energies:
         _ways(particles, count, gravity, np.array(solver.free, float), step, before, after)
         p = solver.laws.parameters
         self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
-        self.totals += count.totals.sum(axis=0)
+        self.totals += solver.communicator.sum(count.totals, axis=0)
         if before + after > 0.0:
             solver.particles.way += self._count.way
         if step > 0.0:

@@ -12,16 +12,20 @@ from typing import Any
 import numpy as np
 
 from cfddem.analysis.bed_laws import weight_over_floor
+from cfddem.analysis.fluctuations import impacts
 from cfddem.analysis.profiles import Profiles, profiles_of
 from cfddem.analysis.report import case_of, recorded_regimes
 from cfddem.analysis.report import report as summary
 from cfddem.analysis.report_text import spelled, steadiness
+from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
 from cfddem.backend.errors import RunFailed
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, SKY, blank, draw_regimes, label, panels
+from cfddem.plotting.wave_figures import BED, draw_impacts, draw_map
+from cfddem.preflight.bed_waves import is_liquid_bed
 
 Rows = list[tuple[str, ...]]
 
@@ -62,6 +66,17 @@ def render(run: Run, result: dict[str, Any]) -> str:
             "keeps the solids apart, below it the asperities. To the right of the orange line most collisions end in "
             "contact."
         )
+    if result["impacts"].get("rate", 0.0) > 0.0:
+        figure, axes = panels(1, width=6.4, height=3.8)
+        temperature = result["measures"].get("granular_temperature", {}).get("mean")
+        draw_impacts(axes, impacts(run.collisions, begin, end, int(run.history["particle_count"][-1])), temperature)
+        figures["impacts"] = _encoded(figure)
+    if is_liquid_bed(case) and len(run.times) >= FEWEST_TIMES and "radius" in run.particle_fields:
+        figure, axes = panels(1, width=8.0, height=3.8)
+        height = result["measures"]["bed_height"]["mean"]
+        found_map = layer_map(run, case)
+        draw_map(axes, found_map, waves(found_map, BED[0] * height, BED[1] * height, begin), (begin, end))
+        figures["waves"] = _encoded(figure)
     text: str = _template().render(
         result=result,
         status=f"{result['status']} at {end:g} s; {counts}; means from {begin:g} to {end:g} s",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import LIQUID, BedEstimate
+from cfddem.preflight.bed_waves import check_waves
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.cost_estimate import CostEstimate, available_memory
 from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel
@@ -45,6 +47,7 @@ def find_issues(
     ]
     if case.fluid is not None:
         found += [*check_kernel(case, steps), *check_flow(case, bed), *check_drag(case, bed)]
+        found += check_waves(case, bed)
     return sorted(found, key=lambda each: each.severity != "error")
 
 
@@ -79,14 +82,7 @@ def check_units(case: Case) -> Iterator[Issue]:
 
 def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
     """Check that contacts are stiff enough."""
-    laws, species = case.laws, case.species[collision.species]
-    if laws.contact == "linear":
-        if laws.normal_stiffness == 0.0:
-            yield Issue(
-                "error", "laws.normal_stiffness", "0 N/m, so that particles pass through each other",
-                "set a stiffness above 0",
-            )  # fmt: skip
-        return
+    law, species = case.laws.contact_law, case.species[collision.species]
     if case.bed.fixed:
         return
     # the modulus scales with overlap to the power -2.5 at a given speed, and -1.5 under a given load
@@ -96,42 +92,45 @@ def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
     }
     cause, (overlap, power) = max(causes.items(), key=lambda each: each[1])
     part, solid = overlap / species.diameter, case.material_of(species)
-    if part > SOFT_OVERLAP:
+    if part <= SOFT_OVERLAP:
+        return
+    key, remedy = "laws.contact_parameters", f"choose stiffer parameters of the contact law {law.name}"
+    if law.takes("contact_modulus"):
+        key = f"material.{case.material_name_of(species)}.contact_modulus"
         softer = solid.contact_modulus or solid.youngs_modulus
-        yield Issue(
-            "error" if part > LARGEST_OVERLAP else "warning",
-            f"material.{case.material_name_of(species)}.contact_modulus",
-            f"overlap of {100.0 * part:.2g} % of a diameter under {cause}; the limit is {100.0 * SOFT_OVERLAP:g} %",
-            f"use {softer * (part / (0.5 * SOFT_OVERLAP)) ** power:.1g} Pa",
-        )  # fmt: skip
+        remedy = f"use {softer * (part / (0.5 * SOFT_OVERLAP)) ** power:.1g} Pa"
+    limit = f"overlap of {100.0 * part:.2g} % of a diameter under {cause}; the limit is {100.0 * SOFT_OVERLAP:g} %"
+    if math.isinf(part):
+        limit = "the contacts are too soft: particles pass through each other"
+    yield Issue("error" if part > LARGEST_OVERLAP else "warning", key, limit, remedy)
 
 
 def check_surface_laws(case: Case) -> Iterator[Issue]:
-    """Check that rolling resistance and cohesion have material properties, and that no property is left unused."""
-    laws = case.laws
-    if laws.cohesion != "none" and case.has_films:
+    """Check that contact law and rolling resistance have material properties, and that no property is unused."""
+    laws, contact = case.laws, case.laws.contact_law
+    if contact.adhesive and case.has_films:
         yield Issue(
-            "error", "laws.cohesion", f"{laws.cohesion} holds for dry solids, but films form between particles",
-            'set laws.lubrication = "none", or laws.cohesion = "none"',
+            "error", "laws.contact", f"{contact.name} holds for dry solids, but films form between particles",
+            'set laws.lubrication = "none", or another contact law',
         )  # fmt: skip
-    if laws.cohesion != "none" and laws.contact != "hertz":
+    if case.run.energy_budget and contact.energy is None:
         yield Issue(
-            "error", "laws.cohesion", f"{laws.cohesion} needs Hertz contacts, but the contact is {laws.contact}",
-            'set laws.contact = "hertz"',
+            "error", "run.energy_budget", f"the contact law {contact.name} does not give its energy",
+            "set it to false, or use another contact law",
         )  # fmt: skip
-    for key, law, needed in (
-        ("rolling_resistance", laws.rolling_resistance, "rolling_friction"),
-        ("cohesion", laws.cohesion, "surface_energy"),
+    for key, law, used, needed in (
+        ("rolling_resistance", laws.rolling_resistance, laws.rolling_resistance != "none", "rolling_friction"),
+        ("contact", laws.contact, contact.takes("work_of_adhesion"), "surface_energy"),
     ):
         given = [name for name, each in case.material.items() if getattr(each, needed) > 0.0]
-        if law != "none" and not given:
+        if used and not given:
             yield Issue(
-                "warning", f"laws.{key}", f"{law} has no effect, because {needed} is 0 in every material",
+                "warning", f"laws.{key}", f"the {needed} that {law} uses is 0 in every material",
                 f"set material.NAME.{needed}",
             )  # fmt: skip
-        if law == "none" and given:
+        if given and not used:
             yield Issue(
-                "warning", f"material.{given[0]}.{needed}", f'unused, because laws.{key} is "none"', f"set laws.{key}"
+                "warning", f"material.{given[0]}.{needed}", f'unused, because laws.{key} is "{law}"', f"set laws.{key}"
             )
 
 

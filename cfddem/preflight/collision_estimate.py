@@ -12,7 +12,7 @@ from cfddem.case.bed import Species
 from cfddem.case.schema import Case
 from cfddem.particles.material_pairs import pair_table
 from cfddem.preflight.bed_estimate import BedEstimate
-from closures import contact, minimum_gap, numbers
+from closures import minimum_gap, numbers
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,8 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
     mass, radius = reduced(case, species, species.diameter)
     speed = max(case.reference_speed, 1e-12)
     real, soft = float(row["film_modulus"]), float(row["contact_modulus"])
-    stiffness, real_stiffness = contact.hertz_stiffness(soft, radius), contact.hertz_stiffness(real, radius)
+    law, hard = case.laws.contact_law, row.copy()
+    hard["contact_modulus"] = real
     load = bed.weight * species.diameter**2
     viscosity = 0.0 if case.fluid is None else case.fluid.viscosity
     roughness_gap = float(row["roughness_gap"])
@@ -75,10 +76,10 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
         roughness_gap=roughness_gap if films else 0.0,
         film_gap=_film_gap(case, (roughness_gap, speed, viscosity, real, radius)) if films else 0.0,
         softened_film_gap=_film_gap(case, (roughness_gap, speed, viscosity, soft, radius)) if films else 0.0,
-        overlap=contact.hertz_largest_overlap(mass, stiffness, speed),
-        real_overlap=contact.hertz_largest_overlap(mass, real_stiffness, speed),
-        resting_overlap=(load / stiffness) ** (2.0 / 3.0),
-        softening=soft / real,
+        overlap=law.largest_overlap(mass, radius, row, speed),
+        real_overlap=law.largest_overlap(mass, radius, hard, speed),
+        resting_overlap=law.resting_overlap(mass, radius, row, load),
+        softening=soft / real if law.takes("contact_modulus") else 1.0,
     )
 
 

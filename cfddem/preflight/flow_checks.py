@@ -11,6 +11,7 @@ from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.step_estimate import StepEstimate
+from closures.registry import Law
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
@@ -130,14 +131,16 @@ def check_drag(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
     ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
     values = [("reynolds", bed.reynolds), ("voidage", voidage), *(("diameter_ratio", each) for each in ratios)]
-    for name, value in values:
-        low, high = law.ranges.get(name, (-math.inf, math.inf))
-        if not low <= value <= high:
-            yield Issue(
-                "warning", "laws.drag",
-                f"{law.name} was fitted to {name} {low:g} to {high:g}, but the bed has {value:.3g}",
-                "choose another law; cfddem explain lists all with their ranges",
-            )  # fmt: skip
+    chosen = {"laws.drag": law, "laws.added_mass": case.laws.added_mass_law}
+    for key, each in ((key, each) for key, each in chosen.items() if isinstance(each, Law)):
+        for name, value in values:
+            low, high = each.ranges.get(name, (-math.inf, math.inf))
+            if not low <= value <= high:
+                yield Issue(
+                    "warning", key,
+                    f"{each.name} was fitted to {name} {low:g} to {high:g}, but the bed has {value:.3g}",
+                    "choose another law; cfddem explain lists all with their ranges",
+                )  # fmt: skip
     if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
         yield Issue(
             "warning", "laws.drag",

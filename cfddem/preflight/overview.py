@@ -97,7 +97,8 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate) -> Iterator[R
         if collision.softening < 1.0:
             note = "if films used the contact modulus"
             yield Row(group, "minimum gap, softened", collision.softened_gap, "m", note)
-    yield Row(group, "contact modulus / real", collision.softening)
+    if case.laws.contact_law.takes("contact_modulus"):
+        yield Row(group, "contact modulus / real", collision.softening)
     yield Row(group, "overlap / diameter", collision.overlap / diameter, "", "largest, dry collision")
     if collision.softening < 1.0:
         yield Row(group, "overlap / diameter, real", collision.real_overlap / diameter, "", "with the real modulus")

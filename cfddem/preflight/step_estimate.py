@@ -9,7 +9,7 @@ from cfddem.case.bed import Species
 from cfddem.case.schema import Case
 from cfddem.coupling.time_scales import courant_step, fluid_step_limits
 from cfddem.fluid.cell_counts import VISCOUS, cell_counts
-from cfddem.particles.step_limits import TimeScales, crossing_step, hertz_steps, linear_steps
+from cfddem.particles.step_limits import TimeScales, crossing_step
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.collision_estimate import pair_row, reduced
 
@@ -63,10 +63,5 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
 def _time_scales(case: Case, species: Species, speed: float) -> TimeScales:
     """Time scales of two of the smallest particles of a species."""
     mass, radius = reduced(case, species, species.smallest_diameter)
-    laws = case.laws
-    if laws.contact == "linear" and max(laws.normal_stiffness, laws.tangential_stiffness) > 0.0:
-        hertz, impact = linear_steps(mass, laws.normal_stiffness, laws.tangential_stiffness)
-    else:
-        modulus = float(pair_row(case, species)["contact_modulus"])
-        hertz, impact = hertz_steps(mass, radius, modulus, speed)
+    hertz, impact = case.laws.contact_law.impact_steps(mass, radius, pair_row(case, species), speed)
     return TimeScales(hertz, impact, math.inf, math.inf, crossing_step(2.0 * radius, speed))

@@ -1,4 +1,4 @@
-"""The pre-run check: what a run will be, in numbers, and its errors and warnings.
+"""The pre-run check: estimates for a run, with errors and warnings.
 
 It uses correlations only: nothing is compiled, poured or allocated, so that it takes a fraction of a second.
 """

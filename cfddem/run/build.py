@@ -11,12 +11,14 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.case.bed import Jet
-from cfddem.case.column_grid import grid_of
+from cfddem.case.column_grid import grid_of, outside_column
 from cfddem.case.schema import Case, Column
 from cfddem.coupling.exchange import Exchange
+from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
+from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
@@ -24,6 +26,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
 from cfddem.run.initial_particles import SPECIES, particles_of, periodic_box, periodic_directions
+from closures.registry import Law
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class Parts:
     exchange: Exchange | None
 
 
-def assemble(
+def parts_of(
     case: Case,
     progress: Callable[[str], None] = lambda _: None,
     particles: Particles | None = None,
@@ -65,8 +68,14 @@ def assemble(
         domain=_domain(case),
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
+        communicator=communicator,
     )
-    return Parts(solver, None, None) if case.fluid is None else Parts(solver, *flow_of(case, spheres, communicator))
+    if case.fluid is None:
+        return Parts(solver, None, None)
+    fluid, exchange = flow_of(case, spheres, communicator)
+    if exchange.added_mass:
+        solver.refresh()  # the forces of films depend on the inertia, which includes the added mass now
+    return Parts(solver, fluid, exchange)
 
 
 def flow_of(case: Case, spheres: Particles, communicator: Communicator = SERIAL) -> tuple[FluidSolver, Exchange]:
@@ -91,26 +100,36 @@ def flow_of(case: Case, spheres: Particles, communicator: Communicator = SERIAL)
         communicator=communicator,
     )
     fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(spheres.position, spheres.radius)))
+    added_mass = AddedMass(case.laws.added_mass_law, fluid.density)
     exchange = Exchange(
         spheres,
         fluid,
         kernel,
         case.laws.drag_law,
-        added_mass=case.laws.added_mass,
+        added_mass=added_mass,
         self_disturbance=case.laws.self_disturbance_correction,
         lift=case.laws.lift,
         torque=case.laws.torque,
         viscous_stress=case.laws.viscous_stress,
-        agitation=agitation_of(case, fluid, kernel),
+        agitation=agitation_of(case, fluid, kernel, added_mass),
     )
     return fluid, exchange
 
 
-def agitation_of(case: Case, fluid: FluidSolver, kernel: FilterKernel) -> PseudoTurbulence | FluctuatingForce | None:
+def agitation_of(
+    case: Case, fluid: FluidSolver, kernel: FilterKernel, added_mass: AddedMass
+) -> PseudoTurbulence | FluctuatingForce | None:
     """Agitation of the particles by the disturbed flow around their neighbours."""
-    if case.laws.agitation == "pseudo_turbulence":
-        return PseudoTurbulence(fluid, kernel, case.bed.seed, case.laws.added_mass)
-    return FluctuatingForce(fluid, kernel, case.bed.seed) if case.laws.agitation == "lattanzi" else None
+    law = case.agitation
+    if law == "none":
+        return None
+    given = case.agitation_factors
+    factors = {"drag_share_along": given.along, "drag_share_across": given.across, "time_share": given.time}
+    if not isinstance(law, Law):
+        return FluctuatingForce(fluid, kernel, case.bed.seed, **factors)
+    return PseudoTurbulence(
+        fluid, kernel, case.bed.seed, law, added_mass=added_mass, inertia_share=given.inertia, **factors
+    )
 
 
 def materials_of(case: Case) -> np.ndarray:
@@ -145,12 +164,9 @@ def laws_of(case: Case) -> Laws:
     return Laws(
         film=case.has_films,
         friction_onset=laws.friction_onset,
-        contact=laws.contact,
-        normal_stiffness=laws.normal_stiffness,
-        tangential_stiffness=laws.tangential_stiffness,
+        contact=laws.contact_law,
         rolling=laws.rolling_resistance,
         rolling_damping=laws.rolling_damping,
-        cohesion=laws.cohesion,
         **own,
     )
 
@@ -184,19 +200,26 @@ def boundaries_of(case: Case) -> dict[str, Condition | list[Condition]]:
 
 
 def _inlet(case: Case) -> list[Condition]:
-    """Inlets in the floor: the whole floor, and a jet in its middle."""
-    velocity = case.bed.inlet_velocity
+    """Inlets in the floor: all of its open cells, and a jet in its middle."""
+    velocity, outside = case.bed.inlet_velocity, outside_column(case.column)
+
+    def within(region: Region | None = None) -> Region | None:
+        """The part of a region inside a cylinder, or inside the box, where `outside` is None."""
+        if outside is None:
+            return region
+        return lambda *at: ~outside(*at) if region is None else region(*at) & ~outside(*at)
+
     if isinstance(velocity, float):
-        inlets: list[Condition] = [Inlet(velocity)]
+        inlets: list[Condition] = [Inlet(velocity, where=within())]
     else:
         times, speeds = np.array(velocity).T
-        inlets = [Inlet(1.0, in_time=lambda t: float(np.interp(t, times, speeds)))]
+        inlets = [Inlet(1.0, in_time=lambda t: float(np.interp(t, times, speeds)), where=within())]
     if case.bed.jet is not None:
-        inlets.append(Inlet(case.bed.jet.velocity, where=_hole(case.bed.jet, case.column)))
+        inlets.append(Inlet(case.bed.jet.velocity, where=within(_hole(case.bed.jet, case.column))))
     return inlets
 
 
-def _hole(jet: Jet, column: Column) -> Callable[..., np.ndarray]:
+def _hole(jet: Jet, column: Column) -> Region:
     width, depth, height = column.size
     if jet.round:
         return discs([(0.5 * width, 0.5 * depth)], diameter=jet.width)

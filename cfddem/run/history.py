@@ -27,7 +27,10 @@ from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.io.quantities import TIME, Quantity
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
+from cfddem.preflight.bed_waves import is_liquid_bed
+from cfddem.run import liquid_bed
 from cfddem.run.budgets import conservation, energy
+from cfddem.run.liquid_bed import BED, cells_of, open_area
 from cfddem.run.simulation import Simulation
 
 Function = Callable[[Simulation], float]
@@ -35,9 +38,6 @@ Function = Callable[[Simulation], float]
 
 MEAN_HEIGHT = "mean_height_"
 """Prefix of the columns with the mean height of each species."""
-
-BED = (0.2, 0.8)
-"""Part of the bed height, away from floor and surface, over which the pressure gradient is taken."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +127,10 @@ def _is_fluid_bed(case: Case) -> bool:
     return _has_fluid(case) and _is_bed(case)
 
 
+def _is_agitated(case: Case) -> bool:
+    return case.fluid is not None and case.agitation != "none"
+
+
 def _is_mixture(case: Case) -> bool:
     return bool(case.bed.species)
 
@@ -143,14 +147,14 @@ def fluid_steps(simulation: Simulation) -> float:
 @measure("m")
 def bed_height(simulation: Simulation) -> float:
     """Height below which 99 % of the particle volume lies."""
-    return measures.bed_height(simulation.particles.position, simulation.particles.radius)
+    return measures.bed_height(simulation.whole("position"), simulation.whole("radius"))
 
 
 @measure("1", when=_is_fluid_bed)
 def bed_voidage(simulation: Simulation) -> float:
     """Mean voidage of the bed, from its height."""
     solids = 0.99 * simulation.communicator.sum(simulation.particles.volume)
-    return 1.0 - solids / (_open_area(simulation.case) * bed_height(simulation))
+    return 1.0 - solids / (open_area(simulation.case) * bed_height(simulation))
 
 
 @measure("1", when=_is_fluid_bed)
@@ -179,15 +183,17 @@ def pressure_drop(simulation: Simulation) -> float:
 @measure("Pa", when=_has_fluid)
 def wall_load(simulation: Simulation) -> float:
     """Vertical contact force on floor and sides, per floor area."""
-    return -float(simulation.communicator.sum(simulation.particle_solver.wall_force[:, 2])) / _open_area(
-        simulation.case
-    )
+    return -float(simulation.communicator.sum(simulation.particle_solver.wall_force[:, 2])) / open_area(simulation.case)
 
 
 @measure("m2/s2", when=_is_bed)
 def granular_temperature(simulation: Simulation) -> float:
     """Granular temperature, a third of the mean square of the velocity fluctuations."""
-    return measures.granular_temperature(simulation.particles.velocity, _cells(simulation)).mean
+    return measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).mean
+
+
+for _unit, _function in liquid_bed.MEASURES:
+    measure(_unit, when=is_liquid_bed)(_function)
 
 
 @measure("J", group="recorded")
@@ -216,9 +222,16 @@ def particle_count(simulation: Simulation) -> float:
 
 @measure("1", group="recorded", when=_has_fluid)
 def out_of_range_count(simulation: Simulation) -> float:
-    """How often laws were evaluated outside of their fitted ranges so far."""
+    """How often drag and film laws were evaluated outside of their fitted ranges so far."""
     assert simulation.exchange is not None
     return simulation.exchange.outside + simulation.particle_solver.outside
+
+
+@measure("1", group="recorded", when=_is_agitated)
+def agitation_out_of_range_count(simulation: Simulation) -> float:
+    """How often the law of agitation was evaluated outside of its fitted range so far."""
+    assert simulation.exchange is not None and simulation.exchange.agitation is not None
+    return simulation.communicator.sum(simulation.exchange.agitation.outside)
 
 
 # ---------------------------------------------------------------- mixtures
@@ -227,13 +240,13 @@ def out_of_range_count(simulation: Simulation) -> float:
 @measure("1", when=_is_mixture)
 def mixing_index(simulation: Simulation) -> float:
     """Mixing index of nearest neighbours, 0 segregated, 1 randomly mixed."""
-    return mixing.neighbour_mixing_index(simulation.particles.species, simulation.particles.position)
+    return mixing.neighbour_mixing_index(simulation.whole("species"), simulation.whole("position"))
 
 
 @measure("1", when=_is_mixture)
 def lacey_index(simulation: Simulation) -> float:
     """Mixing index of Lacey for the first species, in cells of the fluid grid."""
-    return mixing.lacey_index(simulation.particles.species == 0, _cells(simulation))
+    return mixing.lacey_index(simulation.whole("species") == 0, cells_of(simulation))
 
 
 def _mean_height_columns(case: Case) -> dict[str, Quantity]:
@@ -294,22 +307,6 @@ def energy_budget(simulation: Simulation) -> dict[str, float]:
 
 
 _declare("energy_budget", Measure(_energy_columns, energy_budget))
-
-
-# ---------------------------------------------------------------- shared
-
-
-def _open_area(case: Case) -> float:
-    """Floor area of the open cells [m2]."""
-    column = case.column
-    open_part = float(grid_of(column).open.mean())  # local: every rank knows the whole grid
-    return open_part * column.size[0] * column.size[1]
-
-
-def _cells(simulation: Simulation) -> measures.Cells:
-    """The cell of every particle."""
-    grid = grid_of(simulation.case.column)
-    return measures.cells_of(simulation.particles.position, grid.shape, grid.spacing)
 
 
 _BUILT_IN.update(MEASURES)

@@ -9,12 +9,12 @@ import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.case.particle_properties import ParticleProperties, particle_properties
-from cfddem.case.schema import Case
+from cfddem.case.schema import Case, Column
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import loose_places
 from cfddem.particles.initial.packing import lattice, random_packing
-from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, pour_into
+from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, poured_bed
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.state import Particles
 from cfddem.particles.state import make_particles as make_bodies
@@ -29,12 +29,12 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     bed, properties = case.bed, particle_properties(case)
     diameters = properties.diameter
     if bed.start == "poured":
-        spheres = pour_into(
+        spheres = poured_bed(
             table, diameters, properties.density, walls, *_filling_box(case, float(diameters.max())),
             box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
             gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
             at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
-        )  # fmt: skip
+        ).particles  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start == "packed":
         share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(case.column.size)
@@ -44,28 +44,29 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     elif bed.species:
         places = _spread_evenly(case, properties, walls)
     else:
-        places = _suspended(len(diameters), float(diameters.max()), case.column.size, bed.seed)
+        places = _suspended(len(diameters), float(diameters.max()), case.column, bed.seed)
     made = make_bodies(
         places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
         material=properties.material,
         viscosity=case.fluid.viscosity_at(places[:, 2]) if case.fluid else 0.0, fixed=bed.fixed,
     )  # fmt: skip
-    if case.fluid is not None:
-        made.inverse_mass[:] /= 1.0 + case.laws.added_mass * case.fluid.density / properties.density
     if bed.species:
         made.declare(SPECIES, properties.species)
     _must_be_inside(made.position, case.column.size)
     return made
 
 
-def _suspended(count: int, largest: float, size: tuple[float, float, float], seed: int) -> Array:
+def _suspended(count: int, largest: float, column: Column, seed: int) -> Array:
     """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m]."""
-    volume = size[0] * size[1] * size[2]
-    pitch = (volume / count) ** (1.0 / 3.0)
+    volume = column.floor_area * column.height
+    pitch = min((volume / count) ** (1.0 / 3.0), *column.size)
     for _ in range(200):
         if pitch < 1.02 * largest:
             break
-        places = lattice(largest, ((0.0, 0.0, 0.0), size), spacing=pitch / largest, seed=seed)
+        places = lattice(largest, ((0.0, 0.0, 0.0), column.size), spacing=pitch / largest, seed=seed)
+        if column.shape == "cylinder":
+            from_axis = np.hypot(*(places[:, :2] - 0.5 * column.width).T)
+            places = places[from_axis <= 0.5 * (column.width - largest)]
         if len(places) >= count:
             chosen = np.random.default_rng(seed).permutation(len(places))[:count]
             return np.ascontiguousarray(places[np.sort(chosen)])

@@ -26,7 +26,7 @@ _log = logging.getLogger("cfddem.run.progress")
 
 @dataclass(frozen=True)
 class Status:
-    """How far a run is."""
+    """Progress of a run."""
 
     time: float  # simulated time [s]
     end: float  # of the run [s]
@@ -62,7 +62,7 @@ class ProgressLine:
         self._bar.update(self._task, status=text, refresh=True)
 
     def update(self, status: Status) -> None:
-        """Show how far the run is; the log gets one line for each row of the history."""
+        """Show the progress of the run; the log gets one line for each row of the history."""
         self._bar.update(self._task, description="", completed=status.time / status.end, status=str(status))
         if status.row["time"] > self._logged:
             self._logged = status.row["time"]

@@ -18,7 +18,7 @@ from cfddem.io.folder import make_folder, read_about, require_free
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, of_fields
 from cfddem.io.writer import RunFolder
-from cfddem.particles.collision_record import COLLISION_FIELDS
+from cfddem.particles.collision_events import COLLISION_FIELDS
 from cfddem.particles.guard import guard
 from cfddem.run import history
 from cfddem.run.progress import Status

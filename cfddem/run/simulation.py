@@ -13,7 +13,7 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.particles.state import Particles, particles_in
 from cfddem.run.budgets.energy import EnergyLedger
-from cfddem.run.build import assemble
+from cfddem.run.build import parts_of
 from cfddem.run.time_steps import TimeSteps
 
 Callback = Callable[["Simulation"], None]
@@ -45,7 +45,7 @@ class Simulation:
         self.case, self.gravity, self.communicator = case, np.array(case.laws.gravity), communicator
         self.callbacks, fields = list(callbacks), list(fields)
         particles = None if state is None else particles_in(state["particles"]["particles"])
-        parts = assemble(case, progress, particles, communicator)
+        parts = parts_of(case, progress, particles, communicator)
         self.particle_solver, self.fluid, self.exchange = parts.particle_solver, parts.fluid, parts.exchange
         self.wall = self.particle_solver.wall
         self.steps, self.last_step = 0, 0.0
@@ -70,6 +70,10 @@ class Simulation:
         """Criterion that limited the last fluid step."""
         return self.time_steps.limiting
 
+    def whole(self, name: str) -> np.ndarray:
+        """A field of the particles of all ranks, for measures that need every particle."""
+        return self.communicator.joined(self.particles[name])
+
     def step(self, until: float = math.inf) -> None:
         """Make one fluid step and the particle steps within it; some step ends exactly at `until` [s]."""
         part = self.wall.part
@@ -81,10 +85,10 @@ class Simulation:
             with part("fluid"):
                 self.fluid.step(step, *terms.fields)
             with part("forces of the fluid"):
-                self.exchange.apply(self.particles, terms, self.gravity)
+                forces = self.exchange.apply(self.particles, terms, self.gravity)
             if self.energy is not None:
                 with part("energies"):
-                    self.energy.after_fluid_step(terms)
+                    self.energy.after_fluid_step(terms, forces)
         self.particle_solver.advance(step / substeps, substeps)
         if self.energy is not None:
             with part("energies"):
@@ -118,7 +122,7 @@ class Simulation:
     def restored(
         cls, case: Case, state: dict[str, Any], *, fields: Iterable[Field] = (), callbacks: Iterable[Callback] = ()
     ) -> Simulation:
-        """The simulation of a case as it was at a `checkpoint()`; it continues with the same bits."""
+        """The simulation of a case as it was at a `checkpoint()`; it continues bit for bit."""
         return cls(case, fields=fields, callbacks=callbacks, state=state)
 
     def _restore(self, state: dict[str, Any], fields: list[Field]) -> float:

@@ -1,6 +1,6 @@
 """Sweeps: run one case for many values of some keys; one folder per run, one table, one figure.
 
-A sweep that was stopped continues where it was: finished runs are kept, incomplete ones are resumed. A run that fails
+A stopped sweep can be continued: finished runs are kept, incomplete runs are resumed. A run that fails
 is listed at the end; the others are kept.
 """
 

@@ -17,7 +17,7 @@ CHECK_EVERY = 20
 
 SLACK = 1e-6
 """Part by which a step may exceed its limit. Time is summed with rounding; without slack the number of fluid steps
-up to a row of history would change by one now and then."""
+up to a row of history would occasionally change by one."""
 
 
 class TimeSteps:

@@ -53,7 +53,7 @@ def modules(room: str) -> dict[str, str]:
     found = {}
     for path in sorted((ROOT / room).rglob("*.py")):
         place = path.relative_to(ROOT)
-        hidden = room == "scenarios" and (path.name in HIDDEN or str(place.parent) in HIDDEN)
+        hidden = room == "scenarios" and (path.name in HIDDEN or any(str(each) in HIDDEN for each in place.parents))
         if not path.stem.startswith("_") and not hidden:
             text = ast.get_docstring(ast.parse(path.read_text())) or ""
             found[".".join(place.with_suffix("").parts)] = " ".join(text.split("\n\n")[0].split())
@@ -144,10 +144,24 @@ def commands() -> str:
 
 def laws() -> str:
     """All laws by kind."""
+    from cfddem.particles.interactions.contact_law import CONTACTS, load_contact_laws
     from closures import registry
 
     registry.load_built_in_laws()
-    lines = ["# Laws", "", "All laws of `closures`, by kind. A case selects a drag law by name: `[laws] drag`.", ""]
+    load_contact_laws()
+    lines = [
+        "# Laws",
+        "",
+        "All laws by kind. A case selects a drag law and a contact law by name: `drag` and `contact`",
+        "",
+    ]
+    lines[2] += " in `[laws]`. The contact laws consist of functions of `closures`."
+    lines += ["## Contact laws of a run", "", "| law | description | source |", "|:--|:--|:--|"]
+    for name, each in sorted(CONTACTS.items()):
+        sentence = (each.force.__doc__ or "").split("\n\n")[0]
+        address = f"{each.force.__module__}.{each.force.__name__}"
+        lines.append(f"| [`{name}`][{address}] | {_plain(sentence)} | {_plain(each.reference)} |")
+    lines.append("")
     for kind, entries in sorted(registry.REGISTRY.items()):
         lines += [f"## `{kind}`", "", "| law | description | source |", "|:--|:--|:--|"]
         for name, entry in sorted(entries.items()):

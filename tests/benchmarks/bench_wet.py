@@ -17,7 +17,7 @@ LIMITS = {
     ("three-spheres",): 10.0,
     ("wet-pair",): 10.0,
     ("wet-wall", "--velocity", "0.6"): 10.0,
-    ("three-spheres", "--map", "map.png"): 120.0,
+    ("three-spheres", "--map", "map.png"): 60.0,
 }
 """Commands, and how long they may take [s]."""
 

@@ -1,51 +1,108 @@
-r"""Added-mass force, :math:`C\rho V(\dot u - \dot v)`.
+r"""Added-mass force, :math:`C\rho V(Du/Dt - dv/dt)`.
 
 The inertia of a particle contains the added mass :math:`C\rho V` (`inverse_mass`), which is the second part of the
-force. What remains is :math:`C\rho V\dot u`, with the change of the sampled fluid velocity over the last step.
+force. What remains is :math:`C\rho V\,Du/Dt`, with the acceleration of the fluid that passes the particle,
+
+.. math:: \frac{Du}{Dt} = \frac{du}{dt} + ((u-v)\cdot\nabla)u
+
+where du/dt is the change of the sampled velocity at the particle over the last step (Auton, Hunt & Prud'homme, J. Fluid
+Mech. 197 (1988) 241).
+
+C is a number, or a law of the voidage around the particle. A law is evaluated in every fluid step and C is constant
+within it: a change of C changes the inertia of a particle and not its velocity.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
+from cfddem.backend.compile import prange, threaded
+from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
+from closures.registry import Law
 
 SAMPLED = Field(
     "sampled_velocity", "m/s", 3, "memory", np.nan, meaning="fluid velocity at the particle in the last fluid step"
 )
 """NaN in inserted particles: the acceleration of the fluid is not known there."""
 
+coefficient = Slot("coefficient")
+
 
 class AddedMass:
-    """Added-mass force with a constant coefficient.
+    """Added mass of the particles and its force.
 
-    coefficient  C; 0 for none
+    given    C, or a law C(voidage); 0 for none
+    density  rho of the fluid [kg/m3]
     """
 
-    def __init__(self, coefficient: float) -> None:
-        self.coefficient = float(coefficient)
-        self.fields = (SAMPLED,) if self.coefficient else ()
+    def __init__(self, given: float | Law, density: float) -> None:
+        self.law = given if isinstance(given, Law) else None
+        self.constant, self.density = 0.0 if isinstance(given, Law) else float(given), density
+        self.fields = (SAMPLED,) if self else ()
+        self._loop = None
+        if self.law is not None:
+            law = adapted(self.law.function, "voidage", {"voidage": "voidage"})
+            self._loop = specialise(_coefficients, {"coefficient": law})
 
-    def force(self, particles: Particles, flow: SampledFlow, last_step: float) -> Array:
-        """C rho V du/dt on every particle (N, 3) [N], from the change of u over the last step [s]."""
-        if not self.fields or last_step == 0.0:
-            return np.zeros_like(flow.slip)
+    def __bool__(self) -> bool:
+        """Whether particles have an added mass."""
+        return self.law is not None or self.constant > 0.0
+
+    def coefficient(self, voidage: Array) -> Array:
+        """C of particles at these voidages (N,) [-]."""
+        values = np.full(len(voidage), self.constant)
+        if self._loop is not None:
+            self._loop(voidage, values)
+        return values
+
+    def update(self, particles: Particles, voidage: Array) -> Array:
+        """Set the inertia of the coming step: of all particles for a law, of inserted ones for a constant C.
+
+        voidage  around every particle (N,) [-]
+        returns  change of the added mass of every particle (N,) [kg]
+        """
+        change = np.zeros(particles.count)
+        if not self:
+            return change
+        rows = particles.inverse_mass > 0.0
+        if self.law is None:
+            rows &= np.isnan(particles.sampled_velocity[:, 0])
+        if rows.any():  # local: every rank sets the inertia of its own particles
+            before = particles.inverse_mass[rows]
+            ratio = self.coefficient(voidage[rows]) * self.density / particles.density[rows]
+            after = 1.0 / particles.mass[rows] / (1.0 + ratio)
+            particles.inverse_mass[rows] = after
+            particles.film_rate[rows] *= after / before  # a resistance over the inertia
+            change[rows] = 1.0 / after - 1.0 / before
+        return change
+
+    def force(self, particles: Particles, flow: SampledFlow, passing: Array, last_step: float) -> Array:
+        r"""C rho V Du/Dt on every particle (N, 3) [N].
+
+        passing    :math:`((u-v)\cdot\nabla)u` at every particle (N, 3) [m/s2]
+        last_step  over which the change of u at the particle is taken [s]
+        """
         before = particles.sampled_velocity
-        gained = np.where(np.isnan(before), 0.0, flow.slip + particles.velocity - before)
-        force: Array = self.mass(particles)[:, None] * gained / last_step
+        acceleration = (flow.slip + particles.velocity - before) / last_step + passing
+        force: Array = self.mass(particles)[:, None] * np.where(np.isnan(before), 0.0, acceleration)
         return force
 
     def deferred_momentum(self, particles: Particles) -> Array:
-        """Momentum that added mass has taken from every particle; the fluid gets it in the next step (N, 3) [N s]."""
+        """Momentum that added mass has taken from every particle; the fluid gets it in the next step (N, 3) [N s].
+
+        C is still that of the step in which the particles have moved.
+        """
         moved: Array = self.mass(particles)[:, None] * (particles.velocity - particles.velocity_before)
         return moved
 
     def store(self, particles: Particles, slip: Array) -> None:
         """Store the sampled velocity of this step for the next."""
-        if self.fields:
+        if self:
             particles.sampled_velocity = slip + particles.velocity
 
     @staticmethod
@@ -54,3 +111,10 @@ class AddedMass:
         free = particles.inverse_mass > 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(free, 1.0 / particles.inverse_mass - particles.mass, 0.0)
+
+
+@threaded
+def _coefficients(voidage, values):
+    """Coefficient of every particle by the law."""
+    for n in prange(len(voidage)):
+        values[n] = coefficient(voidage[n])

@@ -1,22 +1,23 @@
 r"""Agitation: the fluctuating force on each particle from the disturbed flow around its neighbours.
 
-**Pseudo-turbulence.** Each particle sees the mean velocity of the fluid plus a fluctuation :math:`u''` with the
-covariance of :func:`closures.agitation.pseudo_turbulence`, along and across the mean slip :math:`w`:
+**Fluctuating velocity.** Each particle sees the mean velocity of the fluid plus a fluctuation :math:`u''`. A law of the
+kind `agitation`, such as :func:`closures.agitation.pseudo_turbulence`, gives its variance along and across the mean
+slip :math:`w`. The force is
 
-.. math:: F'' = a_d\,b\,u'' + a_i\,\frac{m'\,(1 + C)\,m_f}{m + C m_f}\,\frac{du''}{dt}
+.. math:: F'' = b\,\mathsf a_d u'' + a_i\,\frac{m'\,(1 + C)\,m_f}{m + C m_f}\,\frac{du''}{dt}
 
-The first part is the drag of the fluctuation and goes through the implicit transfer; the second is the response of a
-body to the acceleration of the fluid around it (m' the inertia of the particle in the run, m its mass, m_f the mass of
-the displaced fluid, C the added-mass coefficient of the run or, without one, Zuber's).
+The first part is the drag of the fluctuation and goes through the implicit transfer; :math:`\mathsf a_d` has one value
+along and one across the mean slip. The second is the response of a body to the acceleration of the fluid around it (m'
+the inertia of the particle in the run, m its mass, m_f the mass of the displaced fluid, C the coefficient of the run's
+added mass or, without added mass, Zuber's). u'' is not part of the velocity whose change drives the added-mass force of
+the run, so that no acceleration is counted twice.
 
 **Fluctuating force** after Lattanzi et al. (2022): :math:`dF'' = -F''\,dt/\tau_F + \sigma_F\sqrt{2/\tau_F}\,dW`.
 
 Both are random processes of each particle, drawn by seed, particle and step (:mod:`cfddem.backend.counter_random`).
-The mean over the neighbourhood, weighted by volume, is subtracted, so that spheres of one size drive no mean flow; in a
-mixture a small mean drag remains. The fluid receives the opposite of every force. Without slip there is no agitation.
-
-Limits: the laws were fitted to fixed spheres at solid fractions of 0.1 to 0.4 and Re_m up to 300. The part a_i is a
-free number (0.4 by default), not yet measured in resolved simulations.
+:func:`without_mean` subtracts the mean over the neighbourhood, so that the sum of the fluctuating forces is zero, for
+any mixture. A lone particle is its own neighbourhood and feels no agitation. The fluid receives the opposite of every
+force. Without slip there is no agitation.
 """
 
 from __future__ import annotations
@@ -29,6 +30,9 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.counter_random import normal_numbers
+from cfddem.backend.law_choice import AGITATION_ARGUMENTS
+from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
@@ -36,10 +40,8 @@ from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
 from closures.added_mass import zuber
-from closures.agitation import anisotropy, force_deviation, force_rate, pseudo_turbulence
-
-SHORT = 0.2
-"""Shorter of the two times of the process, over their sum. The process has a finite derivative because of it."""
+from closures.agitation import SHORT, force_deviation, force_rate
+from closures.registry import Law, law_of
 
 PROCESS = Field(
     "agitation_process", "1", 6, "memory", np.nan, meaning="random process of agitation and its scaled derivative"
@@ -47,11 +49,13 @@ PROCESS = Field(
 """NaN in inserted particles: their process starts in its stationary state."""
 
 FLUCTUATION = Field(
-    "fluid_fluctuation", "m/s", 3, "memory", meaning="fluctuation of the fluid velocity at the particle"
+    "fluid_fluctuation", "m/s", 3, "memory", np.nan, meaning="fluctuation of the fluid velocity at the particle"
 )
 FORCE_PROCESS = Field(
     "agitation_force_process", "1", 3, "memory", np.nan, meaning="random process of the fluctuating force"
 )
+
+variance = Slot("variance")
 
 
 class Neighbourhood(NamedTuple):
@@ -60,6 +64,7 @@ class Neighbourhood(NamedTuple):
     cell_map: ParticleCellMap
     flow: SampledFlow
     mean_slip: Array  # mean over the neighbourhood, weighted by volume (N, 3) [m/s]
+    conductance: Array  # drag over slip (N,) [kg/s]
     solid: Array  # solid fraction of the cells (nz, ny, nx)
 
 
@@ -67,87 +72,130 @@ class AgitationTerms(NamedTuple):
     """What agitation adds to one fluid step."""
 
     velocity: Array  # fluctuation of the fluid velocity in the drag (N, 3) [m/s]
-    force: Array  # explicit force on every particle, its opposite on the fluid (N, 3) [N]
+    force: Array | None  # explicit force on every particle, its opposite on the fluid (N, 3) [N]; None for none
 
 
 class PseudoTurbulence:
     """Fluctuation of the fluid velocity that each particle sees.
 
-    fluid, kernel   of the run
-    seed            of the random numbers
-    added_mass      coefficient C of the run; 0 takes Zuber's in the response to du''/dt
-    drag_share      a_d, part of the fluctuation that enters the drag [-]
-    inertia_share   a_i, part of the response to du''/dt, an average over eddies as small as a particle [-]
-    time_share      correlation time over d / w [-]
-    """
+    fluid, kernel      of the run
+    seed               of the random numbers
+    law                variance of the fluctuation over the square of the mean slip, of the kind `agitation`
+    added_mass         of the particles; without one, the response to du''/dt takes Zuber's C
+    drag_share_along   a_d along the mean slip: part of the fluctuation that enters the drag [-]
+    drag_share_across  a_d across the mean slip [-]
+    inertia_share      a_i, part of the response to du''/dt, an average over eddies as small as a particle [-]
+    time_share         correlation time over d / w [-]
 
-    fields = (PROCESS, FLUCTUATION)
+    outside  how often the law was evaluated outside its range
+    """
 
     def __init__(
         self,
         fluid: FluidSolver,
         kernel: FilterKernel,
         seed: int,
-        added_mass: float = 0.0,
+        law: Law,
         *,
-        drag_share: float = 1.0,
-        inertia_share: float = 0.4,
+        added_mass: AddedMass | None = None,
+        drag_share_along: float = 1.0,
+        drag_share_across: float = 1.0,
+        inertia_share: float = 0.0,
         time_share: float = 1.0,
     ) -> None:
-        self.fluid, self.kernel, self.seed, self.added_mass = fluid, kernel, seed, added_mass
-        self.drag_share, self.inertia_share, self.time_share = drag_share, inertia_share, time_share
-        self.steps = 0
+        self.fluid, self.kernel, self.seed = fluid, kernel, seed
+        self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
+        self.inertia_share, self.time_share = inertia_share, time_share
+        self.steps = self.outside = 0
+        self.fields: tuple[Field, ...] = (PROCESS,)
+        if inertia_share:
+            self.fields, self.added_mass = (PROCESS, FLUCTUATION), added_mass or AddedMass(law_of(zuber), fluid.density)
+        called = adapted(law.function, ", ".join(AGITATION_ARGUMENTS), {name: name for name in AGITATION_ARGUMENTS})
+        self._loop = specialise(_fluctuate, {"variance": called})
+        self._ranges = np.array([law.ranges.get(name, (-math.inf, math.inf)) for name in AGITATION_ARGUMENTS])
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
         """Fluctuation and force in the coming fluid step [s]."""
-        cell_map, flow, mean_slip, solid = around
-        density, fresh = self.fluid.density, np.isnan(particles[PROCESS.name][:, 0])
-        seen = np.empty((particles.count, 3))
-        _fluctuate(
-            particles[PROCESS.name], particles.id, mean_slip, flow.voidage, particles.radius, particles.viscosity,
-            density, self.time_share, step, self.seed, self.steps, seen,
-        )  # fmt: skip
-        seen -= neighbourhood_mean(self.kernel, cell_map, solid, seen)
-        change = np.where(fresh[:, None], 0.0, seen - particles[FLUCTUATION.name])
-        particles[FLUCTUATION.name][:] = seen
-        force = np.empty_like(seen)
-        _inertial_force(
-            change, flow.voidage, particles.mass, density * cell_map.volume, particles.inverse_mass, self.added_mass,
-            self.inertia_share / step, force,
+        flow, density = around.flow, self.fluid.density
+        seen = np.empty((2, particles.count, 3))  # in the drag, and without the factors of the drag
+        shares = np.array([self.drag_share_along, self.drag_share_across])
+        counter = np.array([self.seed, self.steps])
+        self.outside += int(
+            self._loop(
+                particles[PROCESS.name], particles.id, around.mean_slip, flow.voidage, particles.radius,
+                particles.viscosity, particles.density / density, density, shares, self.time_share, step, counter,
+                self._ranges, seen,
+            )
         )  # fmt: skip
         self.steps += 1
-        return AgitationTerms(self.drag_share * seen, force)
+        velocity = without_mean(self.kernel, around.cell_map, around.conductance, seen[0])
+        return AgitationTerms(velocity, self._inertial_force(particles, around, seen[1], step))
+
+    def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array | None:
+        """Response of every particle to the acceleration of the fluctuation (N, 3) [N]."""
+        if not self.inertia_share:
+            return None
+        change = seen - particles[FLUCTUATION.name]
+        change[np.isnan(change)] = 0.0  # of inserted particles
+        particles[FLUCTUATION.name][:] = seen
+        mass, displaced = particles.mass, self.fluid.density * around.cell_map.volume
+        coefficient = self.added_mass.coefficient(around.flow.voidage)
+        with np.errstate(divide="ignore"):
+            free = np.where(particles.inverse_mass > 0.0, 1.0 / particles.inverse_mass, 0.0)
+        inertia = free * (1.0 + coefficient) * displaced / (mass + coefficient * displaced)
+        force: Array = self.inertia_share / step * inertia[:, None]
+        return force * without_mean(self.kernel, around.cell_map, inertia, change)
 
 
 class FluctuatingForce:
     """Fluctuating force of Lattanzi et al. (2022).
 
-    fluid, kernel  of the run
-    seed           of the random numbers
-    across         deviation of the force across the mean slip over that along it [-]
+    fluid, kernel      of the run
+    seed               of the random numbers
+    drag_share_along   factor of the deviation of the force along the mean slip [-]
+    drag_share_across  factor across the mean slip [-]
+    time_share         factor of the correlation time [-]
+
+    outside  how often the law was evaluated outside its range
     """
 
     fields = (FORCE_PROCESS,)
 
-    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, seed: int, *, across: float = 0.6) -> None:
-        self.fluid, self.kernel, self.seed, self.across, self.steps = fluid, kernel, seed, across, 0
+    def __init__(
+        self,
+        fluid: FluidSolver,
+        kernel: FilterKernel,
+        seed: int,
+        *,
+        drag_share_along: float = 1.0,
+        drag_share_across: float = 0.6,
+        time_share: float = 1.0,
+    ) -> None:
+        self.fluid, self.kernel, self.seed, self.time_share = fluid, kernel, seed, time_share
+        self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
+        self.steps = self.outside = 0
+        self._range = law_of(force_deviation).ranges["solid_fraction"]
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
         """Force in the coming fluid step [s]."""
-        cell_map, flow, mean_slip, solid = around
-        velocity = particles.velocity
+        volume, velocity = around.cell_map.volume, particles.velocity
         square = (velocity**2).sum(axis=1)  # local: components of a row
-        mean = neighbourhood_mean(self.kernel, cell_map, solid, np.concatenate([velocity, square[:, None]], axis=1))
+        moments = np.concatenate([velocity, square[:, None]], axis=1)
+        mean = neighbourhood_mean(self.kernel, around.cell_map, around.solid, moments)
         speed = (mean[:, :3] ** 2).sum(axis=1)  # local: components of a row
         temperature, force = np.maximum(mean[:, 3] - speed, 0.0) / 3.0, np.empty_like(velocity)
-        _fluctuate_force(
-            particles[FORCE_PROCESS.name], particles.id, mean_slip, flow.voidage, temperature, particles.radius,
-            particles.viscosity, self.fluid.density, self.across, step, self.seed, self.steps, force,
+        shares, counter = np.array([self.drag_share_along, self.drag_share_across]), np.array([self.seed, self.steps])
+        self.outside += int(
+            _fluctuate_force(
+                particles[FORCE_PROCESS.name], particles.id, around.mean_slip, around.flow.voidage, temperature,
+                particles.radius, particles.viscosity, self.fluid.density, shares, step / self.time_share, counter,
+                self._range, force,
+            )
         )  # fmt: skip
         self.steps += 1
-        force -= neighbourhood_mean(self.kernel, cell_map, solid, force)
-        force[particles.inverse_mass == 0.0] = 0.0
-        return AgitationTerms(np.zeros_like(force), force)
+        free = volume * (particles.inverse_mass > 0.0)  # fixed particles get no force and are left out of the mean
+        acceleration = without_mean(self.kernel, around.cell_map, free, force / volume[:, None])
+        return AgitationTerms(np.zeros_like(force), free[:, None] * acceleration)
 
 
 def neighbourhood_mean(kernel: FilterKernel, cell_map: ParticleCellMap, solid: Array, values: Array) -> Array:
@@ -159,16 +207,24 @@ def neighbourhood_mean(kernel: FilterKernel, cell_map: ParticleCellMap, solid: A
     return mean
 
 
-@inline
-def _advanced(value, rate, long, short, step, first, second):
-    """Exact update over a step of a stationary process of unit variance with two correlation times.
+def without_mean(kernel: FilterKernel, cell_map: ParticleCellMap, weight: Array, values: Array) -> Array:
+    r"""Values (N, m) less a mean over the particles around each one, so that the weighted sum of all is zero.
 
-    The process obeys dx/dt = y / sqrt(t1 t2), dy/dt = -x / sqrt(t1 t2) - (1/t1 + 1/t2) y + white noise.
+    .. math:: x_p - \sum_q K_{pq}\,\frac{g_q}{s_q}\,x_q,\qquad s_q = \sum_p K_{qp}\,g_p
 
-    value, rate    x and y
-    long, short    t1 > t2 [s]
-    first, second  independent standard normal numbers
+    K is the product of deposit, smoothing and gather; it is symmetric, hence :math:`\sum_p g_p x_p` vanishes to
+    round-off.
+
+    weight  g (N,), not negative
     """
+    around = kernel.gather(cell_map.stencil, kernel.smooth(kernel.deposit(cell_map, weight[:, None])))
+    carried = values * (weight / np.maximum(around[:, 0], 1e-300))[:, None]
+    return values - kernel.gather(cell_map.stencil, kernel.smooth(kernel.deposit(cell_map, carried)))
+
+
+@inline
+def _transition(long, short, step):
+    """Coefficients of `_advanced` for the correlation times t1 > t2 and the step [s]."""
     decay_long, decay_short = math.exp(-step / long), math.exp(-step / short)
     spread = 1.0 / (long - short)
     keep = (long * decay_long - short * decay_short) * spread
@@ -180,6 +236,20 @@ def _advanced(value, rate, long, short, step, first, second):
     deviation = math.sqrt(variance)
     shared = covariance / deviation if deviation > 0.0 else 0.0
     rest = math.sqrt(max(rate_variance - shared * shared, 0.0))
+    return keep, mix, rate_keep, deviation, shared, rest
+
+
+@inline
+def _advanced(value, rate, transition, first, second):
+    """Exact update over a step of a stationary process of unit variance with two correlation times.
+
+    The process obeys dx/dt = y / sqrt(t1 t2), dy/dt = -x / sqrt(t1 t2) - (1/t1 + 1/t2) y + white noise.
+
+    value, rate    x and y
+    transition     of `_transition`
+    first, second  independent standard normal numbers
+    """
+    keep, mix, rate_keep, deviation, shared, rest = transition
     return (
         keep * value + mix * rate + deviation * first,
         -mix * value + rate_keep * rate + shared * first + rest * second,
@@ -196,49 +266,55 @@ def _slip_numbers(slip, n, voidage, radius, viscosity, density):
 
 
 @threaded
-def _fluctuate(process, names, slip, voidage, radius, viscosity, density, time_share, step, seed, number, seen):
-    """Advance the process of every particle and give it the covariance of pseudo-turbulence."""
+def _fluctuate(
+    process, names, slip, voidage, radius, viscosity, ratio, density, shares, time_share, step, counter, ranges, seen
+):
+    """Advance the process of every particle and give it the variance of the law; returns how many are out of range.
+
+    ratio    density of the particle over that of the fluid
+    counter  seed, and number of the step
+    ranges   of the law, low and high of each argument (4, 2)
+    seen     fluctuation with the factors of the drag, and without them (2, N, 3)
+    """
+    outside = 0
     for n in prange(len(names)):
-        a, b, c, d = normal_numbers(seed, names[n], number, 0)
-        e, f, _, _ = normal_numbers(seed, names[n], number, 1)
+        a, b, c, d = normal_numbers(counter[0], names[n], counter[1], 0)
+        e, f, _, _ = normal_numbers(counter[0], names[n], counter[1], 1)
         size, direction, reynolds = _slip_numbers(slip, n, voidage, radius, viscosity, density)
         if math.isnan(process[n, 0]):
             process[n, 0], process[n, 1], process[n, 2] = a, b, c
             process[n, 3], process[n, 4], process[n, 5] = d, e, f
         elif size > 0.0:
             time = time_share * 2.0 * radius[n] / size
-            long, short = (1.0 - SHORT) * time, SHORT * time
-            process[n, 0], process[n, 3] = _advanced(process[n, 0], process[n, 3], long, short, step, a, b)
-            process[n, 1], process[n, 4] = _advanced(process[n, 1], process[n, 4], long, short, step, c, d)
-            process[n, 2], process[n, 5] = _advanced(process[n, 2], process[n, 5], long, short, step, e, f)
+            steps = _transition((1.0 - SHORT) * time, SHORT * time, step)
+            process[n, 0], process[n, 3] = _advanced(process[n, 0], process[n, 3], steps, a, b)
+            process[n, 1], process[n, 4] = _advanced(process[n, 1], process[n, 4], steps, c, d)
+            process[n, 2], process[n, 5] = _advanced(process[n, 2], process[n, 5], steps, e, f)
         solid = 1.0 - voidage[n]
-        energy = 0.5 * size * size * pseudo_turbulence(solid, reynolds)
-        uneven = anisotropy(solid, reynolds)
-        along = math.sqrt(2.0 * energy * (uneven + 1.0 / 3.0))
-        across = math.sqrt(2.0 * energy * (1.0 / 3.0 - 0.5 * uneven))
+        along = size * math.sqrt(variance(solid, reynolds, 1.0, ratio[n]))
+        across = size * math.sqrt(variance(solid, reynolds, 0.0, ratio[n]))
         part = process[n, 0] * direction[0] + process[n, 1] * direction[1] + process[n, 2] * direction[2]
         for k in range(3):
-            seen[n, k] = across * process[n, k] + (along - across) * part * direction[k]
-
-
-@threaded
-def _inertial_force(change, voidage, mass, displaced, inverse_mass, added_mass, share, force):
-    """Response of every particle to the acceleration of the fluctuation (N, 3) [N]."""
-    for n in prange(len(mass)):
-        coefficient = added_mass if added_mass > 0.0 else zuber(voidage[n])
-        factor = (1.0 + coefficient) * displaced[n] / (mass[n] + coefficient * displaced[n])
-        inertia = 1.0 / inverse_mass[n] if inverse_mass[n] > 0.0 else 0.0
-        for k in range(3):
-            force[n, k] = share * inertia * factor * change[n, k]
+            parallel = along * part * direction[k]
+            normal = across * (process[n, k] - part * direction[k])
+            seen[0, n, k] = shares[0] * parallel + shares[1] * normal
+            seen[1, n, k] = parallel + normal
+        beyond = solid < ranges[0, 0] or solid > ranges[0, 1] or reynolds < ranges[1, 0] or reynolds > ranges[1, 1]
+        outside += 1 if beyond or ratio[n] < ranges[3, 0] or ratio[n] > ranges[3, 1] else 0
+    return outside
 
 
 @threaded
 def _fluctuate_force(
-    process, names, slip, voidage, temperature, radius, viscosity, density, across, step, seed, number, force
+    process, names, slip, voidage, temperature, radius, viscosity, density, shares, step, counter, fitted, force
 ):
-    """Advance the process of every particle, exactly for a constant rate, and give it the deviation of the force."""
+    """Advance the process of every particle, exactly for a constant rate, and give it the deviation of the force.
+
+    returns  how many are out of the range of solid fractions that the law is fitted to
+    """
+    outside = 0
     for n in prange(len(names)):
-        a, b, c, _ = normal_numbers(seed, names[n], number, 0)
+        a, b, c, _ = normal_numbers(counter[0], names[n], counter[1], 0)
         size, direction, reynolds = _slip_numbers(slip, n, voidage, radius, viscosity, density)
         solid, diameter = 1.0 - voidage[n], 2.0 * radius[n]
         kept = 0.0
@@ -254,4 +330,7 @@ def _fluctuate_force(
         deviation = force_deviation(solid) * alone
         part = process[n, 0] * direction[0] + process[n, 1] * direction[1] + process[n, 2] * direction[2]
         for k in range(3):
-            force[n, k] = deviation * (across * process[n, k] + (1.0 - across) * part * direction[k])
+            normal = process[n, k] - part * direction[k]
+            force[n, k] = deviation * (shares[0] * part * direction[k] + shares[1] * normal)
+        outside += 1 if solid < fitted[0] or solid > fitted[1] else 0
+    return outside

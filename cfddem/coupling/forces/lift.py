@@ -13,20 +13,6 @@ from cfddem.particles.vectors import cross, dot, minus, times
 from closures.lift import magnus, saffman_mei
 
 
-def vorticity(velocity: Array, spacing: tuple[float, float, float]) -> Array:
-    """Curl of the velocity of cells (3, nz, ny, nx) [m/s] by central differences: (3, nz, ny, nx) [1/s]."""
-
-    def along(component: int, axis: int) -> Array:
-        at = 2 - axis
-        if velocity.shape[1 + at] == 1:
-            return np.zeros_like(velocity[component])
-        return np.asarray(np.gradient(velocity[component], spacing[axis], axis=at))
-
-    return np.stack(
-        [along(2, 1) - along(1, 2), along(0, 2) - along(2, 0), along(1, 0) - along(0, 1)],
-    )
-
-
 def lift_force(slip: Array, curl: Array, spin: Array, radius: Array, density: float, viscosity: Array) -> Array:
     """Lift of shear and of spin on every particle (N, 3) [N].
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import prange, threaded
-from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.kernel import FilterKernel, ParticleCellMap, Stencil
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
@@ -31,6 +31,7 @@ class PressureForce:
     def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
         self.fluid, self.kernel = fluid, kernel
         self.fields = (MAPPED, MAPPED_EARLIER) if fluid.model == "A" else ()
+        self._known: list[ParticleCellMap] = []  # of the last step and the one before
 
     def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array:
         """Force on every particle (N, 3) [N], after the step of the fluid.
@@ -41,18 +42,26 @@ class PressureForce:
         force = np.zeros((particles.count, 3))
         if self.fields:
             kernel, gradient = self.kernel, self.kernel.smooth(self.fluid.cell_pressure_gradient())
-            earlier, last = (
-                kernel.stencil(particles[field.name], particles.radius) for field in (MAPPED_EARLIER, MAPPED)
+            last, earlier = (
+                self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER))
             )
             gathered = (kernel.gather(stencil, gradient) for stencil in (earlier, last, cell_map.stencil))
             _weighted(cell_map.volume, *gathered, force)
         return force
+
+    def _stencil(self, particles: Particles, n: int, name: str) -> Stencil:
+        """Stencil of stored positions; kept from the step before unless rows of particles have changed since."""
+        position = particles[name]
+        if n < len(self._known) and np.array_equal(self._known[n].position, position):  # local: rows of this rank
+            return self._known[n].stencil
+        return self.kernel.stencil(position, particles.radius)
 
     def store(self, particles: Particles, cell_map: ParticleCellMap) -> None:
         """Store the places of this step for the next two."""
         if self.fields:
             particles.earlier_mapped_position = particles.mapped_position
             particles.mapped_position = cell_map.position
+            self._known = [cell_map, *self._known[:1]]
 
 
 @threaded

@@ -5,9 +5,9 @@ In every cell, with a face coefficient a >= 0 between neighbours and an anchor d
     sum over faces  a_f (p - p_neighbour)  +  d p  =  b.
 
 A coefficient of zero is a wall; a cell without any coefficient is solid and keeps p = 0, so that solid cells cost
-nothing. Indices wrap around the box: the low face of the first cell is the periodic face, and its coefficient is zero
-where the box is not periodic. If no cell of a connected region is anchored, its mean pressure is free: the mean of b
-is removed there, and the pressure is returned with mean zero.
+nothing. Arrays have no ghosts (:func:`cfddem.fluid.halo.neighbours`): the low face of the first cell is the periodic
+face, and its coefficient is zero where the box is not periodic. If no cell of a connected region is anchored, its mean
+pressure is free: the mean of b is removed there, and the pressure is returned with mean zero.
 
 Multigrid: cells are merged in pairs along the directions of strong coupling, and transfer is piecewise constant. Coarse
 coefficients are sums of the fine ones, halved across the merged direction, which compensates for the piecewise constant
@@ -30,6 +30,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import prange, serial, threaded, use_threads
 from cfddem.backend.errors import RunFailed
 from cfddem.fluid.grid import Array, Grid, layers
+from cfddem.fluid.halo import neighbours
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 STRONG = 0.3
@@ -46,13 +47,13 @@ COARSEST = 32
 def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
     """Relax the cells of one colour in a plane; whole rows are computed, which vectorises, and half is kept."""
     nz, ny, nx = x.shape
-    below, above = (k - 1) % nz, (k + 1) % nz
+    below, above = neighbours(k, nz)
     new = np.empty(nx)
     # Of one colour only the first and the last row can be neighbours (periodic y): backward takes the last one first.
     shift = ny - 1 if backward else 0
     for count in range(ny):
         j = (count + shift) % ny
-        front, back = (j - 1) % ny, (j + 1) % ny
+        front, back = neighbours(j, ny)
         here, west, rhs, invert = x[k, j], ax[k, j], b[k, j], inverse[k, j]
         south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
         a_south, a_north, a_down, a_up = ay[k, j], ay[k, back], az[k, j], az[above, j]
@@ -65,7 +66,8 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
         for count_end in range(min(2, nx)):
             i = nx - 1 if (count_end == 1) != backward else 0
             if (i & 1) == parity:
-                sides = west[i] * here[(i - 1) % nx] + west[(i + 1) % nx] * here[(i + 1) % nx]
+                left, right = neighbours(i, nx)
+                sides = west[i] * here[left] + west[right] * here[right]
                 here[i] = (new[i] + sides) * invert[i]
         for i in range(1, nx - 1):
             here[i] = new[i] if (i & 1) == parity else here[i]
@@ -91,7 +93,7 @@ def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
 def _apply_row(k, j, x, ax, ay, az, diagonal, out):
     """out = L x along one row."""
     nz, ny, nx = x.shape
-    below, above, front, back = (k - 1) % nz, (k + 1) % nz, (j - 1) % ny, (j + 1) % ny
+    (below, above), (front, back) = neighbours(k, nz), neighbours(j, ny)
     here, west, diag = x[k, j], ax[k, j], diagonal[k, j]
     south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
     a_south, a_north, a_down, a_up = ay[k, j], ay[k, back], az[k, j], az[above, j]
@@ -101,9 +103,10 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
         )
     for i in range(1, nx - 1):
         out[i] -= west[i] * here[i - 1] + west[i + 1] * here[i + 1]
-    out[0] -= west[0] * here[nx - 1] + west[1 % nx] * here[1 % nx]
-    if nx > 1:
-        out[nx - 1] -= west[nx - 1] * here[nx - 2] + west[0] * here[0]
+    for end in range(min(2, nx)):
+        i = nx - 1 if end == 1 else 0
+        left, right = neighbours(i, nx)
+        out[i] -= west[i] * here[left] + west[right] * here[right]
 
 
 @threaded

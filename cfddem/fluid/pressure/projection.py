@@ -10,9 +10,56 @@ is the pressure equation with face coefficients eps_f m_f A_f / h. An outlet has
 
 from __future__ import annotations
 
+import numpy as np
+
 from cfddem.backend.compile import prange, threaded
-from cfddem.fluid.grid import LOW, UNIT
+from cfddem.fluid.checks import refuse_nan
+from cfddem.fluid.grid import LOW, UNIT, Array
 from cfddem.fluid.momentum import row
+from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.state import FluidState
+
+
+class Projection:
+    """Corrects velocities and the pressure of a fluid so that continuity holds.
+
+    fluid  with the mobility of its faces and the new rate of change of its voidage
+    """
+
+    def __init__(self, fluid: FluidState) -> None:
+        self.fluid, grid, communicator = fluid, fluid.grid, fluid.communicator
+        self._equation = PressureEquation(grid, ClosedRegions.of(grid, fluid.boundaries, communicator), communicator)
+        self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
+
+    def correct(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
+        """Correct a velocity and the pressure; returns the iterations it took.
+
+        velocity, voidage  padded
+        limit  largest residual of a cell [m3/s]
+        scale  largest volume flux [m3/s]
+        fresh  whether the mobility is new, and with it the coefficients of the equation
+        """
+        fluid, fields, equation, missing = self.fluid, self.fluid.fields, self._equation, self._missing
+        finest = equation.finest
+        gather(
+            velocity, fields.mobility, voidage, fields.new_voidage_rate, fluid.open_cells, fresh,
+            fluid.boundaries.periodic, fluid.face_areas, fluid.inverse_spacing, finest.ax, finest.ay, finest.az,
+            finest.anchor, missing,
+        )  # fmt: skip
+        if fresh:
+            equation.prepare()
+        refuse_nan(fluid.grid, missing, fluid.time, fluid.communicator)
+        if equation.closed_regions is not None:
+            equation.closed_regions.refuse_imbalance(missing, scale, fluid.time)
+        correction, iterations = equation.solve(missing, limit)
+        if iterations:
+            fluid.grid.inner(fields.correction)[:] = correction
+            fluid.boundaries.fill_pressure(fields.correction, correction=True)
+            subtract_gradient(velocity, fields.mobility, fields.correction, fluid.inverse_spacing)
+            fluid.boundaries.fill_velocity(velocity)
+            fluid.pressure[:] += correction
+        return iterations
 
 
 @threaded
@@ -61,7 +108,7 @@ def gather(
 
 
 @threaded
-def correct(new, mobility, correction, inverse):
+def subtract_gradient(new, mobility, correction, inverse):
     """Subtract mobility times the gradient of the pressure correction from the velocity."""
     pz, py, px = correction.shape
     n = px - 2 * LOW

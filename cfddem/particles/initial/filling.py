@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from cfddem.backend.errors import InputError
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.arrays import assemble, near_walls
+from cfddem.particles.walls.arrays import near_walls, wall_arrays
 from cfddem.particles.walls.shapes import Wall
 
 SPACING = 1.05
@@ -148,6 +148,6 @@ def _clear(places: np.ndarray, distance: float, walls: Sequence[Wall]) -> np.nda
     clear = np.ones(len(places), bool)
     if len(walls) and len(places):
         probes = make_particles(places, 0.5 * distance, 1.0)
-        touched, _ = near_walls(probes, assemble(walls), 0.0, 0.5 * distance * (1.0 - 1e-6))
+        touched, _ = near_walls(probes, wall_arrays(walls), 0.0, 0.5 * distance * (1.0 - 1e-6))
         clear[touched] = False
     return clear

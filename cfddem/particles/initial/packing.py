@@ -9,12 +9,12 @@ from cfddem.backend.errors import CfddemError, InputError
 from cfddem.particles.neighbours import list_edges, wrap
 from cfddem.particles.pair_graph import Edges, shifts
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.arrays import assemble
+from cfddem.particles.walls.arrays import wall_arrays
 
 OVERLAP_LIMIT = 1e-4
 """Largest overlap that a packing may have, over the smaller of the two radii."""
 
-Seed = int | tuple[int, ...]
+Seed = int | tuple[int, ...] | np.random.Generator
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
@@ -125,7 +125,7 @@ def random_packing(
     worst = np.inf
     for _ in range(most_sweeps // _SWEEPS + 1):
         wrap(spheres.position, box)
-        graph = list_edges(spheres, assemble(), 0.0, skin, box)
+        graph = list_edges(spheres, wall_arrays(), 0.0, skin, box)
         worst = _push_apart(
             spheres.view, graph.flat_graph, shifts(box).reshape(-1), _SWEEPS, 0.25 * skin, OVERLAP_LIMIT
         )

@@ -48,42 +48,6 @@ class Bed(NamedTuple):
     run: ParticleSolver  # the run at its end
 
 
-def pour_into(
-    table: np.ndarray,
-    diameters: np.ndarray,
-    density: np.ndarray | float,
-    walls: Sequence[Wall],
-    corner: tuple[float, float, float],
-    size: tuple[float, float, float],
-    *,
-    box: tuple[float | None, float | None, float | None] = (None, None, None),
-    seed: int,
-    material: np.ndarray | int = 0,
-    layer: np.ndarray | None = None,
-    gravity: float = 9.81,
-    laws: Laws | None = None,
-    at_rest: float = AT_REST,
-    progress: Progress | None = None,
-) -> Particles:
-    """Particles at rest between walls, by :func:`poured_bed`."""
-    return poured_bed(
-        table,
-        diameters,
-        density,
-        walls,
-        corner,
-        size,
-        box=box,
-        seed=seed,
-        material=material,
-        layer=layer,
-        gravity=gravity,
-        laws=laws,
-        at_rest=at_rest,
-        progress=progress,
-    ).particles
-
-
 def poured_bed(
     table: np.ndarray,
     diameters: np.ndarray,
@@ -285,7 +249,7 @@ def pour(
 ) -> ParticleSolver:
     """Let spheres fall into a column with a flat floor at z = 0 until they are at rest.
 
-    Only their contacts dissipate energy; :func:`pour_into` is faster.
+    Only their contacts dissipate energy; :func:`poured_bed` is faster.
 
     material   of the spheres, the floor and the sides
     diameters  (N,) [m]

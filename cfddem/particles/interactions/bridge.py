@@ -3,6 +3,7 @@
 Every sphere carries liquid, the field `liquid`. A bridge forms where the films of two spheres overlap, from the liquid
 that each has in the shadow of the other. It breaks where it is stretched too far; half of its liquid goes to each
 sphere. In between it pulls and resists, by the laws of :class:`~cfddem.particles.interactions.bridge_loops.BridgeLaws`.
+Impulses are applied one bridge after the other, so bridges are for a run in one process.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bridge_loops import BridgeLaws, Joined, kick, new_contacts, solid_gaps, survey
@@ -33,11 +35,14 @@ class Bridges:
     laws       laws of the bridges
     """
 
+    communicator: Communicator = SERIAL
+
     def __init__(self, particles: Particles, film: np.ndarray | float, laws: BridgeLaws) -> None:
         laws.check()
         thickness = np.broadcast_to(np.asarray(film, float), (particles.count,))
-        if not ((thickness >= 0.0) & np.isfinite(thickness)).all():
-            row = int(np.argmin((thickness >= 0.0) & np.isfinite(thickness)))
+        refused = np.flatnonzero(~((thickness >= 0.0) & np.isfinite(thickness)))
+        if len(refused):
+            row = int(refused[0])
             raise InputError(f"film of particle {particles.id[row]}", float(thickness[row]), "at least 0 and finite")
         self.laws, self.joined = laws, _NONE
         self.formed, self.broken = 0, 0
@@ -63,7 +68,7 @@ class Bridges:
     @property
     def liquid(self) -> float:
         """All liquid of the run, in films and bridges [m3]."""
-        return float(self._particles.liquid.sum() + self.joined.volume.sum())
+        return self.communicator.sum(self._particles.liquid) + self.communicator.sum(self.joined.volume)  # type: ignore[no-any-return]
 
     @property
     def agglomerates(self) -> np.ndarray:
@@ -80,8 +85,7 @@ class Bridges:
         for end in (self.joined.first, self.joined.second):
             np.add.at(returned, self._row[end], 0.5 * self.joined.volume)
         radius = self._particles.radius
-        thickest = float(_thickness(returned, radius).max())
-        return 4.0 * thickest / float(radius.min())
+        return 4.0 * self.communicator.largest(_thickness(returned, radius)) / self.communicator.smallest(radius)  # type: ignore[no-any-return]
 
     def gaps(self, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gap of every bridge, and how far it can still be stretched (n,), (n,) [m]."""
@@ -103,7 +107,7 @@ class Bridges:
     def take(self, particles: Particles) -> None:
         """Continue with these particles, the same ones in another order or others."""
         self._particles = particles
-        self._row = np.full(max(int(particles.id.max(initial=-1)) + 1, len(self._row)), -1, np.int64)
+        self._row = np.full(max(self.communicator.largest(particles.id, default=-1) + 1, len(self._row)), -1, np.int64)
         self._row[particles.id] = np.arange(particles.count)
 
     def release(self, gone: np.ndarray) -> None:
@@ -125,12 +129,13 @@ class Bridges:
 
     def _break(self, broken: np.ndarray) -> None:
         """Break bridges (n,) bool; half of the liquid of each goes to each sphere."""
-        if not broken.any():
+        count = int(np.count_nonzero(broken))  # local: bridges are for one process
+        if not count:
             return
         for end in (self.joined.first, self.joined.second):
             np.add.at(self._particles.liquid, self._row[end[broken]], 0.5 * self.joined.volume[broken])
         self.joined = Joined(*(each[~broken] for each in self.joined))
-        self.broken += int(broken.sum())
+        self.broken += count
 
     def _form(self, edges: Graph, box: np.ndarray) -> None:
         """Join spheres whose films overlap."""

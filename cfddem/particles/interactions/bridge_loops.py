@@ -14,8 +14,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.errors import InputError
-from cfddem.particles.interactions.contact import LEAST
-from cfddem.particles.vectors import across, at, cross, dot, minus, plus, put, times
+from cfddem.particles.vectors import LEAST, across, at, cross, dot, minus, plus, put, times
 from closures.bridge import (
     constant_capillary,
     constant_cut,
@@ -120,7 +119,7 @@ def _apart(particles, i, j, box):
         away[2] - (box[2] * np.rint(away[2] / box[2]) if box[2] < np.inf else 0.0),
     )
     distance = math.sqrt(dot(away, away))
-    return times(1.0 / distance, away), distance, distance - particles.radius[i] - particles.radius[j]
+    return times(1.0 / distance, away), distance, distance - (particles.radius[i] + particles.radius[j])
 
 
 @serial

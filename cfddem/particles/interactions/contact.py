@@ -23,20 +23,17 @@ from cfddem.particles.interactions.slots import (
     remember,
     tangential_stiffness,
 )
-from cfddem.particles.vectors import across, cross, dot, either, minus, plus, times
+from cfddem.particles.vectors import LEAST, NOTHING, across, cross, dot, either, minus, plus, times
 from closures.blend import contact_share
 from closures.friction import coulomb_limit, dry_or_lubricated
 
 ROLLING_MOBILITY = 3.5
 """Mobility of the contact point of two solid spheres along the surface, over that of their centres along the normal."""
 
-NOTHING = (0.0, 0.0, 0.0)
-LEAST = 1e-300  # keeps divisions finite for pairs that do not touch, whose results are dropped
-
 FIELDS = (
-    Field("force", "N", 3, "memory", flips=True, meaning="contact force on the first body"),
+    Field("force", "N", 3, "memory", meaning="contact force on the first body"),
     Field("couple", "N", 3, "memory", meaning="torque per radius, the same on both particles"),
-    Field("spring", "m", 3, "memory", flips=True, meaning="tangential displacement of the contact"),
+    Field("spring", "m", 3, "memory", meaning="tangential displacement of the contact"),
     Field("minimum_gap", "m", role="memory", meaning="gap below which the solids touch: h_min, or reach of adhesion"),
 )
 

@@ -32,11 +32,9 @@ from cfddem.particles.interactions.slots import (
     user_minimum_gap,
 )
 from cfddem.particles.pair_graph import THICKEST, geometry
-from cfddem.particles.vectors import dot, put, times
+from cfddem.particles.vectors import LEAST, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
-
-LEAST = 1e-300
 
 FIELDS = (
     Field("resistance", "kg/s", role="memory", meaning="resistance of the film without lever; 0 out of its reach"),
@@ -80,16 +78,25 @@ def update_film(gap, viscosity, reduced_radius, memory, row, cutoff_ratio):
 
 
 @inline
+def renew_film(k, gap, viscosity, reduced_radius, share, memory, row, cutoff_ratio):
+    """Update resistance and memory of the film of edge k.
+
+    share  part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    """
+    then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
+    now = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
+    memory.resistance[k] = share * now[0]
+    memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now[1], now[2], now[3]
+
+
+@inline
 def update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ratio):
     """Update the film of edge k."""
     _, _, gap = geometry(k, particles, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
     viscosity = pair_viscosity(k, particles, edges)
     row = pair_row(k, particles, edges, walls, table)
-    then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
-    now = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
-    memory.resistance[k] = portion(edges, k) * now[0]
-    memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now[1], now[2], now[3]
+    renew_film(k, gap, viscosity, reduced_radius, portion(edges, k), memory, row, cutoff_ratio)
 
 
 @inline

@@ -25,9 +25,9 @@ from cfddem.particles.interactions.slots import (
     user_resistance,
     user_short_potential,
 )
+from cfddem.particles.vectors import LEAST
 from closures import lubrication
 
-LEAST = 1e-300
 LARGEST_CHANGE = 0.1
 """Change of the gap in a step up to which the short solution is used, over the gap; with a short potential."""
 LARGEST_SAMPLED_CHANGE = 0.05

@@ -38,13 +38,14 @@ def sphere_kinematics(k, particles, edges, shift, free):
     radius, spin, inverse_mass = particles.radius, particles.spin, particles.inverse_mass
     separation = between(i, j, edges.image[k], particles.position, shift)
     distance = math.sqrt(dot(separation, separation))
-    inverse_sum = 1.0 / (radius[i] + radius[j])
+    radii = radius[i] + radius[j]
+    inverse_sum = 1.0 / radii
     relative = minus(at(particles.velocity, i), at(particles.velocity, j))
     rate = 1.0 / distance
     return PairKinematics(
         separation,
         distance,
-        distance - radius[i] - radius[j],
+        distance - radii,
         relative,
         plus(times(radius[i], at(spin, i)), times(radius[j], at(spin, j))),
         radius[i] * radius[j] * inverse_sum,

@@ -11,20 +11,16 @@ from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
 from cfddem.particles.interactions import contact, film, rolling
-from cfddem.particles.interactions.contact_law import ContactLaw
+from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
+from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
-from cfddem.particles.interactions.hertz import HERTZ
-from cfddem.particles.interactions.jkr import JKR
-from cfddem.particles.interactions.linear import linear
 from cfddem.particles.interactions.slots import FilmState, GapState
 
 CHOICES = {
     "integrator": ("drift", "verlet"),
     "friction_onset": ("film", "overlap"),
-    "contact": ("hertz", "linear"),
     "spring": ("total", "rescaled"),
     "rolling": ("none", "constant_torque", "spring_dashpot"),
-    "cohesion": ("none", "jkr"),
 }
 """Words that each choice may take."""
 
@@ -35,13 +31,10 @@ class Laws(NamedTuple):
     film                  there is a lubrication film
     integrator            "drift": films act by impulses, without a stability limit; "verlet": as an explicit force
     friction_onset        friction begins at h_min ("film") or at geometric overlap ("overlap")
-    contact               "hertz", "linear", or a :class:`~cfddem.particles.interactions.contact_law.ContactLaw`
+    contact               name of a contact law, or a :class:`~cfddem.particles.interactions.contact_law.ContactLaw`
     spring                tangential force from the total displacement, or "rescaled" while the contact is loaded
     rolling               resistance to rolling: "none", "constant_torque" or "spring_dashpot"
-    cohesion              adhesion of dry solids: "none" or "jkr", with the contact of Hertz
     cutoff_ratio          reach of the film over R* [-]
-    normal_stiffness      of the linear contact [N/m]
-    tangential_stiffness  of the linear contact [N/m]
     rolling_damping       of the rolling dashpot, over critical; 0.3 as in Ai et al. (2011) [-]
     minimum_gap           a user's law of the minimum gap; the built-in elastohydrodynamic one if not given
     lubrication           a user's film: its resistance, or a
@@ -54,10 +47,7 @@ class Laws(NamedTuple):
     contact: str | ContactLaw = "hertz"
     spring: str = "total"
     rolling: str = "none"
-    cohesion: str = "none"
     cutoff_ratio: float = 1.0
-    normal_stiffness: float = 0.0
-    tangential_stiffness: float = 0.0
     rolling_damping: float = 0.3
     minimum_gap: Callable[..., float] | None = None
     lubrication: Callable[..., float] | FilmLaw | None = None
@@ -70,18 +60,11 @@ class Laws(NamedTuple):
         """Refuse unknown words, laws that cannot be compiled, and choices that exclude each other."""
         for name, words in CHOICES.items():
             value = getattr(self, name)
-            if value not in words and not (name == "contact" and isinstance(value, ContactLaw)):
+            if value not in words:
                 raise InputError(name, value, nearest(str(value), words))
-        if self.cohesion != "none" and self.film:
-            raise InputError("cohesion", self.cohesion, "absent where there are films; adhesion is that of dry solids")
-        if self.cohesion != "none" and self.contact != "hertz":
-            raise InputError("cohesion", self.cohesion, "with the contact of Hertz; linear springs do not adhere")
-        if isinstance(self.contact, ContactLaw):
-            self.contact.check()
-        if self.contact == "linear":
-            for name in ("normal_stiffness", "tangential_stiffness"):
-                if not getattr(self, name) >= 0.0:
-                    raise InputError(name, getattr(self, name), "at least 0")
+        check_contact_law(self.contact_law)
+        if self.contact_law.adhesive and self.film:
+            raise InputError("contact", self.contact_law.name, "a law without adhesion where there are films")
         for kind in OF_THE_PAIR_LOOP:
             if (law := getattr(self, kind)) is None:
                 continue
@@ -96,11 +79,7 @@ class Laws(NamedTuple):
     @property
     def contact_law(self) -> ContactLaw:
         """The law of the normal contact."""
-        if isinstance(self.contact, ContactLaw):
-            return self.contact
-        if self.contact == "linear":
-            return linear(float(self.normal_stiffness), float(self.tangential_stiffness))
-        return HERTZ if self.cohesion == "none" else JKR
+        return self.contact if isinstance(self.contact, ContactLaw) else contact_named(str(self.contact))
 
     @property
     def film_law(self) -> FilmLaw | None:
@@ -127,13 +106,13 @@ class Laws(NamedTuple):
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
-        return _choices(self.contact_law, self._replace(contact="", normal_stiffness=0.0, tangential_stiffness=0.0))
+        return _choices(self.contact_law, self._replace(contact=""))
 
 
 @lru_cache(maxsize=64)
 def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
     made = {
-        **contact_law.choices(),
+        **contact_choices(contact_law),
         "FILM": bool(laws.film),
         "DRIFTING": bool(laws.film) and laws.integrator == "drift",
         "RESCALED": laws.spring == "rescaled",

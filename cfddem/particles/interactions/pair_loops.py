@@ -16,8 +16,8 @@ import numpy as np
 from cfddem.backend.compile import inline, part, prange
 from cfddem.backend.law_set import specialise, written
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.contact import NOTHING, contact, contact_state
-from cfddem.particles.interactions.film import film_impulse_short, update_film
+from cfddem.particles.interactions.contact import contact, contact_state
+from cfddem.particles.interactions.film import film_impulse_short, renew_film
 from cfddem.particles.interactions.film_law import at_least
 from cfddem.particles.interactions.kinematics import sphere_kinematics
 from cfddem.particles.interactions.rolling import resist_rolling
@@ -33,7 +33,7 @@ from cfddem.particles.interactions.slots import (
     write_memory,
 )
 from cfddem.particles.pair_graph import between, memory_class
-from cfddem.particles.vectors import at, dot, minus, put, times
+from cfddem.particles.vectors import NOTHING, at, dot, minus, put, times
 
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
 """Arrays of the particles that loops over pairs read."""
@@ -74,9 +74,7 @@ def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p,
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     if FILM:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-        then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
-        now = update_film(kinematics.gap, viscosity, kinematics.reduced_radius, then, row, cutoff_ratio)
-        memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now
+        renew_film(k, kinematics.gap, viscosity, kinematics.reduced_radius, 1.0, memory, row, cutoff_ratio)
     edge_contact(k, kinematics, row, 1.0, memory, p, step)
 
 
@@ -86,13 +84,12 @@ def pair_film(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio):
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     separation = between(i, j, edges.image[k], particles.position, shift)
-    gap = math.sqrt(dot(separation, separation)) - particles.radius[i] - particles.radius[j]
-    reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
+    radii = particles.radius[i] + particles.radius[j]
+    gap = math.sqrt(dot(separation, separation)) - radii
+    reduced_radius = particles.radius[i] * particles.radius[j] / radii
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-    then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
-    now = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
-    memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now
+    renew_film(k, gap, viscosity, reduced_radius, 1.0, memory, row, cutoff_ratio)
 
 
 @inline
@@ -103,8 +100,9 @@ def pair_impulse(n, particles, edges, memory, shift, cutoff_ratio, step):
     separation = between(i, j, edges.image[k], particles.position, shift)
     distance = math.sqrt(dot(separation, separation))
     normal = times(1.0 / distance, separation)
-    gap = distance - particles.radius[i] - particles.radius[j]
-    reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
+    radii = particles.radius[i] + particles.radius[j]
+    gap = distance - radii
+    reduced_radius = particles.radius[i] * particles.radius[j] / radii
     speed = dot(minus(at(particles.velocity, i), at(particles.velocity, j)), normal)
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)

@@ -7,7 +7,7 @@ import math
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.slots import FILM, rolling_torque, secant_stiffness
-from cfddem.particles.vectors import across, dot, either, plus, times
+from cfddem.particles.vectors import LEAST, NOTHING, across, dot, either, plus, times
 from closures.blend import contact_share
 from closures.friction import (
     dry_or_lubricated,
@@ -17,12 +17,9 @@ from closures.friction import (
     twisting_limit,
 )
 
-NOTHING = (0.0, 0.0, 0.0)
-LEAST = 1e-300
-
 FIELDS = (
-    Field("roll", "rad", 3, "memory", flips=True, meaning="angle of the rolling spring"),
-    Field("moment", "N m", 3, "memory", flips=True, meaning="torque against rolling and twisting on the first body"),
+    Field("roll", "rad", 3, "memory", meaning="angle of the rolling spring"),
+    Field("moment", "N m", 3, "memory", meaning="torque against rolling and twisting on the first body"),
 )
 
 

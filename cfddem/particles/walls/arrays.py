@@ -7,7 +7,7 @@ are few, and every particle checks each of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from cfddem.particles.walls.nearest_point import NUMBERS, TRIANGLE, Walls, in_fr
 from cfddem.particles.walls.shapes import Mesh, Wall
 
 
-def assemble(walls: Sequence[Wall] = ()) -> Walls:
+def wall_arrays(walls: Sequence[Wall] = ()) -> Walls:
     """Arrays of the given walls."""
     pieces = [(number, *piece) for number, wall in enumerate(walls) for piece in wall.pieces()]
     shape = np.zeros((len(pieces), NUMBERS))
@@ -57,6 +57,16 @@ def assemble(walls: Sequence[Wall] = ()) -> Walls:
         cell_member=np.zeros(0, np.int32),
     )
     return _with_cells(made) if len(made.single) < len(kind) else made
+
+
+def checkpoint_walls(walls: Walls) -> dict[str, np.ndarray]:
+    """Copies of all arrays by name."""
+    return {name: each.copy() for name, each in walls._asdict().items()}
+
+
+def restored_walls(kept: Mapping[str, np.ndarray]) -> Walls:
+    """The walls of a `checkpoint_walls()`."""
+    return Walls(**{name: np.array(each) for name, each in kept.items()})
 
 
 def _cells(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:
@@ -98,7 +108,10 @@ def check_walls(walls: Sequence[Wall], box: np.ndarray, materials: int) -> None:
 
 
 def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: float) -> tuple[np.ndarray, np.ndarray]:
-    """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32."""
+    """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32.
+
+    Sorted by row of the particle, then by piece: by wall, and triangle of a mesh.
+    """
     nothing = np.zeros(0, np.uint32)
     if len(walls.kind) == 0:
         return nothing, nothing
@@ -113,15 +126,28 @@ def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: fl
 @serial
 def _near(particles, walls, cutoff_ratio, skin, count, first, second, fill):
     """Count the pieces near each particle, or write them from `count` on."""
-    for i in range(len(particles.radius)):
+    for i in range(particles.owned):
         if particles.inverse_mass[i] == 0.0:
             continue
-        reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
+        reach, begin = (1.0 + cutoff_ratio) * particles.radius[i] + skin, count[i]
         for w in walls.single:
             _list(i, w, walls.wall[w], particles, walls, reach, count, first, second, fill)
         for m in range(len(walls.sweep)):
             if walls.cell_number[3 * m] > 0:
                 _list_triangles(i, m, particles, walls, reach, count, first, second, fill)
+        if fill:
+            _sort(second, begin, count[i])
+
+
+@inline
+def _sort(values, begin, end):
+    """Sort a part of an array in place."""
+    for last in range(begin + 1, end):
+        value, place = values[last], last
+        while place > begin and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
 
 
 @inline

@@ -1,6 +1,6 @@
-"""Conservation of momentum and volume: each counted by another route than the one that moves it.
+"""Conservation of momentum and volume, each counted independently of the step that transfers it.
 
-Momentum that the particles got is summed over particles, momentum that the fluid gave over cells; volume is summed
+Momentum that the particles received is summed over particles, momentum that the fluid gave over cells; volume is summed
 over the faces of cells. Energy is in :mod:`cfddem.run.budgets.energy`.
 """
 
@@ -13,7 +13,7 @@ from cfddem.particles.state import Particles
 
 
 def momentum_imbalance(fluid: FluidSolver, particles: Particles) -> float:
-    """Momentum that the fluid gave in the last step and particles did not get, over that given [-].
+    """Momentum that the fluid gave in the last step and particles did not receive, over that given [-].
 
     The fluid's side is the sum over cells, the particles' side the sum over particles. Momentum taken by walls, inlets
     and outlets belongs to neither.
@@ -25,7 +25,7 @@ def momentum_imbalance(fluid: FluidSolver, particles: Particles) -> float:
 
 
 def volume_imbalance(fluid: FluidSolver) -> float:
-    """Largest volume that a cell has gained against its faces in the last step, over the largest flux [-]."""
+    """Largest volume gained by a cell and not through its faces in the last step, over the largest flux [-]."""
     largest = fluid.communicator.largest
     flux = max(largest(np.abs(fluid.volume_flux(d))) * fluid.grid.face_area(d) for d in range(3))
     return float(largest(np.abs(fluid.continuity_residual())) / max(flux, 1e-300))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from cfddem.coupling.exchange import CouplingTerms, Exchange
+from cfddem.coupling.exchange import CouplingTerms, Exchange, FluidForces
 from cfddem.coupling.work import CouplingWork
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
@@ -33,6 +33,7 @@ GAINED = {
     "walls": "by moving walls",
     "stiffening": "by tangential springs whose stiffness changes with the overlap",
     "fed": "by inserted particles, less that of removed ones",
+    "agitation": "by the fluctuating forces of the flow around neighbours, which moves particles at random",
     "model_b": "by the pressure on the volume of the particles, which model B gives to the fluid",
 }
 """Energy gained; a negative line is a loss."""
@@ -44,7 +45,7 @@ LOST = {
     "implicit_drag": "by the implicit drag step",
     "viscous": "by viscous stress",
     "convection": "by the convection scheme",
-    "lift_and_added_mass": "between fluid and particles by lift, viscous stress, added mass and agitation",
+    "lift_and_added_mass": "between fluid and particles by lift, viscous stress and added mass",
     "torque": "by the torque of the fluid on spin",
     "film": "by films",
     "contact_damping": "by the dashpots of contacts",
@@ -62,8 +63,9 @@ PASSED = {
 """Energy that passes between the phases; the difference of two lines is lost."""
 
 _OF_FLUID = {
-    "fluid_kinetic", "added_mass", "deferred_momentum", "inflow", "driving", "model_b", "drag", "drag_in_cells",
-    "pressure_in_cells", "implicit_drag", "viscous", "convection", "lift_and_added_mass", "torque", *PASSED,
+    "fluid_kinetic", "added_mass", "deferred_momentum", "inflow", "driving", "agitation", "model_b", "drag",
+    "drag_in_cells", "pressure_in_cells", "implicit_drag", "viscous", "convection", "lift_and_added_mass", "torque",
+    *PASSED,
 }  # fmt: skip
 """Lines of runs with a fluid."""
 
@@ -95,7 +97,7 @@ class EnergyLedger:
         self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
         self.start = self._stored()
 
-    def after_fluid_step(self, terms: CouplingTerms) -> None:
+    def after_fluid_step(self, terms: CouplingTerms, forces: FluidForces) -> None:
         """Add the work on the fluid, after `Exchange.apply` and before the particles move."""
         assert self.fluid is not None and self.exchange is not None and self._coupling is not None
         fluid, sums, done = self.fluid, self.sums, self.fluid.work()
@@ -110,17 +112,19 @@ class EnergyLedger:
         sums["torque"] -= self.exchange.spin_work
         sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
         sums["pressure_from_fluid"] -= done.solids
-        self._coupling.begin(self.particle_solver.particles, terms)
+        self._coupling.begin(self.particle_solver.particles, terms, forces)
 
     def after_particle_steps(self) -> None:
         """Add the work of the fluid on the particles."""
         if self._coupling is None:
             return
         sums, done = self.sums, self._coupling.end(self.particle_solver.particles)
-        sums["drag"] += done.drag_on_fluid - done.drag
+        agitation = done.fluctuating - done.fluctuating_on_fluid
+        sums["agitation"] += agitation + done.agitation
+        sums["drag"] += done.drag_on_fluid - done.drag + agitation
         sums["drag_to_particles"] += done.drag
         sums["drag_in_cells"] -= done.drag_on_fluid
-        sums["lift_and_added_mass"] -= done.explicit
+        sums["lift_and_added_mass"] -= done.explicit + done.added
         sums["fallen"] += done.weight
         sums["driving"] += done.driving
         sums["pressure_to_particles"] += done.pressure

@@ -1,5 +1,5 @@
 """A bed of beads fluidised by water."""
 
-from scenarios.beds.liquid_bed.study import STUDIES, Study, alginate, alumina, fluidise
+from scenarios.beds.liquid_bed.study import STUDIES, Study, alginate, alumina, fluidise, glass
 
-__all__ = ["STUDIES", "Study", "alginate", "alumina", "fluidise"]
+__all__ = ["STUDIES", "Study", "alginate", "alumina", "fluidise", "glass"]

@@ -1,13 +1,14 @@
 """A liquid-fluidised bed: its pressure drop carries its weight, and it expands as published laws predict.
 
-Beads of alumina and of alginate in water, after Ferreira et al. (2023), between frictionless sides. The default
-case is a short demonstration; the studies here run longer, at several velocities.
+Beads of glass in water, and of alumina and alginate after Ferreira et al. (2023), between frictionless sides. The
+default case is a short demonstration; the studies here run longer, at several velocities.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -35,16 +36,40 @@ class FluidisedBed:
 
     velocity: float  # [m/s]
     drop_over_weight: float
+    carried: float  # pressure drop and load of the walls, over the weight
     voidage: float
     balance: float  # at which the drag law carries a uniform bed
     expected: float  # mean of the published laws
     exponent: float  # of Richardson and Zaki
     height: float  # [m]
+    layers: float  # deviation in time of the solid fraction of layers of 2.5 d in the lower two thirds
+
+
+def glass(velocity: float) -> Case:
+    """The case of the gallery at another velocity [m/s], in a column high enough."""
+    return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.08})
 
 
 def alumina(velocity: float) -> Case:
-    """The case of the gallery at another velocity [m/s], in a column high enough."""
-    return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.24})
+    """Heavier and larger beads at a velocity [m/s], after Ferreira et al. (2023); plugs rise in this bed."""
+    beads = {
+        "density": 3585.9, "youngs_modulus": 3e11, "contact_modulus": 1e6, "poisson": 0.3, "restitution": 0.9,
+        "friction": 0.1, "friction_lubricated": 0.05, "roughness": 1e-6,
+    }  # fmt: skip
+    return glass(velocity).with_(
+        **{
+            "title": "Liquid-fluidised bed of alumina beads",
+            "fluid": {"density": 997.0, "viscosity": 8.354e-4},
+            "material": {"alumina": beads},
+            "column.width": 0.04,
+            "column.height": 0.24,
+            "column.cell": 0.008,
+            "bed.diameter": 3.087e-3,
+            "bed.count": 2000,
+            "laws.drag": "wen_yu",
+            "run.reference_speed": 0.1,
+        }
+    )
 
 
 def alginate(velocity: float) -> Case:
@@ -68,32 +93,48 @@ def alginate(velocity: float) -> Case:
 
 
 STUDIES = {
+    "glass": Study(glass, (0.030, 0.037, 0.045), 1.5, 2.0),
     "alumina": Study(alumina, (0.12, 0.157033, 0.20, 0.26), 2.0, 2.0),
     "alginate": Study(alginate, (0.006, 0.009, 0.012), 6.0, 4.0),
 }
 """Voidage 0.55 to 0.8 by Richardson and Zaki."""
 
 
-def fluidise(study: Study, velocity: float) -> FluidisedBed:
-    """Run a bed at one of its velocities [m/s], and average."""
-    described = study.case(velocity)
+def fluidise(study: Study, velocity: float, **changes: Any) -> FluidisedBed:
+    """Run a bed at one of its velocities [m/s], and average.
+
+    changes  further keys of the case
+    """
+    described = study.case(velocity).with_(**changes)
     simulation = Simulation(described)
     simulation.until(study.starting)
-    rows = []
+    rows, layers = [], []
     for instant in study.starting + np.linspace(0.0, study.averaged, 101)[1:]:
         simulation.until(float(instant))
         rows.append(history.row(simulation))
+        layers.append(_layers(simulation))
+    mean = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
     weight = buoyant_weight(described) / described.column.floor_area
-    laws = expansion_laws(described)
+    inner = slice(1, max(2, int(2.0 / 3.0 * mean["bed_height"] / (2.5 * described.bed.diameter))))
     return FluidisedBed(
         velocity=velocity,
-        drop_over_weight=float(np.mean([row["pressure_drop"] for row in rows])) / weight,
-        voidage=float(np.mean([row["bed_voidage"] for row in rows])),
+        drop_over_weight=mean["pressure_drop"] / weight,
+        carried=(mean["pressure_drop"] + mean["wall_load"]) / weight,
+        voidage=mean["bed_voidage"],
         balance=estimate_bed(described).voidage,
-        expected=float(np.mean(list(laws.values()))),
+        expected=float(np.mean(list(expansion_laws(described).values()))),
         exponent=expansion_exponents(described)["Richardson-Zaki"][0],
-        height=float(np.mean([row["bed_height"] for row in rows])),
+        height=mean["bed_height"],
+        layers=float(np.std(layers, axis=0)[inner].mean()),
     )
+
+
+def _layers(simulation: Simulation) -> np.ndarray:
+    """Solid fraction of layers of 2.5 d."""
+    column, particles = simulation.case.column, simulation.particles
+    edges = np.arange(0.0, column.height, 2.5 * simulation.case.bed.diameter)
+    solids, _ = np.histogram(particles.position[:, 2], edges, weights=particles.volume)
+    return np.asarray(solids / (column.floor_area * np.diff(edges)))
 
 
 def exponent(beds: list[FluidisedBed]) -> float:

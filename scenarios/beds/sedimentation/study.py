@@ -52,12 +52,12 @@ def alone(case: Case) -> float:
     return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, drag, gravity)
 
 
-def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, way: float = 40.0) -> Settling:
+def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, distance: float = 40.0) -> Settling:
     """Let the spheres of the case settle in a periodic box.
 
     solid_fraction  of the box [-]
     viscosity       of the fluid; the case's if not given [Pa s]
-    way             approximate settling distance in diameters; the first half is not averaged
+    distance        approximate settling distance in diameters; the first half is not averaged
     """
     case = vessel()
     assert case.fluid is not None
@@ -81,7 +81,7 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, wa
     assert fluid is not None
     solids = count * math.pi / 6.0 * diameter**3 / math.prod(fluid.grid.size)
     fluid.boundaries.driving[2] = solids * (case.solid.density - fluid.density) * abs(case.laws.gravity[2])
-    end, rows = way * diameter / (speed * (1.0 - solids) ** 3), 100
+    end, rows = distance * diameter / (speed * (1.0 - solids) ** 3), 100
     falls = []
     for row in range(rows):
         simulation.until(end * (row + 1) / rows)
@@ -91,11 +91,11 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, wa
     return Settling(solids, float(np.mean(falls[rows // 2 :])), speed)
 
 
-def between_walls(solid_fraction: float, *, way: float = 0.45) -> Settling:
+def between_walls(solid_fraction: float, *, fall: float = 0.45) -> Settling:
     """Let the spheres of the case settle in the closed vessel.
 
     solid_fraction  at the start [-]
-    way             approximate fall of the boundary over the height; the first third is not fitted
+    fall            approximate fall of the boundary over the height; the first third is not fitted
     """
     case = vessel()
     volume = math.pi / 6.0 * case.bed.diameter**3
@@ -104,7 +104,7 @@ def between_walls(solid_fraction: float, *, way: float = 0.45) -> Settling:
     particles, speed = simulation.particles, alone(case)
     solids = count * volume / math.prod(case.column.size)
     packed = 1.0 - solids / 0.58  # largest fall of the boundary over the height
-    end, rows = min(way, 0.7 * packed) * case.column.height / (speed * (1.0 - solids) ** 3), 90
+    end, rows = min(fall, 0.7 * packed) * case.column.height / (speed * (1.0 - solids) ** 3), 90
     times, heights = [], []
     for row in range(rows):
         simulation.until(end * (row + 1) / rows)

@@ -108,7 +108,7 @@ def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
     sphere = (case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, law, gravity)
     speeds = [0.0]
     for begin, end in pairwise(times):
-        speeds.append(speed_after(end - begin, speeds[-1], *sphere, added_mass=case.laws.added_mass))
+        speeds.append(speed_after(end - begin, speeds[-1], *sphere, added_mass=case.laws.added_mass_at(1.0)))
     return np.array(speeds)
 
 

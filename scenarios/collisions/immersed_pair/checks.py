@@ -1,4 +1,4 @@
-"""Binary collisions against exact and converged solutions, and against themselves at a finer step."""
+"""Binary collisions compared with exact solutions, converged solutions, and runs with a finer step."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from scenarios.validation.table import Columns, Curves, Row, numbers, worst
 DRY = 0.97  # e_dry of the four materials
 CUTOFF = 12.7e-3 / 4  # R* of two equal spheres and the reach of their film [m]
 WATER = 1.0e-3  # [Pa s]
-SPEED = 0.1  # of approach, where not said otherwise [m/s]
+SPEED = 0.1  # of approach, unless given [m/s]
 CONVERGED = 5e-4
-"""Step in Hertz times of a solution that a finer step does not change."""
+"""Step of a converged solution, over the Hertz time."""
 
 
 def film_gap(material: Material, speed: float, stokes: float, diameter: float = 12.7e-3) -> float:
@@ -138,7 +138,7 @@ class Impact:
         return film_gap(self.material, self.speed, self.stokes, self.diameter) > self.material.roughness
 
     def collide(self, **options: Any) -> Collision:
-        """Let it happen between two such spheres."""
+        """Collide two such spheres."""
         return collide(self.material, diameter=self.diameter, velocity=self.speed, stokes=self.stokes, **options)
 
 
@@ -207,7 +207,7 @@ def oblique(curves: Curves) -> list[Row]:
 
 @dataclass
 class Integrated:
-    """What both integrators make of some impacts: (St, e, e converged) of each."""
+    """Results of both integrators for some impacts: (St, e, e converged) of each."""
 
     drift: list[tuple[float, float, float]] = field(default_factory=list)
     verlet: list[tuple[float, float, float]] = field(default_factory=list)
@@ -216,7 +216,7 @@ class Integrated:
     refused: int = 0
 
     def add(self, impact: Impact) -> None:
-        """Run an impact converged, with the drift, and with plain Verlet unless that refuses."""
+        """Run an impact with a converged step, with the drift integrator, and with Verlet unless that is refused."""
         self.deformed += impact.deformed
         exact = impact.collide(step_fraction=CONVERGED).restitution
         self.drift.append((impact.stokes, impact.collide().restitution, exact))

@@ -166,7 +166,7 @@ def oblique(curves: Curves) -> Any:
 
 
 def pair_and_wall(curves: Curves) -> Any:
-    """Pair and wall against the binary Stokes number, as they are and with the exact offset taken out."""
+    """Pair and wall against the binary Stokes number, as computed and with the exact offset removed."""
     figure, (left, right) = panels(2, width=9.0, height=4.4, sharey=True)
     for name in ("steel_rough", "glass", "delrin"):
         run, (title, colour) = _of(curves, f"pair_and_wall/{name}"), MATERIAL_STYLES[name]

@@ -120,7 +120,7 @@ def follow(simulation: ParticleSolver, setting: Setting, full: bool) -> dict[str
 
     Where only the film acts its impulse depends on the gap alone, so a step may take up to half of the gap, less
     where the film changes the speed so much that times would be coarse. The first step into the film is short,
-    because a film is felt from the step after the one that enters it.
+    because a film acts from the step after the one that enters it.
     """
     rows = [_row(simulation, _look(simulation))]
     laws, cutoff = simulation.laws, setting.cutoff_gap if simulation.laws.film else 0.0
@@ -194,7 +194,7 @@ def _creep_time(moment: _Moment, minimum_gap: float, setting: Setting) -> float:
 
 
 def _halted(moment: _Moment, minimum_gap: float, setting: Setting, full: bool) -> bool:
-    """Whether motion and spring together can no longer change ln h noticeably against the film."""
+    """Whether kinetic and spring energy are too small to change ln h noticeably against the film."""
     overlap = max(0.0, minimum_gap - moment.gap)
     share = min(1.0, overlap / minimum_gap)
     spring_energy = 0.4 * share * contact.hertz_force(setting.stiffness, overlap) * overlap

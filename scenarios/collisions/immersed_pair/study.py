@@ -14,7 +14,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -121,8 +121,8 @@ def collide(
     >>> wall.mechanism, round(float(wall.restitution), 2)
     ('roughness', 0.53)
     """
-    materials, diameters = _both(material), _both(diameter)
-    velocity, viscosity = _speed_and_viscosity(materials, diameters, against, velocity, viscosity, stokes)
+    bodies = Bodies(_both(material), _both(diameter), against)
+    velocity, viscosity = _speed_and_viscosity(bodies, velocity, viscosity, stokes)
     _check("angle", angle, 0.0 <= angle < 90.0, "at least 0 and below 90 degrees")
     oblique = angle > 0.0 or any(spin)
     if step_fraction is None:
@@ -140,10 +140,10 @@ def collide(
     )
     laws.check()
     full = _choice("trajectory", trajectory, {"frozen": False, "full": True})
-    table = pair_table(materials)
-    setting = _setting(table, materials, diameters, against, velocity, viscosity, angle, step_fraction, laws)
+    table = pair_table(bodies.materials)
+    setting = _setting(table[0, 1], bodies, velocity, viscosity, angle, step_fraction, laws)
     caveats = _check_film_step(setting, laws, step_fraction)
-    simulation = stage(setting, table, materials, laws, full, spin)
+    simulation = stage(setting, table, bodies.materials, laws, full, spin)
     history = follow(simulation, setting, full)
     return _result(simulation, setting, table, history, laws, full, caveats)
 
@@ -166,20 +166,25 @@ def _check(name: str, value: float, holds: bool, limit: str) -> None:
         raise InputError(name, value, limit)
 
 
-def _masses(materials: tuple[Material, Material], diameters: tuple[float, float], against: str) -> tuple[float, float]:
-    """Reduced radius and reduced mass."""
-    for name, diameter in zip(("diameter", "diameter of the target"), diameters):
-        _check(name, diameter, math.isfinite(diameter) and diameter > 0.0, "above 0 and finite")
-    wall = _choice("against", against, {"sphere": False, "wall": True})
-    mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(materials, diameters)]
-    other = (math.inf, math.inf) if wall else (0.5 * diameters[1], mass[1])
-    return contact.reduced(0.5 * diameters[0], other[0]), contact.reduced(mass[0], other[1])
+class Bodies(NamedTuple):
+    """Striker and target."""
+
+    materials: tuple[Material, Material]
+    diameters: tuple[float, float]  # [m]
+    against: str  # "sphere" or "wall"
+
+    def reduced(self) -> tuple[float, float]:
+        """Reduced radius [m] and reduced mass [kg]."""
+        for name, diameter in zip(("diameter", "diameter of the target"), self.diameters):
+            _check(name, diameter, math.isfinite(diameter) and diameter > 0.0, "above 0 and finite")
+        wall = _choice("against", self.against, {"sphere": False, "wall": True})
+        mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(self.materials, self.diameters)]
+        other = (math.inf, math.inf) if wall else (0.5 * self.diameters[1], mass[1])
+        return contact.reduced(0.5 * self.diameters[0], other[0]), contact.reduced(mass[0], other[1])
 
 
 def _speed_and_viscosity(
-    materials: tuple[Material, Material],
-    diameters: tuple[float, float],
-    against: str,
+    bodies: Bodies,
     velocity: float | None,
     viscosity: float | None,
     stokes: float | None,
@@ -194,7 +199,7 @@ def _speed_and_viscosity(
         zero_allowed = name == "viscosity"
         sound = math.isfinite(value) and (value >= 0.0 if zero_allowed else value > 0.0)  # type: ignore[arg-type, operator]
         _check(name, value, sound, "finite and " + ("at least 0" if zero_allowed else "above 0"))  # type: ignore[arg-type]
-    radius, mass = _masses(materials, diameters, against)
+    radius, mass = bodies.reduced()
     film_speed_per_viscosity = lubrication.film_strength(1.0, radius) / mass
     if velocity is None:
         _check("viscosity", viscosity, viscosity > 0.0, "above 0 where stokes sets the velocity")  # type: ignore[arg-type, operator]
@@ -205,24 +210,22 @@ def _speed_and_viscosity(
 
 
 def _setting(
-    table: np.ndarray,
-    materials: tuple[Material, Material],
-    diameters: tuple[float, float],
-    against: str,
+    row: np.void,
+    bodies: Bodies,
     velocity: float,
     viscosity: float,
     angle: float,
     step_fraction: float,
     laws: Laws,
 ) -> Setting:
-    reduced_radius, reduced_mass = _masses(materials, diameters, against)
-    row = table[0, 1]
+    """Numbers of the collision; `row` is the entry of the pair table for the two materials."""
+    reduced_radius, reduced_mass = bodies.reduced()
     stiffness = contact.hertz_stiffness(float(row["contact_modulus"]), reduced_radius)
     roughness = float(row["roughness_gap"])
     asked = (roughness, velocity, viscosity, float(row["film_modulus"]), reduced_radius)
     deformed = called_by_name(laws.minimum_gap or elastohydrodynamic, GAP_ARGUMENTS, asked)
     return Setting(
-        radius=(0.5 * diameters[0], math.inf if against == "wall" else 0.5 * diameters[1]),
+        radius=(0.5 * bodies.diameters[0], math.inf if bodies.against == "wall" else 0.5 * bodies.diameters[1]),
         reduced_radius=reduced_radius,
         reduced_mass=reduced_mass,
         speed=velocity,

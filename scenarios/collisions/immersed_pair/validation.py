@@ -1,4 +1,4 @@
-"""Binary collisions: the figures of Nijssen et al. (2023), redrawn, with public data and correlations laid over.
+"""Binary collisions: the figures of Nijssen et al. (2023), redrawn with public data and correlations.
 
 Nijssen, Ottens & Padding, Powder Technol. 413 (2023) 118017, figures 2 to 5. Each part computes curves for
 `histories.h5` and the figures, and rows for the table. The data of Yang & Hunt (2006) were published as figures only;

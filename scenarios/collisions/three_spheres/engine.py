@@ -1,8 +1,8 @@
 """Three wet spheres in the particle engine: Cartesian coordinates, soft Hertz-Mindlin contacts, films as impulses.
 
-The spheres of the engine are larger by the minimum gap, so that its dry contact begins where the solids touch. Before
-and after each step, every pair with joined films receives the impulse of its film, exact for the pair alone. Pairs are
-treated in one order and then in reverse.
+Spheres in the engine are larger by the minimum gap, so that dry contact begins where solids touch. Before and after
+each step, every pair with joined films receives the impulse of its film, exact for an isolated pair. Pairs are treated
+in one order and then in reverse.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Three wet spheres followed from event to event: films meet and separate, solids touch, are pressed together, let go.
+"""Three wet spheres from event to event: films meet and separate; solids touch, press together and let go.
 
 `scipy.integrate.solve_ivp` integrates each segment between two events and locates the event that ends it.
 
@@ -25,7 +25,8 @@ from scenarios.collisions.three_spheres.motion import (
     Numbers,
     View,
     forces,
-    rates,
+    observe,
+    rates_of,
     strike,
     view,
 )
@@ -45,9 +46,12 @@ TENSILE = 1e-12
 
 FIRST_STEP = 1e-2
 STRIDE = 0.1
-"""Longest step, as the way of the striker at its speed of impact over the diameter."""
+"""Longest step: distance that the striker travels at its speed of impact, over the diameter."""
 
 MOST_SEGMENTS = 50_000
+
+GAP, APPROACH, FORCE = 0, 1, 2
+"""Rows of `motion.observe`."""
 
 KINDS = ("contact", "meet", "separate", "release", "closest")
 CONTACT, MEET, SEPARATE, RELEASE, CLOSEST = KINDS
@@ -56,7 +60,7 @@ CONTACT, MEET, SEPARATE, RELEASE, CLOSEST = KINDS
 
 @dataclass
 class Path:
-    """The motion up to a time, and what happened on the way."""
+    """The motion up to a time, and its events."""
 
     state: np.ndarray
     modes: np.ndarray
@@ -70,8 +74,13 @@ class Path:
         return next((speed for kind, which, _, speed in self.events if (kind, which) == (SEPARATE, pair)), 0.0)
 
 
-def follow(state: np.ndarray, modes: np.ndarray, numbers: Numbers, until: float) -> Path:
-    """Integrate to the end, from event to event."""
+def follow(
+    state: np.ndarray, modes: np.ndarray, numbers: Numbers, until: float, tolerance: float | None = None
+) -> Path:
+    """Integrate to the end, from event to event.
+
+    tolerance  of each step, relative; the default keeps times of events to 1e-8
+    """
     path = Path(state.copy(), modes.copy())
     _record(path, np.array([0.0]), path.state[:, None])
     speed = max(1.0, *(math.hypot(each.approach, each.distance * each.turning) for each in _views(path, numbers)))
@@ -80,7 +89,7 @@ def follow(state: np.ndarray, modes: np.ndarray, numbers: Numbers, until: float)
         if path.time >= until or _flies_apart(path, numbers, until - path.time):
             return path
         _release(path, numbers)
-        found = _segment(path, numbers, until, longest)
+        found = _segment(path, numbers, until, longest, tolerance or RELATIVE)
         _record(path, found.t[1:], found.y[:, 1:])
         path.time, path.state = float(found.t[-1]), found.y[:, -1].copy()
         if found.status == 1:
@@ -100,18 +109,18 @@ def _ended(watched: tuple[str, int], times: np.ndarray) -> bool:
     return watched[0] != CLOSEST and len(times) > 0
 
 
-def _segment(path: Path, numbers: Numbers, until: float, longest: float) -> Any:
+def _segment(path: Path, numbers: Numbers, until: float, longest: float, tolerance: float) -> Any:
     """Integrate to the next event; the result also lists the watched events as (kind, pair)."""
-    watched = _watched(path, numbers)
+    watched, flat = _watched(path, numbers), numbers.flat()
     while True:
         found = solve_ivp(
-            lambda _, state: rates(state, path.modes, numbers),
+            lambda _, state: rates_of(state, path.modes, flat),
             (path.time, until),
             path.state,
             METHOD,
             events=list(watched.values()),
-            rtol=RELATIVE,
-            atol=ABSOLUTE,
+            rtol=tolerance,
+            atol=ABSOLUTE / RELATIVE * tolerance,
             first_step=min(FIRST_STEP, longest, until - path.time),
             max_step=longest,
         )
@@ -129,19 +138,24 @@ def _segment(path: Path, numbers: Numbers, until: float, longest: float) -> Any:
 def _watched(path: Path, numbers: Numbers) -> dict[tuple[str, int], Any]:
     """Events that can happen to the pairs in their present modes."""
     watched: dict[tuple[str, int], Any] = {}
+    flat, last = numbers.flat(), (None, np.zeros((3, 3)))
+
+    def seen(state: Any) -> np.ndarray:
+        nonlocal last
+        if last[0] is not state:  # all events are asked for the same state in turn
+            last = state, observe(state, path.modes, flat)
+        return last[1]
+
     for pair, (mode, film) in enumerate(zip(path.modes, numbers.films)):
 
-        def gap(_: float, state: Any, pair: int = pair) -> float:
-            return view(state, numbers.film_ratio, pair).gap
-
-        def beyond(at: float, gap: Any = gap) -> Any:
-            return lambda time, state: gap(time, state) - at
+        def beyond(at: float, pair: int = pair) -> Any:
+            return lambda _, state: seen(state)[GAP, pair] - at
 
         def approach(_: float, state: Any, pair: int = pair) -> float:
-            return view(state, numbers.film_ratio, pair).approach
+            return float(seen(state)[APPROACH, pair])
 
         def pressed(_: float, state: Any, pair: int = pair) -> float:
-            return forces(state, path.modes, numbers)[2][pair] + TENSILE
+            return float(seen(state)[FORCE, pair]) + TENSILE
 
         if mode == RESTING:
             watched[RELEASE, pair] = event(pressed, -1)
@@ -149,7 +163,7 @@ def _watched(path: Path, numbers: Numbers) -> dict[tuple[str, int], Any]:
         if mode == APART:
             watched[MEET, pair] = event(beyond(film), -1)
         else:
-            now = view(path.state, numbers.film_ratio, pair).gap
+            now = float(seen(path.state)[GAP, pair])
             watched[CONTACT, pair] = event(beyond(min(numbers.minimum_gap, now) - RIM), -1)
             watched[SEPARATE, pair] = event(beyond(max(film, now) + RIM), 1)
         watched[CLOSEST, pair] = event(approach, -1, terminal=False)
@@ -157,7 +171,7 @@ def _watched(path: Path, numbers: Numbers) -> dict[tuple[str, int], Any]:
 
 
 def _missed(found: Any, watched: dict[tuple[str, int], Any], path: Path, numbers: Numbers) -> float | None:
-    """Time of the first closest approach at which a pair had passed its event unseen, within one step."""
+    """Time of the first closest approach at which a pair passed an event undetected within one step."""
     times = []
     for (kind, pair), at, states in zip(watched, found.t_events, found.y_events):
         if kind != CLOSEST or not len(at):
@@ -169,7 +183,7 @@ def _missed(found: Any, watched: dict[tuple[str, int], Any], path: Path, numbers
 
 
 def _happen(path: Path, numbers: Numbers, kind: str, pair: int) -> None:
-    """Apply an event and the contacts that it brings about at once."""
+    """Apply an event and the contacts that follow from it immediately."""
     seen = view(path.state, numbers.film_ratio, pair)
     if kind == CONTACT:
         _place(path, pair, numbers.minimum_gap)
@@ -195,7 +209,7 @@ def _touch(path: Path, numbers: Numbers, pair: int, speed: float) -> None:
 
 
 def _touch_others(path: Path, numbers: Numbers) -> None:
-    """Contacts brought about at once by an impulse, until none is left."""
+    """Apply the contacts that follow immediately from an impulse, until none is left."""
     for _ in range(300):
         still = True
         for pair in range(3):
@@ -240,7 +254,7 @@ def _views(path: Path, numbers: Numbers) -> list[View]:
 
 
 def _place(path: Path, pair: int, gap: float) -> None:
-    """Set the gap of a pair exactly to a value that it has reached to rounding."""
+    """Set the gap of a pair to the exact value that it has reached within rounding."""
     if pair < 2:
         path.state[4 * pair] = gap
 

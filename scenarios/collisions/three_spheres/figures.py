@@ -1,4 +1,4 @@
-"""Figures of three wet spheres: outcomes over Stokes number and angle, restitutions, and sequences of places."""
+"""Figures of three wet spheres: outcomes over Stokes number and angle, restitutions, and sequences of positions."""
 
 from __future__ import annotations
 

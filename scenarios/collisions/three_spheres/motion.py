@@ -46,6 +46,10 @@ class Numbers(NamedTuple):
     films: tuple[float, float, float]  # of the pairs 1-2, 2-3 and 1-3
     slowest_bounce: float
 
+    def flat(self) -> np.ndarray:
+        """All numbers in one array, which costs a compiled function less to take (10,)."""
+        return np.array([*self[:6], *self.films, self.slowest_bounce])
+
 
 class View(NamedTuple):
     """Geometry and relative motion of a pair."""
@@ -164,6 +168,29 @@ def rates(state, modes, numbers):
         slopes[SPINS + FIRST[pair]] -= turn
         slopes[SPINS + SECOND[pair]] -= turn
     return slopes
+
+
+@serial
+def rates_of(state, modes, flat):
+    """Rates of change of the state (11,), given `Numbers.flat()`."""
+    return rates(state, modes, _numbers(flat))
+
+
+@serial
+def observe(state, modes, flat):
+    """Gap, approach speed and contact force of each pair (3, 3), given `Numbers.flat()`."""
+    numbers, found = _numbers(flat), np.zeros((3, 3))
+    for pair in range(3):
+        seen = view(state, numbers.film_ratio, pair)
+        found[0, pair], found[1, pair] = seen.gap, seen.approach
+    if (modes == RESTING).any():
+        found[2] = forces(state, modes, numbers)[2]
+    return found
+
+
+@serial
+def _numbers(f):
+    return Numbers(f[0], f[1], f[2], f[3], f[4], f[5], (f[6], f[7], f[8]), f[9])
 
 
 @serial

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from joblib import Parallel, delayed
 
 from cfddem.backend.errors import InputError, nearest
 from scenarios.collisions.three_spheres.engine import follow as follow_in_engine
@@ -38,6 +39,9 @@ SLOWEST_BOUNCE = 1e-4
 """Contacts slower than this fraction of the impact stay pressed together; 1e-3 to 2e-6 agree to 8 digits."""
 
 SOLVERS = ("equations", "particles")
+
+MAP_TOLERANCE, PARALLEL_FROM = 1e-8, 200
+"""Tolerance of the runs of a map, and number of runs from which it uses all cores."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,7 @@ def simulate_three_spheres(
     stokes: float = 8.0,
     theta12: float = 45.0,
     theta23: float = 0.0,
+    *,
     film_ratio: float = 0.01,
     minimum_gap: float = 0.05,
     capillary_number: float = math.inf,
@@ -96,6 +101,7 @@ def simulate_three_spheres(
     slowest_bounce: float = SLOWEST_BOUNCE,
     solver: str = "equations",
     overlap: float = 0.002,
+    tolerance: float | None = None,
 ) -> Triplet:
     r"""Let sphere 1 strike sphere 2 of a resting pair 2-3; all spheres are equal and coated with a viscous film.
 
@@ -117,6 +123,7 @@ def simulate_three_spheres(
     slowest_bounce    contacts slower than this fraction of v_n0 stay pressed together [-]
     solver            "equations" in polar coordinates with hard contacts, or the "particles" engine with soft ones
     overlap           of soft contacts: deepest overlap of an impact without a film, over the minimum gap [-]
+    tolerance         of each step of the equations, relative; 1e-11 if not given [-]
     returns           :class:`Triplet`
 
     >>> simulate_three_spheres(stokes=2, theta12=45).outcome          # sphere 1 separates after it has met sphere 3
@@ -140,7 +147,7 @@ def simulate_three_spheres(
 
     diameters = math.cos(one) / film_ratio  # time v_n0 t / delta_12 over time v_10 t / diameter
     if solver == "equations":
-        path = follow(state, modes, numbers, until * diameters)
+        path = follow(state, modes, numbers, until * diameters, tolerance)
     else:
         path = follow_in_engine(state, numbers, until * diameters, overlap)
     events = tuple(
@@ -177,6 +184,7 @@ def _check(given: Mapping[str, Any]) -> None:
         "slowest_bounce": (lambda x: 0.0 < x <= 0.01, "above 0 and at most 0.01"),
         "solver": (lambda x: x in SOLVERS, nearest(str(given["solver"]), SOLVERS)),
         "overlap": (lambda x: 0.0 < x <= 1.0, "above 0 and at most 1"),
+        "tolerance": (lambda x: x is None or 1e-13 <= x <= 1e-3, "from 1e-13 to 1e-3"),
     }
     for name, (holds, limit) in limits.items():
         if not holds(given[name]):
@@ -217,16 +225,25 @@ def centres(history: dict[str, np.ndarray], film_ratio: float) -> np.ndarray:
 
 
 def outcomes(stokes: Iterable[float], theta12: Iterable[float], **conditions: Any) -> dict[str, np.ndarray]:
-    """Outcome and restitutions for every Stokes number (columns) at every angle (rows).
+    """Outcome and restitutions for every Stokes number (columns) at every angle (rows); large maps use all cores.
 
     stokes, theta12  values of the two axes
-    conditions       further arguments of :func:`simulate_three_spheres`, the same for all
+    conditions       further arguments of :func:`simulate_three_spheres`, the same for all; `tolerance` is 1e-8 if not
+                     given, which keeps restitutions to 1e-5
     returns          arrays "outcome", "restitution12", "restitution23" of shape (angles, Stokes numbers)
 
     >>> outcomes([2.0, 20.0], [45.0])["outcome"].tolist()
     [['PA1', 'FS']]
     """
-    numbers = list(stokes)
-    table = [[simulate_three_spheres(number, angle, **conditions) for number in numbers] for angle in theta12]
+    numbers, angles = list(stokes), list(theta12)
+    conditions = {"tolerance": MAP_TOLERANCE} | conditions
+    jobs = -1 if len(numbers) * len(angles) >= PARALLEL_FROM else 1
+    table = Parallel(n_jobs=jobs)(delayed(_row)(numbers, angle, conditions) for angle in angles)
     names = ("outcome", "restitution12", "restitution23")
-    return {name: np.array([[getattr(run, name) for run in row] for row in table]) for name in names}
+    return {name: np.array([[run[place] for run in row] for row in table]) for place, name in enumerate(names)}
+
+
+def _row(stokes: list[float], theta12: float, conditions: dict[str, Any]) -> list[tuple[str, float, float]]:
+    """Outcome and both restitutions at one angle."""
+    runs = (simulate_three_spheres(number, theta12, **conditions) for number in stokes)
+    return [(run.outcome, run.restitution12, run.restitution23) for run in runs]

@@ -18,7 +18,7 @@ from closures.restitution import davis_sitison
 from scenarios.collisions.three_spheres import figures
 from scenarios.collisions.three_spheres.study import Triplet, outcomes, simulate_three_spheres
 from scenarios.validation.table import Columns, Row, reference, worst
-from scenarios.validation.wet_checks import cartesian
+from scenarios.validation.wet.cartesian import cartesian
 
 Curves = dict[str, Columns]
 

@@ -64,6 +64,7 @@ def collide_wet(
     angle: float = 0.0,
     bridge: str = "deforming",
     cut: str = "zero",
+    *,
     tangential: str = "davis",
     friction: float = 0.0,
     capillary: bool = False,

@@ -43,14 +43,14 @@ GRAIN = Material(
 """Glass whose contacts are softened, so that the steps are long; films feel the real modulus."""
 
 SUBSTEPS = 8
-"""Steps of the engine between two kicks of bridges and flow, which are softer by far than contacts."""
+"""Steps of the engine between two kicks of bridges and flow, which are much softer than contacts."""
 
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
 class Tumbling:
-    """How agglomerates grew: spheres joined by bridges, alone ones counting as agglomerates of one."""
+    """Growth of agglomerates: spheres joined by bridges; a single sphere counts as an agglomerate of one."""
 
     capillary_number: float  # eta G d / sigma [-]
     surface_tension: float  # [N/m]
@@ -95,7 +95,7 @@ def tumble(
     follows from the capillary number, :math:`Ca = \eta G d/\sigma`, so that viscous films are the same at each.
 
     capillary_number  Ca [-]
-    count             spheres
+    count             number of spheres
     until             length of the run [s]
     shear_rate        G, largest shear rate of the flow; 0 for no flow [1/s]
     diameter          d [m]
@@ -124,10 +124,7 @@ def tumble(
     counted = [_count(bridges)]
     for sample in range(samples):
         for _ in range(rounds):
-            flow.kick(0.5 * SUBSTEPS * step)
-            run.advance(step, SUBSTEPS)
-            flow.update()
-            flow.kick(0.5 * SUBSTEPS * step)
+            flow.advance(step)
         counted.append(_count(bridges))
         if progress is not None:
             progress((sample + 1) / samples)
@@ -173,6 +170,13 @@ class Flow:
         self.fastest = shear_rate / self.wave
         self.impulse = np.zeros(3)  # given to all spheres so far [N s]
         self.update()
+
+    def advance(self, step: float) -> None:
+        """Make `SUBSTEPS` steps of the engine between two kicks of the flow [s]."""
+        self.kick(0.5 * SUBSTEPS * step)
+        self.run.advance(step, SUBSTEPS)
+        self.update()
+        self.kick(0.5 * SUBSTEPS * step)
 
     def update(self) -> None:
         """Update the flow velocity at the positions of the spheres (N, 3) [m/s]."""

@@ -77,7 +77,7 @@ def half_filling(particle: Any, liquid: Any, film: float, given: float | None) -
             f"given for {particle} and {liquid} under {film * 1e6:g} um",
             f"measured are layers of: {listed}",
         )
-    raise InputError("half_filling_angle", None, "given for a particle or liquid of your own")
+    raise InputError("half_filling_angle", None, "given for a user-defined particle or liquid")
 
 
 def sliding_friction(particle: Any, liquid: Any, given: float | None) -> float:

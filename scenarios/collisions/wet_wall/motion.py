@@ -1,4 +1,4 @@
-"""A sphere meets a wall under a liquid layer: the forces of each phase, and the motion through them.
+"""A sphere meets a wall under a liquid layer: the forces and the motion in each phase.
 
 Phase I, into the layer; II, contact with the wall; III, out of the layer; IV, on a liquid bridge until it breaks.
 Along the normal, viscous and capillary forces and gravity act outside the contact; inside it the contact and
@@ -44,7 +44,7 @@ tangential displacement of the contact point, and the energy dissipated by each 
 HEIGHT, SPEED, DISTANCE, ALONG, SPIN, DISPLACEMENT = range(6)
 CONTACT, VISCOUS, CAPILLARY, GRAVITY = range(6, 10)
 _SCALE = np.array([1e-6, 1.0, 1e-6, 1.0, 1e3, 1e-6, 1.0, 1.0, 1.0, 1.0])
-"""Size of each column that the tolerance is a part of, where the value itself is smaller."""
+"""Least size of each column to which the relative tolerance applies."""
 
 
 class Wet(NamedTuple):
@@ -63,8 +63,8 @@ class Wet(NamedTuple):
     surface_tension: float
     contact_angle: float
     half_filling_angle: float
-    smallest_gap: float  # below it the film's resistance stays what it is [m]
-    smallest_arc: float  # r_m is not taken below it [m]
+    smallest_gap: float  # below it the resistance of the film is constant [m]
+    smallest_arc: float  # lower limit of r_m [m]
     pulled_in: tuple[str, ...]  # phases with a capillary force
     length_from: float  # height of the sphere's lowest point from which the length of the bridge counts [m]
     printed_signs: bool  # of the coupling of sliding and spin in the film
@@ -92,7 +92,7 @@ def bridge(wet: Wet, height: float) -> Bridge:
 def pull(wet: Wet, height: float) -> float:
     """Capillary pull towards the wall [N]."""
     toroid = bridge(wet, height)
-    neck = max(toroid.azimuthal, 1e-3 * wet.radius)  # trial steps may look beyond a closed neck; no motion goes there
+    neck = max(toroid.azimuthal, 1e-3 * wet.radius)  # only trial steps reach a closed neck
     angles = wet.half_filling_angle, wet.contact_angle
     return capillary.toroid_pull(wet.surface_tension, toroid.line_radius, toroid.meridional, neck, *angles)
 
@@ -135,9 +135,9 @@ def film_along(wet: Wet, height: float, along: float, spin: float) -> tuple[floa
 def touch(wet: Wet, state: Any) -> tuple[float, float, float]:
     """Normal force and force along the wall of the contact [N], and the rate of its spring's displacement [m/s].
 
-    A contact that slides carries friction times the normal force, also, with its sign, in the weak pull that ends a
-    damped contact: so the impulse of one that slides throughout is friction times the normal impulse. A spring that
-    is cut follows Coulomb's limit, less what the dashpot carries, within a small part of the contact time.
+    A sliding contact carries friction times the normal force, with its sign, also in the weak pull that ends a damped
+    contact. The tangential impulse of a contact that slides throughout is therefore friction times the normal impulse.
+    A truncated spring follows Coulomb's limit, less the force of the dashpot, within a small part of the contact time.
     """
     overlap = max(wet.radius - state[HEIGHT], 0.0)
     damping = contact.hertz_damping(wet.damping_ratio, wet.mass, wet.stiffness, overlap)
@@ -165,7 +165,7 @@ def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
         height, speed, along, spin = state[HEIGHT], state[SPEED], state[ALONG], state[SPIN]
         pressed = sideways = couple = touched = drawn = viscous = rubbed = stretched = 0.0
         if wetted:
-            above = max(height, wet.radius)  # the layer's phases end there; only trial steps look below
+            above = max(height, wet.radius)  # phases in the layer end there; only trial steps go below
             viscous = -resistance(wet, above, speed) * speed
             if pulled:
                 drawn = -pull(wet, above)
@@ -251,7 +251,7 @@ def follow(wet: Wet, speed: float, along: float, spin: float, tolerance: float) 
 
 
 def _ends(wet: Wet, phase: str) -> tuple[Any, Any]:
-    """Events that end a phase: the sphere has passed it, or has come to rest on the way out."""
+    """Events that end a phase: the sphere reaches its end, or comes to rest while it moves out."""
 
     def at_wall(_: float, state: Any) -> float:
         return float(state[HEIGHT] - wet.radius)

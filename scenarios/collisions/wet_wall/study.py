@@ -31,7 +31,7 @@ PULLED_IN = {"always": ("I", "III", "IV"), "rebound": ("III", "IV"), "bridge": (
 """Phases with a capillary force, by name; the source does not say whether the first is among them."""
 
 SLENDER = 0.01
-"""Arc of the toroid over the radius of the sphere, below which the suction just before contact decides."""
+"""Arc of the toroid over the radius of the sphere, below which the suction before contact determines the result."""
 
 CUTTING = 1e-4
 """Relaxation time of the spring of a sliding contact towards Coulomb's limit, over the Hertz time."""
@@ -90,7 +90,7 @@ def impact(
     film                thickness of the layer; 0 for a dry wall [m]
     velocity            normal speed where the sphere meets the layer [m/s]
     angle               between velocity and normal there, 0 <= angle < 90; tan(angle) = tangential/normal [deg]
-    spin                before; positive where it moves the lowest point the way the sphere goes [rad/s]
+    spin                before; positive if it moves the lowest point in the direction of the sphere [rad/s]
     half_filling_angle  of the bridge; that of table 5 of the source where it lists the case [deg]
     friction            of the contact; that of table 3 of the source where it lists the case [-]
     wall                solid of the wall
@@ -205,12 +205,12 @@ def _refuse_the_singular(wet: Wet) -> None:
         round(math.degrees(wet.half_filling_angle), 3),
         f"above {least:.1f} degrees in a layer of {wet.film * 1e6:g} um, so that the contact line of the bridge stays "
         f"above the layer; it lies at {height * 1e6:.0f} um while the solids touch",
-        "smallest_arc=5e-6 runs it with a floor of the toroid's radius, on which the result then depends",
+        "smallest_arc=5e-6 limits the radius of the toroid from below; the result then depends on this limit",
     )
 
 
 def _nearly_singular(wet: Wet) -> tuple[str, ...]:
-    """Warn where the suction before contact grows so much that the result depends on the arc of the toroid there."""
+    """Warn if the suction before contact grows so much that the result depends on the arc of the toroid."""
     if wet.film == 0.0 or wet.pulled_in == PULLED_IN["bridge"]:
         return ()
     arc = motion.bridge(wet, wet.radius).meridional

@@ -1,8 +1,8 @@
 """Wet impacts on a wall: figures 7 to 13 of Buck et al. (2018) redrawn, and comparisons.
 
-The paper shows its results as figures only. Compared are the solution of its equations with a second solution, the
-velocities below which spheres stick, dry sliding with its exact solution, and the sum of dissipated energies with the
-loss.
+The paper shows its results as figures only. The table compares the solution of its equations with a second solution,
+the velocities below which spheres stick, dry sliding with its exact solution, and the sum of dissipated energies with
+the loss.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ def spinning(folder: Path, curves: Curves) -> list[Row]:
     legend(axes[0], loc="lower left")
     save(figure, folder / "wet_wall_spinning.png")
     rolling = []
-    for spin in spins:  # where the lowest point is at rest along the wall, nothing rubs
+    for spin in spins:  # no friction where the lowest point is at rest along the wall
         angle = math.degrees(math.atan(-spin * 0.87e-3))
         dry = impact("alumina_1.74", None, angle=angle, spin=spin)
         rolling += [(spin, dry.restitution_tangential, 1.0), (spin, dry.restitution_rotational, 1.0)]

@@ -16,9 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.analysis.measures import cells_of, granular_temperature
 from cfddem.case.schema import Case
 from cfddem.particles.initial.packing import random_packing
-from cfddem.plotting.curves import label, legend, panels, save, shades
+from cfddem.plotting.curves import BLUE, GREEN, ORANGE, SKY, label, legend, panels, save
+from cfddem.preflight.bed_waves import grid_damping, uniform_bed, with_agitation
 from cfddem.run.simulation import Simulation
 from closures.stability import UniformBed
 from scenarios.validation.table import Progress, Row, write_histories
@@ -36,6 +38,9 @@ START, FIT, END = 0.02, 0.03, 0.12
 
 SEEDS = (1, 2, 3)
 """Seeds of the packings in a validation."""
+
+FINE = 0.005
+"""Cells up to this height do not damp the waves measurably [m]."""
 
 ROWS = 400
 """Readings of the amplitude in a run."""
@@ -84,6 +89,7 @@ class Measured:
 
     growth: float  # [1/s]
     speed: float  # upward, against the mean of the particles [m/s]
+    granular_temperature: float  # mean over the run, of particles about the mean of their layer [m2/s2]
     amplitude: np.ndarray  # of every reading, over the mean solid fraction
     time: np.ndarray  # [s]
 
@@ -95,24 +101,13 @@ def box(wavelength: float, *, cell: float = 0.004, seed: int = 1, **changes: obj
     count = round((1.0 - VOIDAGE) * math.prod(size) / case.bed.mean_volume)
     wider = np.full(count, ROOM * case.bed.diameter)
     places, _ = random_packing(wider, float((math.pi / 6.0 * wider**3).sum()) / math.prod(size), seed, shape=size)
-    return case.with_(**{"bed.positions": [tuple(place) for place in places.tolist()]})
+    return case.with_(**{"bed.positions": [tuple(place) for place in places.tolist()], "bed.seed": seed})
 
 
 def theory(case: Case) -> UniformBed:
     """The uniform bed of the case, with its kernel and added mass."""
-    assert case.fluid is not None and case.laws.drag_law is not None
     solids = case.particle_count * case.bed.mean_volume / math.prod(case.column.size)
-    return UniformBed(
-        1.0 - solids,
-        case.bed.diameter,
-        case.solid.density,
-        case.fluid.density,
-        case.fluid.viscosity,
-        case.laws.drag_law.function,
-        gravity=abs(case.laws.gravity[2]),
-        kernel=case.laws.kernel_width * case.bed.diameter,
-        added_mass=case.laws.added_mass,
-    )
+    return uniform_bed(case, 1.0 - solids)
 
 
 def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Measured:
@@ -136,51 +131,64 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
         height += (1j * missing * np.exp(1j * number * height)).real / number
     height %= case.column.height
     particles.velocity[:, 2] = (by_particles * np.exp(1j * number * height)).real
+    particles.velocity += _random_motion(case, particles.count)
     simulation.particle_solver.refresh()
     fluid.boundaries.driving[2] = (1.0 - bed.voidage) * (bed.density - bed.fluid_density) * bed.gravity
     kernel = simulation.exchange.kernel
     fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(particles.position, particles.radius)))
     fluid.set_velocity((0.0, 0.0, lambda x, y, z: slip + (by_fluid * np.exp(1j * number * z)).real + 0.0 * x * y))
-    times, components = [], []
+    times, components, temperatures = [], [], []
     for row in range(ROWS):
         simulation.until(duration * (row + 1) / ROWS)
         drift = float(particles.velocity[:, 2].mean())
         times.append(simulation.time)
         components.append(2.0 * np.exp(-1j * number * particles.position[:, 2]).mean())
+        cells = cells_of(particles.position, simulation.fluid.grid.shape, simulation.fluid.grid.spacing)
+        temperatures.append(granular_temperature(particles.velocity, cells).mean)
         if abs(components[-1]) > 1.3 * END or abs(drift) > 0.2 * slip:
             break
-    return _fitted(np.array(times), np.array(components), number)
+    return _fitted(np.array(times), np.array(components), number, float(np.mean(temperatures)))
 
 
-def _fitted(time: np.ndarray, component: np.ndarray, number: float) -> Measured:
+def _random_motion(case: Case, count: int) -> np.ndarray:
+    """Velocities of the granular temperature that the agitation of the case is expected to keep up (N, 3) [m/s]."""
+    temperature = with_agitation(theory(case), case).granular_temperature
+    draw = np.random.default_rng(case.bed.seed).normal(0.0, math.sqrt(temperature), (count, 3))
+    return np.asarray(draw - draw.mean(axis=0))
+
+
+def _fitted(time: np.ndarray, component: np.ndarray, number: float, temperature: float) -> Measured:
     """Growth and speed of the wave where its amplitude is large against noise and small against one."""
     amplitude = np.abs(component)
     last = int(np.argmax(amplitude > END)) if (amplitude > END).any() else len(time)
     inside = slice(int(np.argmax(amplitude[:last] > FIT)) if (amplitude[:last] > FIT).any() else 0, last)
     growth = np.polyfit(time[inside], np.log(amplitude[inside]), 1)[0]
     turning = np.polyfit(time[inside], np.unwrap(np.angle(component[inside])), 1)[0]
-    return Measured(float(growth), float(-turning / number), amplitude, time)
+    return Measured(float(growth), float(-turning / number), temperature, amplitude, time)
+
+
+CASES: tuple[tuple[float, float, str, dict[str, Any]], ...] = (
+    (0.032, 0.004, "", {}),
+    (0.048, 0.004, "", {}),
+    (0.032, 0.004, ", with Zuber's added mass", {"laws.added_mass": "zuber"}),
+    (0.032, 0.008, ", cells of 8 mm", {"column.width": 0.04}),
+    (0.048, 0.012, ", cells of 12 mm", {}),
+    (0.032, 0.004, ", with agitation", {"laws.agitation": "free_spheres"}),
+    (0.048, 0.004, ", with agitation", {"laws.agitation": "free_spheres"}),
+)
+"""Wavelength and cell of each comparison [m], its name, and changes of the case."""
 
 
 def study(folder: Path, progress: Progress) -> list[Row]:
-    """Growth and speed of two waves against theory, and the short wave with agitation."""
+    """Growth and speed of waves against linear theory: fine and coarse cells, added mass, agitation."""
     rows: list[Row] = []
     curves: dict[str, Any] = {}
-    for wavelength, agitation in ((0.032, "none"), (0.048, "none"), (0.032, "pseudo_turbulence")):
-        name = f"wave of {1e3 * wavelength:.0f} mm" + (", with agitation" if agitation != "none" else "")
+    for wavelength, cell, text, changes in CASES:
+        name = f"wave of {1e3 * wavelength:.0f} mm{text}"
         progress(name)
-        cases = [box(wavelength, seed=seed, **{"laws.agitation": agitation}) for seed in SEEDS]
+        cases = [box(wavelength, cell=cell, seed=seed, **changes) for seed in SEEDS]
         waves = [single_wave(case, wavelength) for case in cases]
-        expected = theory(cases[0]).wave(wavelength)
-        growth, speed = (float(np.mean([getattr(each, part) for each in waves])) for part in ("growth", "speed"))
-        spread = float(np.std([each.growth for each in waves], ddof=1) / math.sqrt(len(waves)))
-        note = f"mean of {len(waves)} seeds, standard error {spread:.2g}"
-        if agitation == "none":
-            rows.append(Row(f"growth, {name}", growth, expected.growth, 0.1 * expected.growth, "1/s", note))
-            rows.append(Row(f"speed, {name}", speed, expected.speed, None, "m/s"))
-        else:
-            rows.append(Row(f"growth above zero, {name}", max(growth, 0.0), 0.0, 2.0 * spread, "1/s", note))
-            rows.append(Row(f"growth, {name}", growth, expected.growth, None, "1/s", "theory without agitation"))
+        rows += _rows(name, cases[0], wavelength, waves)
         for seed, each in zip(SEEDS, waves):
             curves[f"{name}, seed {seed}"] = {"time": (each.time, "s"), "amplitude": (each.amplitude, "-")}
     write_histories(folder / "histories.h5", curves)
@@ -188,11 +196,50 @@ def study(folder: Path, progress: Progress) -> list[Row]:
     return rows
 
 
+def _rows(name: str, case: Case, wavelength: float, waves: list[Measured]) -> list[Row]:
+    """Rows of one comparison: with agitation the wave must not grow; coarse cells must damp it as expected."""
+    growth, speed, temperature = (
+        float(np.mean([getattr(each, part) for each in waves])) for part in ("growth", "speed", "granular_temperature")
+    )
+    spread = float(np.std([each.growth for each in waves], ddof=1) / math.sqrt(len(waves)))
+    note = f"mean of {len(waves)} seeds, standard error {spread:.2g}"
+    bed = theory(case)
+    expected, cell = bed.wave(wavelength), case.column.cell
+    assert isinstance(cell, float)
+    if case.agitation != "none":
+        agitated = with_agitation(bed, case)
+        estimate = agitated.granular_temperature
+        return [
+            Row(f"growth above zero, {name}", max(growth, 0.0), 0.0, 2.0 * spread, "1/s", note),
+            Row(f"growth, {name}", growth, agitated.wave(wavelength).growth, None, "1/s", "theory with agitation"),
+            Row(f"granular temperature, {name}", temperature, estimate, None, "m2/s2", "estimate"),
+        ]
+    if cell > FINE:
+        damped = expected.growth - grid_damping(expected.speed, wavelength, cell)
+        return [Row(f"growth, {name}", growth, damped, 0.1 * expected.growth, "1/s", note)]
+    return [
+        Row(f"growth, {name}", growth, expected.growth, 0.1 * expected.growth, "1/s", note),
+        Row(f"speed, {name}", speed, expected.speed, None, "m/s"),
+    ]
+
+
 def draw(path: Path, curves: Mapping[str, Any]) -> None:
-    """Amplitude of every wave against time."""
-    figure, axes = panels()
-    for shade, (name, columns) in zip(shades(len(curves)), curves.items()):
-        axes.semilogy(columns["time"][0], columns["amplitude"][0], color=shade, label=name)
-    label(axes, "time", "s", "amplitude over mean solid fraction", "-")
-    legend(axes)
+    """Amplitude of every wave against time; one panel for each wavelength, one colour for each case."""
+    lengths = sorted({wavelength for wavelength, _, _, _ in CASES})
+    figure, both = panels(len(lengths), width=10.0, height=4.2, sharey=True)
+    for wavelength, axes in zip(lengths, both):
+        beginning = f"wave of {1e3 * wavelength:.0f} mm"
+        cases = [text for length, _, text, _ in CASES if length == wavelength]
+        for colour, text in zip((BLUE, GREEN, SKY, ORANGE) if len(cases) > 3 else (BLUE, SKY, ORANGE), cases):
+            for seed in SEEDS:
+                columns = curves[f"{beginning}{text}, seed {seed}"]
+                named = text.removeprefix(", ") or "fine cells, no agitation"
+                axes.semilogy(
+                    columns["time"][0], columns["amplitude"][0], color=colour, label=named if seed == SEEDS[0] else None
+                )
+        label(axes, "time", "s", "amplitude over mean solid fraction", "-", beginning)
+        axes.set_yticks((0.02, 0.05, 0.1), ("0.02", "0.05", "0.1"))
+        axes.minorticks_off()
+        legend(axes)
+    both[-1].set_ylabel("")
     save(figure, path)

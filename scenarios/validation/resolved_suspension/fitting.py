@@ -17,7 +17,7 @@ measured force: F'' = F' + b v'.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -128,3 +128,67 @@ def fit_row(
     along, across = seen_fluctuation(row["solid_fraction"], row["reynolds"])
     variances = [along if way == "along" else across for way in ways]
     return fit(lags, covariances, variances, row["window"], 1.0, row["inertia"] if inertial else 0.0, smoothing)
+
+
+class Shares(NamedTuple):
+    """Free numbers of pseudo-turbulence, common to all runs."""
+
+    along: float  # a_d along the mean slip
+    across: float  # a_d across it
+    inertia: float  # a_i
+    time: float  # tau over d/w
+
+
+class Levels(NamedTuple):
+    """Numbers of the law of free spheres, common to all runs."""
+
+    along: float  # variance over w^2, along the mean slip
+    across: float  # across it
+    time: float  # tau over d/w
+
+
+def fit_shares(rows: Sequence[dict[str, Any]]) -> Shares:
+    """Fit one set of a_d, a_i and tau to several runs at once."""
+
+    def model(numbers: np.ndarray, row: dict[str, Any], along: bool) -> np.ndarray:
+        shares = Shares(*np.exp(numbers))
+        variance = seen_fluctuation(row["solid_fraction"], row["reynolds"])[0 if along else 1]
+        drag = shares.along if along else shares.across
+        return variance * _of(row, drag, shares.inertia * row["inertia"], shares.time)
+
+    starts = (np.log([0.5, 0.5, inertia, 1.0]) for inertia in (0.03, 0.3))
+    return Shares(*(float(each) for each in np.exp(_fit_all(rows, model, starts))))
+
+
+def fit_levels(rows: Sequence[dict[str, Any]]) -> Levels:
+    """Fit the law of free spheres to several runs at once."""
+
+    def model(numbers: np.ndarray, row: dict[str, Any], along: bool) -> np.ndarray:
+        levels = Levels(*np.exp(numbers))
+        return (levels.along if along else levels.across) * _of(row, 1.0, 0.0, levels.time)
+
+    return Levels(*(float(each) for each in np.exp(_fit_all(rows, model, [np.log([0.1, 0.1, 1.0])]))))
+
+
+def _of(row: dict[str, Any], drag: float, inertia: float, time: float) -> np.ndarray:
+    """Autocovariance for a seen velocity of unit variance, at the lags and with the window of a run."""
+    return autocovariance(np.array(row["lag"])[: len(row["seen_covariance_along"])], row["window"], drag, inertia, time)
+
+
+def _fit_all(
+    rows: Sequence[dict[str, Any]],
+    model: Callable[[np.ndarray, dict[str, Any], bool], np.ndarray],
+    starts: Iterable[np.ndarray],
+) -> np.ndarray:
+    """Numbers of a model for the autocovariances of all runs, each of which counts equally, over its variance."""
+
+    def missed(numbers: np.ndarray) -> np.ndarray:
+        parts = []
+        for row in rows:
+            for way in ("along", "across"):
+                measured = np.array(row[f"seen_covariance_{way}"])
+                parts.append((model(numbers, row, way == "along") - measured) / measured[0])
+        return np.concatenate(parts)
+
+    found = min((least_squares(missed, start) for start in starts), key=lambda each: float(each.cost))
+    return np.asarray(found.x)

@@ -19,6 +19,10 @@ ALONG = 2
 LAGS = 65
 """Samples of the autocorrelation, four times d/w at sixteen samples each."""
 
+DEVELOPED, EVEN, SMOOTHED = 5.0, 0.25, 2.0
+"""A suspension is developed after this time [d/w], and even while its wave of one box length along gravity, in running
+means over the last time [d/w], stays below the given part of the solid fraction."""
+
 
 @dataclass
 class Series:
@@ -59,22 +63,38 @@ class Series:
         return cls(int(arrays["every"]), *(list(arrays[each]) for each in list(vars(cls()))[1:]))
 
 
-def measure(point: Point, series: Series, settle: float) -> dict[str, Any]:
+def even_window(point: Point, series: Series) -> tuple[float, float]:
+    """Times between which the suspension is developed and even [d/w, by the slip aimed at]."""
+    step = series.every * point.slip / point.diameter
+    phase = 2.0 * math.pi / point.cells * np.array(series.position)[:, :, ALONG]
+    amplitude = 2.0 * np.abs(np.exp(1j * phase).mean(axis=1))
+    start, window = round(DEVELOPED / step), round(SMOOTHED / step)
+    waves = averaged(amplitude[start:], window) > EVEN
+    end = start + window // 2 + int(np.argmax(waves)) if waves.any() else len(amplitude)
+    return start * step, end * step
+
+
+def measure(
+    point: Point, series: Series, settle: float, until: float = math.inf, *, weight: float | None = None
+) -> dict[str, Any]:
     """The row of a point: means and standard errors of everything that is measured.
 
     Speeds are over the mean slip w, times over d/w, forces over the mean drag. Drag is the force of the fluid without
     that of the mean pressure gradient.
 
     settle  time that is dropped [d/w, by the slip aimed at]
+    until   end of what is measured [d/w, by the slip aimed at]
+    weight  buoyant weight of a sphere; that of the point by default
     """
-    start = round(settle * point.diameter / point.slip / series.every)
-    arrays = {name: values[start:] for name, values in series.arrays().items() if name != "every"}
+    sampled = series.every * point.slip / point.diameter
+    start, end = round(settle / sampled), round(min(until / sampled, len(series.slip)))
+    arrays = {name: values[start:end] for name, values in series.arrays().items() if name != "every"}
     slip = arrays["slip"][:, ALONG]
     w = float(slip.mean())
     step = series.every * w / point.diameter  # between samples [d/w]
     block, quarter = max(round(3.0 / step), 1), max(round(0.25 / step), 1)
     solid = point.count * sphere_volume(point.diameter) / point.cells**3
-    pressure = point.count * point.weight / point.cells**3 * sphere_volume(point.diameter)
+    pressure = solid * (point.weight if weight is None else weight)
     drag = float(arrays["force"][:, :, ALONG].mean()) - pressure
     velocity, force = (_deviation(arrays[name]) / scale for name, scale in (("velocity", w), ("force", drag)))
     phase = 2.0 * math.pi / point.cells * arrays["position"]

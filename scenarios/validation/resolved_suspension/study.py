@@ -22,8 +22,7 @@ def study(folder: Path, progress: Progress) -> list[Row]:
     rows = verified(folder, progress)
     kept = {matrix.name(matrix.Point(**row["point"])): row for row in stored()}
     found = [kept.get(matrix.name(point)) or matrix.run(point, folder / "matrix", progress) for point in matrix.runs()]
-    with replacing(folder / "measured.json") as fresh:
-        fresh.write_text(json.dumps(found, indent=1) + "\n")
+    matrix.write_table(found, folder / "table.json", matrix.MADE)
     progress("pictures")
     pictures.correlations(found, folder / "force_correlation.png")
     return rows + [row for each in found for row in measured(each)]

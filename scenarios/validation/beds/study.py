@@ -32,8 +32,8 @@ from scenarios.beds.sedimentation.study import (
 from scenarios.beds.segregation.study import VELOCITIES, balance, figure, mixture, separation, thresholds
 from scenarios.beds.spouted_bed.study import BED_HEIGHT, SPOUTED, profiles
 from scenarios.beds.spouted_bed.study import bed as spout
+from scenarios.validation.beds.refinement import refined
 from scenarios.validation.kept_runs import finished
-from scenarios.validation.refinement import refined
 from scenarios.validation.table import Progress, Row
 
 MUELLER_HEIGHT, PROBE = 0.05, 0.045

@@ -23,6 +23,7 @@ def cartesian(
     stokes: float,
     theta12: float,
     theta23: float = 0.0,
+    *,
     film_ratio: float = 0.01,
     minimum_gap: float = 0.05,
     capillary_number: float = math.inf,

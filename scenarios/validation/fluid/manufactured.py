@@ -1,4 +1,4 @@
-"""A manufactured solution of the averaged equations: a moving voidage, drag, both models."""
+"""A manufactured solution of the averaged equations with a moving voidage and drag, for both models."""
 
 # mypy: disable-error-code="no-untyped-def"
 from __future__ import annotations
@@ -7,7 +7,7 @@ import numpy as np
 
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
-from scenarios.validation.fluid_checks import ALL_PERIODIC, rms
+from scenarios.validation.fluid.flows import ALL_PERIODIC, rms
 
 
 class Manufactured:
@@ -81,7 +81,7 @@ class Manufactured:
 
 
 def error(n: int, steps: int, until: float = 0.4, model: str = "A") -> tuple[float, float, np.ndarray]:
-    """Run it on n by n cells in so many steps, unlimited scheme.
+    """Run the solver on n by n cells for a number of steps, without the limiter.
 
     returns  error of the velocity in L2, of the pressure, and the velocity along x on its faces
     """

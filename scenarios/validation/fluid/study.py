@@ -1,4 +1,4 @@
-"""The fluid alone: flows with a known solution, a manufactured one with particles, fixed beds, rest.
+"""The fluid alone: flows with a known solution, a manufactured solution with particles, fixed beds, water at rest.
 
 References: Taylor and Green's vortices, Hagen and Poiseuille, the series of a square duct, the cavity of
 Ghia, Ghia & Shin (1982) and of Botella & Peyret (1998), Ergun (1952).
@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation.fluid_checks import (
+from scenarios.validation.fluid.flows import (
     cavity,
     duct,
     fixed_bed,
@@ -22,11 +22,11 @@ from scenarios.validation.fluid_checks import (
     taylor_green,
     water_at_rest,
 )
-from scenarios.validation.fluid_manufactured import error
+from scenarios.validation.fluid.manufactured import error
 from scenarios.validation.table import Curves, Progress, Row, in_parts, worst
 
 CAVITIES = ((100, 10.0), (400, 35.0), (1000, 50.0))
-"""Reynolds numbers, and times at which the flow stands [s]."""
+"""Reynolds numbers, and times at which the flow is steady [s]."""
 
 
 def study(folder: Path, progress: Progress) -> list[Row]:
@@ -44,7 +44,7 @@ def orders(curves: Curves) -> list[Row]:
         ("manufactured, model B", [error(n, n // 2, model="B")[:2] for n in cells]),
     ):
         for what, found in zip(("velocity", "pressure"), zip(*errors)):
-            # an order above 2 is no fault: the limit is that of falling short of it
+            # an order above 2 passes, too
             rows.append(Row(f"{name}: order in L2, {what}", min(min(order(found)), 2.0), 2.0, 0.1))
             curves[f"order/{name}/{what}"] = {"cells": (np.array(cells), "-"), "error": (np.array(found), "-")}
     limited = order([taylor_green(n, n // 4, "limited")[0] for n in cells])

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from cfddem.particles.interactions.hertz import HERTZ
+from cfddem.particles.interactions.contact_law import register
+from cfddem.particles.interactions.contacts.hertz import HERTZ
 from closures.cohesion import jkr_contact_radius, jkr_force, jkr_pull_off, jkr_stretch
 
-LEAST = 1e-300
+LEAST = 1e-100
+"""Least work of adhesion [J/m2] and overlap [m]: zero would be divided by, and smaller values vanish when squared."""
 
 
 def contact_radius(gap: float, work_of_adhesion: float, reduced_radius: float, contact_modulus: float) -> float:
@@ -16,7 +18,18 @@ def contact_radius(gap: float, work_of_adhesion: float, reduced_radius: float, c
 
 
 def force(contact_radius: float, work_of_adhesion: float, reduced_radius: float, contact_modulus: float) -> float:
-    """Normal force; negative where adhesion pulls [N]."""
+    r"""Adhesive contact of two elastic spheres without a film, with Mindlin's spring and Tsuji's dashpot.
+
+    .. math:: F = \frac{4 E^* a^3}{3 R^*} - \sqrt{8\pi w E^* a^3}
+
+    contact_radius    a, of the overlap [m]
+    work_of_adhesion  w, twice the surface energy of two like solids [J/m2]
+    reduced_radius    R* [m]
+    contact_modulus   E* [Pa]
+    returns           F, negative where adhesion pulls [N]
+
+    Range: dry solids. A contact that has formed lasts until the solids are a small gap apart.
+    """
     return jkr_force(contact_radius, max(work_of_adhesion, LEAST), reduced_radius, contact_modulus)
 
 
@@ -38,6 +51,7 @@ def reach(work_of_adhesion: float, reduced_radius: float, contact_modulus: float
 JKR = replace(
     HERTZ,
     name="jkr",
+    reference="Johnson, Kendall and Roberts, Proc. R. Soc. A 324 (1971) 301",
     derived={**HERTZ.derived, "contact_radius": contact_radius},
     force=force,
     overlap=overlap,
@@ -45,3 +59,4 @@ JKR = replace(
     reach=reach,
     energy=None,
 )
+register(JKR)

@@ -1,7 +1,7 @@
 """The particle engine: MFIX' cases of one sphere, oblique impacts, a bed at rest, slopes, a hopper, many films.
 
 One sphere: MFIX DEM01, DEM02 and DEM04 (Garg et al. 2012) against their exact solutions; Kharaz, Gorham & Salman
-(2001) against what they measured. A bed must come to rest and press on its floor with its weight; a slope must
+(2001) against their measurements. A bed must come to rest and press on its floor with its weight; a slope must
 keep its angle under water; a hopper follows Beverloo et al. (1961); films never raise kinetic energy. The
 poured beds have rolling friction, because without it particles would roll indefinitely.
 """
@@ -15,11 +15,11 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation import particles_checks as checks
+from scenarios.validation.particles import granular_beds, single_sphere, suspensions
 from scenarios.validation.table import Curves, Progress, Row, in_parts, reference, worst
 
 ANGLE = 9.0
-"""Impacts of Kharaz et al. are judged from this angle on; e_t below it divides two small numbers [deg]."""
+"""Impacts of Kharaz et al. have a limit at this angle and above; below it e_t divides two small numbers [deg]."""
 
 
 def study(folder: Path, progress: Progress) -> list[Row]:
@@ -29,20 +29,20 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 def falling(curves: Curves) -> list[Row]:
     """DEM01 and DEM02: a sphere falls on a spring."""
-    fall = checks.DROP_HEIGHT - checks.BALL_RADIUS
+    fall = single_sphere.DROP_HEIGHT - single_sphere.BALL_RADIUS
     points = []
     for stiffness in (1e4, 2.5e4, 5e4, 1e5):
         for restitution in (0.6, 0.8, 1.0):
-            time, height = checks.drop(stiffness, restitution, 0.6)
-            exact = checks.drop_exactly(stiffness, restitution, time)
+            time, height = single_sphere.drop(stiffness, restitution, 0.6)
+            exact = single_sphere.drop_exactly(stiffness, restitution, time)
             points.append((stiffness, float(np.abs(height - exact).max()) / fall, 0.0))
     apexes = []
     for restitution, until in ((0.6, 0.93), (0.9, 1.8)):
-        time, height = checks.drop(5e6, restitution, until, samples=2000)
+        time, height = single_sphere.drop(5e6, restitution, until, samples=2000)
         curves[f"dem02/restitution_{restitution}"] = {"time": (time, "s"), "height": (height, "m")}
         top = (height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])
         for bounce, apex in enumerate(height[1:-1][top][:3], 1):
-            hard = checks.BALL_RADIUS + fall * restitution ** (2 * bounce)
+            hard = single_sphere.BALL_RADIUS + fall * restitution ** (2 * bounce)
             apexes.append((restitution, apex / hard, 1.0))
     return [
         worst("DEM01: error of the path over the fall", points, 1e-3),
@@ -52,7 +52,9 @@ def falling(curves: Curves) -> list[Row]:
 
 def rolling(curves: Curves) -> list[Row]:
     """DEM04: a sliding sphere begins to roll."""
-    runs = {(mu, linear): checks.slide(mu, linear) for mu in (0.2, 0.4, 0.6, 0.8, 1.0) for linear in (False, True)}
+    runs = {
+        (mu, linear): single_sphere.slide(mu, linear) for mu in (0.2, 0.4, 0.6, 0.8, 1.0) for linear in (False, True)
+    }
     ends = [(mu, run["time"], 2.0 / 7.0) for (mu, _), run in runs.items()]
 
     def kept(when: str) -> list[tuple[float, float, float]]:
@@ -74,7 +76,9 @@ def oblique(curves: Curves) -> list[Row]:
     limits = {"e_t": 0.05, "com_rebound_angle [deg]": 0.05, "omega_out [rad/s]": 0.08}
     for observable, span in spans.items():
         points = [
-            (angle, checks.strike(angle)[observable], value) for name, angle, value in measured if name == observable
+            (angle, single_sphere.strike(angle)[observable], value)
+            for name, angle, value in measured
+            if name == observable
         ]
         angle, ours, theirs = np.array(sorted(points)).T
         name, _, unit = observable.partition(" [")
@@ -94,7 +98,7 @@ def resting(curves: Curves) -> list[Row]:
     for count, width in ((400, 8e-3), (2000, 12e-3)):
         name = f"bed of {count}"
         try:
-            bed = checks.rest(count, width, 0.05)
+            bed = granular_beds.rest(count, width, 0.05)
         except RunFailed as failure:
             rows.append(Row(f"{name}: kinetic over poured energy", np.nan, 0.0, 1e-7, note=str(failure)))
             continue
@@ -116,10 +120,10 @@ def slopes(curves: Curves) -> list[Row]:
     for friction in (0.2, 0.5):
         angles = {}
         for name, film, onset in (("dry", False, "film"), ("wet", True, "film"), ("wet_overlap", True, "overlap")):
-            angles[name], tilt, speed = checks.slope(friction, film, onset)
+            angles[name], tilt, speed = granular_beds.slope(friction, film, onset)
             curves[f"slope/friction_{friction}_{name}"] = {"angle": (tilt, "deg"), "speed": (speed, "m/s")}
         rows.append(Row(f"slope, mu {friction}: under water against dry", angles["wet"], angles["dry"], 2.0, "deg"))
-        rolls, _, _ = checks.slope(friction, False, rolling_friction=0.3)
+        rolls, _, _ = granular_beds.slope(friction, False, rolling_friction=0.3)
         rows.append(Row(f"slope, mu {friction}: with rolling friction of 0.3", rolls, angles["dry"], unit="deg"))
         rows.append(
             Row(f"slope, mu {friction}: friction at overlap only", angles["wet_overlap"], angles["dry"], unit="deg")
@@ -129,17 +133,17 @@ def slopes(curves: Curves) -> list[Row]:
 
 def hopper(curves: Curves) -> list[Row]:
     """Discharge of a hopper."""
-    flow, beverloo = checks.hopper(5000, 8.0, 0.4)
+    flow, beverloo = granular_beds.hopper(5000, 8.0, 0.4)
     return [Row("hopper, hole of 8 d: discharge over Beverloo", flow / beverloo, 1.0, 0.15)]
 
 
 def films(curves: Curves) -> list[Row]:
     """Many films at once."""
-    alone = {step: checks.films_alone(0.5, 60, step, count=400) for step in (5e-9, 1e-7, 5e-7, 5e-6)}
+    alone = {step: suspensions.films_alone(0.5, 60, step, count=400) for step in (5e-9, 1e-7, 5e-7, 5e-6)}
     gains = [
         (step, max(0.0, float(np.max(run.energy[1:] / run.energy[:-1])) - 1.0), 0.0) for step, run in alone.items()
     ]
-    crowd, under_lid = checks.shear(0.5, 10_000), checks.shear(0.6, 20_000, press=20.0)
+    crowd, under_lid = suspensions.shear(0.5, 10_000), suspensions.shear(0.6, 20_000, press=20.0)
     curves["shear"] = {"energy": (crowd.energy, "J")}
     return [
         worst("films alone: rise of kinetic energy, to 20 film times", [p for p in gains if p[0] < 2e-7], 0.0),

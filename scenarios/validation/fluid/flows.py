@@ -1,4 +1,4 @@
-"""Flows with a known solution, each a function that runs the fluid and says how far off it is."""
+"""Flows with a known solution: each function runs the solver and returns its error or its result."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def cavity(reynolds: int, n: int, until: float) -> dict[str, Array]:
 
 
 def sound(line: str, reynolds: int) -> Array:
-    """Which entries of Ghia's tables are not wrong themselves.
+    """Which entries of Ghia's tables are free of errors.
 
     Left out: v = -0.23827 at x = 0.9063 for Re 400, which breaks the curve through its neighbours (-0.22847 at
     0.9453, -0.44993 at 0.8594), and the four entries of v at 0.945 <= x <= 0.969 for Re 1000, which are 1.4 to 1.9 %

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
-from cfddem.particles.interactions.contact_law import ContactLaw
+from cfddem.particles.interactions.contact_law import ContactLaw, register
 from cfddem.particles.step_limits import hertz_steps
 from closures.contact import hertz_damping, hertz_force, hertz_stiffness, mindlin_stiffness, spring_energy
 from closures.timescales import overlap_period
 
 
 def force(overlap: float, stiffness: float) -> float:
-    """Normal force [N]."""
+    r"""Elastic contact of two spheres, with Mindlin's tangential spring and Tsuji's dashpot.
+
+    .. math:: F = \tfrac43 E^*\sqrt{R^*}\,\delta^{3/2}
+
+    overlap    delta [m]
+    stiffness  4/3 E* sqrt(R*), from the moduli of the two materials [N/m^1.5]
+    returns    F [N]
+
+    Range: overlaps small against the radius.
+    """
     return hertz_force(stiffness, overlap)
 
 
@@ -41,12 +49,11 @@ def energy(overlap: float, minimum_gap: float, stiffness: float) -> float:
     return spring_energy(stiffness, 1.5, overlap, minimum_gap)
 
 
-def impact(reduced_mass: float, reduced_radius: float, row: Any, speed: float) -> tuple[float, float]:
+def impact(reduced_mass: float, reduced_radius: float, contact_modulus: float, speed: float) -> tuple[float, float]:
     """Default step and stability limit of an impact [s]."""
-    modulus = float(row["contact_modulus"])
-    if not (speed > 0.0 and modulus > 0.0):
+    if not (speed > 0.0 and contact_modulus > 0.0):
         return math.inf, math.inf
-    return hertz_steps(reduced_mass, reduced_radius, modulus, speed)
+    return hertz_steps(reduced_mass, reduced_radius, contact_modulus, speed)
 
 
 def hertz_constant(contact_modulus: float, reduced_radius: float) -> float:
@@ -56,6 +63,7 @@ def hertz_constant(contact_modulus: float, reduced_radius: float) -> float:
 
 HERTZ = ContactLaw(
     name="hertz",
+    reference="Hertz (1882); Mindlin and Deresiewicz (1953); Tsuji et al. (1992)",
     derived={"stiffness": hertz_constant},
     force=force,
     damping=damping,
@@ -66,3 +74,4 @@ HERTZ = ContactLaw(
     impact=impact,
     damping_mean=0.8,  # the damping grows as the fourth root of the overlap
 )
+register(HERTZ)

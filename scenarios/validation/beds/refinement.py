@@ -1,7 +1,7 @@
 """Numerical convergence of beds: the same bed with finer cells, a shorter step, and stiffer contacts.
 
-The width of the kernel that spreads particles over cells is kept; so is everything that is physics. Stiffer
-contacts are run with the shorter step, and compared with it.
+The width of the filter kernel and all physical parameters are kept. Runs with stiffer contacts use the shorter step and
+are compared with the run that only has the shorter step.
 """
 
 from __future__ import annotations

@@ -1,0 +1,102 @@
+r"""Waves of the solid fraction in a bed: its map over height and time, and wavelength, speed and growth from the map.
+
+Waves in liquid beds are horizontal layers of higher solid fraction that move upward. A wave is described by the Fourier
+component of the map along the height,
+
+.. math:: A_k(t) = \frac{2}{\sum w}\sum_z w(z)\,\bigl[\phi(z,t) - \bar\phi(z)\bigr]\,e^{-ikz}
+
+with a Hann window w. The wave number with the largest mean square is that of the wave.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cfddem.analysis.measures import layer_solid_fraction
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.io.reading import Run
+
+Array = NDArray[np.float64]
+
+LAYER = 2.5
+"""Thickness of a layer of the map over the mean diameter [-]."""
+
+FEWEST_LAYERS, FEWEST_TIMES = 4, 8
+"""Layers and times that a wave needs."""
+
+
+class LayerMap(NamedTuple):
+    """Solid fraction of horizontal layers over time."""
+
+    time: Array  # (T,) [s]
+    height: Array  # (L,) of the layer centres [m]
+    solid_fraction: Array  # (T, L) [-]
+
+
+class Waves(NamedTuple):
+    """Waves in a map."""
+
+    wavelength: float  # [m]
+    speed: float  # upward [m/s]
+    amplitude: float  # root mean square over time, of the solid fraction [-]
+    growth: float  # of the amplitude in time [1/s]
+    deviation: float  # standard deviation in time of the solid fraction of a layer, mean over the layers [-]
+
+
+def layer_map(run: Run, case: Case, layer: float | None = None) -> LayerMap:
+    """Map of a run, from the positions of the particles in all snapshots.
+
+    layer  thickness of the layers [m]; 2.5 mean diameters if not given
+    """
+    height = case.column.height
+    count = max(1, round(height / (layer or LAYER * case.bed.diameter)))
+    edges = np.linspace(0.0, height, count + 1)
+    rows = []
+    for place in range(len(run.times)):
+        particles = run.particles(place)
+        rows.append(layer_solid_fraction(particles["position"], particles["radius"], edges, case.column.floor_area))
+    return LayerMap(run.times, 0.5 * (edges[1:] + edges[:-1]), np.array(rows))
+
+
+def waves(found: LayerMap, low: float, high: float, begin: float = -math.inf) -> Waves:
+    """Wavelength, speed, amplitude and growth of the strongest wave in part of a map.
+
+    found      evenly spaced in time
+    low, high  heights between which waves are sought, inside the bed [m]
+    begin      first time [s]
+    returns    Waves; NaN where the map is too short or too flat to tell
+
+    The speed follows from the phase between neighbouring times. It is ambiguous, and too small, if a wave moves by more
+    than half of its length between two times. Waves longer than the part of the bed are not seen.
+    """
+    if not low < high:
+        raise InputError("low", low, f"below high, {high:g} m")
+    inside, late = (found.height >= low) & (found.height <= high), found.time >= begin
+    height, time, field = found.height[inside], found.time[late], found.solid_fraction[np.ix_(late, inside)]
+    nan = math.nan
+    if len(height) < FEWEST_LAYERS or len(time) < FEWEST_TIMES:
+        return Waves(nan, nan, nan, nan, nan)
+    field = field - field.mean(axis=0)
+    deviation = float(field.std(axis=0).mean())
+    thickness = height[1] - height[0]
+    extent = len(height) * thickness
+    window = np.sin(math.pi * (np.arange(len(height)) + 0.5) / len(height)) ** 2
+    numbers = np.linspace(2.0 * math.pi / extent, math.pi / thickness, 8 * len(height))
+    parts = 2.0 / window.sum() * (field * window) @ np.exp(-1j * np.outer(height, numbers))  # (T, K)
+    best = int(np.argmax((np.abs(parts) ** 2).mean(axis=0)))
+    wave, number = parts[:, best], float(numbers[best])
+    if not np.abs(wave).any():
+        return Waves(nan, nan, 0.0, nan, deviation)
+    turned = float(np.angle((wave[1:] * np.conj(wave[:-1])).sum()))
+    return Waves(
+        wavelength=2.0 * math.pi / number,
+        speed=-turned / (number * float(np.diff(time).mean())),
+        amplitude=float(np.sqrt((np.abs(wave) ** 2).mean())),
+        growth=float(np.polyfit(time, np.log(np.maximum(np.abs(wave), 1e-300)), 1)[0]),
+        deviation=deviation,
+    )

@@ -1,0 +1,136 @@
+"""The neighbour lists of a run, one after the other: sorting of rows, width of the skin, memory of pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.communicator import Communicator
+from cfddem.backend.errors import InputError
+from cfddem.data.fields import Field
+from cfddem.particles.ghosts import Divided, Slabs, Whole
+from cfddem.particles.neighbours import list_edges, locality_order, pair_reach, wrap
+from cfddem.particles.pair_graph import Edges
+from cfddem.particles.skin import FIRST_SKIN, tuned
+from cfddem.particles.state import Particles
+from cfddem.particles.walls.nearest_point import Walls
+
+THREADING_PAYS = 1000
+"""Number of particles from which loops run on all threads."""
+
+
+class NeighbourLists:
+    """Makes the neighbour lists of a run.
+
+    pair_fields   what each pair remembers
+    table         pair table
+    box           (3,) length of the periodic box; infinite along open axes [m]
+    communicator  of the run
+    division      of space among the ranks; None in one process
+    skin          of all lists; tuned during the run if None [m]
+    sort_every    sort the particles by position at every this many lists, if they are many
+
+    made       number of lists since the first
+    listed_at  step of the run at which the last list was made
+    many       there are so many particles that loops run on all threads
+    """
+
+    def __init__(
+        self,
+        pair_fields: Sequence[Field],
+        table: np.ndarray,
+        box: np.ndarray,
+        *,
+        communicator: Communicator,
+        division: Slabs | None,
+        skin: float | None,
+        sort_every: int,
+    ) -> None:
+        self.pair_fields, self.table, self.box, self.communicator = pair_fields, table, box, communicator
+        if communicator.size > 1 and division is None:
+            raise InputError("division", None, "given in a run of several processes")
+        self.ghosts = Whole() if division is None else Divided(division, communicator)
+        self.skin, self.sort_every, self._is_tuned = skin or 0.0, sort_every, skin is None
+        self.made, self.listed_at, self.many = -1, 0, False
+        self._mean_radius = 0.0
+
+    def own(self, particles: Particles) -> Particles:
+        """Those of the particles that belong to this rank."""
+        wrap(particles.position, self.box)
+        return self.ghosts.own(particles)
+
+    def count(self, particles: Particles) -> None:
+        """Take note of how many and how large the particles of all ranks are; called where particles come or go."""
+        radius = particles.radius[: particles.owned]
+        # rounded, so that the skin does not depend on the order of the sum
+        self._mean_radius = float(f"{self.communicator.mean(radius):.6g}")
+        self.many = self.communicator.sum(len(radius)) >= THREADING_PAYS
+
+    def first(
+        self, particles: Particles, walls: Walls, reach_ratio: float, old_row: np.ndarray, old: Edges | None
+    ) -> Edges:
+        """The first list of a run; arguments as of `renewed`."""
+        self.count(particles)
+        if self._is_tuned:
+            self.skin = FIRST_SKIN[self.many] * self._mean_radius
+        return self.renewed(particles, walls, reach_ratio, old_row, old, steps=0)
+
+    def renewed(
+        self,
+        particles: Particles,
+        walls: Walls,
+        reach_ratio: float,
+        old_row: np.ndarray,
+        old: Edges | None,
+        *,
+        steps: int | None = None,
+    ) -> Edges:
+        """A new list. Particles change ranks, are sorted from time to time, and get new ghosts.
+
+        particles    of this rank, without ghosts
+        reach_ratio  reach of films and bridges over the reduced radius [-]
+        old_row      (N,) int32, row of each particle in the old list; -1 for new particles
+        old          the list whose memory is carried over, None if there is none
+        steps        made by the run so far; None for a list out of turn: nothing is sorted, the skin stays
+        """
+        wrap(particles.position, self.box)
+        old_row = self.ghosts.migrate(particles, old_row, old)
+        largest = self.communicator.largest(particles.radius, default=0.0)
+        if steps is not None:
+            old_row = old_row[self._sort(particles)]
+            age, self.listed_at = steps - self.listed_at, steps
+            if self._is_tuned and age > 0:
+                room = 0.5 * min(self.box) - (2.0 + 0.5 * reach_ratio) * largest
+                self.skin = tuned(self.skin, age, self._mean_radius, self.many, room)
+        reach = pair_reach(largest, reach_ratio, self.skin)
+        old_row = np.append(old_row, self.ghosts.renew(particles, reach, self.box))
+        roughness = float(self.table["roughness_gap"].max())  # local: every rank has the table
+        fresh = list_edges(
+            particles, walls, reach_ratio, self.skin, self.box, self.pair_fields, roughness, self.communicator
+        )
+        if old is not None:
+            fresh.remember(old, old_row)
+        self.ghosts.recall(fresh, particles.id)
+        return fresh
+
+    def _sort(self, particles: Particles) -> np.ndarray:
+        """Sort the particles from time to time, so that near particles have near rows; returns the old rows."""
+        self.made += 1
+        if not self.many or self.made % self.sort_every or not particles.count:
+            return np.arange(particles.count, dtype=np.int32)
+        order = locality_order(particles.position, 2.0 * self._mean_radius)
+        particles.reorder(order)
+        return order
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next list depends on."""
+        return {"skin": self.skin, "lists": self.made, "listed_at": self.listed_at, "ghosts": self.ghosts.checkpoint()}
+
+    def restore(self, particles: Particles, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`, with the particles of that time."""
+        self.skin, self.made = float(state["skin"]), int(state["lists"])
+        self.listed_at = int(state["listed_at"])
+        self.ghosts.restore(particles, state.get("ghosts", {}))  # a file keeps no empty group
+        self.count(particles)

@@ -1,0 +1,88 @@
+"""Measures of liquid beds: random motion by direction, waves, and pressure of the contacts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cfddem.analysis import measures
+from cfddem.analysis.waves import FEWEST_LAYERS, LAYER
+from cfddem.case.column_grid import grid_of
+from cfddem.case.schema import Case
+from cfddem.run.simulation import Simulation
+
+BED = (0.2, 0.8)
+"""Part of the bed height, away from floor and surface, over which the bed is measured."""
+
+
+def granular_temperature_along(simulation: Simulation) -> float:
+    """Mean square of the velocity fluctuations along z."""
+    return float(measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).components[2])
+
+
+def granular_temperature_across(simulation: Simulation) -> float:
+    """Mean square of the velocity fluctuations along x or y, mean of the two."""
+    components = measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).components
+    return float(0.5 * (components[0] + components[1]))
+
+
+def layer_deviation(simulation: Simulation) -> float:
+    """Standard deviation of the solid fraction of layers of 2.5 diameters within the bed."""
+    case = simulation.case
+    low, high = (share * _bed_height(simulation) for share in BED)
+    count = int((high - low) / (LAYER * case.bed.diameter))
+    if count < FEWEST_LAYERS:
+        return math.nan
+    edges = np.linspace(low, high, count + 1)
+    layers = measures.layer_solid_fraction(
+        simulation.whole("position"), simulation.whole("radius"), edges, open_area(case)
+    )
+    return float(layers.std())  # local: a layer of the whole column
+
+
+def collisional_pressure(simulation: Simulation) -> float:
+    """Pressure of the contacts within the bed: a third of the sum of force times separation, over the volume."""
+    solver, positions = simulation.particle_solver, simulation.particles.position
+    edges, pairs = solver.edges, slice(0, solver.edges.between_particles)
+    touching = np.flatnonzero((edges.force[pairs] != 0.0).any(axis=1))  # local: components of a row
+    apart = positions[edges.first[touching]] - positions[edges.second[touching]]
+    box = np.where(np.isfinite(solver.box), solver.box, 0.0)
+    apart -= box * np.rint(apart / np.maximum(box, np.finfo(float).tiny))
+    volume = open_area(simulation.case) * _bed_height(simulation)
+    return float(simulation.communicator.sum(edges.force[touching] * apart)) / (3.0 * volume)
+
+
+def floor_pressure(simulation: Simulation) -> float:
+    """Normal contact force of the particles on the floor, per floor area; NaN without a floor."""
+    if simulation.case.column.ends == "periodic":
+        return math.nan
+    floor = -simulation.particle_solver.wall_force[0, 2]  # the floor is the first wall
+    return float(simulation.communicator.sum(np.array([floor]))) / open_area(simulation.case)
+
+
+MEASURES = (
+    ("m2/s2", granular_temperature_along),
+    ("m2/s2", granular_temperature_across),
+    ("1", layer_deviation),
+    ("Pa", collisional_pressure),
+    ("Pa", floor_pressure),
+)
+"""Unit and function of each measure."""
+
+
+def open_area(case: Case) -> float:
+    """Floor area of the open cells [m2]."""
+    column = case.column
+    open_part = float(grid_of(column).open.mean())  # local: every rank knows the whole grid
+    return open_part * column.size[0] * column.size[1]
+
+
+def cells_of(simulation: Simulation) -> measures.Cells:
+    """The cell of every particle of all ranks."""
+    grid = grid_of(simulation.case.column)
+    return measures.cells_of(simulation.whole("position"), grid.shape, grid.spacing)
+
+
+def _bed_height(simulation: Simulation) -> float:
+    return measures.bed_height(simulation.whole("position"), simulation.whole("radius"))

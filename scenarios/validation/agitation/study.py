@@ -1,0 +1,126 @@
+"""Agitation: the law of free spheres against the resolved runs it was fitted to, those it was not, and beds.
+
+The fit uses the autocovariance of the force in every other point of the matrix of resolved runs, in the time in which
+the suspension is even. The unresolved model is then run in the same boxes, and in fluidised beds; nothing is fitted to
+a granular temperature or a voidage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.compile import use_threads
+from closures.agitation import SHARES, TIMES, free_spheres
+from scenarios.beds.liquid_bed.study import STUDIES, FluidisedBed, fluidise
+from scenarios.validation.agitation.unresolved import run
+from scenarios.validation.resolved_suspension import matrix
+from scenarios.validation.resolved_suspension.fitting import fit_levels, fit_shares
+from scenarios.validation.resolved_suspension.study import stored
+from scenarios.validation.resolved_suspension.suspension import Point
+from scenarios.validation.table import Progress, Row
+
+LIMIT = 0.3
+"""Largest deviation of the unresolved model from the resolved runs that are not part of the fit."""
+
+COMPARED = {
+    "granular temperature": "temperature_without_waves",
+    "anisotropy": "anisotropy_without_waves",
+    "collision rate": "collision_rate",
+}
+"""What is compared, and its name in a row."""
+
+STILL = {"laws.agitation": "none"}
+
+PUBLISHED = {0.009: 0.635, 0.012: 0.703}
+"""Velocity [m/s] and mean of the published voidages of alginate beads, where the law acts."""
+
+
+def study(folder: Path, progress: Progress) -> list[Row]:
+    """Fit, runs in the boxes of the resolved runs, and beds."""
+    use_threads(1)  # the boxes are small
+    rows = [*fits(), *boxes(progress)]
+    use_threads(None)
+    return rows + list(beds(progress))
+
+
+def even_rows() -> list[dict[str, Any]]:
+    """Measured values of the stored runs, each while its suspension is even."""
+    return [{**row["even"], "point": row["point"]} for row in stored() if row["even"] is not None]
+
+
+def fitted(row: dict[str, Any]) -> bool:
+    """Whether a run belongs to the half of the points that the law is fitted to: every other one of the matrix."""
+    numbers = [matrix.name(point) for point in matrix.POINTS]
+    point = Point(**{**row["point"], "seed": 1})
+    return numbers.index(matrix.name(point)) % 2 == 0
+
+
+def fits() -> Iterator[Row]:
+    """The numbers of the laws, fitted again to the stored runs."""
+    half = [row for row in even_rows() if fitted(row)]
+    levels, shares = fit_levels(half), fit_shares(half)
+    note = f"{len(half)} runs"
+    yield Row("free spheres: variance along", free_spheres(0.3, 40.0, 1.0, 2.5), levels.along, 0.002, "w^2", note)
+    yield Row("free spheres: variance across", free_spheres(0.3, 40.0, 0.0, 2.5), levels.across, 0.002, "w^2", note)
+    yield Row("free spheres: correlation time", TIMES["free_spheres"], levels.time, 0.02, "d/w", note)
+    along, across = SHARES["pseudo_turbulence"]
+    yield Row("pseudo-turbulence: a_d along", along, shares.along, 0.01, "-", note)
+    yield Row("pseudo-turbulence: a_d across", across, shares.across, 0.01, "-", note)
+    yield Row("pseudo-turbulence: a_i", 0.0, shares.inertia, 0.01, "-", note)
+    yield Row("pseudo-turbulence: correlation time", TIMES["pseudo_turbulence"], shares.time, 0.02, "d/w", note)
+
+
+def boxes(progress: Progress) -> Iterator[Row]:
+    """The unresolved model over the resolved runs, mean of the seeds; limits for points that are not fitted."""
+    points: dict[str, list[dict[str, Any]]] = {}
+    for row in even_rows():
+        points.setdefault(matrix.name(Point(**{**row["point"], "seed": 1})), []).append(row)
+    for rows in points.values():
+        point, is_fitted = rows[0]["point"], fitted(rows[0])
+        name = f"density ratio {point['density_ratio']:g}, solid fraction {point['solid_fraction']:g}"
+        progress(name)
+        found = [run(row) for row in rows]
+        for quantity, key in COMPARED.items():
+            model, resolved = (float(np.mean([_value(each[key]) for each in some])) for some in (found, rows))
+            note = f"{model:.3g} for {resolved:.3g}, {len(rows)} seeds" + (", fitted to its force" if is_fitted else "")
+            yield Row(f"{name}: {quantity}", model / resolved, 1.0, None if is_fitted else LIMIT, note=note)
+
+
+def _value(mean: Any) -> float:
+    return float(mean[0] if isinstance(mean, list) else mean)
+
+
+def beds(progress: Progress) -> Iterator[Row]:
+    """Beds of glass within the measured range, of alginate at its edge, of alumina far outside."""
+    glass, alginate, alumina = (STUDIES[name] for name in ("glass", "alginate", "alumina"))
+    for velocity in glass.velocities:
+        name = f"glass at {1e3 * velocity:g} mm/s"
+        progress(name)
+        yield from _expansion(name, fluidise(glass, velocity), 0.02, None)
+        still = fluidise(glass, velocity, **STILL)
+        yield Row(f"{name}, without agitation: voidage", still.voidage, still.balance)
+        yield Row(f"{name}, without agitation: deviation of layers in time", still.layers)
+    for velocity, published in PUBLISHED.items():
+        name = f"alginate at {1e3 * velocity:g} mm/s"
+        progress(name)
+        moved, still = (
+            fluidise(alginate, velocity, **{"laws.agitation": law}).voidage for law in ("free_spheres", "none")
+        )
+        yield Row(f"{name}, without agitation: voidage", still, published, 0.015)
+        yield Row(f"{name}: voidage", moved, published, 0.015)
+        farther = max(abs(moved - published) - abs(still - published), 0.0)
+        yield Row(f"{name}: farther from the published mean than without agitation", farther, 0.0, 0.005)
+    name = "alumina at 157 mm/s, an extrapolation"
+    progress(name)
+    yield from _expansion(name, fluidise(alumina, 0.157033, **{"laws.agitation": "free_spheres"}), 0.02, 0.03)
+
+
+def _expansion(name: str, bed: FluidisedBed, limit: float, layers: float | None) -> Iterator[Row]:
+    """Voidage with its limit, waves with theirs, and what carries the weight."""
+    yield Row(f"{name}: voidage", bed.voidage, bed.balance, limit, note="balance of weight and drag")
+    yield Row(f"{name}: deviation of layers in time", bed.layers, 0.0, layers, note="solid fraction, layers of 2.5 d")
+    yield Row(f"{name}: pressure drop and wall load over weight", bed.carried, 1.0, 0.01)

@@ -1,0 +1,1 @@
+"""Fluidised, packed and settling beds."""

@@ -1,0 +1,1 @@
+"""Fluid alone: flows with a known solution."""

@@ -1,0 +1,1 @@
+"""Particle engine: one sphere, granular beds, dense suspensions."""

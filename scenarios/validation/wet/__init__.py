@@ -1,0 +1,1 @@
+"""Wet collisions of a few spheres."""

@@ -1,0 +1,166 @@
+"""Added mass: the acceleration of a sphere, laws of the voidage, inserted particles, and the energy ledger."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_coupling import stirred, suspension
+
+from cfddem.coupling.forces.added_mass import AddedMass
+from cfddem.coupling.forces.agitation import PseudoTurbulence
+from cfddem.particles.state import make_particles
+from cfddem.run.simulation import Simulation
+from closures.added_mass import zuber
+from closures.registry import law_of
+
+
+@pytest.mark.parametrize(("added_mass", "coefficient"), [(0.0, 0.0), (0.5, 0.5), ("constant", 0.5), ("zuber", 0.5)])
+def test_a_sphere_without_drag_falls_with_its_added_mass(added_mass: float | str, coefficient: float) -> None:
+    """Acceleration (rho_s - rho_f) g / (rho_s + C rho_f) of a single sphere in water at rest, within 0.1 %."""
+    width = 0.02
+    case = suspension(
+        **{
+            "fluid.viscosity": 1e-6,
+            "laws": {"drag": None, "added_mass": added_mass, "lubrication": "none"},
+            "column": {"width": width, "height": width, "cell": 1.25e-3, "ends": "closed"},
+            "bed": {"diameter": 1e-3, "positions": [(0.51 * width, 0.5 * width, 0.5 * width)]},
+            "run": {"until": 1.0, "fluid_step": 2e-4, "reference_speed": 0.01},
+        }
+    )
+    simulation = Simulation(case)
+    for _ in range(40):
+        simulation.step()
+    acceleration = simulation.particles.velocity[0, 2] / simulation.time
+    assert acceleration == pytest.approx(-9.81 * 1500.0 / (2500.0 + coefficient * 1000.0), rel=1e-3)
+
+
+def on_a_lattice(added_mass: float | str) -> Simulation:
+    """Spheres on a lattice with the pitch of the cells: the solid fraction is 0.382 in every cell at all times."""
+    pitch = 1e-3
+    places = [tuple(pitch * (0.5 + n) for n in place) for place in np.ndindex(8, 8, 12)]
+    column = {"width": 8e-3, "height": 12e-3, "cell": pitch, "sides": "periodic", "ends": "periodic"}
+    laws = {"added_mass": added_mass, "gravity": (0.0, 0.0, 0.0), "self_disturbance_correction": False}
+    bed = {"diameter": 0.9e-3, "positions": places}
+    run = {"until": 1.0, "reference_speed": 0.1, "fluid_step": 2e-4}
+    case = suspension(column=column, bed=bed, laws=laws | {"lubrication": "none"}, run=run)
+    simulation = Simulation(case)
+    simulation.particles.velocity[:] = (0.01, 0.02, 0.03)
+    for _ in range(20):
+        simulation.step()
+    return simulation
+
+
+def test_at_a_uniform_solid_fraction_a_law_equals_its_constant() -> None:
+    """The spheres stop and set the fluid in motion; with another constant they stop at another rate."""
+    solids = 0.9**3 * np.pi / 6.0
+    by_law, constant, other = (on_a_lattice(each) for each in ("zuber", zuber(1.0 - solids), 0.5))
+    assert zuber(1.0 - solids) == pytest.approx(1.426, abs=1e-3)
+    assert by_law.particles.velocity == pytest.approx(constant.particles.velocity, rel=1e-9)
+    assert by_law.particles.velocity[0, 2] - other.particles.velocity[0, 2] > 1e-5
+
+
+def test_the_inertia_follows_the_local_solid_fraction() -> None:
+    """The coefficient of each particle is the law at the voidage around it."""
+    simulation = Simulation(suspension(**{"laws.added_mass": "zuber"}))
+    simulation.step()
+    particles, exchange = simulation.particles, simulation.exchange
+    assert exchange is not None
+    terms = exchange.prepare(particles, simulation.last_step)
+    expected = [zuber(voidage) for voidage in terms.flow.voidage]
+    coefficient = exchange.added_mass.mass(particles) / (1000.0 * particles.volume)
+    assert coefficient == pytest.approx(np.array(expected), rel=1e-12)
+    assert coefficient.max() - coefficient.min() > 0.05
+
+
+def test_a_change_of_the_coefficient_changes_the_inertia_only() -> None:
+    """Fixed particles stay fixed; the change is returned, and the film resistance over the inertia follows."""
+    particles = make_particles(np.arange(9.0).reshape(3, 3), 1e-3, 2500.0, fixed=np.array([False, True, False]))
+    particles.film_rate[:] = 3.0
+    resistance = 3.0 / particles.inverse_mass[0]
+    added_mass = AddedMass(law_of(zuber), 1000.0)
+    for voidage in (np.array([1.0, 0.5, 0.5]), np.array([0.4, 0.4, 1.0])):
+        before = added_mass.mass(particles)
+        change = added_mass.update(particles, voidage)
+        assert added_mass.mass(particles) - before == pytest.approx(change, rel=1e-9)
+    assert particles.inverse_mass[1] == 0.0
+    assert added_mass.mass(particles)[[0, 2]] == pytest.approx(
+        1000.0 * particles.volume[[0, 2]] * [zuber(0.4), 0.5], rel=1e-12
+    )
+    assert particles.film_rate[0] / particles.inverse_mass[0] == pytest.approx(resistance, rel=1e-12)
+
+
+@pytest.mark.parametrize("added_mass", [0.5, "zuber"])
+def test_an_inserted_particle_that_moves_with_the_fluid_is_not_pushed(added_mass: float | str) -> None:
+    """It has an added mass, but the fluid that was at rest before at its place exerts no force on it."""
+    pushes = []
+    for chosen in (0.0, added_mass):
+        open_ends = {"column.ends": "flow", "bed.inlet_velocity": 0.2, "bed.count": 20, "run.fluid_step": 1e-4}
+        simulation = Simulation(suspension(**{"laws.added_mass": chosen} | open_ends))
+        fluid, solver = simulation.fluid, simulation.particle_solver
+        assert fluid is not None
+        fluid.set_velocity((0.0, 0.0, 0.2))
+        solver.particles.velocity[:, 2] = 0.2
+        for _ in range(5):
+            simulation.step()
+        velocity = np.array([[0.0, 0.0, 0.2]])
+        new = solver.insert(make_particles(np.full((1, 3), 1e-3), 2e-4, 2500.0, velocity=velocity))
+        simulation.step()
+        pushes.append(float(solver.particles.velocity[solver.particles.id == new[0], 2][0]) - 0.2)
+    assert pushes[1] == pytest.approx(pushes[0] / 1.2, rel=0.01)
+
+
+def test_a_change_of_the_added_mass_is_in_the_energy_ledger() -> None:
+    """The coefficient of all particles triples: the remainder changes by less than 2 % of what this adds."""
+    simulation = stirred(suspension(**{"laws.added_mass": 0.5, "run.energy_budget": True}))
+    simulation.step()
+    particles, exchange = simulation.particles, simulation.exchange
+    assert simulation.energy is not None and exchange is not None
+    before = simulation.energy.row()["energy_remainder"]
+    added = float((0.5 * 1000.0 * particles.volume[:, None] * particles.velocity**2).sum())
+    exchange.added_mass = AddedMass(1.5, 1000.0)
+    particles.sampled_velocity[:] = np.nan
+    simulation.step()
+    assert abs(simulation.energy.row()["energy_remainder"] - before) < 0.02 * added
+
+
+def test_agitation_and_added_mass_have_one_coefficient() -> None:
+    """The added mass of the run, a law or a number; agitation without added mass takes Zuber's."""
+    voidage = np.array([0.5, 0.7, 1.0])
+    for added_mass, expected in (("zuber", [2.0, 8.0 / 7.0, 0.5]), (0.7, [0.7] * 3), (0.0, [2.0, 8.0 / 7.0, 0.5])):
+        case = suspension(
+            **{
+                "laws.added_mass": added_mass,
+                "laws.agitation": "pseudo_turbulence",
+                "laws.agitation_inertia": 0.4,
+                "bed.count": 20,
+            }
+        )
+        exchange = Simulation(case).exchange
+        assert exchange is not None and isinstance(exchange.agitation, PseudoTurbulence)
+        assert exchange.agitation.added_mass.coefficient(voidage) == pytest.approx(expected, rel=1e-12)
+        assert not exchange.added_mass or exchange.agitation.added_mass is exchange.added_mass
+
+
+def test_fluid_in_uniform_motion_does_not_push_a_fixed_particle() -> None:
+    """A shear wave that passes the particle: the velocity there changes, but no fluid accelerates."""
+    height, speed, amplitude = 0.02, 0.5, 0.1
+    case = suspension(
+        **{
+            "fluid.viscosity": 0.0,
+            "laws": {"drag": None, "added_mass": 0.5, "lubrication": "none", "gravity": (0.0, 0.0, 0.0)},
+            "column": {"width": 0.01, "height": height, "cell": 1e-3, "sides": "periodic", "ends": "periodic"},
+            "bed": {"diameter": 1e-4, "positions": [(5e-3, 5e-3, 0.25 * height)], "fixed": True},
+            "run": {"until": 1.0, "fluid_step": 1e-5, "reference_speed": 0.01},
+        }
+    )
+    number = 2.0 * np.pi / height
+    simulation = Simulation(case)
+    particles, fluid, exchange = simulation.particles, simulation.fluid, simulation.exchange
+    assert fluid is not None and exchange is not None
+    fluid.set_velocity((lambda x, y, z: amplitude * np.cos(number * z) + 0.0 * x * y, 0.0, speed))
+    simulation.step()
+    particles.inverse_mass[:] = 1.0 / (particles.mass + 0.5 * 1000.0 * particles.volume)  # as if it were free
+    terms = exchange.prepare(particles, simulation.last_step)
+    change = (terms.flow.slip - particles.sampled_velocity)[0, 0] / simulation.last_step
+    assert change == pytest.approx(amplitude * number * speed, rel=0.05)
+    assert abs(terms.explicit[0, 0]) < 0.05 * 0.5 * 1000.0 * particles.volume[0] * change

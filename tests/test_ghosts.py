@@ -1,0 +1,249 @@
+"""A run divided among ranks, and a run with its rows in another order, have the bits of the plain run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from in_process_ranks import on_ranks
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError, RunFailed
+from cfddem.case.materials import Material
+from cfddem.particles import listing
+from cfddem.particles.feeding import Feed, ParticleOutlet
+from cfddem.particles.ghosts import Slabs
+from cfddem.particles.initial.packing import random_packing
+from cfddem.particles.interactions.bridge import Bridges
+from cfddem.particles.interactions.bridge_loops import BridgeLaws
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import Particles, make_particles
+from cfddem.particles.walls.shapes import Box, Mesh, Plane, Wall
+
+GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.8, friction=0.4, rolling_friction=0.02)
+STEEL = Material(density=7800, youngs_modulus=20e6, poisson=0.3, restitution=0.9, friction=0.2, rolling_friction=0.01)
+DIAMETER, STEP = 1e-3, 2e-6
+WET = Laws(film=True, rolling="spring_dashpot")
+DRY = Laws(rolling="spring_dashpot")
+
+
+def bed(count: int = 300, film: bool = False, fast: float = 0.5) -> tuple[Particles, np.ndarray]:
+    """Spheres of two sizes and materials in a periodic box, in motion, and the edges of the box."""
+    draw = np.random.default_rng(2)
+    diameters = DIAMETER * draw.choice([0.7, 1.0], count)
+    centres, box = random_packing(diameters, 0.5, seed=3, shape=(2.0, 1.0, 1.0))
+    kind = (diameters < DIAMETER).astype(int)
+    spheres = make_particles(
+        centres, 0.5 * diameters, np.where(kind, STEEL.density, GLASS.density), material=kind,
+        velocity=draw.normal(0.0, fast, (count, 3)), spin=draw.normal(0.0, 300.0, (count, 3)),
+        viscosity=draw.uniform(0.5e-3, 2e-3, count) if film else 0.0,
+    )  # fmt: skip
+    return spheres, box
+
+
+def floor_of_triangles(size: np.ndarray) -> Mesh:
+    """A wavy floor a little above the corner of a box."""
+    x, y = (np.linspace(-0.2 * each, 1.2 * each, 7) for each in size[:2])
+    corners = np.array([[a, b, 1e-4 * np.sin(5e3 * a) * np.cos(4e3 * b)] for a in x for b in y])
+    cells = [7 * i + j for i in range(6) for j in range(6)]
+    return Mesh(
+        vertices=corners, triangles=np.array([t for c in cells for t in ((c, c + 7, c + 1), (c + 7, c + 8, c + 1))])
+    )
+
+
+def state(run: ParticleSolver) -> dict[str, np.ndarray]:
+    """Particles of this rank, and what their pairs remember, with ids."""
+    rows = slice(run.particles.owned)
+    kept = {name: array[rows].copy() for name, array in run.particles.arrays.items()}
+    first = run.edges.first < run.particles.owned
+    pairs = {name: array[first].copy() for name, array in run.edges.checkpoint().items() if name in run.edges}
+    return kept | pairs | {"ends": run.edges.ends(run.particles.id)[first]}
+
+
+def joined(states: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The particles of all ranks by id, and the pairs in contact or with a film."""
+    whole = {name: np.concatenate([each[name] for each in states]) for name in states[0]}
+    ends = whole["ends"]
+    lasting = (whole["spring"] != 0.0).any(axis=1) | (whole.get("resistance", np.zeros(len(ends))) > 0.0)
+    pairs, particles = np.flatnonzero(lasting), np.argsort(whole["id"])
+    pairs = pairs[np.lexsort(ends[pairs].T[::-1])]
+    return {name: each[pairs if len(each) == len(ends) else particles] for name, each in whole.items()}
+
+
+def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
+    """All arrays are equal."""
+    assert one.keys() == other.keys()
+    for name in one:
+        assert np.array_equal(one[name], other[name], equal_nan=True), name
+
+
+def settings(film: bool, walls: bool) -> tuple[Particles, dict[str, Any]]:
+    """Particles and what else the solver takes: a periodic box, or a box of walls with a mesh as its floor."""
+    spheres, box = bed(film=film)
+    given: dict[str, Any] = {"laws": WET if film else DRY, "gravity": (0.0, 0.0, -9.81)}
+    if not walls:
+        return spheres, given | {"box": tuple(box)}
+    sides: list[Wall] = [Box(low=(0.0, 0.0, -DIAMETER), high=tuple(box)), floor_of_triangles(box)]
+    return spheres, given | {"walls": sides}
+
+
+def finished(spheres: Particles, given: dict[str, Any], steps: int, **others: Any) -> ParticleSolver:
+    """The run after some steps."""
+    run = ParticleSolver(spheres, pair_table([GLASS, STEEL]), check_steps=False, **given, **others)
+    run.advance(STEP, steps)
+    return run
+
+
+@pytest.mark.parametrize(("film", "walls"), [(False, False), (True, False), (False, True), (True, True)])
+def test_bits_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> None:
+    """The same spheres with the same ids in other rows, over several neighbour lists."""
+    spheres, given = settings(film, walls)
+    mixed = spheres.copy(np.random.default_rng(5).permutation(spheres.count))
+    plain = finished(spheres, given, 300)
+    assert plain.lists.made > 3
+    assert_same_bits(joined([state(finished(mixed, given, 300))]), joined([state(plain)]))
+
+
+def test_bits_do_not_depend_on_sorting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that sorts its rows at every list."""
+    spheres, given = settings(True, False)
+    plain = joined([state(finished(spheres.copy(), given, 200, skin=1e-5))])
+    monkeypatch.setattr(listing, "THREADING_PAYS", 1)
+    sorted_run = finished(spheres, given, 200, skin=1e-5, sort_every=1)
+    assert (np.diff(sorted_run.particles.id) < 0).any()
+    assert_same_bits(joined([state(sorted_run)]), plain)
+
+
+def test_bridges_do_not_depend_on_the_order_of_rows() -> None:
+    """Liquid, volumes and velocities."""
+    spheres, given = settings(False, False)
+    mixed = spheres.copy(np.random.default_rng(5).permutation(spheres.count))
+    states = []
+    for each in (spheres, mixed):
+        laws = BridgeLaws(viscosity=1e-3, surface_tension=0.07, every=2)
+        run = finished(each, given, 150, bridges=Bridges(each, 1e-5, laws))
+        assert run.bridges is not None and run.bridges.formed > run.bridges.count > 100
+        states.append(joined([state(run)]) | {"volume": run.bridges.joined.volume})
+    assert_same_bits(*states)
+
+
+# ---------------------------------------------------------------- ranks
+
+
+def divided(size: int, axis: int, length: float) -> Slabs:
+    """Equal slabs."""
+    return Slabs(axis, [length * n / size for n in range(1, size)])
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize(("film", "walls"), [(False, False), (True, False), (False, True), (True, True)])
+def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, ranks: int) -> None:
+    """Over several lists, with particles that change their rank and pairs across the planes and the periodic border."""
+    spheres, given = settings(film, walls)
+    length = float(spheres.position[:, 0].max())
+
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int]:
+        division = divided(ranks, 0, length)
+        run = finished(spheres.copy(), given, 0, communicator=communicator, division=division)
+        before, most = set(run.particles.id[: run.particles.owned].tolist()), 0
+        for _ in range(3):
+            run.advance(STEP, 100)
+            most = max(most, run.particles.count - run.particles.owned)
+        return state(run), len(before - set(run.particles.id[: run.particles.owned].tolist())), most
+
+    results = on_ranks(ranks, program)
+    whole = finished(spheres.copy(), given, 0)
+    for _ in range(3):
+        whole.advance(STEP, 100)
+    assert whole.lists.made > 3
+    assert sum(moved for _, moved, _ in results) > 2
+    assert all(ghosts > 20 for _, _, ghosts in results)
+    assert_same_bits(joined([each for each, _, _ in results]), joined([state(whole)]))
+
+
+def test_particles_come_and_go_on_ranks_as_in_one_process() -> None:
+    """A feed and an outlet; ids, particles and counts are the same."""
+
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], list[float]]:
+        first = make_particles([[1e-3, 2e-3, 5e-3], [4e-3, 2e-3, 5e-3]], 0.5e-3, GLASS.density)
+        division = Slabs(0, [2.5e-3]) if communicator.size == 2 else None
+        run = ParticleSolver(
+            first, pair_table([GLASS]), walls=[Plane()], gravity=(0.0, 0.0, -9.81), skin=2e-4,
+            communicator=communicator, division=division,
+        )  # fmt: skip
+        feed = Feed(
+            3e4, (0.0, 0.0, 6e-3), (5e-3, 4e-3, 0.0), lambda n, draw: draw.uniform(6e-4, 1e-3, n), GLASS.density,
+            velocity=(0.2, 0.0, -1.0), seed=1,
+        )  # fmt: skip
+        outlet = ParticleOutlet(high=(4.5e-3, np.inf, np.inf))
+        for _ in range(12):
+            feed(run)
+            run.advance(5e-6, 50)
+            outlet(run)
+        return state(run), [feed.entered, len(feed.waiting), outlet.left, outlet.mass]
+
+    one, counts = program(SERIAL)
+    many = on_ranks(2, program)
+    assert counts[0] > 40 and counts[2] > 3
+    assert [each[1][:3] for each in many] == [counts[:3]] * 2
+    assert many[0][1][3] == pytest.approx(counts[3], rel=1e-12)
+    assert_same_bits(joined([each for each, _ in many]), joined([one]))
+
+
+def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
+    """Checkpoints of the ranks hold ghosts and who sends to whom."""
+    spheres, given = settings(True, True)
+    division = divided(2, 0, float(spheres.position[:, 0].max()))
+
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        straight, again = (
+            finished(spheres.copy(), given, 0, communicator=communicator, division=division) for _ in range(2)
+        )
+        straight.advance(STEP, 70)
+        again.restore(straight.checkpoint())
+        for run in (straight, again):
+            run.advance(STEP, 70)
+        return state(again), state(straight)
+
+    for again, straight in on_ranks(2, program):
+        assert_same_bits(again, straight)
+
+
+def test_a_failure_on_one_rank_stops_all() -> None:
+    """After the first step; the message names the same particle on every rank."""
+    spheres, given = settings(False, False)
+
+    def program(communicator: Communicator) -> str:
+        division = divided(2, 0, given["box"][0])
+        run = finished(spheres.copy(), given, 0, communicator=communicator, division=division)
+        run.particles.velocity[run.particles.id == 7] = np.nan
+        with pytest.raises(RunFailed) as failure:
+            run.advance(STEP, 10)
+        assert run.steps == 1
+        return str(failure.value)
+
+    one, other = on_ranks(2, program)
+    assert one == other and "is NaN" in one
+
+
+def test_what_ranks_cannot_share_is_refused() -> None:
+    """An energy budget, space that is not divided, and a number of planes that does not fit."""
+    spheres, given = settings(False, False)
+
+    def program(communicator: Communicator) -> None:
+        with pytest.raises(InputError, match="planes"):
+            finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, []))
+        with pytest.raises(InputError, match="division"):
+            finished(spheres.copy(), given, 0, communicator=communicator)
+        with pytest.raises(InputError, match="energies"):
+            finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, [1e-3]), energies=True)
+
+    on_ranks(2, program)
