@@ -14,8 +14,9 @@ from closures.registry import Law
 REMEDY = "choose a law with a wider range (cfddem explain)"
 
 
-LEAST_SHARE = 0.01
-"""Share of the uses of a law outside of its range from which a warning is given."""
+LEAST_SHARE, AGITATION_SHARE = 0.01, 0.25
+"""Share of the uses of a law outside of its range from which a warning is given; more for agitation, because surface
+and floor of every bed are outside."""
 
 
 def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], laws: list[dict[str, Any]]) -> list[str]:
@@ -64,7 +65,7 @@ def _range_warnings(run: Run, case: Case, begin: float) -> Iterator[str]:
         yield from _beyond("drag law", drag, _gained(run, "out_of_range_count", begin), evaluations)
     if isinstance(agitation, Law):
         outside = _gained(run, "agitation_out_of_range_count", begin)
-        yield from _beyond("law of agitation", agitation, outside, evaluations)
+        yield from _beyond("law of agitation", agitation, outside, evaluations, AGITATION_SHARE)
 
 
 def _gained(run: Run, name: str, begin: float) -> int:
@@ -73,9 +74,9 @@ def _gained(run: Run, name: str, begin: float) -> int:
     return int(column[-1] - column[np.searchsorted(run.history["time"], begin)]) if len(column) else 0
 
 
-def _beyond(kind: str, law: Law, outside: int, evaluations: float) -> Iterator[str]:
-    """Warning that a law was used outside of its range too often."""
-    if evaluations and outside > LEAST_SHARE * evaluations:
+def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float = LEAST_SHARE) -> Iterator[str]:
+    """Warning that a law was used outside of its range in more than a share of its uses."""
+    if evaluations and outside > share * evaluations:
         yield (
             f"the {kind} {law.name} was evaluated outside of its fitted range in {100.0 * outside / evaluations:.2g} % "
             f"of its uses: {law.fitted_for}; {REMEDY}"
