@@ -75,6 +75,7 @@ class _Specialiser:
         self._done: dict[int, Any] = {}
 
     def of(self, template: Any) -> Any:
+        """The copy of a function."""
         key = id(template)
         if key not in self._done:
             self._done[key] = template  # a function that calls itself

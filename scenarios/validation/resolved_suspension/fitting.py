@@ -23,6 +23,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from closures.added_mass import zuber
+from closures.agitation import pseudo_turbulence
+
 SMOOTHING = 0.2
 """Second time of the process over the first, s."""
 
@@ -42,16 +45,13 @@ def seen_fluctuation(solid_fraction: float, reynolds: float) -> tuple[float, flo
     >>> [round(each, 3) for each in seen_fluctuation(0.36, 45.0)]
     [0.477, 0.132]
     """
-    phi, re = solid_fraction, reynolds
-    energy = 0.5 * (2.0 * phi + 2.5 * phi * (1.0 - phi) ** 3 * math.exp(-phi * math.sqrt(re)))
-    along = 0.523 / (1.0 + 0.305 * math.exp(-0.114 * re))
-    along *= math.exp(-3.511 * phi / (1.0 + 1.801 * math.exp(-0.005 * re)))
-    return 2.0 * energy * (along + 1.0 / 3.0), 2.0 * energy * (1.0 / 3.0 - 0.5 * along)
+    along, across = (pseudo_turbulence(solid_fraction, reynolds, component) for component in (1.0, 0.0))
+    return along, across
 
 
 def inertia_coefficient(mass: float, displaced: float, solid_fraction: float) -> float:
     """Coefficient c of the fluid's acceleration, with Zuber's added mass."""
-    added = (1.0 + 2.0 * solid_fraction) / (2.0 * (1.0 - solid_fraction))
+    added = zuber(1.0 - solid_fraction)
     return mass * (1.0 + added) * displaced / (mass + added * displaced)
 
 
