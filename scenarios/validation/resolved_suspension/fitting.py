@@ -109,27 +109,6 @@ def fit(
     return Fit(float(a_d), float(a_i) if inertia else 0.0, float(time), float(np.sqrt(np.mean(best.fun**2))))
 
 
-def fit_row(
-    row: dict[str, Any],
-    ways: Sequence[str] = ("along", "across"),
-    *,
-    inertial: bool = True,
-    smoothing: float = SMOOTHING,
-) -> Fit:
-    """Fit the numbers to a run of the matrix; the time is in d/w.
-
-    With speeds over w, times over d/w and forces over the mean drag, b is 1.
-
-    ways      directions that are fitted at once
-    inertial  fit a_i too, else the force is that of the drag part alone
-    """
-    covariances = [np.array(row[f"seen_covariance_{way}"]) for way in ways]
-    lags = np.array(row["lag"])[: len(covariances[0])]
-    along, across = seen_fluctuation(row["solid_fraction"], row["reynolds"])
-    variances = [along if way == "along" else across for way in ways]
-    return fit(lags, covariances, variances, row["window"], 1.0, row["inertia"] if inertial else 0.0, smoothing)
-
-
 class Shares(NamedTuple):
     """Free numbers of pseudo-turbulence, common to all runs."""
 
