@@ -48,14 +48,14 @@ class Communicator:
 
         default  contribution of a rank without elements
         """
-        return _plain(self._combine(_extreme(np.max, values, axis, default), np.maximum))
+        return _plain(self._combine(_extreme(np.maximum, values, axis, default), np.maximum))
 
     def smallest(self, values: ArrayLike, axis: Axis = None, *, default: float = np.inf) -> Any:
         """Smallest element of the arrays of all ranks; NaN if any element is NaN.
 
         default  contribution of a rank without elements
         """
-        return _plain(self._combine(_extreme(np.min, values, axis, default), np.minimum))
+        return _plain(self._combine(_extreme(np.minimum, values, axis, default), np.minimum))
 
     def any(self, condition: ArrayLike) -> bool:
         """Whether a condition holds for any element on any rank; False without elements."""
@@ -95,14 +95,17 @@ class Communicator:
         return local
 
 
-def _extreme(find: Callable[..., Any], values: ArrayLike, axis: Axis, default: float) -> Any:
-    """The extreme of an array along some axes; `default` where these axes hold no element."""
+def _extreme(extreme: np.ufunc, values: ArrayLike, axis: Axis, default: float) -> Any:
+    """The extreme of an array along some axes; `default` where these axes hold no element.
+
+    extreme  np.maximum or np.minimum
+    """
     array = np.asarray(values)
     if array.size:
-        return find(array, axis=axis)
+        return extreme.reduce(array, axis=axis)
     if axis is None:
         return default
-    return find(array.astype(float), axis=axis, initial=default)
+    return extreme.reduce(array.astype(float), axis=axis, initial=default)
 
 
 def _not_none(first: Any, second: Any) -> Any:

@@ -189,18 +189,15 @@ class Exchange:
         gravity  (3,) [m/s2]; weight and buoyancy are part of the force
         """
         fluid, cell_map, step = self.fluid, terms.cell_map, terms.step
-        weight, seen, _ = fluid.drag_exchange()
+        excess_mass = particles.mass - fluid.density * cell_map.volume
         forces = FluidForces(
-            drag=self.momentum.apply(particles, cell_map, terms.drag, weight, seen),
+            drag=self.momentum.apply(particles, cell_map, terms.drag, *fluid.drag_response()),
             pressure=self.pressure.force(particles, cell_map),
-            weight=(particles.mass - fluid.density * cell_map.volume)[:, None] * gravity,
+            weight=np.stack([excess_mass * each for each in gravity], axis=-1),
             explicit=terms.explicit,
             agitation=terms.fluctuating_force,
         )
-        force = forces.drag + forces.pressure
-        for each in (forces.weight, forces.explicit, *(() if terms.agitation is None else (forces.agitation,))):
-            force += each
-        _replace(particles.applied, force, particles.force)
+        _replace(particles.applied, forces, particles.force)
         self.pressure.store(particles, cell_map)
         self.added_mass.store(particles, terms.flow.slip)
         if self.torque and fluid.viscous:
@@ -216,7 +213,7 @@ class Exchange:
     def drag_work(self, particles: Particles, terms: CouplingTerms) -> DragWork:
         """Work of the last drag impulse at the velocity with which the fluid acts on every particle."""
         kernel, drag, total = self.kernel, particles.drag_impulse / terms.step, self.fluid.communicator.sum
-        weight = kernel.smooth(np.moveaxis(self.fluid.drag_exchange()[0], -1, 0))
+        weight = kernel.smooth(np.moveaxis(self.fluid.drag_response()[0], -1, 0))
         conductance = kernel.gather(terms.cell_map.stencil, weight) * terms.drag.implicit[:, None]
         acting = terms.drag.target + drag / np.maximum(conductance, 1e-300)
         if terms.agitation is None:
@@ -303,12 +300,15 @@ class Exchange:
 
 
 @threaded
-def _replace(applied, new, force):
-    """Replace the force from outside, as part of the sum of all forces."""
-    for n in prange(len(new)):
+def _replace(applied, forces, force):
+    """Replace the force from outside by the sum of the forces of the fluid, as part of the sum of all forces."""
+    for n in prange(len(force)):
         for d in range(3):
-            force[n, d] += new[n, d] - applied[n, d]
-            applied[n, d] = new[n, d]
+            new = 0.0
+            for each in forces:
+                new += each[n, d]
+            force[n, d] += new - applied[n, d]
+            applied[n, d] = new
 
 
 def inertia(particles: Particles) -> Array:

@@ -29,7 +29,7 @@ def crossing_rate(velocity: np.ndarray, spacing: Sequence[float], communicator: 
     >>> crossing_rate(np.array([[0.5, 0.0, -0.5], [0.0, 1.5, 0.0]]), (0.5, 0.5, 0.25))
     3.0
     """
-    fastest = communicator.largest(np.abs(velocity), axis=0, default=0.0)
+    fastest = (communicator.largest(np.abs(along), default=0.0) for along in velocity.T)
     return max(float(speed) / length for speed, length in zip(fastest, spacing))
 
 

@@ -131,9 +131,8 @@ class Transfer:
         kernel, value = self.kernel, _columns(particles[self.value])
         fields = np.moveaxis(np.concatenate([weight, weight * seen], axis=-1), -1, 0)
         gathered, rate = kernel.gather(cell_map.stencil, kernel.smooth(fields)), np.empty(value.shape)
-        _received(gathered, sent.implicit, sent.target, rate)
-        _columns(particles[self.before])[:] = value
-        _columns(particles[self.received[0]])[:] = sent.step * rate
+        before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
+        _receive(gathered, sent.implicit, sent.target, sent.step, value, rate, before, received)
         self.last_step = sent.step
         return rate
 
@@ -178,12 +177,17 @@ def _implicit_coefficients(conductance, capacity, other, value, disturbance, ste
 
 
 @threaded
-def _received(gathered, implicit, target, rate):
-    """Rate b* (W u - W v*) of every particle; gathered holds W and W u (N, 2 m)."""
+def _receive(gathered, implicit, target, step, value, rate, before, received):
+    """Rate b* (W u - W v*) of every particle, and what is stored until the next step.
+
+    gathered  W and W u around each particle (N, 2 m)
+    """
     components = target.shape[1]
     for n in prange(len(target)):
         for d in range(components):
             rate[n, d] = implicit[n] * (gathered[n, components + d] - gathered[n, d] * target[n, d])
+            before[n, d] = value[n, d]
+            received[n, d] = step * rate[n, d]
 
 
 @threaded

@@ -13,27 +13,36 @@ from cfddem.fluid.work import Works, kinetic_energy, works
 class FluidBudgets(FluidState):
     """A fluid that accounts for its momentum and energy; nothing here advances it."""
 
-    def drag_exchange(self) -> tuple[Array, Array, Array]:
-        r"""What drag did to the fluid over the last step, cell by cell.
+    def drag_response(self) -> tuple[Array, Array]:
+        """How the implicit drag of the last step saw the fluid, cell by cell.
+
+        returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
+                 the implicit drag has seen [m/s]
+        """
+        fields = self.fields
+        weight, seen = np.empty((*self.grid.shape, 3)), np.empty((*self.grid.shape, 3))
+        drag_seen(
+            fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
+            self.density, self.last_step, self.model_b, weight, seen,
+        )  # fmt: skip
+        return weight, seen
+
+    def drag_exchange(self) -> Array:
+        r"""Momentum that drag gave to the fluid over the last step, cell by cell (nz, ny, nx, 3) [N s].
 
         .. math:: \Delta m = h V\, W\,(\beta v - \beta u_d)
 
-        returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
-                 the implicit drag has seen [m/s]; the momentum given to the fluid (nz, ny, nx, 3) [N s]
+        with the weight W and the velocity u_d of `drag_response`.
 
         A particle with its own coefficient b [kg/s], of which beta V is the sum, received the impulse
-        h W b (u_d - v): summed over the particles of a cell this is the opposite of the third array to round-off.
-        h is the step just made, V the cell. Half the drag of a cell acts on each of its two faces; where a face is a
-        wall or an inlet, that half is taken by what holds the face, and is counted here too.
+        h W b (u_d - v): summed over the particles of a cell this is the opposite of the momentum of the cell to
+        round-off. h is the step just made, V the cell. Half the drag of a cell acts on each of its two faces; where a
+        face is a wall or an inlet, that half is taken by what holds the face, and is counted here too.
         """
-        fields, grid, h = self.fields, self.grid, self.last_step
-        weight, seen = np.empty((*grid.shape, 3)), np.empty((*grid.shape, 3))
-        drag_seen(
-            fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
-            self.density, h, self.model_b, weight, seen,
-        )  # fmt: skip
+        fields, (weight, seen) = self.fields, self.drag_response()
         push = np.moveaxis(fields.owned("drag_momentum"), 0, -1) - fields.owned("drag")[..., None] * seen
-        return weight, seen, h * grid.cell_volume * weight * push
+        moved: Array = self.last_step * self.grid.cell_volume * weight * push
+        return moved
 
     def momentum(self) -> Array:
         """Momentum of the fluid, sum of rho eps u V over all faces with an unknown velocity (3,) [N s]."""
@@ -55,7 +64,7 @@ class FluidBudgets(FluidState):
         share = self.open_cells if self.model == "B" else self.open_cells * fields.owned("centred_voidage")
         lines = {
             "change": self.momentum() - before,
-            "drag": total(self.drag_exchange()[2], axis=(0, 1, 2)),
+            "drag": total(self.drag_exchange(), axis=(0, 1, 2)),
             "particles": np.zeros(3) if self.model == "B" else self._pressure_on_particles(),
             "source": h * volume * total(fields.owned("source"), axis=(1, 2, 3)),
             "driving": h * volume * total(share) * self.boundaries.driving,

@@ -100,15 +100,13 @@ class Edges(Table):
         """
         source = np.empty(self.rows, np.int64)
         _find(old.flat_graph, self.flat_graph, old_row, source)
-        known = source >= 0
-        every = bool(known.all())  # local: edges of this rank
+        new = np.flatnonzero(source < 0)
         for name, field in self.fields.items():
-            if field.role == "scratch" or name not in old:
+            if field.role == "scratch" or name not in old or not old.rows:
                 continue
-            if every:
-                np.take(old[name], source, axis=0, out=self[name])
-            else:
-                self[name][known] = old[name][source[known]]
+            initial = self[name][new]
+            np.take(old[name], source, axis=0, out=self[name], mode="wrap")  # faster than to choose the known ones
+            self[name][new] = initial
 
     def ends(self, ids: np.ndarray) -> np.ndarray:
         """Names of the two bodies of each edge: ids of particles, -1 - w for piece w of the walls (n, 2).

@@ -32,6 +32,7 @@ class PressureForce:
         self.fluid, self.kernel = fluid, kernel
         self.fields = (MAPPED, MAPPED_EARLIER) if fluid.model == "A" else ()
         self._known: list[ParticleCellMap] = []  # of the last step and the one before
+        self._known_ids = np.zeros(0, np.int64)  # of the particles in the rows of these maps
 
     def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array:
         """Force on every particle (N, 3) [N], after the step of the fluid.
@@ -42,6 +43,8 @@ class PressureForce:
         force = np.zeros((particles.count, 3))
         if self.fields:
             kernel, gradient = self.kernel, self.kernel.smooth(self.fluid.cell_pressure_gradient())
+            if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
+                self._known = []  # rows have changed
             last, earlier = (
                 self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER))
             )
@@ -51,17 +54,16 @@ class PressureForce:
 
     def _stencil(self, particles: Particles, n: int, name: str) -> Stencil:
         """Stencil of stored positions; kept from the step before unless rows of particles have changed since."""
-        position = particles[name]
-        if n < len(self._known) and np.array_equal(self._known[n].position, position):  # local: rows of this rank
+        if n < len(self._known):
             return self._known[n].stencil
-        return self.kernel.stencil(position, particles.radius)
+        return self.kernel.stencil(particles[name], particles.radius)
 
     def store(self, particles: Particles, cell_map: ParticleCellMap) -> None:
         """Store the places of this step for the next two."""
         if self.fields:
             particles.earlier_mapped_position = particles.mapped_position
             particles.mapped_position = cell_map.position
-            self._known = [cell_map, *self._known[:1]]
+            self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()
 
 
 @threaded

@@ -19,7 +19,7 @@ def momentum_imbalance(fluid: FluidSolver, particles: Particles) -> float:
     and outlets belongs to neither.
     """
     total = fluid.communicator.sum
-    given, got = total(fluid.drag_exchange()[2], axis=(0, 1, 2)), total(particles.drag_impulse, axis=0)
+    given, got = total(fluid.drag_exchange(), axis=(0, 1, 2)), total(particles.drag_impulse, axis=0)
     scale = max(total(np.abs(particles.drag_impulse)), 1e-300)
     return float(max(abs(component) for component in given + got) / scale)
 
