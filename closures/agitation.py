@@ -21,22 +21,25 @@ _RESOLVED = "resolved simulations of free spheres, scenarios/validation/resolved
 INERTIA_SHARE = 0.0
 """Part of the force by the acceleration of the fluctuation; the resolved simulations show none."""
 
-SHARES = {"pseudo_turbulence": (0.46, 0.65), "lattanzi": (1.0, 0.6)}
+SHARES = {"pseudo_turbulence": (0.45, 0.65), "lattanzi": (1.0, 0.6)}
 """Part of the fluctuation of a law that acts on free spheres, along and across the mean slip; 1 for other laws.
 
 The numbers of pseudo-turbulence are fitted to resolved simulations of free spheres. The ratio of the force of Lattanzi
 et al. is the middle of the range of Osnes et al. (2023).
 """
 
-TIMES = {"pseudo_turbulence": 1.07, "free_spheres": 1.05}
-"""Correlation time over d/w, fitted to the same simulations; 1 for other laws."""
+TIMES = {"pseudo_turbulence": 1.29, "free_spheres": 1.27}
+"""Correlation time over d/w, fitted to the same simulations; 1 for other laws. It is the sum of the process's two."""
+
+SHORT = 0.2
+"""Shorter of the two correlation times of the fluctuation that a particle sees, over their sum [-]."""
 
 
 @law("agitation", _RESOLVED, solid_fraction=(0.2, 0.45), reynolds=(25.0, 60.0), density_ratio=(1.03, 7.0))
 def free_spheres(solid_fraction: float, reynolds: float, along: float, density_ratio: float) -> float:
     r"""Variance of one component of the fluid velocity that a free sphere sees, over the square of the mean slip.
 
-    .. math:: \frac{R}{w^2} = \left(0.09\cos^2\theta + 0.056\sin^2\theta\right)\min(\phi/0.2,\,1)
+    .. math:: \frac{R}{w^2} = \left(0.09\cos^2\theta + 0.055\sin^2\theta\right)\min(\phi/0.2,\,1)
 
     solid_fraction  phi [-]
     reynolds        Re_m, of the mean slip; for the range only [-]
@@ -48,9 +51,9 @@ def free_spheres(solid_fraction: float, reynolds: float, along: float, density_r
     them beyond its scatter of 15 %. Below phi = 0.2 a proportional decrease is assumed.
 
     >>> [free_spheres(0.36, 40.0, along, 2.5) for along in (1.0, 0.0)], free_spheres(0.0, 40.0, 1.0, 2.5)
-    ([0.09, 0.056], 0.0)
+    ([0.09, 0.055], 0.0)
     """
-    return min(5.0 * solid_fraction, 1.0) * (0.056 + 0.034 * along)
+    return min(5.0 * solid_fraction, 1.0) * (0.055 + 0.035 * along)
 
 
 @law("agitation", _SOURCE, solid_fraction=(0.1, 0.4), reynolds=(0.01, 300.0))
@@ -118,10 +121,6 @@ def anisotropy(solid_fraction: float, reynolds: float) -> float:
     return float(dilute * math.exp(-3.511 * solid_fraction / (1.0 + 1.801 * math.exp(-0.005 * reynolds))))
 
 
-SHORT = 0.2
-"""Shorter of the two correlation times of the fluctuation that a particle sees, over their sum [-]."""
-
-
 _STEPS = 60
 """Bisections of the logarithm of a granular temperature: it is found to round-off."""
 
@@ -160,14 +159,14 @@ def agitated_temperature(
     0.206
     """
     long, short = (1.0 - SHORT) * time, SHORT * time
-    encounters = solid_fraction * radial_distribution(solid_fraction) / (diameter * math.sqrt(math.pi))
+    crowding = solid_fraction * radial_distribution(solid_fraction) / (diameter * math.sqrt(math.pi))
     low, high = 1e-12 * variance, variance
     for _ in range(_STEPS):
         middle = math.sqrt(low * high)
         speed = math.sqrt(middle)
-        rate = 1.0 / relaxation + 8.0 * (1.0 + restitution) * encounters * speed
+        rate = 1.0 / relaxation + 8.0 * (1.0 + restitution) * crowding * speed
         memory = (time + rate * long * short) / ((1.0 + rate * long) * (1.0 + rate * short))
-        lost = middle * (1.0 / relaxation + 4.0 * (1.0 - restitution**2) * encounters * speed)
+        lost = middle * (1.0 / relaxation + 4.0 * (1.0 - restitution**2) * crowding * speed)
         if lost * relaxation**2 < variance * memory:
             low = middle
         else:

@@ -39,7 +39,7 @@ def call(*words: str) -> Done:
     return Done(code, out.getvalue(), err.getvalue())
 
 
-def cfddem(*words: str, folder: Path | None = None, seconds: float = 300) -> subprocess.CompletedProcess[str]:
+def cfddem(*words: str, folder: Path | None = None, seconds: float = 900) -> subprocess.CompletedProcess[str]:
     """Run a command in a process of its own, in a terminal of 100 columns."""
     environment = os.environ | {"COLUMNS": str(WIDTH), "NUMBA_NUM_THREADS": "1", "PYTHONPATH": str(HOME)}
     return subprocess.run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -48,7 +49,8 @@ class Rank(Communicator):
 
     def exchange(self, parcels: Sequence[Value]) -> list[Value]:
         assert len(parcels) == self.size
-        return [given[self.rank] for given in self.board.gather(self.rank, list(parcels))]
+        given = self.board.gather(self.rank, [pickle.dumps(parcel) for parcel in parcels])  # as between processes
+        return [pickle.loads(parcels[self.rank]) for parcels in given]
 
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         total, *others = self.board.gather(self.rank, local)

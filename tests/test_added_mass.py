@@ -123,6 +123,23 @@ def test_a_change_of_the_added_mass_is_in_the_energy_ledger() -> None:
     assert abs(simulation.energy.row()["energy_remainder"] - before) < 0.02 * added
 
 
+@pytest.mark.parametrize("added_mass", [0.5, "zuber"])
+def test_removed_particles_take_the_energy_of_their_added_mass(added_mass: float | str) -> None:
+    """Removal changes no remainder, to round-off."""
+    simulation = stirred(suspension(**{"laws.added_mass": added_mass, "run.energy_budget": True}))
+    for _ in range(3):
+        simulation.step()
+    assert simulation.energy is not None and simulation.exchange is not None
+    solver, before = simulation.particle_solver, simulation.energy.row()
+    gone = simulation.particles.id % 3 == 0
+    taken = solver.remove(gone)
+    after = simulation.energy.row()
+    lost = 0.5 * float((simulation.exchange.added_mass.mass(taken)[:, None] * taken.velocity**2).sum())
+    assert lost > 0.1 * -after["energy_fed"]
+    assert before["energy_added_mass"] - after["energy_added_mass"] == pytest.approx(lost, rel=1e-9)
+    assert after["energy_remainder"] == pytest.approx(before["energy_remainder"], abs=1e-9 * lost)
+
+
 def test_agitation_and_added_mass_have_one_coefficient() -> None:
     """The added mass of the run, a law or a number; agitation without added mass takes Zuber's."""
     voidage = np.array([0.5, 0.7, 1.0])

@@ -89,7 +89,7 @@ def test_onset_of_an_exact_bed_is_the_balance() -> None:
 
 
 def test_drag_of_a_layered_bed_is_the_sum_over_its_layers() -> None:
-    """At one Reynolds number, the pull on two layers is the sum of both: each grain at its own voidage."""
+    """At one Reynolds number, the pull on two layers is the sum of both: each sphere at its own voidage."""
     loose, dense = 0.5, 0.4
     together = in_layers(ergun, np.array([dense, loose, 1.0]))
     pulls = [ergun(20.0, own) / own * (1.0 - own) for own in (dense, loose)]
@@ -137,8 +137,8 @@ def test_separation_of_layers_of_a_mixture_and_upside_down() -> None:
     assert separation(history | {"mean_height_b": history["mean_height_a"]}, ("a", "b"), 0.5) == 0.0
 
 
-def test_the_spout_is_where_grains_go_up() -> None:
-    """Grains that rise within 30 mm of the middle and sink beside it; two snapshots of unequal speed."""
+def test_the_spout_is_where_particles_go_up() -> None:
+    """Spheres that rise within 30 mm of the middle and sink beside it; two snapshots of unequal speed."""
     width, generator = 0.28, np.random.default_rng(1)
     x, z = generator.uniform(0.0, width, 40_000), generator.uniform(0.0, 0.1, 40_000)
     inner = np.abs(x - 0.5 * width) < 0.028

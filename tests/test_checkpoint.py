@@ -140,7 +140,7 @@ def test_a_checkpoint_of_an_earlier_format_is_refused_with_a_remedy(tmp_path, mo
     with monkeypatch.context() as earlier:
         earlier.setattr(checkpoint, "FORMAT", 1)
         write(tmp_path, state(0))
-    remedy = r"earlier version; run .*case\.toml again"
+    remedy = r"earlier version of cfddem; run .*case\.toml again"
     with pytest.raises(InputError, match=rf"format = 1: must be {checkpoint.FORMAT}; .*{remedy}"):
         newest(tmp_path)
 

@@ -27,7 +27,7 @@ from closures.minimum_gap import elastohydrodynamic
 
 
 def rows(count: int, seed: int = 0) -> np.ndarray:
-    """Encounters with random names and times."""
+    """Collisions with random names and times."""
     random = np.random.default_rng(seed)
     made = np.zeros(count, COLLISION)
     made["first"], made["second"] = random.integers(0, 1000, (2, count))
@@ -92,7 +92,7 @@ def test_the_record_says_how_close_a_pair_came(speed: float, meets: bool) -> Non
         if len(run.collisions.table):
             break
         if not meets and np.abs(pair.velocity[1, 0] - pair.velocity[0, 0]) < 1e-3 * speed:
-            pair.velocity[1] = 2.0 * speed, 0.0, 0.0  # pull them apart, so that the encounter ends
+            pair.velocity[1] = 2.0 * speed, 0.0, 0.0  # pull them apart, so that the collision ends
     (row,) = run.collisions.table
     strength = 6.0 * np.pi * viscosity * (0.5 * radius) ** 2
     stokes = 0.5 * 2500 * 4 / 3 * np.pi * radius**3 * speed / strength
@@ -106,7 +106,7 @@ def test_the_record_says_how_close_a_pair_came(speed: float, meets: bool) -> Non
     assert row["elastohydrodynamic_gap"] == pytest.approx(deformed, rel=1e-12)
 
 
-def test_the_map_counts_every_encounter_once() -> None:
+def test_the_map_counts_every_collision_once() -> None:
     """Four collisions at known places: densities times areas add up to one, and the solids meet where they do."""
     collisions = {
         "stokes": np.array([2.0, 2.0, 50.0, np.inf]),
@@ -129,7 +129,7 @@ def test_a_record_without_films_has_no_map() -> None:
         regime_map({"stokes": np.array([np.inf])})
 
 
-def test_a_report_shows_the_map_where_encounters_were_recorded(tmp_path: Path) -> None:
+def test_a_report_shows_the_map_where_collisions_were_recorded(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     Run.begin(Case.from_text(TINY.replace("until = 0.024", "until = 0.06")), folder).go()
     found = report(folder)

@@ -231,7 +231,7 @@ def test_all_input_errors_of_a_case_are_reported(tmp_path: Path, monkeypatch: py
 
 def test_the_status_of_the_check_sets_the_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    low, high = ("--set", "inlet_velocity=0.007"), ("--set", "inlet_velocity=0.7")
+    low, high = ("--set", "inlet_velocity=0.007", "--set", "start=poured"), ("--set", "inlet_velocity=0.7")
     codes = [call("check", "liquid-bed", *given).code for given in ((), low, (*low, "--strict"), high)]
     assert codes == [0, 0, 1, 2]
     refused = call("run", "liquid-bed", *high)

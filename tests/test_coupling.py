@@ -94,7 +94,7 @@ def test_width_of_the_kernel_does_not_depend_on_the_cell() -> None:
 
 
 def suspension(**changes: object) -> Case:
-    """Two hundred grains in a periodic box of water, without weight."""
+    """Two hundred spheres in a periodic box of water, without weight."""
     values: dict[str, object] = {
         "fluid.density": 1000.0,
         "fluid.viscosity": 1e-3,
@@ -132,7 +132,7 @@ def momentum(simulation: Simulation) -> np.ndarray:
     [("A", 1e-3, 0.0), ("B", 1.0, 0.0), ("A", 1.0, 0.5), ("A", 1e-3, "zuber")],
 )
 def test_momentum_of_fluid_and_particles_is_kept(model: str, viscosity: float, added_mass: float | str) -> None:
-    """In a periodic box, for weak drag and drag that stops a grain in a step; with lift, stress, added mass or not."""
+    """In a periodic box, for weak drag and drag that stops a sphere in a step; with lift, stress, added mass or not."""
     forces = added_mass != 0.0
     more = {"laws.added_mass": added_mass, "laws.lift": forces, "laws.viscous_stress": forces}
     case = suspension(**{"laws.model": model, "fluid.viscosity": viscosity} | more)
@@ -164,7 +164,7 @@ def test_rest_stays_rest() -> None:
 
 
 def test_stiff_drag_is_stable_and_right() -> None:
-    """50 um grains in syrup, beta dt/(eps rho) of 1e4: at once at the balance of weight and drag."""
+    """50 um spheres in syrup, beta dt/(eps rho) of 1e4: at once at the balance of weight and drag."""
     case = suspension(
         **{
             "fluid.viscosity": 1.0,

@@ -16,7 +16,7 @@ WIDTH = 0.01
 
 
 def cylinder(**changes: object) -> Case:
-    """Grains in a cylinder of water, 8 cells across, whose corner cells are solid."""
+    """Spheres in a cylinder of water, 8 cells across, whose corner cells are solid."""
     column = {"shape": "cylinder", "width": WIDTH, "height": 0.02, "cell": WIDTH / 8.0, "ends": "flow"}
     bed = {"diameter": 1e-3, "count": 300, "start": "suspended", "inlet_velocity": 0.02}
     return suspension(**{"column": column, "bed": bed} | changes)

@@ -15,6 +15,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
+from cfddem.particles.energy_count import CHANNELS
 from cfddem.particles.initial.packing import lattice
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
@@ -22,7 +23,6 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy as of_spheres
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
-from cfddem.particles.work import CHANNELS
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 from closures.contact import hertz_force, spring_energy
@@ -88,7 +88,7 @@ def test_a_box_of_colliding_spheres_accounts_for_its_energy(asked: dict) -> None
     assert (counted["rolling"] > 0.0) == ("laws" in asked and asked["laws"].rolling != "none")
 
 
-def test_every_encounter_says_what_it_lost_and_to_what() -> None:
+def test_every_collision_says_what_it_lost_and_to_what() -> None:
     """Oblique, wet and rough: the sum over the row is the energy of motion that the pair has lost."""
     radius, speed = 1e-3, 0.5
     places = np.array([[0.0, 0.0, 0.0], [3.0 * radius, 0.8 * radius, 0.0]])
@@ -108,7 +108,7 @@ def test_every_encounter_says_what_it_lost_and_to_what() -> None:
     assert min(row["lost_to_film"], row["lost_to_contact"], row["lost_to_friction"]) > 0.01 * lost
 
 
-def test_the_count_changes_no_bit_and_hangs_on_no_thread() -> None:
+def test_the_count_changes_no_bit_and_is_the_same_on_any_number_of_threads() -> None:
     """On one thread, and on all; counted, and not."""
     found = []
     for threads in (1, None):

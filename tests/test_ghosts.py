@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,13 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from example_case import TEXT as EXAMPLE
 from in_process_ranks import on_ranks
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.materials import Material
+from cfddem.case.schema import Case
 from cfddem.particles import listing
 from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.ghosts import Slabs
@@ -27,6 +30,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, make_particles
 from cfddem.particles.walls.shapes import Box, Mesh, Plane, Wall
+from cfddem.run import history
 
 GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.8, friction=0.4, rolling_friction=0.02)
 STEEL = Material(density=7800, youngs_modulus=20e6, poisson=0.3, restitution=0.9, friction=0.2, rolling_friction=0.01)
@@ -199,7 +203,7 @@ def test_particles_come_and_go_on_ranks_as_in_one_process() -> None:
 
 
 def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
-    """Checkpoints of the ranks hold ghosts and who sends to whom."""
+    """From the state by ids."""
     spheres, given = settings(True, True)
     division = divided(2, 0, float(spheres.position[:, 0].max()))
 
@@ -208,13 +212,44 @@ def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
             finished(spheres.copy(), given, 0, communicator=communicator, division=division) for _ in range(2)
         )
         straight.advance(STEP, 70)
-        again.restore(straight.checkpoint())
+        again.restore(communicator.broadcast(straight.checkpoint()))
         for run in (straight, again):
             run.advance(STEP, 70)
         return state(again), state(straight)
 
-    for again, straight in on_ranks(2, program):
-        assert_same_bits(again, straight)
+    results = on_ranks(2, program)
+    assert_same_bits(joined([again for again, _ in results]), joined([straight for _, straight in results]))
+
+
+@pytest.mark.parametrize(("before", "after"), [(1, 2), (3, 2), (3, 1)])
+@pytest.mark.parametrize("film", [False, True])
+def test_a_checkpoint_goes_on_with_another_number_of_ranks(film: bool, before: int, after: int) -> None:
+    """With moving triangles, between two lists; the bits are those of a run without a stop."""
+    spheres, given = settings(film, True)
+    given["walls"] = [given["walls"][0], replace(given["walls"][1], velocity=(0.1, 0.0, 0.3))]
+    length = float(spheres.position[:, 0].max())
+
+    def made(communicator: Communicator) -> ParticleSolver:
+        space = divided(communicator.size, 0, length) if communicator.size > 1 else None
+        return finished(spheres.copy(), given, 0, communicator=communicator, division=space)
+
+    def begun(communicator: Communicator) -> Any:
+        run = made(communicator)
+        run.advance(STEP, 70)
+        return run.checkpoint()
+
+    def resumed(communicator: Communicator) -> dict[str, np.ndarray]:
+        run = made(communicator)
+        run.restore(kept)
+        run.advance(STEP, 130)
+        return state(run)
+
+    kept = on_ranks(before, begun)[0]
+    straight = made(SERIAL)
+    straight.advance(STEP, 70)
+    straight.advance(STEP, 130)
+    assert straight.lists.made > 3
+    assert_same_bits(joined(on_ranks(after, resumed)), joined([state(straight)]))
 
 
 def test_a_failure_on_one_rank_stops_all() -> None:
@@ -247,3 +282,22 @@ def test_what_ranks_cannot_share_is_refused() -> None:
             finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, [1e-3]), energies=True)
 
     on_ranks(2, program)
+
+
+def test_a_measure_of_one_process_is_refused_on_ranks() -> None:
+    """By its name, unless it says that it sums over the ranks."""
+    case = Case.from_text(EXAMPLE)
+
+    @history.measure("m/s")
+    def mean_speed(simulation: Any) -> float:
+        return float(np.linalg.norm(simulation.particles.velocity, axis=1).mean())
+
+    try:
+        history.require_shared(case, 1)
+        with pytest.raises(InputError, match="mean_speed"):
+            history.require_shared(case, 2)
+        history.forget("mean_speed")
+        history.measure("m/s", shared=True)(mean_speed)
+        history.require_shared(case, 2)
+    finally:
+        history.forget("mean_speed")

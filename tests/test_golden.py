@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from golden_runs import FOLDER, RUNS
+from golden.every_run import RUNS
+from golden.registry import FOLDER
 
 WITHIN = 1e-9
 """Largest difference, over the largest value of the array."""

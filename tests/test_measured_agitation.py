@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,8 @@ from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from closures.agitation import free_spheres
 from closures.registry import law_of
+from scenarios.beds.liquid_bed.study import FluidisedBed, Study
+from scenarios.validation.agitation import study
 from scenarios.validation.agitation.study import fits, fitted
 from scenarios.validation.agitation.unresolved import case_of
 from scenarios.validation.resolved_suspension import matrix
@@ -19,6 +23,7 @@ from scenarios.validation.resolved_suspension.fitting import autocovariance, fit
 from scenarios.validation.resolved_suspension.measures import Series, even_window
 from scenarios.validation.resolved_suspension.study import stored
 from scenarios.validation.resolved_suspension.suspension import Point
+from scenarios.validation.table import validate
 
 
 def liquid_bed(**changes: Any) -> Case:
@@ -113,3 +118,28 @@ def test_the_unresolved_box_has_the_slip_and_reynolds_number_of_the_resolved_run
     weight = math.pi / 6.0 * case.bed.diameter**3 * 2.6 * case.fluid.density * abs(case.laws.gravity[2])
     drag = 3.0 * math.pi * case.fluid.viscosity * case.bed.diameter * 15.0 * slip
     assert weight == pytest.approx(drag, rel=1e-12)  # the drag on a sphere, and its share of the pressure gradient
+
+
+def test_the_study_is_one_command_and_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With runs that give the resolved values and beds in balance, all limits hold; the second time nothing is run."""
+    computed: list[str] = []
+
+    def box(row: dict[str, Any]) -> dict[str, Any]:
+        computed.append(matrix.name(Point(**row["point"])))
+        return row
+
+    def fluidised(described: Study, velocity: float, **changes: Any) -> FluidisedBed:
+        computed.append(changes["laws.agitation"])
+        voidage = study.PUBLISHED.get(velocity, 0.6)
+        return FluidisedBed(velocity, 1.0, 1.0, voidage, voidage, voidage, 3.0, 0.02, 0.01)
+
+    monkeypatch.setattr(study, "run", box)
+    monkeypatch.setattr(study, "fluidise", fluidised)
+    assert validate("agitation", tmp_path)
+    table = json.loads((tmp_path / "agitation" / "table.json").read_text())
+    rows = {row["quantity"]: row for row in table["rows"]}
+    assert rows["density ratio 7, solid fraction 0.45: collision rate"]["value"] == pytest.approx(1.0, rel=1e-12)
+    assert rows["alginate at 9 mm/s: voidage"]["limit"] == 0.015
+    assert len(computed) == len(set(computed) - {"none", "free_spheres"}) + 11
+    before = len(computed)
+    assert validate("agitation", tmp_path) and len(computed) == before

@@ -17,12 +17,13 @@ from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
+from cfddem.particles.energy_count import CHANNELS
+from cfddem.particles.interactions.contact_law import ContactLaw, contact_named, register
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import make_particles
+from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.preflight.summary import preflight
 from cfddem.run.simulation import Simulation
 from closures import contact
@@ -39,14 +40,15 @@ def law_of_the_page() -> ContactLaw:
 
 
 LAW = law_of_the_page()
+WITHOUT_ENERGY = register(replace(LAW, name="energy_unknown", energy=None, lost=None))
 
 
-def pair(law: ContactLaw = LAW, speed: float = 0.1, slide: float = 0.0) -> ParticleSolver:
+def pair(law: ContactLaw = LAW, speed: float = 0.1, slide: float = 0.0, **options: Any) -> ParticleSolver:
     """Two spheres about to collide."""
     position, velocity = np.zeros((2, 3)), np.zeros((2, 3))
     position[1, 0], velocity[:, 0], velocity[0, 1] = 2.02 * RADIUS, (speed, -speed), slide
     made = make_particles(position, RADIUS, 2500.0, velocity=velocity)
-    return ParticleSolver(made, pair_table([GLASS]), laws=Laws(contact=law), skin=0.2 * RADIUS)
+    return ParticleSolver(made, pair_table([GLASS]), laws=Laws(contact=law), skin=0.2 * RADIUS, **options)
 
 
 def collide(run: ParticleSolver) -> None:
@@ -68,6 +70,23 @@ def test_restitution_is_the_root_of_the_ratio_of_stiffnesses(ratio: float, speed
     collide(run)
     assert -run.particles.velocity[0, 0] / speed == pytest.approx(math.sqrt(1.0 / ratio), rel=2e-3)
     assert run.particles.velocity.sum(axis=0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_energy_lost_to_hysteresis_is_counted() -> None:
+    """Head-on, it is all that the pair has lost; halfway, the spring holds what it will give back."""
+    run = pair(energies=True, record=True)
+    assert run.energies is not None and run.collisions is not None
+    before, step = kinetic_energy(run.particles), 0.1 * run.recommended_step(0.2)
+    while not (run.edges.largest_overlap > 0.0).any() or run.particles.velocity[0, 0] > 0.0:
+        run.advance(step)
+    spring, _ = run.energies.springs(run)
+    assert spring == pytest.approx(0.25 * before, rel=0.01)
+    collide(run)
+    lost = dict(zip(CHANNELS, run.energies.totals))
+    assert lost.pop("hysteresis") == pytest.approx(before - kinetic_energy(run.particles), rel=1e-3)
+    assert max(map(abs, lost.values())) < 1e-9 * before
+    run.advance(step, 10)
+    assert run.collisions.table["lost_to_contact"][0] == pytest.approx(0.75 * before, rel=1e-3)
 
 
 def test_a_pair_remembers_its_largest_overlap() -> None:
@@ -133,8 +152,9 @@ def test_a_registered_law_is_chosen_by_its_name_in_a_case() -> None:
     depth = case.reference_speed * swing * math.sqrt(500.0 / 400.0)  # loading is softer than unloading
     assert numbers["collisions and film"]["overlap / diameter"]["value"] == pytest.approx(depth / 1e-3, rel=1e-4)
     assert "contact modulus / real" not in numbers["collisions and film"]
-    simulation = Simulation(case)
+    simulation = Simulation(case.with_(**{"run.energy_budget": True}))
     simulation.until(1e-3)
+    assert simulation.energy is not None and simulation.energy.row()["energy_hysteresis"] == 0.0  # no collision yet
     assert "largest_overlap" in simulation.particle_solver.edges.fields
     assert simulation.particle_solver.laws.parameters[:2] == (400.0, 500.0)
     assert Case.from_text(case.to_toml()) == case
@@ -160,7 +180,8 @@ def test_wrong_words_for_a_contact_law_are_refused(changed: dict[str, Any], said
 
 
 def test_a_run_that_counts_energy_needs_a_law_that_gives_it() -> None:
-    found = preflight(Case.from_text(CASE, "bed.toml", {"run.energy_budget": True}))
+    unknown = {"laws.contact": WITHOUT_ENERGY.name, "run.energy_budget": True}
+    found = preflight(Case.from_text(CASE, "bed.toml", unknown))
     assert [each.key for each in found.issues] == ["run.energy_budget"]
 
 
@@ -189,8 +210,8 @@ def test_what_a_law_cannot_do_is_refused() -> None:
         pair(ContactLaw(name="odd", force=odd, damping=odd, stiffness=odd, tangential_stiffness=odd))
     with pytest.raises(InputError, match=r"laws.contact = 'worded'.*compiled"):
         check_contact_law(replace(LAW, energy=worded))
-    with pytest.raises(InputError, match=r"energies.*'walton_braun'"):
-        ParticleSolver(pair().particles, pair_table([GLASS]), laws=Laws(contact=LAW), energies=True)
+    with pytest.raises(InputError, match=r"energies.*'energy_unknown'"):
+        pair(WITHOUT_ENERGY, energies=True)
     with pytest.raises(InputError, match=r"contact = 'herz'.*did you mean 'hertz'"):
         Laws(contact="herz").check()
 

@@ -42,6 +42,7 @@ SIZES = {
 }
 
 
+@pytest.mark.parametrize("walled", [(), (2,), (0, 1, 2)], ids=["periodic", "floor and lid", "six walls"])
 @pytest.mark.parametrize(
     ("sizes", "fraction"),
     [
@@ -53,15 +54,20 @@ SIZES = {
         ("ratio 10", 0.55),
     ],
 )
-def test_random_packing_has_its_fraction_and_no_overlap(sizes: str, fraction: float) -> None:
-    """Solid fraction to rounding, largest overlap below the stated limit by a search through all pairs."""
+def test_random_packing_has_its_fraction_and_no_overlap(sizes: str, fraction: float, walled: tuple[int, ...]) -> None:
+    """Solid fraction to rounding; overlap of pairs below the stated limit by a search through all, of walls none."""
+    fraction = min(fraction, 0.4) if len(walled) == 3 else fraction  # in a box of a few diameters between walls
     diameters = SIZES[sizes]
-    centres, box = random_packing(diameters, fraction, seed=7, shape=(1.0, 1.5, 1.0))
+    periodic = (0 not in walled, 1 not in walled, 2 not in walled)
+    centres, box = random_packing(diameters, fraction, seed=7, shape=(1.0, 1.5, 1.0), periodic=periodic)
     assert np.sum(np.pi / 6.0 * diameters**3) / np.prod(box) == pytest.approx(fraction, rel=1e-12)
     assert box / box[0] == pytest.approx([1.0, 1.5, 1.0], rel=1e-12)
     assert ((centres >= 0.0) & (centres <= box)).all()
-    apart, _ = nearest_images(centres, box)
+    apart, _ = nearest_images(centres, np.where(periodic, box, np.inf))
     radius = 0.5 * diameters
+    for axis in walled:
+        assert (centres[:, axis] - radius >= 0.0).all()
+        assert (centres[:, axis] + radius <= box[axis] * (1.0 + 1e-15)).all()
     smaller = np.minimum(radius[:, None], radius[None])
     overlap = (radius[:, None] + radius[None] - np.linalg.norm(apart, axis=2)) / smaller
     np.fill_diagonal(overlap, -1.0)
@@ -82,6 +88,8 @@ def test_packing_that_cannot_be_reached_says_so_in_one_line() -> None:
     for fraction in (0.0, 0.74, -1.0):
         with pytest.raises(InputError, match="solid_fraction"):
             random_packing(mono(100, 1e-3), fraction, seed=1)
+    with pytest.raises(InputError, match=r"shape\[0\]"):
+        random_packing(mono(10, 1e-3), 0.3, seed=1, shape=(1.0, 20.0, 20.0), periodic=(False, True, True))
 
 
 def test_lattice_fills_its_room_without_overlap() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cfddem.analysis.bed_laws import comparison, expansion_note
 from cfddem.analysis.measures import voidage_from_pressure
 from cfddem.analysis.report import report
 from cfddem.analysis.report_text import as_json, lines
@@ -116,6 +117,22 @@ def test_means_errors_and_laws_match_the_record(tmp_path: Path) -> None:
     assert rows["voidage by Richardson-Zaki, from height"]["expected"] == pytest.approx(expected, rel=1e-12)
     assert result["ledger"] == {"momentum_imbalance": 1e-15, "volume_imbalance": 1e-9, "particles_lost": 0.0}
     assert result["steps"] == {"particles": 40_000, "fluid": 4000}
+
+
+def test_a_sentence_says_where_the_voidages_lie_among_the_published_ones(tmp_path: Path) -> None:
+    laws = [
+        comparison(f"voidage by {law}, from {source}", computed, expected, "1")
+        for law, expected in (("one", 0.59), ("other", 0.62))
+        for source, computed in (("height", 0.6), ("pressure", 0.63))
+    ]
+    spread = "the published voidages differ by 0.030, 0.590 to 0.620"
+    assert (
+        expansion_note(laws)
+        == f"{spread}; that from the height lies within, that from the pressure lies 0.010 above them"
+    )
+    assert expansion_note(laws[:1]).endswith("that from the height lies 0.010 above them")
+    assert expansion_note([]) == ""
+    assert any("published voidages differ" in line for line in lines(report(made_up(tmp_path / "run"))))
 
 
 def test_no_slip_walls_increase_the_expected_voidage(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ RADIUS = 0.5e-3
 
 
 def rain(film: bool, skin: float | None = None, sort_every: int = 5) -> ParticleSolver:
-    """1 440 grains of several sizes that fall on a floor in a periodic box, with and without water."""
+    """1 440 spheres of several sizes that fall on a floor in a periodic box, with and without water."""
     generator = np.random.default_rng(4)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in (12, 12, 10)), indexing="ij"), axis=-1).reshape(-1, 3)
     position = (cells + 0.5 + 0.1 * generator.uniform(-1, 1, cells.shape)) * 2.2 * RADIUS

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cfddem.backend.compile import use_threads
+from cfddem.backend.compile import serial, use_threads
+from cfddem.coupling.forces.agitation import _advanced, _transition
+from closures.agitation import SHORT
 from scenarios.validation.resolved_suspension import fitting, matrix, pictures, verification
 from scenarios.validation.resolved_suspension.film import approach_resistance, unresolved_film
 from scenarios.validation.resolved_suspension.measures import _box_waves, autocovariance, averaged, block_mean
@@ -155,25 +157,31 @@ def test_means_and_correlations_of_a_known_series():
     assert abs(mean - 2.0) < 0.02 and abs(error / 0.005 - 1.0) < 0.1
 
 
-def test_the_fit_finds_the_numbers_of_a_synthetic_force():
-    a_d, a_i, tau, s, step, window = 0.9, 0.4, 1.3, fitting.SMOOTHING, 0.01, 0.25
-    random = np.random.default_rng(5)
-    decay = np.exp(-step / np.array([tau, s * tau]))
-    count, length = 1500, 6000
-    slow, u = random.normal(size=count), np.zeros(count)
-    path = np.empty((length, count))
-    for k in range(length):  # a plain process, filtered once more
-        slow = decay[0] * slow + math.sqrt(1.0 - decay[0] ** 2) * random.normal(size=count)
-        u = decay[1] * u + (1.0 - decay[1]) * slow
-        path[k] = u
-    path /= path[1000:].std()
-    samples = round(window / step)
-    force = a_d * 2.0 * path[1:] + a_i * 0.7 * np.diff(path, axis=0) / step
-    force = averaged(force[1000:], samples)
+@serial
+def _agitate(numbers, long, short, step, path):
+    transition = _transition(long, short, step)
+    for column in range(path.shape[1]):
+        value, rate = numbers[0, column, 0], numbers[0, column, 1]
+        for n in range(len(path)):
+            value, rate = _advanced(value, rate, transition, numbers[n, column, 0], numbers[n, column, 1])
+            path[n, column] = value
+
+
+def test_the_fit_finds_the_numbers_that_a_run_agitates_with():
+    """The force is made by the process of the run itself, so that fit and run mean the same by their numbers."""
+    a_d, a_i, tau, step, window, inertia = 0.9, 0.4, 1.3, 0.01, 0.25, 0.7
+    path = np.empty((5000, 1500))
+    numbers = np.random.default_rng(5).standard_normal((*path.shape, 2))
+    _agitate(numbers, (1.0 - SHORT) * tau, SHORT * tau, step, path)
+    force = a_d * path[1:] + a_i * inertia * np.diff(path, axis=0) / step
+    force = averaged(force, round(window / step))
     lags = np.arange(0, 300, 5)
     covariance = np.array([(force[: len(force) - k] * force[k:]).mean() for k in lags])
-    found = fitting.fit(lags * step, (covariance, 0.5 * covariance), (1.0, 0.5), window, 2.0, 0.7)
-    assert abs(found.drag / a_d - 1.0) < 0.05
-    assert abs(found.inertia / a_i - 1.0) < 0.1
-    assert abs(found.time / tau - 1.0) < 0.1
-    assert found.residual < 0.02
+    row = {"lag": (lags * step).tolist(), "window": window, "inertia": inertia, "solid_fraction": 0.3, "reynolds": 40.0}
+    for way, variance in zip(("along", "across"), fitting.seen_fluctuation(0.3, 40.0)):
+        row[f"seen_covariance_{way}"] = (variance * covariance).tolist()
+    found = fitting.fit_shares([row])
+    assert found.along == pytest.approx(a_d, rel=0.05)
+    assert found.across == pytest.approx(found.along, rel=1e-3)
+    assert found.inertia == pytest.approx(a_i, rel=0.1)
+    assert found.time == pytest.approx(tau, rel=0.05)

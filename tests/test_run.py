@@ -15,6 +15,7 @@ import pytest
 from disturbed_runs import TINY, kill_and_go_on, long_enough, same_record, same_state
 
 from cfddem import open_run
+from cfddem.backend.communicator import SERIAL
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError, RunFailed, RunStopped
 from cfddem.case.schema import Case
@@ -228,7 +229,7 @@ def test_an_interrupt_within_a_step_is_a_stop(tmp_path: Path) -> None:
     def step(_: float) -> None:
         raise KeyboardInterrupt
 
-    halted = SimpleNamespace(case=Case.from_text(TINY), time=0.0, step=step)
+    halted = SimpleNamespace(case=Case.from_text(TINY), time=0.0, step=step, communicator=SERIAL)
     folder = RunFolder.create(tmp_path / "run", TINY, {})
     with pytest.raises(KeyboardInterrupt):
         Run(halted, folder).go()  # type: ignore[arg-type]

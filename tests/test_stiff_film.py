@@ -105,7 +105,7 @@ class TypicalCollision:
                 return rate / pair.approach
             if abs(rate) < 5e-4 * pair.approach and run.gap[0] > 0.99 * self.minimum_gap:
                 return 0.0
-        raise AssertionError("the encounter does not end")
+        raise AssertionError("the collision does not end")
 
 
 def by_stokes(material: Material, diameter: float, stokes: float, speed: float, wall: bool = False) -> TypicalCollision:
@@ -127,12 +127,12 @@ def test_immersed_restitution_at_checkpoints(name: str) -> None:
     """The engine and the solution in this file both give the converged values, within 1e-3 and the printed digit."""
     material, values = CHECKPOINTS[name]
     for stokes, restitution in values.items():
-        encounter = by_stokes(material, 12.7e-3, stokes, 0.1)
-        assert encounter.converged() == pytest.approx(restitution, abs=1e-4), stokes
-        assert encounter.simulated("drift") == pytest.approx(restitution, abs=1e-3), stokes
+        collision = by_stokes(material, 12.7e-3, stokes, 0.1)
+        assert collision.converged() == pytest.approx(restitution, abs=1e-4), stokes
+        assert collision.simulated("drift") == pytest.approx(restitution, abs=1e-3), stokes
 
 
-def random_encounter(seed: int) -> TypicalCollision:
+def random_collision(seed: int) -> TypicalCollision:
     """Diameter 0.2 to 13 mm, E 50 MPa to 190 GPa, rough and smooth, a pair, an unlike pair or a wall."""
     draw = np.random.default_rng(seed)
     kind = ("pair", "unlike", "wall")[seed % 3]
@@ -157,42 +157,42 @@ def random_encounter(seed: int) -> TypicalCollision:
     return TypicalCollision(pair)
 
 
-ENCOUNTERS = [random_encounter(seed) for seed in range(30)]
+COLLISIONS = [random_collision(seed) for seed in range(30)]
 
 
 def test_sample_holds_both_mechanisms() -> None:
     """The random collisions turn back on asperities and on the film's own pressure, deep and shallow."""
-    assert 8 <= sum(encounter.by_film for encounter in ENCOUNTERS) <= 22
-    assert min(e.depth for e in ENCOUNTERS) < 5.0 and max(e.depth for e in ENCOUNTERS) > 50.0
-    assert sum(e.converged() > 0.0 for e in ENCOUNTERS) >= 20
+    assert 8 <= sum(collision.by_film for collision in COLLISIONS) <= 22
+    assert min(e.depth for e in COLLISIONS) < 5.0 and max(e.depth for e in COLLISIONS) > 50.0
+    assert sum(e.converged() > 0.0 for e in COLLISIONS) >= 20
 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_lubricated_drift_is_converged(seed: int) -> None:
     """Restitution at 2 % of the Hertz time within 1e-3 of the converged solution of the same model."""
-    encounter = ENCOUNTERS[seed]
-    assert encounter.simulated("drift") == pytest.approx(encounter.converged(), abs=1e-3)
+    collision = COLLISIONS[seed]
+    assert collision.simulated("drift") == pytest.approx(collision.converged(), abs=1e-3)
 
 
-@pytest.mark.parametrize("seed", [n for n, e in enumerate(ENCOUNTERS) if e.depth < 15.0 and e.film_rate < 1.0])
+@pytest.mark.parametrize("seed", [n for n, e in enumerate(COLLISIONS) if e.depth < 15.0 and e.film_rate < 1.0])
 def test_plain_verlet_is_near(seed: int) -> None:
     """Restitution with the film as a force within 0.012 where delta_max/h_min < 15 and lambda dt < 1."""
-    encounter = ENCOUNTERS[seed]
-    assert encounter.simulated("verlet") == pytest.approx(encounter.converged(), abs=0.012)
+    collision = COLLISIONS[seed]
+    assert collision.simulated("verlet") == pytest.approx(collision.converged(), abs=0.012)
 
 
 @pytest.mark.parametrize("stokes", [1.0, 2.0, 4.0, 6.0])
 @pytest.mark.parametrize("wall", [False, True], ids=["pair", "wall"])
 def test_film_stops_a_slow_pair_where_it_must(stokes: float, wall: bool) -> None:
     """Above h_min the speed is linear in ln h, and the pair stops at h_co exp(-St); both within 1e-3 (ours 1e-6)."""
-    encounter = by_stokes(DELRIN, 12.7e-3, stokes, 0.1, wall)
-    pair, reach = encounter.pair, encounter.pair.reduced_radius
+    collision = by_stokes(DELRIN, 12.7e-3, stokes, 0.1, wall)
+    pair, reach = collision.pair, collision.pair.reduced_radius
     pair.gap = reach
     run = pair.simulation(Laws(film=True))
     step = STEP * pair.hertz_time
     for _ in range(400):
         run.advance(step, math.ceil(0.02 * reach / (pair.approach * step)))
-        law = -pair.approach + encounter.speed_scale * math.log(reach / run.gap[0])
+        law = -pair.approach + collision.speed_scale * math.log(reach / run.gap[0])
         assert normal_speed(run) == pytest.approx(law, abs=1e-3 * pair.approach)
     assert abs(normal_speed(run)) <= 1e-6 * pair.approach
     assert run.gap[0] == pytest.approx(reach * math.exp(-stokes), rel=1e-3)

@@ -2,7 +2,7 @@
 
 Vyas, Ottino, Lueptow & Umbanhowar, Comput. Phys. Commun. 310, 109524 (2025), doi:10.1016/j.cpc.2025.109524: a code
 that moves the tangential spring with the velocity of the half step in the tangent plane of the full step makes
-small grains stick to large ones. Where a grain touches two large ones the error is of first order in the step.
+small spheres stick to large ones. Where a sphere touches two large ones the error is of first order in the step.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from closures import contact
 
 GRAVITY = 9.81
 GRAIN = 0.25e-3
-"""Radius of the small grain [m]; it is of glass."""
+"""Radius of the small sphere [m]; it is of glass."""
 
 SOLID = Material(density=2500, youngs_modulus=5e8, poisson=0.3, restitution=0.5)
 STIFF = Laws(contact=LINEAR.with_parameters(normal_stiffness=1e4, tangential_stiffness=8235.0))
@@ -33,7 +33,7 @@ STIFF = Laws(contact=LINEAR.with_parameters(normal_stiffness=1e4, tangential_sti
 def grain_and_large(
     position: list[float], ratio: float, half_distance: float, friction: float, laws: Laws, **options: object
 ) -> ParticleSolver:
-    """A grain and two fixed spheres, `ratio` times larger, with centres at x = -half_distance and half_distance."""
+    """A sphere and two fixed spheres, `ratio` times larger, with centres at x = -half_distance and half_distance."""
     solid = SOLID.model_copy(update={"friction": friction})
     centres = [[-half_distance, 0.0, 0.0], [half_distance, 0.0, 0.0]]
     made = make_particles(
@@ -47,12 +47,12 @@ def grain_and_large(
 @pytest.mark.parametrize("laws", [STIFF, Laws(contact="hertz")], ids=["linear", "hertz"])
 @pytest.mark.parametrize("ratio", [3.0, 10.0, 20.0, 100.0])
 def test_grain_rolls_out_of_a_groove(ratio: float, laws: Laws) -> None:
-    """A grain in the groove of two large spheres rolls off: energy to 2e-4, spin to 5e-5, and no deeper.
+    """A sphere in the groove of two large spheres rolls off: energy to 2e-4, spin to 5e-5, and no deeper.
 
     The centre moves on a circle of radius b about the line of the large centres, the contacts lie b/(R + r) of the
     radius from the axis of the spin: v^2 (1 + 0.4 (R + r)^2/b^2) = 2 g b (cos theta_0 - cos theta). The overlap is
     what the weight, less the centrifugal force, asks of the two contacts. A spring moved in the wrong plane turns
-    into the radial direction and takes the grain 2 to 24 times deeper.
+    into the radial direction and takes the sphere 2 to 24 times deeper.
     """
     large, start = ratio * GRAIN, 0.2
     reach = math.sqrt((large + GRAIN) ** 2 - large**2)
@@ -61,7 +61,7 @@ def test_grain_rolls_out_of_a_groove(ratio: float, laws: Laws) -> None:
     angle = start
     while angle < 0.65:
         run.advance(1e-6, 200)
-        assert run.time < 0.5, "the grain sticks in the groove"
+        assert run.time < 0.5, "the sphere sticks in the groove"
         _, y, z = run.particles.position[0]
         angle, speed = math.atan2(y, z), np.linalg.norm(run.particles.velocity[0])
         if angle > 0.3:
@@ -74,7 +74,7 @@ def test_grain_rolls_out_of_a_groove(ratio: float, laws: Laws) -> None:
 
 
 def hertz_overlap(force: float, ratio: float) -> float:
-    """Overlap of the grain and a large sphere [m]."""
+    """Overlap of the sphere and a large sphere [m]."""
     radius = contact.reduced(GRAIN, ratio * GRAIN)
     modulus = contact.reduced_modulus(SOLID.youngs_modulus, SOLID.poisson, SOLID.youngs_modulus, SOLID.poisson)
     return (force / contact.hertz_stiffness(modulus, radius)) ** (2.0 / 3.0)
@@ -83,7 +83,7 @@ def hertz_overlap(force: float, ratio: float) -> float:
 @pytest.mark.parametrize("friction", [0.1, 0.5, 2.0])
 @pytest.mark.parametrize("ratio", [10.0, 30.0, 100.0])
 def test_grain_falls_through_a_wide_gap(ratio: float, friction: float) -> None:
-    """A gap of 1.1 grain diameters between two large spheres never holds the grain, however rough."""
+    """A gap of 1.1 sphere diameters between two large spheres never holds the sphere, however rough."""
     large = ratio * GRAIN
     half = large + 1.1 * GRAIN
     angle = 0.2  # above the horizontal, where it touches the left one at first
@@ -91,13 +91,13 @@ def test_grain_falls_through_a_wide_gap(ratio: float, friction: float) -> None:
     run = grain_and_large(place, ratio, half, friction, STIFF, free=(1.0, 0.0, 1.0))
     while run.particles.position[0, 2] > -0.5 * large:
         run.advance(2e-6, 1000)
-        assert run.time < 1.0, "the grain sticks in the gap"
+        assert run.time < 1.0, "the sphere sticks in the gap"
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.5, 2.0])
 @pytest.mark.parametrize("ratio", [10.0, 30.0, 100.0])
 def test_grain_rests_above_a_narrow_gap(ratio: float, friction: float) -> None:
-    """A gap of 0.9 diameters holds the grain, and it comes to rest where it touches both, or wedged 2 % of r deeper."""
+    """A gap of 0.9 diameters holds the sphere; it comes to rest where it touches both, or wedged 2 % of r deeper."""
     large = ratio * GRAIN
     half = large + 0.9 * GRAIN
     height = math.sqrt((large + GRAIN) ** 2 - half**2)
@@ -144,7 +144,7 @@ def test_a_run_repeats_bit_by_bit(film: bool) -> None:
 def moved(
     pair: Pair, laws: Laws, order: list[int], axes: np.ndarray, shift: float, **options: object
 ) -> ParticleSolver:
-    """The same encounter with its particles listed in another order, axes reflected, and elsewhere."""
+    """The same collision with its particles listed in another order, axes reflected, and elsewhere."""
     given = pair.simulation(laws).particles
     reflected = np.prod(axes) * axes  # spins are axial vectors
     made = make_particles(

@@ -140,8 +140,8 @@ def test_a_sphere_turns_about_edge_and_corner_of_a_mesh() -> None:
         assert again.particles.force[0] == pytest.approx(expected * normal, rel=1e-6, abs=1e-9 * expected)
 
 
-def test_a_crossing_is_one_encounter() -> None:
-    """In the record a sphere that meets a mesh and crosses its edges has one encounter, with the wall's number."""
+def test_a_crossing_is_one_collision() -> None:
+    """In the record a sphere that meets a mesh and crosses its edges has one collision, with the wall's number."""
     run = sphere(
         [-0.004, 0.0003, 2.2 * RADIUS], [Plane(point=(0.0, 0.0, -1.0)), sheet(7)], velocity=[1.0, 0.0, -0.5], film=1e-3,
         gravity=(0.0, 0.0, 0.0), record=True,
@@ -216,7 +216,7 @@ MOVING = {
         triangles=np.array([[0, 1, 2]]),
         velocity=(0.0, 0.0, 0.5),
     ),
-    "peg": Cylinder(
+    "rod": Cylinder(
         point=(0.0, 0.0, -0.03), radius=0.01, length=0.02, caps=True, outside=True, velocity=(0.0, 0.0, 0.5)
     ),
     "paddle": Mesh(
@@ -263,7 +263,7 @@ WET = {
     "inside a cylinder": (Cylinder(point=(0.0, 0.0, 0.05), axis=(0.0, 1.0, 0.0), radius=0.05), (0.0, 0.0, 1.0)),
     "outside a cylinder": (Cylinder(point=(0, 0, -0.05), axis=(0, 1, 0), radius=0.05, outside=True), (0.0, 0.0, 1.0)),
     "tube": (Cylinder(point=(0, -0.05, 0.05), axis=(0, 1, 0), radius=0.05, length=0.1), (0.0, 0.0, 1.0)),
-    "end of a peg": (Cylinder(point=(0, 0, -1), radius=0.05, length=1.0, caps=True, outside=True), (0.0, 0.0, 1.0)),
+    "end of a rod": (Cylinder(point=(0, 0, -1), radius=0.05, length=1.0, caps=True, outside=True), (0.0, 0.0, 1.0)),
     "cone": (Cone(point=(0.0, 0.0, -0.1), radius=0.1, top_radius=0.2, length=0.2), (-2.0, 0.0, 1.0)),
     "mesh": (sheet(7), (0.0, 0.0, 1.0)),
 }

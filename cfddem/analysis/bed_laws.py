@@ -12,6 +12,9 @@ from closures import bed as laws_of_beds
 from closures import numbers
 from closures.registry import REGISTRY
 
+VOIDAGES = {"bed_voidage": "height", "bed_voidage_from_pressure": "pressure"}
+"""Measures of the voidage, and what they are taken from."""
+
 FREE_SIDES = ("free_slip", "periodic")
 """Sides that do not retard the flow: no wall correction applies."""
 
@@ -39,12 +42,34 @@ def compared_with_bed_laws(case: Case, measures: dict[str, Any]) -> list[dict[st
         return [comparison("pressure drop by Ergun", drop, slope * height, "Pa", outside)]
     weight = buoyant_weight(case) / case.column.floor_area
     rows = [comparison("pressure drop by the buoyant weight", drop, weight, "Pa")]
+    if "wall_load" in measures:
+        carried = drop + measures["wall_load"]["mean"]
+        rows.append(comparison("pressure drop and wall load by the weight", carried, weight, "Pa"))
     if case.fluid.density > LIQUID and abs(case.laws.gravity[2]) > 0.0 and not case.bed.species:
         for law, voidage in expansion_laws(case).items():
-            for name, source in (("bed_voidage", "height"), ("bed_voidage_from_pressure", "pressure")):
+            for name, source in VOIDAGES.items():
                 if name in measures:
                     rows.append(comparison(f"voidage by {law}, from {source}", measures[name]["mean"], voidage, "1"))
     return rows
+
+
+def expansion_note(laws: list[dict[str, Any]]) -> str:
+    """Where the voidages of a run lie in the range of the published ones, in one sentence; empty if there are none.
+
+    laws  rows of the comparison
+    """
+    found = {source: [each for each in laws if each["law"].endswith(f"from {source}")] for source in VOIDAGES.values()}
+    rows = [row for each in found.values() for row in each]
+    if not rows:
+        return ""
+    low, high = (pick(row["expected"] for row in rows) for pick in (min, max))
+    places = []
+    for source, each in found.items():
+        if each:
+            off = max(low - each[0]["computed"], each[0]["computed"] - high)
+            side = "below" if each[0]["computed"] < low else "above"
+            places.append(f"that from the {source} lies " + (f"{off:.3f} {side} them" if off > 0.0 else "within"))
+    return f"the published voidages differ by {high - low:.3f}, {low:.3f} to {high:.3f}; {', '.join(places)}"
 
 
 def comparison(law: str, computed: float, expected: float, unit: str, outside_range: str = "") -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison
+from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison, expansion_note
 from cfddem.analysis.fluctuations import impacts
 from cfddem.analysis.regimes import RegimeMap, regime_map
 from cfddem.analysis.run_warnings import last_value, warnings_of
@@ -28,9 +28,9 @@ def report(folder: Path) -> dict[str, Any]:
 
     folder   of the run
     returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
-             (law, computed, expected, ratio), `ledger` (largest imbalances), `energy` and `energy_lines` (energy budget
-             at the end [J], if the case asks for it), `collisions` and `impacts` (of the window, if recorded),
-             `warnings`, `wall_time`, `preflight`, `provenance`
+             (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
+             and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
+             the window, if recorded), `warnings`, `wall_time`, `preflight`, `provenance`
     errors   InputError if the run has no history
     """
     run = open_run(folder)
@@ -50,6 +50,7 @@ def report(folder: Path) -> dict[str, Any]:
         "window": [begin, end],
         "measures": measures,
         "laws": laws,
+        "laws_note": expansion_note(laws),
         "ledger": _ledger(run),
         "energy": energy,
         "energy_lines": _energy_lines(run, energy),

@@ -23,7 +23,7 @@ def lines(result: dict[str, Any]) -> list[str]:
     """
     return [
         *_headline(result),
-        *_laws(result["laws"]),
+        *_laws(result["laws"], result["laws_note"]),
         *_ledger(result["ledger"]),
         *_collisions(result["collisions"]),
         *_impacts(result["impacts"]),
@@ -73,7 +73,7 @@ def _headline(result: dict[str, Any]) -> Iterator[str]:
         yield f"  {spelled(name):<26} {value:<28} {steadiness(each)}"
 
 
-def _laws(rows: list[dict[str, Any]]) -> Iterator[str]:
+def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
     if not rows:
         return
     wide = max(40, *(len(row["law"]) for row in rows))
@@ -82,6 +82,7 @@ def _laws(rows: list[dict[str, Any]]) -> Iterator[str]:
     for row in rows:
         numbers = f"{row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}"
         yield f"  {row['law']:<{wide}} {numbers} {shown_unit(row['unit'])}"
+    yield from textwrap.wrap(note, WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
 def _ledger(ledger: dict[str, float]) -> Iterator[str]:

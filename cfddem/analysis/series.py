@@ -94,8 +94,9 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     returns  Stationarity
 
     The start-up is cut where the standard error of the mean of the rest is smallest (MSER: White, Simulation 69 (1997)
-    323), on means of five values. The series is not stationary if the start-up exceeds half of the record, if the two
-    halves of the rest differ by more than `limit` standard errors, or if the rest is too short for an error.
+    323), on means of five values. The cut leaves at least a quarter of the record: the variance of less than a period
+    of a wave says nothing. The series is not stationary if the start-up exceeds half of the record, if the two halves
+    of the rest differ by more than `limit` standard errors, or if the rest is too short for an error.
     """
     series = np.asarray(values, float)
     batch = 5 if len(series) >= 10 * FEWEST else 1
@@ -106,7 +107,7 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     left = np.arange(count, 0, -1.0)
     tail, square = np.cumsum(means[::-1])[::-1], np.cumsum(((means - means.mean()) ** 2)[::-1])[::-1]
     spread = square - left * (tail / left - means.mean()) ** 2
-    cut = int(np.argmin((np.maximum(spread, 0.0) / left**2)[: count - 4]))
+    cut = int(np.argmin((np.maximum(spread, 0.0) / left**2)[: 3 * count // 4 + 1]))
     start = cut * batch
     rest = series[start:]
     first, second = np.array_split(rest, 2)

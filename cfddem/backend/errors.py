@@ -57,6 +57,13 @@ class RunStopped(CfddemError):
         super().__init__(message)
 
 
+def failure_elsewhere(message: str, exit_code: int) -> CfddemError:
+    """The failure of another process, with its message and exit code."""
+    failure = CfddemError(message)
+    failure.exit_code = exit_code
+    return failure
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """The limit to state for an unknown word: all known words, or the nearest of many, and the nearest one.
 

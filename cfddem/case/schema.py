@@ -16,8 +16,8 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.backend.law_choice import BUILT_IN, chosen
 from cfddem.case.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
+from cfddem.case.case_laws import AgitationFactors, CaseLaws
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
-from cfddem.case.laws import AgitationFactors, CaseLaws
 from cfddem.case.materials import Checked, Fluid, Material
 from cfddem.case.toml_text import parse, read_text, set_value
 from closures.agitation import SHARES, TIMES, free_spheres

@@ -6,12 +6,15 @@ import os
 import shutil
 import sys
 import textwrap
+from typing import NoReturn
 
 from cyclopts import App, CycloptsError, Group
 
 from cfddem import __version__
 from cfddem.backend.errors import CfddemError
+from cfddem.backend.launch import several_ranks
 from cfddem.cli import cases, information, results, validation
+from cfddem.cli.ranks import end_together
 
 WIDTH = 100
 """Widest line on a terminal [characters]."""
@@ -69,20 +72,28 @@ def main() -> None:
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
     except CycloptsError as failure:
-        _print_error(" ".join(str(failure).split()))
-        sys.exit(2)
+        _fail(" ".join(str(failure).split()), 2)
     except CfddemError as failure:
-        for line in str(failure).splitlines():
-            _print_error(line)
-        sys.exit(failure.exit_code)
+        _fail(str(failure), failure.exit_code)
     except BrokenPipeError:  # the reader of the output has closed it, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as failure:  # such as a full disk, or a folder without write permission
-        _print_error(f"{failure.filename or 'file'}: {failure.strerror or failure}")
-        sys.exit(2)
+        _fail(f"{failure.filename or 'file'}: {failure.strerror or failure}", 2)
     except KeyboardInterrupt:
-        _print_error("stopped")
-        sys.exit(130)
+        _fail("stopped", 130)
+    except Exception:
+        if not several_ranks():
+            raise
+        end_together("", 1)
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    """Print an error, one for each line, and end."""
+    if several_ranks():
+        end_together(message, code)
+    for line in message.splitlines():
+        _print_error(line)
+    sys.exit(code)
 
 
 def _print_error(message: str) -> None:

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json as _json
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from cfddem.cli.printing import announce_compilation, with_colour
+from cfddem.cli.ranks import on_ranks
 
 CASE = "case file or gallery name; default: the only TOML file here"
 SET = "KEY=VALUE that replaces a value of the case; may be repeated"
 THREADS = "number of threads; default: all processors"
+RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
+CONTINUE = "resume the run if the folder holds one"
 LOG = "file for progress, one line per history row"
 
 
@@ -102,6 +106,8 @@ def run(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; default: NAME-run")] = None,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     threads: Annotated[int | None, Parameter(help=THREADS)] = None,
+    ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
+    go_on: Annotated[bool, Parameter(name="--continue", help=CONTINUE, negative="")] = False,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
 ) -> None:
     """Run a case, write snapshots and history to a new folder, and print a report.
@@ -111,13 +117,23 @@ def run(
     Example: cfddem run liquid-bed -o bed --set start=suspended --set run.until=0.02
     """
     from cfddem.case.gallery import find_case, overrides
+
+    path = find_case(case)
+    folder = output or Path(f"{path.stem}-run")
+    if go_on and (folder / "run.json").exists():
+        resume(folder, threads=threads, ranks=ranks, log=log)
+        return
     from cfddem.case.schema import Case
     from cfddem.case.toml_text import read_text
     from cfddem.preflight.summary import refuse_errors
 
-    path = find_case(case)
     described = Case.from_toml(path, overrides(set or []))
-    for issue in refuse_errors(described).issues:
+    communicator = on_ranks(ranks, threads)
+    if communicator.size > 1:
+        from cfddem.run.build import require_parallel
+
+        require_parallel(described, communicator.size)
+    for issue in refuse_errors(described).issues if communicator.rank == 0 else ():
         print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
     from cfddem.analysis.report import report as summary
     from cfddem.analysis.report_text import lines
@@ -126,13 +142,17 @@ def run(
     from cfddem.run.runner import Run
     from cfddem.run.warmup import warmup
 
-    folder = output or Path(f"{path.stem}-run")
-    use_threads(threads)
-    with live_line(log) as line:
+    if communicator.size == 1:
+        use_threads(threads)
+    with live_line(log, communicator.rank == 0) as line:
         text = described.to_toml() if set else read_text(path)
-        with warmup(described):
-            prepared = Run.begin(described, folder, text=text, report=line.update, progress=line.progress)
+        with warmup(described) if communicator.rank == 0 else nullcontext():
+            prepared = Run.begin(
+                described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator
+            )
         prepared.go()
+    if communicator.rank > 0:
+        return
     print("\n".join(lines(summary(folder))))
     print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
 
@@ -142,6 +162,7 @@ def resume(
     *,
     until: Annotated[float | None, Parameter(help="new end time [s]")] = None,
     threads: Annotated[int | None, Parameter(help=THREADS)] = None,
+    ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
 ) -> None:
     """Continue a run that was stopped or killed, or extend one that has finished.
@@ -155,11 +176,13 @@ def resume(
     from cfddem.run.progress import live_line
     from cfddem.run.runner import Run
 
-    use_threads(threads)
-    folder = folder or newest_run(Path())
-    with live_line(log) as line:
-        Run.resume(folder, until=until, report=line.update, progress=line.progress).go()
-    print(f"written to {folder}")
+    folder, communicator = folder or newest_run(Path()), on_ranks(ranks, threads)
+    if communicator.size == 1:
+        use_threads(threads)
+    with live_line(log, communicator.rank == 0) as line:
+        Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
+    if communicator.rank == 0:
+        print(f"written to {folder}")
 
 
 def sweep(
@@ -168,12 +191,16 @@ def sweep(
     over: Annotated[list[str], Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")],
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
+    scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None,
+    write_jobs: Annotated[bool, Parameter(help="write commands and a Slurm script, run nothing", negative="")] = False,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
     json: Annotated[bool, Parameter(help="print the outcomes as JSON", negative="")] = False,
 ) -> None:
     """Run a case for many values, one folder each, and write a table and a figure of the results.
 
-    After a stop, the same command continues with the missing runs. Exit code: 3 if a run fails; the others are kept.
+    After a stop, the same command continues with the missing runs. With --write-jobs nothing is run: the folder gets
+    one command for each run, and a script for Slurm; the same command without it collects the results afterwards.
+    Exit code: 3 if a run fails; the others are kept.
 
     Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
     """
@@ -185,6 +212,13 @@ def sweep(
 
     path = find_case(case)
     values = ranges(over)
+    folder = output or Path(f"{path.stem}-sweep")
+    if write_jobs:
+        from cfddem.run.job_array import write_jobs as write
+
+        lines, script, count = write(path, values, folder, overrides(set or []))
+        print(f"{count} commands written to {lines}; submit with: sbatch {script}")
+        return
     done = 0
 
     def progress(outcome: Outcome) -> None:
@@ -193,10 +227,11 @@ def sweep(
         status = "already finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
         print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
 
-    folder = output or Path(f"{path.stem}-sweep")
-    if jobs == 1:
+    if jobs == 1 and scheduler is None:
         announce_compilation()
-    outcomes = run_all(path, values, folder, overrides=overrides(set or []), jobs=jobs, progress=progress)
+    outcomes = run_all(
+        path, values, folder, overrides=overrides(set or []), jobs=jobs, scheduler=scheduler, progress=progress
+    )
     failed = list(failures(outcomes))
     if json:
         print(_json.dumps([asdict(each) for each in outcomes]))

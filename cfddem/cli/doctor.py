@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import platform
 import shutil
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 TEST_CASE = """
@@ -22,6 +25,9 @@ run = {until = 0.01, every = 0.01}
 
 LARGEST_IMBALANCE = 1e-9
 """Largest relative imbalance of momentum exchange and volume in the test run [-]."""
+
+TIME_FOR_RANKS = 60.0
+"""Time in which two ranks must have exchanged a message [s]."""
 
 LEAST_DISK = 1e9
 """Free disk space below which the doctor objects [byte]."""
@@ -52,6 +58,7 @@ def examine(quick: bool = False) -> Iterator[Answer]:
     yield _compiled_loops()
     yield from _law_packages()
     yield _disk(Path())
+    yield _processes(quick)
     if not quick:
         yield _rendering()
         yield _test_run()
@@ -95,6 +102,28 @@ def _disk(folder: Path) -> Answer:
     if free <= LEAST_DISK:
         text += f", less than the {LEAST_DISK / 1e9:.0f} GB that a run may need"
     return Answer("folder", free > LEAST_DISK, text)
+
+
+def _processes(quick: bool) -> Answer:
+    """Whether a run can be shared by several processes: mpi4py, a launcher, and a message between two ranks."""
+    from cfddem.backend import launch
+    from cfddem.backend.errors import InputError
+
+    if find_spec("mpi4py") is None:
+        return Answer("processes", True, f"one; for runs on several ranks: {launch.INSTALL}")
+    try:
+        command = launch.launch_command(2, [sys.executable, "-m", "cfddem.backend.mpi"])
+    except InputError as failure:
+        return Answer("processes", False, str(failure))
+    if quick:
+        return Answer("processes", True, f"mpi4py is there, launcher {command[0]}")
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_FOR_RANKS, check=False)
+    except subprocess.TimeoutExpired:
+        return Answer("processes", False, f"{command[0]} did not end within {TIME_FOR_RANKS:g} s")
+    if done.returncode:
+        return Answer("processes", False, f"{command[0]}: {(done.stderr or done.stdout).strip()[-300:]}")
+    return Answer("processes", True, f"{done.stdout.strip()}\nlauncher {command[0]}")
 
 
 def _rendering() -> Answer:

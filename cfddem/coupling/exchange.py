@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cfddem.backend.compile import prange, threaded
+from cfddem.coupling.fluid_step_limits import COURANT, crossing_rate
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import (
     AgitationTerms,
@@ -32,7 +33,6 @@ from cfddem.coupling.forces.viscous_stress import viscous_force
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler, SampledFlow
 from cfddem.coupling.self_disturbance import SelfDisturbance
-from cfddem.coupling.time_scales import COURANT, crossing_rate
 from cfddem.coupling.transfer import ImplicitCoefficients, Transfer
 from cfddem.coupling.velocity_gradient import change_along, vorticity_at
 from cfddem.fluid.grid import Array
@@ -136,9 +136,10 @@ class Exchange:
         self._mean_step = 0.0
         self._declare(particles)
         if self.added_mass:
-            cell_map = kernel.map_particles(particles.position, particles.radius)
-            flow = self.flow.sample(particles, cell_map, kernel.solid_fraction(cell_map))
-            self.added_mass.update(particles, flow.voidage)
+            owned = particles.without_ghosts()
+            cell_map = kernel.map_particles(owned.position, owned.radius)
+            flow = self.flow.sample(owned, cell_map, kernel.solid_fraction(cell_map))
+            self.added_mass.update(owned, flow.voidage)
 
     def _declare(self, particles: Particles) -> None:
         """Declare the fields of all forces."""
@@ -153,7 +154,10 @@ class Exchange:
     # ------------------------------------------------------------ around one fluid step
 
     def prepare(self, particles: Particles, step: float) -> CouplingTerms:
-        """What the particles send into the coming fluid step [s]: volume, drag, momentum and explicit forces."""
+        """What the particles send into the coming fluid step [s]: volume, drag, momentum and explicit forces.
+
+        particles  of this rank, without ghosts
+        """
         if self.momentum.last_step == 0.0:
             particles.reset(*self._stored)  # particles may have been moved since the fields were declared
         fluid, kernel, last_step = self.fluid, self.kernel, self.momentum.last_step
@@ -226,21 +230,27 @@ class Exchange:
         """How often the drag law was evaluated outside its range."""
         return int(self.fluid.communicator.sum(self.drag.outside))
 
+    def _agitation_outside(self) -> int:
+        assert self.agitation is not None
+        return int(self.fluid.communicator.sum(self.agitation.outside))
+
     def checkpoint(self) -> dict[str, Any]:
         """What the next step depends on beside fluid and particles."""
         return {
             "last_step": self.momentum.last_step,
             "mean_step": self._mean_step,
-            "outside": self.drag.outside,
-            **({} if self.agitation is None else {"agitation": [self.agitation.steps, self.agitation.outside]}),
+            "outside": self.outside,
+            **({} if self.agitation is None else {"agitation": [self.agitation.steps, self._agitation_outside()]}),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
-        self.drag.outside = int(state["outside"])
+        first = self.fluid.communicator.rank == 0  # counts what all ranks have counted
+        self.drag.outside = int(state["outside"]) if first else 0
         if self.agitation is not None:
-            self.agitation.steps, self.agitation.outside = (int(each) for each in state["agitation"])
+            steps, outside = (int(each) for each in state["agitation"])
+            self.agitation.steps, self.agitation.outside = steps, outside if first else 0
 
     # ------------------------------------------------------------ terms
 

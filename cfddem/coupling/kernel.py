@@ -10,6 +10,10 @@ the given standard deviation, for any cell size:
 
 S is symmetric, keeps sums, and does not pass walls or solid cells. What the first stage puts behind a wall is put into
 the nearest open cell.
+
+Where several ranks share the grid, each deposits its own particles, on its cells and on ghosts of those around
+(:class:`cfddem.coupling.reach.Reach`). Ghosts are then added to the cells that they stand for; a gather fills them
+before. Deposit and gather stay adjoint.
 """
 
 from __future__ import annotations
@@ -19,11 +23,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, nearest
 from cfddem.coupling import kernel_loops as loops
+from cfddem.coupling.reach import Reach
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.halo import Halo
 
@@ -41,7 +45,7 @@ SLAB = 4
 class Stencil(NamedTuple):
     """Cells on which particles deposit, and the weight of each."""
 
-    cells: np.ndarray  # (N, m) uint32, flat index of the cell
+    cells: np.ndarray  # (N, m) uint32, flat index of the cell, ghosts included
     weights: Array  # (N, m), the sum of a row is 1
 
 
@@ -83,10 +87,11 @@ class FilterKernel:
         self._periodic = np.array(periodic, bool)
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
-        self._origin, self._inverse = np.array(grid.origin), 1.0 / np.array(grid.spacing)
-        self.halo = Halo(grid.cells, periodic, 1, 1)
+        self.reach = Reach(grid, periodic)
+        self._origin, self._inverse = self.reach.origin, 1.0 / np.array(grid.spacing)
+        self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
         self._buffers: dict[int, Array] = {}
-        self._home = _homes(grid, self.halo)
+        self._home = self.reach.homes()
         self._gates = _gates(grid, self.halo)
         self.sweeps, self.strength = self._diffusion()
 
@@ -103,36 +108,38 @@ class FilterKernel:
 
     def map_particles(self, position: Array, radius: Array) -> ParticleCellMap:
         """Map of particles at positions (N, 3) [m] with radii (N,) [m]."""
-        order, start = np.empty(len(position), np.int64), np.zeros(max(self.grid.cells[2] // SLAB, 1) + 1, np.int64)
+        slabs = max(self.reach.shape[0] // SLAB, 1)
+        order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         loops.sort_into_slabs(position, self._origin[2], self._inverse[2], SLAB, order, start)
         volume = (4.0 / 3.0) * math.pi * radius**3
         return ParticleCellMap(position.copy(), radius, volume, order, start, self.stencil(position, radius))
 
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""
-        size = np.array(self.grid.size)
-        inside: Array = position - self._periodic * size * np.floor((position - self._origin) / size)
+        size, origin = np.array(self.grid.whole.size), np.array(self.grid.whole.origin)
+        inside: Array = position - self._periodic * size * np.floor((position - origin) / size)
         return inside
 
     def stencil(self, position: Array, radius: Array) -> Stencil:
         """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
         shape = len(position), 8 * len(self._offsets)
         stencil = Stencil(np.empty(shape, np.uint32), np.empty(shape))
+        position = self.reach.placed(position, radius if len(self._offsets) > 1 else None)
         loops.stencils(position, radius, self._offsets, self._linear, self._origin, self._inverse, self._home, *stencil)
         return stencil
 
     def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx)."""
-        fields = np.zeros((math.prod(self.grid.cells), values.shape[1]))
+        fields = np.zeros((math.prod(self.reach.shape), values.shape[1]))
         loops.deposit(cell_map.order, cell_map.start, np.ascontiguousarray(values), *cell_map.stencil, fields)
-        return np.ascontiguousarray(fields.T).reshape(-1, *self.grid.shape)
+        return self.reach.collected(np.ascontiguousarray(fields.T).reshape(-1, *self.reach.shape))
 
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
         count = len(fields)
         values = np.empty((len(stencil.cells), count))
-        by_cell = np.zeros((math.prod(self.grid.cells), -(-count // loops.FOUR) * loops.FOUR))
-        by_cell[:, :count] = fields.reshape(count, -1).T
+        by_cell = np.zeros((math.prod(self.reach.shape), -(-count // loops.FOUR) * loops.FOUR))
+        by_cell[:, :count] = self.reach.spread(fields).reshape(count, -1).T
         loops.gather(*stencil, by_cell, values)
         return values
 
@@ -143,7 +150,7 @@ class FilterKernel:
         now, other = self._scratch(len(fields))
         self.halo.inner(now)[:] = fields
         for _ in range(self.sweeps):
-            self.halo.fill(now)
+            self.halo.fill(now, extend=False)  # gates are closed at sides
             loops.sweep(now, other, self.strength, *self._gates)
             now, other = other, now
         return self.halo.inner(now).copy()
@@ -176,6 +183,8 @@ class FilterKernel:
         errors    InputError for solid cells, or a particle that moves by a cell or more
         """
         grid = self.grid
+        if grid.whole is not grid:
+            raise InputError("solid_flux", None, "computed in a run of one process")
         moved = new.position - old.position
         moved -= self._periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
         farthest = self.communicator.largest(np.abs(moved * self._inverse), default=0.0)
@@ -223,15 +232,6 @@ def _pieces(count: int) -> Array:
     ring = np.sqrt(1.0 - height**2)
     points = radius[:, None] * np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
     return np.ascontiguousarray(points - points.mean(axis=0))  # local: pieces of one sphere
-
-
-def _homes(grid: Grid, halo: Halo) -> np.ndarray:
-    """Flat index of the cell that receives a deposit, for every cell and a layer around the grid.
-
-    It is the cell itself, the nearest open cell of a solid one, or that of the cell whose value a ghost takes.
-    """
-    nearest_open = distance_transform_edt(~grid.open, sampling=grid.spacing[::-1], return_indices=True)[1]
-    return halo.padded(np.ravel_multi_index(tuple(nearest_open), grid.shape)).astype(np.int64)
 
 
 def _gates(grid: Grid, halo: Halo) -> tuple[Array, Array, Array]:

@@ -20,9 +20,10 @@ def velocity_gradient(fluid: FluidSolver, kernel: FilterKernel) -> Array:
         if count == 1:
             continue
         along = kernel.halo.inner(np.roll(padded, -1, 3 - axis) - np.roll(padded, 1, 3 - axis)) / (2.0 * spacing)
-        if not kernel.halo.periodic[axis]:
-            ends = np.moveaxis(along, 3 - axis, 0)
-            ends[[0, -1]] *= 2.0  # the ghost repeats the cell beside it
+        ends = np.moveaxis(along, 3 - axis, 0)
+        for layer, side in ((0, 0), (-1, 1)):
+            if kernel.halo.ends[axis, side]:
+                ends[layer] *= 2.0  # the ghost repeats the cell beside it
         gradient[axis] = along
     return np.moveaxis(gradient, 0, 1)
 

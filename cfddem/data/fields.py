@@ -172,10 +172,10 @@ class Table:
                 self._fill(field, rows=rows)
         return rows
 
-    def keep(self, rows: np.ndarray) -> None:
+    def keep(self, rows: Any) -> None:
         """Remove all rows but these.
 
-        rows  mask (n,) or row numbers (k,)
+        rows  mask (n,), row numbers (k,) or a slice
         """
         self.arrays = {name: array[rows] for name, array in self.arrays.items()}
         self.rows = len(np.arange(self.rows)[rows])
@@ -190,11 +190,21 @@ class Table:
         taken._set(dict(self.fields), arrays, len(np.arange(self.rows)[rows]))
         return taken
 
+    def rows_from(self, arrays: Mapping[str, np.ndarray]) -> Self:
+        """A table with fields of this one and these arrays, for rows that come from another process."""
+        taken = type(self).__new__(type(self))
+        taken._set({name: self.fields[name] for name in arrays}, dict(arrays), len(next(iter(arrays.values()))))
+        return taken
+
     # ------------------------------------------------------------ checkpoints and snapshots
 
     def checkpoint(self) -> dict[str, np.ndarray]:
         """Copies of all fields that are not scratch."""
-        return {name: self.arrays[name].copy() for name, field in self.fields.items() if field.role != "scratch"}
+        return {name: array.copy() for name, array in self.lasting().items()}
+
+    def lasting(self) -> dict[str, np.ndarray]:
+        """The arrays of all fields that are not scratch, not copied."""
+        return {name: self.arrays[name] for name, field in self.fields.items() if field.role != "scratch"}
 
     def restore(self, kept: Mapping[str, np.ndarray]) -> None:
         """Take all rows from a `checkpoint()`; scratch fields start at their initial values.

@@ -36,17 +36,22 @@ class Boundaries:
 
     Sides not named are no-slip walls, or free-slip walls where the box is one cell thick.
 
-    halo      fills ghosts from the cells themselves
+    halo      fills ghosts from the cells themselves, or from those of other ranks
+    box       the conditions on the whole box; others if the grid is the block of a rank
+    sides     sides that the grid touches
     periodic  (3,) whether x, y, z are periodic
     driving   (3,) mean fall of the pressure along x, y, z [Pa/m]
     """
 
     def __init__(self, grid: Grid, conditions: Mapping[str, Condition | Sequence[Condition]] | None = None) -> None:
+        self.grid, self.box = grid, self
+        if grid.whole is not grid:
+            self._cut_out_of(Boundaries(grid.whole, conditions))
+            return
         given = dict(conditions or {})
         for name in given:
             if name not in SIDES:
                 raise InputError(f"boundaries.{name}", None, "one of " + ", ".join(SIDES))
-        self.grid = grid
         self.periodic, self.driving = np.zeros(3, dtype=bool), np.zeros(3)
         self.sides: list[Side] = []
         for axis in range(3):
@@ -66,6 +71,14 @@ class Boundaries:
         for side in self.sides:
             self._lay_out(side)
         self.has_outlet = any(bool(side.outlet.any()) for side in self.sides)
+
+    def _cut_out_of(self, box: Boundaries) -> None:
+        """Take over the conditions on the whole box, where the grid touches its sides."""
+        grid, self.box = self.grid, box
+        self.periodic, self.driving, self.has_outlet = box.periodic, box.driving, box.has_outlet
+        self.halo = Halo(grid.cells, self.periodic, borders=grid.borders(self.periodic))
+        here = [slice(first, first + n) for first, n in zip(grid.first, grid.cells)][::-1]
+        self.sides = [side.cut(here) for side in box.sides if grid.touches(side.axis, side.high)]
 
     def _pair_up(self, axis: int, pair: list[Side]) -> None:
         """Keep the two sides of an axis, or make the axis periodic; refuse a periodic side without its opposite."""
@@ -163,6 +176,8 @@ class Boundaries:
         """
         inlet = side.conditions[number]
         assert isinstance(inlet, Inlet)
+        if not here.any():
+            return np.zeros((0, 3))  # of a block beside the inlet
         x, y, z = (c[here] for c in self._points(side))
         by_function = callable(inlet.velocity)
         given = np.asarray(inlet.velocity(x, y, z, time) if callable(inlet.velocity) else inlet.velocity, dtype=float)
@@ -187,10 +202,22 @@ class Boundaries:
             )  # fmt: skip
         return vector
 
+    @property
+    def outlets(self) -> np.ndarray:
+        """Whether a side of the box normal to x, y, z has an outlet (3,)."""
+        return np.array([any(s.axis == d and bool(s.outlet.any()) for s in self.box.sides) for d in range(3)])
+
     def varies_along(self, axis: int) -> bool:
         """Whether the flow can vary along an axis; false for one cell between planes of symmetry or periodic sides."""
-        sides = [side for side in self.sides if side.axis == axis]
-        return self.grid.cells[axis] > 1 or any((side.mirror < 0.0).any() or side.outlet.any() for side in sides)
+        sides = [side for side in self.box.sides if side.axis == axis]
+        return self.grid.whole.cells[axis] > 1 or any((side.mirror < 0.0).any() or side.outlet.any() for side in sides)
+
+    def owned_faces(self, axis: int) -> int:
+        """Number of layers of faces normal to an axis that the grid owns: one more than cells where the box ends.
+
+        The last layer of a periodic box is the first one again; that of a block belongs to the rank above.
+        """
+        return int(self.grid.cells[axis]) + int(self.halo.ends[axis, 1])
 
     def faces(self) -> Faces:
         """Kinds of all faces of the grid."""
@@ -208,6 +235,7 @@ class Boundaries:
             face = LOW + grid.cells[side.axis] if side.high else LOW
             inside = side.layer(fluid, face - 1 if side.high else face)
             side.layer(solved[side.axis], face)[:] = side.outlet * inside
+        self.halo.fill_borders(solved)
         return Faces(solved, buried, blocked)
 
     # ------------------------------------------------------------ ghosts

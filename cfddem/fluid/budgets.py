@@ -7,7 +7,7 @@ import numpy as np
 from cfddem.fluid.grid import Array
 from cfddem.fluid.momentum import drag_seen
 from cfddem.fluid.state import FluidState, on_faces
-from cfddem.fluid.work import Works, kinetic_energy, works
+from cfddem.fluid.work_of_terms import Works, kinetic_energy, works
 
 
 class FluidBudgets(FluidState):
@@ -85,8 +85,7 @@ class FluidBudgets(FluidState):
         grid, total = self.grid, np.zeros(3)
         for d in range(3):
             faces = grid.inner_faces(on_faces(voidage, d) * velocity[d] * self.faces.solved[d], d)
-            # The last face of a periodic direction is the first one again.
-            unique = np.moveaxis(faces, 2 - d, 0)[: grid.cells[d] if self.boundaries.periodic[d] else None]
+            unique = np.moveaxis(faces, 2 - d, 0)[: self.boundaries.owned_faces(d)]
             total[d] = self.density * grid.cell_volume * self.communicator.sum(unique)
         return total
 

@@ -40,7 +40,7 @@ def checked_viscosity(grid: Grid, viscosity: Array | float, communicator: Commun
     inside = everywhere[grid.open]
     if communicator.smallest(inside) == 0.0 < communicator.largest(inside):
         raise InputError("fluid.viscosity", 0.0, "positive everywhere, or zero everywhere")
-    if grid.solid is None:
+    if grid.solid is None or grid.solid.all():  # local: a block of solid cells has no open one to take it from
         return everywhere
     nearest = distance_transform_edt(~grid.open, sampling=grid.spacing[::-1], return_indices=True)[1]
     filled: Array = everywhere[tuple(nearest)]
@@ -79,6 +79,7 @@ def refuse_trapped_inflow(grid: Grid, boundaries: Boundaries) -> None:
     """Raise `InputError` if the steady inflow has no outlet to leave through."""
     if boundaries.has_outlet:
         return
+    grid, boundaries = grid.whole, boundaries.box
     net, gross = 0.0, 0.0
     for side in boundaries.sides:
         for number in side.inlets:

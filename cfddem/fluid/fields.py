@@ -102,15 +102,20 @@ class CellFields:
         self.arrays[first], self.arrays[second] = self.arrays[second], self.arrays[first]
 
     def checkpoint(self) -> dict[str, Array]:
-        """Copies of all fields that the next step depends on, without ghosts."""
-        return {name: self.owned(name).copy() for name, field in self.fields.items() if field.role != "scratch"}
+        """Copies of all fields that the next step depends on, over the whole grid, without ghosts."""
+        return {
+            name: self.grid.joined(self.owned(name), field.place == "faces").copy()
+            for name, field in self.fields.items()
+            if field.role != "scratch"
+        }
 
     def restore(self, stored: Mapping[str, Array]) -> None:
         """Take over the values of a `checkpoint()` on the same grid; ghosts remain to be filled."""
         for name, field in self.fields.items():
             if field.role == "scratch":
                 continue
-            own = self.owned(name)
-            if np.shape(stored[name]) != own.shape:
-                raise InputError(f"checkpoint.{name}", np.shape(stored[name]), f"of shape {own.shape}, as on this grid")
-            own[:] = stored[name]
+            faces = field.place == "faces"
+            shape = (*self.owned(name).shape[:-3], *(n + faces for n in self.grid.whole.shape))
+            if np.shape(stored[name]) != shape:
+                raise InputError(f"checkpoint.{name}", np.shape(stored[name]), f"of shape {shape}, as on this grid")
+            self.owned(name)[:] = self.grid.part(np.asarray(stored[name]), faces)

@@ -69,7 +69,7 @@ class Grid:
             solid = np.ascontiguousarray(self.solid, dtype=bool)
             if solid.shape != self.shape:
                 raise InputError("grid.solid", solid.shape, f"an array of shape (nz, ny, nx) = {self.shape}")
-            if solid.all():
+            if self.whole is self and solid.all():
                 raise InputError("grid.solid", None, "open in at least one cell", "the mask fills the whole box")
             object.__setattr__(self, "solid", solid if solid.any() else None)
 
@@ -102,6 +102,35 @@ class Grid:
         """The same grid with every cell solid whose centre lies in `region`."""
         inside = np.broadcast_to(region(*self.centres()), self.shape)
         return Grid(self.cells, self.spacing, self.origin, np.array(inside, dtype=bool))
+
+    @property
+    def whole(self) -> Grid:
+        """The grid of the whole box; another one if this grid is the :class:`cfddem.fluid.block.Block` of a rank."""
+        return self
+
+    @property
+    def first(self) -> tuple[int, int, int]:
+        """Number of the first cell along x, y, z in the whole grid."""
+        return 0, 0, 0
+
+    def touches(self, axis: int, high: bool) -> bool:
+        """Whether the low or high end of an axis is a side of the box."""
+        return True
+
+    def borders(self, periodic: Sequence[bool] | NDArray[np.bool_]) -> tuple[Any, ...]:
+        """Borders with the cells of other ranks (:class:`cfddem.fluid.halo.Borders`).
+
+        periodic  (3,) whether x, y, z are periodic
+        """
+        return ()
+
+    def part(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
+        """The part of this grid in an array over the whole one (..., nz, ny, nx), as `Block.part`."""
+        return values
+
+    def joined(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
+        """The array over the whole grid of which every rank has a part (..., nz, ny, nx), as `Block.joined`."""
+        return values
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -147,7 +176,8 @@ class Grid:
 
     def _coordinates(self, offset: Sequence[float], counts: Sequence[int]) -> tuple[Array, Array, Array]:
         lines: list[Array] = [
-            x0 + h * (np.arange(n, dtype=float) + o) for x0, h, n, o in zip(self.origin, self.spacing, counts, offset)
+            x0 + h * (np.arange(first, first + n, dtype=float) + o)
+            for x0, h, first, n, o in zip(self.whole.origin, self.spacing, self.first, counts, offset)
         ]
         return lines[0][None, None, :], lines[1][None, :, None], lines[2][:, None, None]
 

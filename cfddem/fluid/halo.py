@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import inline, serial
 from cfddem.fluid.grid import HIGH, LOW, Array
 
@@ -43,16 +44,17 @@ def fill_ghosts(fields, low, counts, periodic, extend):
     low       layers of ghosts below the inside layers
     counts    (m, 3) inside layers along x, y, z; or (1, 3), the same for all fields
     periodic  (3,) whether an axis is periodic
-    extend    whether ghosts along other axes take the value of the nearest layer; if not, they are left alone
+    extend    (3, 2) whether ghosts below and above along other axes take the value of the nearest layer; if not, they
+              are left alone
     """
     _, nz, ny, nx = fields.shape
     for axis in range(3):
-        if not (periodic[axis] or extend):
+        if not (periodic[axis] or extend[axis, 0] or extend[axis, 1]):
             continue
         for m in range(fields.shape[0]):
             field, n = fields[m], counts[min(m, counts.shape[0] - 1), axis]
             for ghost in range(fields.shape[3 - axis]):
-                if low <= ghost < n + low:
+                if low <= ghost < n + low or not (periodic[axis] or extend[axis, 1 if ghost >= low else 0]):
                     continue
                 inside = low + (ghost - low) % n if periodic[axis] else min(max(ghost, low), n + low - 1)
                 if axis == 0:
@@ -69,38 +71,119 @@ def fill_ghosts(fields, low, counts, periodic, extend):
                             field[ghost, j, i] = field[inside, j, i]
 
 
+_NOTHING = np.zeros(0)
+
+
+class Borders:
+    """The borders of a rank's cells with those of its neighbours along one axis.
+
+    Arrays have ghosts below and above the own layers of cells along this axis; whatever other axes they have is sent.
+
+    communicator  of the run
+    axis          0, 1, 2 for x, y, z
+    below, above  ranks of the neighbours; None where the box ends. Both may be the same rank
+    """
+
+    def __init__(self, communicator: Communicator, axis: int, below: int | None, above: int | None) -> None:
+        self.communicator, self.axis, self.below, self.above = communicator, axis, below, above
+
+    def fill(self, fields: np.ndarray, low: int, high: int, at: int | None = None) -> None:
+        """Fill the ghosts that neighbours own.
+
+        low, high  layers of ghosts below and above
+        at         array axis of the layers; that of `axis` in the last three if None
+        """
+        if at is None:
+            at = fields.ndim - 1 - self.axis
+        before, own = (slice(None),) * at, fields.shape[at] - low - high
+        below, above = self._swapped(fields[*before, low : low + high], fields[*before, own : own + low])
+        if below is not None:
+            fields[*before, :low] = below
+        if above is not None:
+            fields[*before, low + own :] = above
+
+    def add(self, fields: np.ndarray, layers: int) -> None:
+        """Add what ghosts hold to the cells of the neighbours that they stand for: the adjoint of `fill`.
+
+        layers  of ghosts below and above
+        """
+        before = (slice(None),) * (fields.ndim - 1 - self.axis)
+        below, above = self._swapped(fields[*before, :layers], fields[*before, -layers:])
+        if below is not None:
+            fields[*before, layers : 2 * layers] += below
+        if above is not None:
+            fields[*before, -2 * layers : -layers] += above
+
+    def _swapped(self, down: np.ndarray, up: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Give layers to the neighbours below and above; returns what these give: as `up`, and as `down`."""
+        sent, got = [_NOTHING] * self.communicator.size, [_NOTHING] * self.communicator.size
+        below, above, size = self.below, self.above, down.size
+        if below is not None:
+            sent[below], got[below] = np.ascontiguousarray(down, float).reshape(-1), np.empty(up.size)
+        if above is not None and above != below:
+            sent[above], got[above] = np.ascontiguousarray(up, float).reshape(-1), np.empty(size)
+        elif above is not None:  # on both sides: first what lies above the receiver, then what lies below it
+            sent[above], got[above] = np.concatenate([sent[above], up.ravel()]), np.empty(size + up.size)
+        self.communicator.swap(sent, got)
+        return (
+            None if below is None else got[below][-up.size :].reshape(up.shape),
+            None if above is None else got[above][:size].reshape(down.shape),
+        )
+
+
 class Halo:
-    """The ghost cells of a grid.
+    """The ghost cells of a grid, or of the part of it that a rank owns.
 
     cells      nx, ny, nz
     periodic   (3,) whether x, y, z are periodic
     low, high  layers of ghosts below and above the cells in every direction
+    borders    with the cells of other ranks
     """
 
     def __init__(
-        self, cells: Sequence[int], periodic: Sequence[bool] | np.ndarray, low: int = LOW, high: int = HIGH
+        self,
+        cells: Sequence[int],
+        periodic: Sequence[bool] | np.ndarray,
+        low: int = LOW,
+        high: int = HIGH,
+        borders: Sequence[Borders] = (),
     ) -> None:
-        self.periodic, self.low, self.high = np.array(periodic, bool), low, high
+        self.periodic, self.low, self.high, self.borders = np.array(periodic, bool), low, high, tuple(borders)
         self._cells = np.array([cells], dtype=np.int64)
+        self.ends = np.ones((3, 2), bool)
+        for each in self.borders:
+            self.ends[each.axis] = each.below is None, each.above is None
+        self.ends[self.periodic] = False
+        self._wraps = self.periodic & ~np.isin(range(3), [each.axis for each in self.borders])
         # A direction that is not periodic has one more face than cells.
-        self._faces = self._cells + np.diag(~self.periodic)
+        self._faces = self._cells + np.diag(self.ends[:, 1])
 
     def inner(self, padded: Array) -> Array:
         """View of padded cell fields (..., nz, ny, nx) without their ghosts."""
         nx, ny, nz = self._cells[0] + self.low
         return padded[..., self.low : nz, self.low : ny, self.low : nx]
 
-    def fill(self, fields: Array) -> None:
-        """Fill the ghosts of a padded cell field (nz, ny, nx), or of several (m, nz, ny, nx)."""
+    def fill(self, fields: Array, extend: bool = True) -> None:
+        """Fill the ghosts of a padded cell field (nz, ny, nx), or of several (m, nz, ny, nx).
+
+        extend  whether to fill the ghosts beyond sides that are not periodic, which not every loop reads
+        """
         stacked = fields[None] if fields.ndim == 3 else fields
-        fill_ghosts(stacked, self.low, self._cells, self.periodic, True)
+        fill_ghosts(stacked, self.low, self._cells, self._wraps, self.ends & extend)
+        self.fill_borders(fields)
+
+    def fill_borders(self, fields: Array) -> None:
+        """Fill the ghosts that other ranks own, of fields (..., nz, ny, nx)."""
+        for each in self.borders:
+            each.fill(fields, self.low, self.high)
 
     def fill_faces(self, vector: Array, extend: bool = True) -> None:
         """Fill the ghosts of a face field (3, nz, ny, nx); the faces on the sides of the box are not ghosts.
 
         extend  whether to fill the ghosts beyond sides that are not periodic; if not, boundary conditions do
         """
-        fill_ghosts(vector, self.low, self._faces, self.periodic, extend)
+        fill_ghosts(vector, self.low, self._faces, self._wraps, self.ends & extend)
+        self.fill_borders(vector)
 
     def padded(self, values: ArrayLike, outside: float | None = None) -> Array:
         """A padded copy of a cell field (nz, ny, nx), or of several (m, nz, ny, nx), with its ghosts.
@@ -111,7 +194,8 @@ class Halo:
         shape = tuple(n + self.low + self.high for n in given.shape[-3:])
         made = np.full((*given.shape[:-3], *shape), 0.0 if outside is None else outside)
         self.inner(made)[:] = given
-        fill_ghosts(made.reshape(-1, *shape), self.low, self._cells, self.periodic, outside is None)
+        fill_ghosts(made.reshape(-1, *shape), self.low, self._cells, self._wraps, self.ends & (outside is None))
+        self.fill_borders(made)
         return made
 
     def extended(self, plane: np.ndarray, axis: int) -> np.ndarray:
@@ -119,5 +203,8 @@ class Halo:
         for at, other in zip((-2, -1), [d for d in (2, 1, 0) if d != axis]):
             width = [(0, 0)] * plane.ndim
             width[at] = (self.low, self.high)
-            plane = np.pad(plane, width, mode="wrap" if self.periodic[other] else "edge")
+            plane = np.pad(plane, width, mode="wrap" if self._wraps[other] else "edge")
+            for each in self.borders:
+                if each.axis == other:
+                    each.fill(plane, self.low, self.high, plane.ndim + at)
         return plane

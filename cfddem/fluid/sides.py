@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,19 @@ class Side:
         self.outlet = np.zeros(0, dtype=bool)
         self.pressure = np.zeros(0)  # given on outlets [Pa]
         self.inlets: list[int] = []  # indices of the conditions that are inlets
+
+    def cut(self, here: Sequence[slice]) -> Side:
+        """The part of the side that belongs to a block of cells.
+
+        here  which cells of the whole grid the block has along z, y, x
+        """
+        made = Side(self.name, self.axis, self.high, self.conditions)
+        across = tuple(cells for n, cells in enumerate(here) if n != 2 - self.axis)
+        padded: Any = (Ellipsis, *(slice(cells.start, cells.stop + LOW + HIGH) for cells in across))
+        made.owner, made.inlets = self.owner[across], self.inlets
+        made.mirror, made.wall = self.mirror[padded].copy(), self.wall[padded].copy()
+        made.outlet, made.pressure = self.outlet[padded].copy(), self.pressure[padded].copy()
+        return made
 
     @property
     def inward(self) -> float:

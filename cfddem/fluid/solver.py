@@ -224,7 +224,7 @@ class FluidSolver(FluidBudgets):
         fastest = max(self.communicator.largest(rate), -self.communicator.smallest(rate))
         displaced = self.grid.cell_volume * fastest
         # a voidage is known to its last digits only, and so is its rate
-        displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * math.prod(self.grid.cells) ** 0.5 / step)
+        displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * math.prod(self.grid.whole.cells) ** 0.5 / step)
         return max(float(max(self.face_areas)) * max(old, 0.01 * predicted), displaced)
 
     def _still_moves(self, step: float) -> bool:

@@ -100,6 +100,17 @@ class FluidState:
         """Whether the viscosity is above zero."""
         return bool(self.communicator.largest(self.viscosity) > 0.0)
 
+    def whole(self, name: str) -> Array:
+        """A cell field of this class in the cells of all ranks: (nz, ny, nx), or (nz, ny, nx, 3).
+
+        name  "pressure", "velocity", "voidage", "mean_voidage", "viscosity", "static_pressure"
+        """
+        values = getattr(self, name)
+        if values.ndim == 3:
+            return self.grid.joined(values)
+        joined: Array = np.moveaxis(self.grid.joined(np.moveaxis(values, -1, 0)), 0, -1)
+        return joined
+
     def set_viscosity(self, viscosity: Array | float) -> None:
         """Viscosity from now on: of every cell (nz, ny, nx), or a number [Pa s]; all positive, or all zero."""
         self.viscosity[:] = checked_viscosity(self.grid, viscosity, self.communicator)
@@ -125,11 +136,12 @@ class FluidState:
     # ------------------------------------------------------------ checkpoint
 
     def checkpoint(self) -> dict[str, Any]:
-        """Time, and copies of all fields that the next step depends on, without ghosts."""
+        """Time, and copies of all fields that the next step depends on, over the whole grid without ghosts."""
         return {"time": np.array(self.time)} | self.fields.checkpoint()
 
     def restore(self, stored: Mapping[str, Any]) -> None:
-        """Go on from a `checkpoint()` of a fluid with the same grid and boundaries; gives the same bits."""
+        """Go on from a `checkpoint()` of a fluid with the same grid and boundaries, on any number of ranks; gives the
+        same bits on the same number of ranks."""
         self.fields.restore(stored)
         self.time = float(stored["time"])
         fields, halo = self.fields, self.boundaries.halo
@@ -221,6 +233,7 @@ class FluidState:
 
     def _continued(self, vector: Array) -> Array:
         """Extend values on the faces of the momentum balance to the faces without one, at walls and inlets."""
+        self.boundaries.halo.fill_borders(vector)
         for d in range(3):
             known, axis = self.faces.solved[d] > 0.0, 2 - d
             above, below = np.roll(known, -1, axis), np.roll(known, 1, axis)

@@ -54,7 +54,7 @@ class EffectiveViscosity:
 
     def __init__(self, grid: Grid, halo: Halo, density: float, smagorinsky: float) -> None:
         self.halo, self._inverse = halo, 1.0 / np.array(grid.spacing)
-        resolved = [h for h, n in zip(grid.spacing, grid.cells) if n > 1] or [0.0]
+        resolved = [h for h, n in zip(grid.spacing, grid.whole.cells) if n > 1] or [0.0]
         width = math.prod(resolved) ** (1.0 / len(resolved))
         self._factor = density * (smagorinsky * width) ** 2
         self._has_eddies = smagorinsky > 0.0
@@ -84,12 +84,12 @@ class EffectiveViscosity:
 
 def _rim(grid: Grid, halo: Halo) -> tuple[np.ndarray, np.ndarray, Array] | None:
     """Solid cells that touch open ones: indices in a flat padded field, those of their 26 neighbours, weights."""
-    if grid.solid is None:
+    if grid.whole.solid is None:
         return None
     is_open = halo.padded(grid.open, outside=0.0)
     _, ny, nx = grid.padded_shape
     steps = np.array([(c * ny + b) * nx + a for c in (-1, 0, 1) for b in (-1, 0, 1) for a in (-1, 0, 1) if a or b or c])
-    k, j, i = np.nonzero(grid.solid)
+    k, j, i = np.nonzero(~grid.open)
     cells = ((k + LOW) * ny + j + LOW) * nx + i + LOW
     neighbours = cells[:, None] + steps
     shares = is_open.ravel()[neighbours]

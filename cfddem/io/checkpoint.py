@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
-from cfddem.io.files import disk_error, hdf5_in_memory, reason, write_whole
+from cfddem.io.files import disk_error, hdf5_in_memory, reason, require_format, write_whole
 
 FORMAT = 4
 """Format of checkpoints. Checkpoints of any other format are refused."""
@@ -111,13 +111,7 @@ def _require_format(path: Path) -> None:
     """Refuse another format. Such a checkpoint is not damaged, so the previous one is no substitute."""
     with path.open("rb") as file:
         number = int(_format(file.read(_HEAD).decode("ascii", "replace")))
-    if number != FORMAT:
-        remedy = (
-            "it was written by a newer version of cfddem; update cfddem"
-            if number > FORMAT
-            else f"it was written by an earlier version; run {path.parent.parent}/case.toml again in another folder"
-        )
-        raise InputError(f"{path}: format", number, str(FORMAT), remedy)
+    require_format(path, number, FORMAT, path.parent.parent)
 
 
 def _words(number: int, content: memoryview) -> str:

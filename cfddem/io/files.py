@@ -57,6 +57,21 @@ def reason(failure: OSError) -> str:
     return (failure.strerror or str(failure)).lower()
 
 
+def require_format(path: Path, found: int, expected: int, run: Path) -> None:
+    """Refuse a file of another format.
+
+    found, expected  numbers of the formats
+    run              folder of the run that the file belongs to
+    """
+    if found != expected:
+        remedy = (
+            "it was written by a newer version of cfddem; update cfddem"
+            if found > expected
+            else f"it was written by an earlier version of cfddem; run {run}/case.toml again in another folder"
+        )
+        raise InputError(f"{path}: format", found, str(expected), remedy)
+
+
 def require_folder(output: Path | None) -> None:
     """Refuse an output file whose folder does not exist, before any work is done.
 

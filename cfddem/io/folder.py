@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
-from cfddem.io.files import disk_error, reason
+from cfddem.io.files import disk_error, reason, require_format
 from cfddem.io.index import POINTS, Layout, Snapshot
 
 FORMAT = 2
@@ -35,13 +35,7 @@ def read_about(folder: Path) -> dict[str, Any]:
         raise disk_error("read", path, failure) from failure
     except (ValueError, KeyError, TypeError) as damage:
         raise RunFailed(f"{path}: the file is damaged ({damage}); restore it, the snapshots are in data/") from damage
-    if found != FORMAT:
-        remedy = (
-            "the run was written by a newer version of cfddem; update cfddem"
-            if found > FORMAT
-            else f"the run was written by an earlier version of cfddem; run {folder}/case.toml again in another folder"
-        )
-        raise InputError(f"{path}: format", found, str(FORMAT), remedy)
+    require_format(path, found, FORMAT, folder)
     return about
 
 

@@ -10,19 +10,27 @@ division of space.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from cfddem.backend.communicator import Communicator
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
-from cfddem.data.fields import Phase, Table
+from cfddem.data.fields import Phase
 from cfddem.particles.integrate import finish_step, move, start_step
 from cfddem.particles.pair_graph import Edges
-from cfddem.particles.state import Particles
+from cfddem.particles.state import Particles, rows_of
+
+BINS = 1000
+"""Places among which a plane between two ranks is chosen."""
+
+IMBALANCE = 1.1
+"""Largest number of particles of a rank over the mean; where it is exceeded the planes are moved."""
 
 
 @dataclass(frozen=True)
@@ -36,20 +44,53 @@ class Slabs:
     axis: int
     planes: Sequence[float]
 
+    @classmethod
+    def balanced(cls, axis: int, position: np.ndarray, ranks: int, communicator: Communicator = SERIAL) -> Slabs:
+        """Slabs that hold equally many particles, within a thousandth of the length that these take up.
+
+        axis          0, 1 or 2
+        position      of the particles (N, 3); those of this rank where several share them [m]
+        ranks         number of slabs
+        communicator  of these ranks
+        """
+        place = position[:, axis]
+        low, high = communicator.smallest(place), communicator.largest(place)
+        borders = np.linspace(low, high, BINS + 1)[1:-1]
+        counts = np.bincount(np.searchsorted(borders, place, side="right"), minlength=BINS)  # local: summed below
+        below = np.cumsum(communicator.sum(counts, axis=()))
+        wanted = below[-1] * np.arange(1, ranks) / ranks
+        return cls(axis, borders[np.minimum(np.searchsorted(below, wanted), BINS - 2)].tolist())
+
     def owner(self, position: np.ndarray) -> np.ndarray:
         """Rank that owns each position (N,)."""
         return np.searchsorted(np.asarray(self.planes), position[:, self.axis], side="right")
+
+    def near(self, rank: int, reach: float, box: np.ndarray) -> list[int]:
+        """Other ranks whose space is closer than `reach` [m] to that of a rank.
+
+        box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
+        """
+        borders = np.zeros((2, 3))
+        borders[:, self.axis] = self.range_of(rank, box)
+        borders = borders[np.isfinite(borders[:, self.axis])]
+        others = [other for other in range(len(self.planes) + 1) if other != rank]
+        return [other for other in others if (self.distance(borders, other, box) < reach).any()]  # local: two borders
+
+    def range_of(self, rank: int, box: np.ndarray) -> tuple[float, float]:
+        """Ends of the space of a rank along the axis, within a periodic box [m]."""
+        ends, length = (-np.inf, *self.planes, np.inf), float(box[self.axis])
+        if np.isinf(length):
+            return ends[rank], ends[rank + 1]
+        return max(ends[rank], 0.0), min(ends[rank + 1], length)
 
     def distance(self, position: np.ndarray, rank: int, box: np.ndarray) -> np.ndarray:
         """Distance of each position from the space of a rank, over the borders of a periodic box too (N,) [m].
 
         box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
         """
-        ends = (-np.inf, *self.planes, np.inf)
-        place, length = position[:, self.axis], box[self.axis]
+        (low, high), place, length = self.range_of(rank, box), position[:, self.axis], box[self.axis]
         if np.isinf(length):
-            return np.maximum(np.maximum(ends[rank] - place, place - ends[rank + 1]), 0.0)
-        low, high = max(ends[rank], 0.0), min(ends[rank + 1], length)
+            return np.maximum(np.maximum(low - place, place - high), 0.0)
         images = [np.maximum(low - place - shift, place + shift - high) for shift in (-length, 0.0, length)]
         return np.maximum(np.minimum(np.minimum(*images[:2]), images[2]), 0.0)
 
@@ -74,18 +115,11 @@ class Whole:
         """Add the ghosts that lists up to a distance `reach` [m] need; returns their rows in the old list."""
         return np.zeros(0, np.int32)
 
-    def recall(self, edges: Edges, ids: np.ndarray) -> None:
+    def recall(self, edges: Edges) -> None:
         """Give pairs of particles that have come what they remember."""
 
     def refresh(self, phase: Phase) -> None:
         """Give ghosts the present values of the fields of a phase."""
-
-    def checkpoint(self) -> dict[str, np.ndarray]:
-        """Which rows are ghosts, and of whom."""
-        return {}
-
-    def restore(self, particles: Particles, state: Mapping[str, np.ndarray]) -> None:
-        """Continue from a `checkpoint()`, with the particles of that time."""
 
 
 class Divided(Whole):
@@ -93,17 +127,18 @@ class Divided(Whole):
 
     division      of space
     communicator  between the ranks
+    balance       move the planes when particles become unequally many
     """
 
-    def __init__(self, division: Slabs, communicator: Communicator) -> None:
+    def __init__(self, division: Slabs, communicator: Communicator, balance: bool = False) -> None:
         if len(division.planes) + 1 != communicator.size:
             raise InputError("planes", len(division.planes), f"{communicator.size - 1}, one fewer than ranks")
-        self.division, self.communicator = division, communicator
+        self.division, self.communicator, self.balance = division, communicator, balance
         self._sent: list[np.ndarray] = []  # owned rows that each rank has as ghosts
         self._received: list[slice] = []  # rows of the ghosts from each rank
         self._ids = np.zeros(0, np.int64)  # of all rows, as the last list was made
         self._order = np.zeros(0, np.int64)  # rows in the order of these ids
-        self._arrived: list[Table] = []
+        self._arrived: list[dict[str, np.ndarray]] = []
         self._particles: Any = None
 
     def own(self, particles: Particles) -> Particles:
@@ -113,79 +148,98 @@ class Divided(Whole):
     def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
         """See `Whole.migrate`."""
         particles.drop_ghosts()
+        if self.balance:
+            self._move_planes(particles)
         owner = self.division.owner(particles.position)
-        stay = owner == self.communicator.rank
-        parcels = []
-        for rank in range(self.communicator.size):
-            go = np.flatnonzero((owner == rank) & ~stay)
-            parcels.append((particles.copy(go), None if edges is None else edges.of(old_row[go], self._ids)))
-        particles.keep(stay)
-        old_row, self._arrived = old_row[stay], []
-        for comers, pairs in self.communicator.exchange(parcels):
-            old_row = np.append(old_row, self._known(comers.id))
-            particles.append(comers)
-            if pairs is not None and pairs.rows:
+        leave = np.flatnonzero(owner != self.communicator.rank)
+        parcels: list[Any] = [None] * self.communicator.size
+        for rank in np.unique(owner[leave]):
+            go = leave[owner[leave] == rank]
+            parcels[rank] = (particles.copy(go).arrays, {} if edges is None else edges.of(old_row[go], self._ids))
+        if len(leave):
+            stay = np.flatnonzero(owner == self.communicator.rank)
+            particles.keep(stay)
+            old_row = old_row[stay]
+        self._arrived = []
+        for comers, pairs in filter(None, self.communicator.exchange(parcels)):
+            old_row = np.append(old_row, self._known(comers["id"]))
+            particles.append(particles.rows_from(comers))
+            if pairs:
                 self._arrived.append(pairs)
         return old_row
 
     def renew(self, particles: Particles, reach: float, box: np.ndarray) -> np.ndarray:
         """See `Whole.renew`."""
-        others = [rank for rank in range(self.communicator.size) if rank != self.communicator.rank]
-        self._sent = [np.zeros(0, np.int64) for _ in range(self.communicator.size)]
-        for rank in others:
-            self._sent[rank] = np.flatnonzero(self.division.distance(particles.position, rank, box) < reach)
+        size, rank = self.communicator.size, self.communicator.rank
+        self._sent = [np.zeros(0, np.int64) for _ in range(size)]
+        parcels: list[Any] = [None] * size
+        for other in self.division.near(rank, reach, box):
+            self._sent[other] = np.flatnonzero(self.division.distance(particles.position, other, box) < reach)
+            parcels[other] = particles.copy(self._sent[other]).arrays
         self._received = []
-        for ghosts in self.communicator.exchange([particles.copy(rows) for rows in self._sent]):
-            self._received.append(slice(particles.count, particles.count + ghosts.count))
-            particles.add_ghosts(ghosts)
+        for ghosts in self.communicator.exchange(parcels):
+            begin = particles.count
+            if ghosts is not None:
+                particles.add_ghosts(particles.rows_from(ghosts))
+            self._received.append(slice(begin, particles.count))
         old_row = self._known(particles.id[particles.owned :])
         self._listed(particles)
         return old_row
 
-    def recall(self, edges: Edges, ids: np.ndarray) -> None:
+    def recall(self, edges: Edges) -> None:
         """See `Whole.recall`."""
         for pairs in self._arrived:
-            edges.recall(pairs, ids)
+            edges.recall(pairs, self._known(pairs["bodies"].reshape(-1)).reshape(-1, 2))
         self._arrived = []
 
     def refresh(self, phase: Phase) -> None:
         """See `Whole.refresh`."""
-        particles = self._particles
-        names = particles.halo_fields(phase)
-        parcels = [[particles[name][rows] for name in names] for rows in self._sent]
-        for rows, parcel in zip(self._received, self.communicator.exchange(parcels)):
-            for name, values in zip(names, parcel):
-                particles[name][rows] = values
+        arrays = [_as_words(self._particles[name]) for name in self._particles.halo_fields(phase)]
+        width = sum(array.shape[1] for array in arrays)
+        outgoing = [np.empty(width * len(rows), np.int32) for rows in self._sent]
+        incoming = [np.empty(width * (rows.stop - rows.start), np.int32) for rows in self._received]
+        for rows, buffer in zip(self._sent, outgoing):
+            end = 0
+            for array in arrays if len(rows) else ():
+                end = _pack(array, rows, buffer, end)
+        self.communicator.swap(outgoing, incoming)
+        for place, buffer in zip(self._received, incoming):
+            end = 0
+            for array in arrays if len(buffer) else ():
+                ghosts = array[place]
+                begin, end = end, end + ghosts.size
+                ghosts[...] = buffer[begin:end].reshape(ghosts.shape)
 
-    def checkpoint(self) -> dict[str, np.ndarray]:
-        """See `Whole.checkpoint`."""
-        return {
-            "sent": np.concatenate(self._sent),
-            "sent_to": np.array([len(rows) for rows in self._sent]),
-            "received": np.array([rows.stop - rows.start for rows in self._received]),
-        }
+    def _move_planes(self, particles: Particles) -> None:
+        """Divide space anew if a rank has many more particles than the mean."""
+        most, total = self.communicator.largest([particles.count]), self.communicator.sum([particles.count])
+        if most > IMBALANCE * total / self.communicator.size:
+            ranks = self.communicator.size
+            self.division = Slabs.balanced(self.division.axis, particles.position, ranks, self.communicator)
 
-    def restore(self, particles: Particles, state: Mapping[str, np.ndarray]) -> None:
-        """See `Whole.restore`."""
-        self._sent = np.split(np.asarray(state["sent"]), np.cumsum(state["sent_to"])[:-1])
-        ends = particles.count - np.cumsum(state["received"][::-1])[::-1]
-        self._received = [slice(int(a), int(a + n)) for a, n in zip(ends, state["received"])]
-        particles.set_ghosts(particles.count - self._received[0].start)
-        self._listed(particles)
+    def _known(self, ids: np.ndarray) -> np.ndarray:
+        """Row that each id had in the last list; -1 if it was not in it (k,) int32."""
+        return rows_of(ids, self._ids, self._order)
 
     def _listed(self, particles: Particles) -> None:
         """Take note of the rows of a list."""
         self._particles, self._ids, self._order = particles, particles.id.copy(), np.argsort(particles.id)
 
-    def _known(self, ids: np.ndarray) -> np.ndarray:
-        """Row that each id had in the last list; -1 if it was not in it (k,) int32."""
-        place = np.searchsorted(self._ids, ids, sorter=self._order)
-        found = np.full(len(ids), -1, np.int32)
-        inside = np.flatnonzero(place < len(self._order))
-        rows = self._order[place[inside]]
-        same = self._ids[rows] == ids[inside]
-        found[inside[same]] = rows[same]
-        return found
+
+def _as_words(array: np.ndarray) -> np.ndarray:
+    """An array of numbers of four or eight bytes as words of four bytes, one row for each of its rows."""
+    width = array.itemsize * math.prod(array.shape[1:]) // 4
+    return array.reshape(-1).view(np.int32).reshape(len(array), width)
+
+
+@serial
+def _pack(values, rows, buffer, begin):
+    """Copy some rows to a buffer, from `begin` on; returns the end."""
+    for row in rows:
+        for c in range(values.shape[1]):
+            buffer[begin] = values[row, c]
+            begin += 1
+    return begin
 
 
 class StepsWithGhosts:

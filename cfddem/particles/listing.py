@@ -29,6 +29,7 @@ class NeighbourLists:
     box           (3,) length of the periodic box; infinite along open axes [m]
     communicator  of the run
     division      of space among the ranks; None in one process
+    balance       move its planes when particles become unequally many
     skin          of all lists; tuned during the run if None [m]
     sort_every    sort the particles by position at every this many lists, if they are many
 
@@ -45,13 +46,14 @@ class NeighbourLists:
         *,
         communicator: Communicator,
         division: Slabs | None,
+        balance: bool = False,
         skin: float | None,
         sort_every: int,
     ) -> None:
         self.pair_fields, self.table, self.box, self.communicator = pair_fields, table, box, communicator
         if communicator.size > 1 and division is None:
             raise InputError("division", None, "given in a run of several processes")
-        self.ghosts = Whole() if division is None else Divided(division, communicator)
+        self.ghosts = Whole() if division is None else Divided(division, communicator, balance)
         self.skin, self.sort_every, self._is_tuned = skin or 0.0, sort_every, skin is None
         self.made, self.listed_at, self.many = -1, 0, False
         self._mean_radius = 0.0
@@ -112,7 +114,7 @@ class NeighbourLists:
         )
         if old is not None:
             fresh.remember(old, old_row)
-        self.ghosts.recall(fresh, particles.id)
+        self.ghosts.recall(fresh)
         return fresh
 
     def _sort(self, particles: Particles) -> np.ndarray:
@@ -126,11 +128,26 @@ class NeighbourLists:
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next list depends on."""
-        return {"skin": self.skin, "lists": self.made, "listed_at": self.listed_at, "ghosts": self.ghosts.checkpoint()}
+        return {"skin": self.skin, "lists": self.made, "listed_at": self.listed_at}
 
-    def restore(self, particles: Particles, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()`, with the particles of that time."""
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`; then `count` the particles."""
         self.skin, self.made = float(state["skin"]), int(state["lists"])
         self.listed_at = int(state["listed_at"])
-        self.ghosts.restore(particles, state.get("ghosts", {}))  # a file keeps no empty group
-        self.count(particles)
+
+
+def rows_before(particles: Particles, earlier: Any, films: bool) -> tuple[np.ndarray, Edges | None]:
+    """Row of each particle in an earlier run (N,), and the list of that run; -1 and None without one.
+
+    films  this run has films, so that the earlier one must have them too
+    """
+    if earlier is None:
+        return np.full(particles.count, -1, np.int32), None
+    then, now = np.argsort(earlier.particles.id), np.argsort(particles.id)
+    if earlier.particles.id[then].tolist() != particles.id[now].tolist():
+        raise InputError("after", None, "a run over the same particles", "ids differ")
+    if "resistance" not in earlier.edges and films:
+        raise InputError("after", None, "a run with films, as this one")
+    old_row = np.empty(len(now), np.int32)
+    old_row[now] = then
+    return old_row, earlier.edges

@@ -74,10 +74,9 @@ class Edges(Table):
         """The declared fields as loops take them: vectors one after the other; nothing is copied."""
         return memory_class(tuple(self.fields))(*(array.reshape(-1) for array in self.arrays.values()))
 
-    @property
-    def uses_outside(self) -> int:
-        """Uses of laws outside of their range that have been counted for these edges."""
-        return int(self.outside.sum()) if "outside" in self else 0  # local: of the pairs of this rank
+    def uses_outside(self, owned: int) -> int:
+        """Uses of laws outside of their range that have been counted for edges whose first body is owned."""
+        return int(self.outside[self.first < owned].sum()) if "outside" in self else 0  # local: of this rank
 
     def checkpoint(self) -> dict[str, Any]:
         """Copies of the graph and of everything that pairs remember."""
@@ -108,49 +107,47 @@ class Edges(Table):
             np.take(old[name], source, axis=0, out=self[name], mode="wrap")  # faster than to choose the known ones
             self[name][new] = initial
 
-    def ends(self, ids: np.ndarray) -> np.ndarray:
-        """Names of the two bodies of each edge: ids of particles, -1 - w for piece w of the walls (n, 2).
+    def ends(self, ids: np.ndarray, edges: Any = slice(None)) -> np.ndarray:
+        """Names of the two bodies of some edges: ids of particles, -1 - w for piece w of the walls (n, 2).
 
-        ids  of the particles (N,)
+        ids    of the particles (N,)
+        edges  rows of the edges; all of them if not given
         """
-        second = -1 - self.second.astype(np.int64)
-        second[: self.between_particles] = ids[self.second[: self.between_particles]]
-        return np.stack([ids[self.first], second], axis=1)
+        second, walls = self.second[edges].astype(np.int64), np.arange(self.rows)[edges] >= self.between_particles
+        second = np.where(walls, -1 - second, ids[np.where(walls, 0, second)])
+        return np.stack([ids[self.first[edges]], second], axis=1)
 
-    def of(self, rows: np.ndarray, ids: np.ndarray) -> Table:
-        """What the pairs of some particles remember, with the names of the two bodies, for another list.
+    def of(self, rows: np.ndarray, ids: np.ndarray) -> dict[str, np.ndarray]:
+        """What the pairs of some particles remember, with the names of their "bodies", for another list.
 
         rows  of the particles; negative numbers are left out
         ids   of all particles (N,)
         """
-        chosen = np.zeros(len(ids), bool)
-        chosen[rows[rows >= 0]] = True
-        mine = chosen[self.first]
-        mine[: self.between_particles] |= chosen[self.second[: self.between_particles]]
-        kept = {name: array[mine] for name, array in super().checkpoint().items()}
-        pairs = Table([BODIES, *(self.fields[name] for name in kept)], int(np.count_nonzero(mine)))  # local: pairs
-        pairs.restore({"bodies": self.ends(ids)[mine]} | kept)
-        return pairs
+        places = [self.incident[self.start[row] : self.start[row + 1]] for row in rows[rows >= 0]]
+        incident = np.concatenate([np.zeros(0, np.int64), *places])
+        mine = np.unique(np.where(incident < 0, -1 - incident, incident))
+        return {name: array[mine] for name, array in self.lasting().items()} | {"bodies": self.ends(ids, mine)}
 
-    def recall(self, pairs: Table, ids: np.ndarray) -> None:
+    def recall(self, pairs: Mapping[str, np.ndarray], rows: np.ndarray) -> None:
         """Take over what pairs remembered in another list; see `of`.
 
-        ids  of the particles (N,)
+        rows  of their bodies in this list; -1 for particles that are not in it, and for walls (n, 2)
         """
-        ends = self.ends(ids)
-        rows = np.flatnonzero(np.isin(ends[:, 0], pairs.bodies) | np.isin(ends[:, 1], pairs.bodies))
-        _, name = np.unique(np.concatenate([pairs.bodies, ends[rows]]), axis=0, return_inverse=True)
-        source = np.full(len(name), -1)
-        source[name.reshape(-1)[: pairs.rows]] = np.arange(pairs.rows)
-        source = source[name.reshape(-1)[pairs.rows :]]
-        for each, field in self.fields.items():
-            if field.role != "scratch":
-                self[each][rows[source >= 0]] = pairs[each][source[source >= 0]]
+        found = self.between(rows, pairs["bodies"])
+        known = np.flatnonzero(found >= 0)
+        for name, array in self.lasting().items():
+            array[found[known]] = pairs[name][known]
 
+    def between(self, rows: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+        """Edges of pairs; -1 where there is none (n,).
 
-BODIES = Field(
-    "bodies", components=2, role="memory", dtype=np.int64, meaning="names of the two bodies, see `Edges.ends`"
-)
+        rows    of their bodies; -1 for particles that are not in this list, and for walls (n, 2)
+        bodies  names of their bodies, see `ends` (n, 2)
+        """
+        found = np.empty(len(bodies), np.int64)
+        _find_named(self.flat_graph, rows, bodies, found)
+        return found
+
 
 _MEMORY = "Memory__"
 
@@ -284,6 +281,22 @@ def _find(old, new, old_row, source):
             # the lower id is first in both lists
             if edge >= 0 and old.second[edge] == j and (edge >= old.between_particles) == wall:
                 source[k] = edge
+                break
+
+
+@serial
+def _find_named(edges, rows, bodies, found):
+    """Find the edges of pairs by the rows of their particles and the names of their walls; -1 where there is none."""
+    for n in range(len(found)):
+        wall, i = bodies[n, 1] < 0, rows[n, 0]
+        j = -1 - bodies[n, 1] if wall else rows[n, 1]
+        found[n] = -1
+        if i < 0 or j < 0:
+            continue
+        for place in range(edges.start[i], edges.start[i + 1]):
+            edge = edges.incident[place]
+            if edge >= 0 and edges.second[edge] == j and (edge >= edges.between_particles) == wall:
+                found[n] = edge
                 break
 
 

@@ -16,13 +16,15 @@ from cfddem.backend.stopwatch import Stopwatch
 from cfddem.particles.collision_events import COLLISION
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.collision_record import CollisionRecord
+from cfddem.particles.energy_count import Energies
 from cfddem.particles.ghosts import Slabs, StepsWithGhosts
 from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
 from cfddem.particles.interactions.bridge import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.pair_loops import loop_choices
-from cfddem.particles.listing import NeighbourLists
+from cfddem.particles.listing import NeighbourLists, rows_before
+from cfddem.particles.named_state import named_state, restored_list
 from cfddem.particles.pair_graph import Edges, Graph, gaps, shifts, wall_forces
 from cfddem.particles.state import Particles
 from cfddem.particles.time_scales import TimeScales, check_step, time_scales
@@ -31,7 +33,6 @@ from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restore
 from cfddem.particles.walls.mesh_contacts import wall_contacts
 from cfddem.particles.walls.nearest_point import Walls
 from cfddem.particles.walls.shapes import Wall
-from cfddem.particles.work import Energies
 
 CHECK_EVERY = 20
 """The time step is checked again at every this many neighbour lists."""
@@ -60,6 +61,7 @@ class ParticleSolver:
     after    an earlier run over the same particles and walls, whose pair memory is taken over
     communicator  path to sums, extremes and decisions over all ranks
     division  of space among the ranks; needed if there are several. All ranks pass all particles
+    balance   move the planes of the division when particles become unequally many
     """
 
     def __init__(
@@ -82,6 +84,7 @@ class ParticleSolver:
         after: ParticleSolver | None = None,
         communicator: Communicator = SERIAL,
         division: Slabs | None = None,
+        balance: bool = False,
     ) -> None:
         self.table, self.communicator = table, communicator
         self.walls = wall_arrays(walls)
@@ -108,11 +111,15 @@ class ParticleSolver:
         self.bridges = bridges
         self.wall = Stopwatch()
         self.lists = NeighbourLists(
-            self.pair_fields, table, self.box, communicator=communicator, division=division, skin=skin,
-            sort_every=sort_every,
+            self.pair_fields, table, self.box, communicator=communicator, division=division, balance=balance,
+            skin=skin, sort_every=sort_every,
         )  # fmt: skip
         self.particles = self.lists.own(particles)
-        self._take_list(self.lists.first(self.particles, self.walls, self._reach_ratio, *self._recalled(after)))
+        self._take_list(
+            self.lists.first(
+                self.particles, self.walls, self._reach_ratio, *rows_before(self.particles, after, self.laws.film)
+            )
+        )
         self._outside = 0
         self.refresh()
         if bridges is not None:
@@ -137,7 +144,7 @@ class ParticleSolver:
     @property
     def outside(self) -> int:
         """Number of uses of a user's law, minimum gap or film, outside of its range."""
-        return self._outside + self.edges.uses_outside
+        return self._outside + self.edges.uses_outside(self._owned)
 
     def refresh(self) -> None:
         """Find the forces at the present positions, for instance after a change of state from outside."""
@@ -220,36 +227,43 @@ class ParticleSolver:
             self.wall.lap("neighbour lists")
 
     def checkpoint(self) -> dict[str, Any]:
-        """Copies of everything that the next step depends on, including age and order of the neighbour list."""
-        return {
-            "particles": self.particles.checkpoint(),
-            "edges": self.edges.checkpoint(),
+        """Copies of everything that the next step depends on; of several ranks, on rank 0 and by ids."""
+        if self.communicator.size > 1:
+            state = named_state(self.particles, self.edges, self._origin, self.communicator)
+        else:
+            kept = self.particles.checkpoint(), self.edges.checkpoint(), self._origin.copy()
+            state = dict(zip(("particles", "edges", "origin"), kept))
+        outside = self.communicator.sum([self.outside])
+        return state | {
             "walls": checkpoint_walls(self.walls),
+            "listed_walls": self._listed_walls,
             **({} if self.energies is None else {"energies": self.energies.checkpoint()}),
             **({} if self.bridges is None else {"bridges": self.bridges.checkpoint()}),
-            "origin": self._origin.copy(),
             "lists": self.lists.checkpoint(),
-            "counters": {
-                "time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": self.outside,
-            },
-        }  # fmt: skip
+            "counters": {"time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": outside},
+        }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()` of a solver with the same particles, walls and laws, with the same bits."""
-        self.particles.restore(state["particles"])
-        self.lists.restore(self.particles, state["lists"])
-        self.walls = restored_walls(state["walls"])
+        """Continue from a `checkpoint()` of a solver with the same particles, walls and laws, with the same bits.
+
+        The numbers of ranks then and now may differ.
+        """
+        walls, listed_walls = state["walls"], state.get("listed_walls", state["walls"])
+        self.lists.restore(state["lists"])
+        found = restored_list(state, self.particles, self.edges, self.lists, listed_walls, self._reach_ratio)
+        self.particles, edges, origin = found
+        self.lists.count(self.particles)
         counters = state["counters"]
         self.time, self.steps = float(counters["time"]), int(counters["steps"])
         self._next_id = max(self._next_id, self.communicator.largest(self.particles.id, default=-1) + 1)
-        self._accepted, self._outside = float(counters["accepted"]), int(counters["outside"])
-        travel = self.walls.travel.copy()
+        self._accepted = float(counters["accepted"])
+        self._outside = int(counters["outside"]) if self.communicator.rank == 0 else 0
+        self.walls, touch = restored_walls(walls), edges.touch.copy()
         if self.bridges is not None:
             self.bridges.restore(state["bridges"])
-        self._take_list(self.edges.restored(state["edges"]))
-        self._origin[:] = state["origin"]
-        self.walls.travel[:] = travel
-        self.edges.touch[:] = state["edges"]["touch"]
+        self._take_list(edges)
+        self._origin[:], self._listed_walls = origin, listed_walls
+        self.walls.travel[:], self.edges.touch[:] = walls["travel"], touch
         if self.energies is not None:
             self.energies.restore(state["energies"])
 
@@ -268,8 +282,8 @@ class ParticleSolver:
 
     def _take_list(self, edges: Edges) -> None:
         """Use a new neighbour list: note the positions it was made at, and make the arrays that loops take."""
-        self.edges = edges
-        self._origin = self.particles.position.copy()
+        self.edges, self._owned = edges, self.particles.owned
+        self._origin, self._listed_walls = self.particles.position.copy(), checkpoint_walls(self.walls)
         self._views = (
             self.particles.view, edges.flat_graph, edges.memory, flat(self.walls), shifts(self.box).reshape(-1),
         )  # fmt: skip
@@ -289,7 +303,7 @@ class ParticleSolver:
 
     def _renew(self, old_row: np.ndarray, steps: int | None = None) -> None:
         """Make a new neighbour list; arguments as of `NeighbourLists.renewed`."""
-        self._outside += self.edges.uses_outside
+        self._outside += self.edges.uses_outside(self._owned)
         fresh = self.lists.renewed(self.particles, self.walls, self._reach_ratio, old_row, self.edges, steps=steps)
         self._take_list(fresh)
 
@@ -332,7 +346,7 @@ class ParticleSolver:
         old_row  row of each before; -1 for an inserted particle
         """
         counting = self.energies
-        had = 0.0 if counting is None else counting.mechanical(self)
+        had = 0.0 if counting is None else counting.of_all(self)
         self.particles = made
         if self.bridges is not None:
             self.bridges.take(made)
@@ -343,17 +357,4 @@ class ParticleSolver:
         self.refresh()
         self.edges.spring[:] = springs  # no time has passed in which contacts could slide
         if counting is not None:
-            counting.fed += counting.mechanical(self) - had
-
-    def _recalled(self, earlier: ParticleSolver | None) -> tuple[np.ndarray, Edges | None]:
-        """Row of each particle in an earlier run, and the list of that run."""
-        if earlier is None:
-            return np.full(self.particles.count, -1, np.int32), None
-        then, now = np.argsort(earlier.particles.id), np.argsort(self.particles.id)
-        if earlier.particles.id[then].tolist() != self.particles.id[now].tolist():
-            raise InputError("after", None, "a run over the same particles", "ids differ")
-        if "resistance" not in earlier.edges and self.laws.film:
-            raise InputError("after", None, "a run with films, as this one")
-        old_row = np.empty(len(now), np.int32)
-        old_row[now] = then
-        return old_row, earlier.edges
+            counting.fed += counting.of_all(self) - had

@@ -66,8 +66,16 @@ class Particles(Table):
     def drop_ghosts(self) -> None:
         """Remove the rows of all ghosts."""
         if self._ghosts:
-            self.keep(np.arange(self.owned))
+            self.keep(slice(self.owned))
             self.set_ghosts(0)
+
+    def without_ghosts(self) -> Particles:
+        """The rows that this process owns, as a table over the same arrays."""
+        if not self._ghosts:
+            return self
+        owned = Particles.__new__(Particles)
+        owned._set(self.fields, {name: array[: self.owned] for name, array in self.arrays.items()}, self.owned)
+        return owned
 
     def halo_fields(self, phase: Phase) -> list[str]:
         """Names of the fields that ghosts receive in a phase of the step."""
@@ -96,6 +104,20 @@ class Particles(Table):
         """Mass of each particle (N,) [kg]."""
         mass: np.ndarray = self.density * (4.0 / 3.0) * np.pi * self.radius**3
         return mass
+
+
+def rows_of(ids: np.ndarray, among: np.ndarray, order: np.ndarray) -> np.ndarray:
+    """Row in `among` (N,) of each of these ids; -1 for those that are not in it (n,) int32.
+
+    order  rows in the order of their ids (N,)
+    """
+    found = np.full(len(ids), -1, np.int32)
+    place = np.searchsorted(among, ids, sorter=order)
+    inside = np.flatnonzero(place < len(order))
+    rows = order[place[inside]]
+    same = among[rows] == ids[inside]
+    found[inside[same]] = rows[same]
+    return found
 
 
 def make_particles(
@@ -167,3 +189,16 @@ def kinetic_energy(spheres: Particles, communicator: Communicator = SERIAL) -> f
     linear = communicator.sum(mass * spheres.velocity[own] ** 2)
     turning = communicator.sum(0.4 * mass * radius**2 * spheres.spin[own] ** 2)
     return 0.5 * float(linear + turning)
+
+
+def added_mass(spheres: Particles) -> np.ndarray:
+    """Inertia of every particle beyond its mass: that of the fluid that moves with it (N,) [kg]; zero if fixed."""
+    free = spheres.inverse_mass > 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(free, 1.0 / spheres.inverse_mass - spheres.mass, 0.0)
+
+
+def added_mass_energy(spheres: Particles, communicator: Communicator = SERIAL) -> float:
+    """Kinetic energy of the added mass of all particles [J]."""
+    own = slice(spheres.owned)
+    return 0.5 * float(communicator.sum(added_mass(spheres)[own, None] * spheres.velocity[own] ** 2))

@@ -15,7 +15,7 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.slots import FILM, ContactState, derive, read_memory, tangent_stiffness
 from cfddem.particles.pair_graph import Edges, memory_class
 from cfddem.particles.state import Particles
-from cfddem.particles.step_limits import STABLE, TimeScales, check_step, crossing_step
+from cfddem.particles.step_criteria import STABLE, TimeScales, check_step, crossing_step
 from cfddem.particles.walls.nearest_point import Walls
 from closures import lubrication, timescales
 

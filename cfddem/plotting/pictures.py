@@ -16,7 +16,7 @@ from cfddem.backend.errors import InputError
 from cfddem.io.files import PARTIAL
 from cfddem.io.reading import open_run
 from cfddem.plotting.curves import save
-from cfddem.plotting.stage import Stage
+from cfddem.plotting.panels import Stage
 
 _MOST_EXAMINED = 20  # snapshots that set the colour limits of a film
 

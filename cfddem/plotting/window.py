@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.backend.errors import RunFailed
 from cfddem.io.reading import Run, open_run
 from cfddem.plotting import rendering
-from cfddem.plotting.stage import Stage
+from cfddem.plotting.panels import Stage
 
 
 def window(folder: str | Path, colour: str = "speed") -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError
 from cfddem.case.bed import Jet
 from cfddem.case.column_grid import grid_of, outside_column
 from cfddem.case.schema import Case, Column
@@ -17,9 +18,11 @@ from cfddem.coupling.exchange import Exchange
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.ghosts import Slabs
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -55,9 +58,13 @@ def parts_of(
     if spheres is None:
         if case.bed.start == "poured":
             progress(f"pouring {case.particle_count} particles")
-        spheres = particles_of(case, table, walls, laws)
+        spheres = communicator.by_first(lambda: particles_of(case, table, walls, laws))
     if case.bed.species:
         spheres.declare(SPECIES)
+    require_parallel(case, communicator.size)
+    cells = None
+    if case.fluid is not None and communicator.size > 1:
+        cells = divide(grid_of(case.column), communicator.size, spheres.position)
     solver = ParticleSolver(
         spheres,
         table,
@@ -69,19 +76,46 @@ def parts_of(
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
         communicator=communicator,
+        division=division_of(case, spheres, communicator.size, cells),
+        balance=case.fluid is None,
     )
     if case.fluid is None:
         return Parts(solver, None, None)
-    fluid, exchange = flow_of(case, spheres, communicator)
+    fluid, exchange = flow_of(case, solver.particles, communicator, cells)
     if exchange.added_mass:
         solver.refresh()  # the forces of films depend on the inertia, which includes the added mass now
     return Parts(solver, fluid, exchange)
 
 
-def flow_of(case: Case, spheres: Particles, communicator: Communicator = SERIAL) -> tuple[FluidSolver, Exchange]:
-    """The fluid of a case around its particles, and their coupling."""
+def require_parallel(case: Case, ranks: int) -> None:
+    """Refuse what several ranks cannot share yet, by its key."""
+    if ranks > 1 and case.run.energy_budget:
+        limit = "false in a run of several processes"
+        raise InputError("run.energy_budget", True, limit, "count energies in a run of one process")
+
+
+def division_of(case: Case, spheres: Particles, ranks: int, cells: Division | None) -> Slabs | None:
+    """Space divided among ranks: as the cells, else across the longer side with equally many particles each."""
+    if ranks == 1:
+        return None
+    if cells is not None:
+        return Slabs(cells.axis, cells.planes(grid_of(case.column)))
+    width, depth, _ = case.column.size
+    return Slabs.balanced(0 if width >= depth else 1, spheres.position, ranks)
+
+
+def flow_of(
+    case: Case, spheres: Particles, communicator: Communicator = SERIAL, cells: Division | None = None
+) -> tuple[FluidSolver, Exchange]:
+    """The fluid of a case around its particles, and their coupling.
+
+    spheres  particles of this rank
+    cells    division of the cells among the ranks; None in one process
+    """
     assert case.fluid is not None
     grid = grid_of(case.column)
+    if cells is not None:
+        grid = Block(grid, cells, communicator)
     fluid = FluidSolver(
         grid,
         boundaries_of(case),
@@ -99,7 +133,8 @@ def flow_of(case: Case, spheres: Particles, communicator: Communicator = SERIAL)
         smoothing=case.laws.kernel_width * case.bed.largest_diameter,
         communicator=communicator,
     )
-    fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(spheres.position, spheres.radius)))
+    owned = spheres.without_ghosts()
+    fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(owned.position, owned.radius)))
     added_mass = AddedMass(case.laws.added_mass_law, fluid.density)
     exchange = Exchange(
         spheres,

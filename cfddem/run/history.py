@@ -28,9 +28,9 @@ from cfddem.case.schema import Case
 from cfddem.io.quantities import TIME, Quantity
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
-from cfddem.run import liquid_bed
+from cfddem.run import liquid_bed_measures
 from cfddem.run.budgets import conservation, energy
-from cfddem.run.liquid_bed import BED, cells_of, open_area
+from cfddem.run.liquid_bed_measures import BED, cells_of, open_area
 from cfddem.run.simulation import Simulation
 
 Function = Callable[[Simulation], float]
@@ -46,10 +46,12 @@ class Measure:
 
     columns   name -> quantity, for a case; empty if the case has no such columns
     values    name -> value, for a simulation
+    shared    right on several ranks too
     """
 
     columns: Callable[[Case], Mapping[str, Quantity]]
     values: Callable[[Simulation], Mapping[str, float]]
+    shared: bool = True
 
 
 MEASURES: dict[str, Measure] = {}
@@ -59,13 +61,15 @@ _BUILT_IN: set[str] = set()
 
 
 def measure(
-    unit: str, *, group: str = "measure", when: Callable[[Case], bool] = lambda case: True
+    unit: str, *, group: str = "measure", when: Callable[[Case], bool] = lambda case: True, shared: bool = False
 ) -> Callable[[Function], Function]:
     """Declare a function of a simulation as a measure.
 
     unit     SI, `1` for a plain number
     group    how the report shows it: `measure` (mean with an error), `imbalance` (largest value), `recorded` (not)
     when     of a case: whether the history has this column
+    shared   the function gives the same number on several ranks: it reads `simulation.owned` and sums by
+             `simulation.communicator`, or reads `simulation.whole(...)`. Others are refused there
     returns  decorator
     errors   InputError if a built-in measure has the name of the function
     """
@@ -78,7 +82,7 @@ def measure(
         def columns(case: Case) -> Mapping[str, Quantity]:
             return {name: quantity} if when(case) else {}
 
-        _declare(name, Measure(columns, lambda simulation: {name: float(function(simulation))}))
+        _declare(name, Measure(columns, lambda simulation: {name: float(function(simulation))}, shared))
         return function
 
     return declare
@@ -95,6 +99,14 @@ def all_columns(case: Case) -> dict[str, Quantity]:
     for each in MEASURES.values():
         found |= each.columns(case)
     return found
+
+
+def require_shared(case: Case, ranks: int) -> None:
+    """Refuse measures of a user that do not say that they are right on several ranks."""
+    for name, each in MEASURES.items():
+        if ranks > 1 and name not in _BUILT_IN and not each.shared and each.columns(case):
+            remedy = "declare it with @measure(unit, shared=True) if it is"
+            raise InputError("measure", name, "right on several ranks", remedy)
 
 
 def row(simulation: Simulation) -> dict[str, float]:
@@ -153,20 +165,21 @@ def bed_height(simulation: Simulation) -> float:
 @measure("1", when=_is_fluid_bed)
 def bed_voidage(simulation: Simulation) -> float:
     """Mean voidage of the bed, from its height."""
-    solids = 0.99 * simulation.communicator.sum(simulation.particles.volume)
+    solids = 0.99 * simulation.communicator.sum(simulation.owned.volume)
     return 1.0 - solids / (open_area(simulation.case) * bed_height(simulation))
 
 
 @measure("1", when=_is_fluid_bed)
 def bed_voidage_from_pressure(simulation: Simulation) -> float:
     """Mean voidage of the bed, from the pressure gradient within it."""
-    particles, fluid, grid = simulation.particles, simulation.fluid, grid_of(simulation.case.column)
+    particles, fluid, grid = simulation.owned, simulation.fluid, grid_of(simulation.case.column)
     assert fluid is not None
     carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
     total, volume = simulation.communicator.sum, particles.volume
     weight = (total(particles.density * volume) / total(volume) - fluid.density) * carried
     low, high = (share * bed_height(simulation) for share in BED)
-    return measures.voidage_from_pressure(fluid.pressure, grid.spacing, float(weight), low, high, open_cells=grid.open)
+    pressure = fluid.whole("pressure")
+    return measures.voidage_from_pressure(pressure, grid.spacing, float(weight), low, high, open_cells=grid.open)
 
 
 @measure("Pa", when=_is_fluid_bed)
@@ -175,8 +188,8 @@ def pressure_drop(simulation: Simulation) -> float:
     fluid, column = simulation.fluid, simulation.case.column
     assert fluid is not None
     grid = grid_of(column)
-    drop = measures.pressure_drop(fluid.pressure, grid.spacing, 0.0, column.height, open_cells=grid.open)
-    inflow, voidage = fluid.volume_flux(2)[0], fluid.mean_voidage[0]
+    drop = measures.pressure_drop(fluid.whole("pressure"), grid.spacing, 0.0, column.height, open_cells=grid.open)
+    inflow, voidage = fluid.grid.joined(fluid.volume_flux(2)[:-1])[0], fluid.whole("mean_voidage")[0]
     return drop + measures.entrance_pressure_drop(inflow, voidage, fluid.density, grid.open[0])
 
 
@@ -192,39 +205,40 @@ def granular_temperature(simulation: Simulation) -> float:
     return measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).mean
 
 
-for _unit, _function in liquid_bed.MEASURES:
+for _unit, _function in liquid_bed_measures.MEASURES:
     measure(_unit, when=is_liquid_bed)(_function)
 
 
 @measure("J", group="recorded")
 def kinetic_energy(simulation: Simulation) -> float:
     """Kinetic energy of the particles, with rotation."""
-    return kinetic_energy_of(simulation.particles)
+    return kinetic_energy_of(simulation.particles, simulation.communicator)
 
 
 @measure("m/s")
 def largest_speed(simulation: Simulation) -> float:
     """Speed of the fastest particle."""
-    return math.sqrt(simulation.communicator.largest((simulation.particles.velocity**2).sum(axis=1), default=0.0))
+    return math.sqrt(simulation.communicator.largest((simulation.owned.velocity**2).sum(axis=1), default=0.0))
 
 
 @measure("1")
 def contact_count(simulation: Simulation) -> float:
     """Number of contacts."""
-    return simulation.communicator.count((simulation.particle_solver.edges.force != 0.0).any(axis=1))
+    edges, owned = simulation.particle_solver.edges, simulation.particles.owned
+    return simulation.communicator.count((edges.force != 0.0).any(axis=1) & (edges.first < owned))
 
 
 @measure("1", group="recorded")
 def particle_count(simulation: Simulation) -> float:
     """Number of particles."""
-    return simulation.particles.count
+    return simulation.communicator.sum([simulation.particles.owned])
 
 
 @measure("1", group="recorded", when=_has_fluid)
 def out_of_range_count(simulation: Simulation) -> float:
     """How often drag and film laws were evaluated outside of their fitted ranges so far."""
     assert simulation.exchange is not None
-    return simulation.exchange.outside + simulation.particle_solver.outside
+    return simulation.exchange.outside + simulation.communicator.sum([simulation.particle_solver.outside])
 
 
 @measure("1", group="recorded", when=_is_agitated)
@@ -258,7 +272,7 @@ def _mean_height_columns(case: Case) -> dict[str, Quantity]:
 
 def mean_heights(simulation: Simulation) -> dict[str, float]:
     """Mean height of each species of a mixture, by volume [m]."""
-    particles, names, total = simulation.particles, list(simulation.case.bed.species), simulation.communicator.sum
+    particles, names, total = simulation.owned, list(simulation.case.bed.species), simulation.communicator.sum
 
     def by_species(weights: np.ndarray) -> np.ndarray:
         here = np.bincount(particles.species, weights, len(names))  # local: summed over the ranks below
@@ -278,7 +292,7 @@ _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
 def momentum_imbalance(simulation: Simulation) -> float:
     """Momentum that the fluid gave and particles did not receive, over that given."""
     assert simulation.fluid is not None
-    return conservation.momentum_imbalance(simulation.fluid, simulation.particles)
+    return conservation.momentum_imbalance(simulation.fluid, simulation.owned)
 
 
 @measure("1", group="imbalance", when=_has_fluid)

@@ -38,7 +38,9 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start == "packed":
         share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(case.column.size)
-        places, _ = random_packing(diameters, share, bed.seed, shape=case.column.size)
+        x, y, z = periodic_directions(case)
+        repeats = (x, y, z or bed.fixed)  # fixed particles are a slice of a longer bed
+        places, _ = random_packing(diameters, share, bed.seed, shape=case.column.size, periodic=repeats)
     elif bed.start == "placed":
         places = np.array(bed.positions, float)
     elif bed.species:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 
 from cfddem.backend.compile import announce_compilation
 from cfddem.backend.errors import CfddemError, InputError
+from cfddem.backend.launch import TERMINAL
 
 _log = logging.getLogger("cfddem.run.progress")
 
@@ -70,13 +72,16 @@ class ProgressLine:
 
 
 @contextmanager
-def live_line(log: Path | None = None) -> Iterator[ProgressLine]:
+def live_line(log: Path | None = None, shown: bool = True) -> Iterator[ProgressLine]:
     """Show a progress line inside a `with` block.
 
+    shown   whether this process shows and logs anything; of several ranks only one does
     log     file to which one line per row of history, and every warning, is appended
     errors  InputError if the log cannot be written
     """
-    console = Console(stderr=True, quiet=not sys.stderr.isatty(), width=min(Console(stderr=True).width, 120))
+    terminal = sys.stderr.isatty() or TERMINAL in os.environ
+    width = min(Console(stderr=True).width, 120)
+    console = Console(stderr=True, quiet=not (shown and terminal), force_terminal=terminal or None, width=width)
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(bar_width=10),
@@ -84,7 +89,7 @@ def live_line(log: Path | None = None) -> Iterator[ProgressLine]:
         console=console,
         transient=True,
     )
-    with _logged(log), bar:
+    with _logged(log if shown else None), bar:
         line = ProgressLine(bar)
         announce_compilation(line.compiling)
         try:

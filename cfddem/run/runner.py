@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
+import numpy as np
+
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed, RunStopped, UnstableStep
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
@@ -17,6 +20,7 @@ from cfddem.io import checkpoint
 from cfddem.io.folder import make_folder, read_about, require_free
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, of_fields
+from cfddem.io.silent import folder_of_ranks
 from cfddem.io.writer import RunFolder
 from cfddem.particles.collision_events import COLLISION_FIELDS
 from cfddem.particles.guard import guard
@@ -45,11 +49,12 @@ class Run:
 
     simulation  the simulation
     folder      that is written
-    report      called after every row of history, and every half second of wall time
+    report      called after every row of history, and every half second of wall time; of several ranks on rank 0
     """
 
     def __init__(self, simulation: Simulation, folder: RunFolder, report: Report = lambda _: None) -> None:
-        self.simulation, self.folder, self.report = simulation, folder, report
+        self.simulation, self.folder = simulation, folder
+        self.report = report if simulation.communicator.rank == 0 else lambda _: None
         plan = simulation.case.run
         self.end = plan.until
         self.every = plan.every or plan.until / 50.0
@@ -74,6 +79,7 @@ class Run:
         progress: Callable[[str], None] = lambda _: None,
         fields: Sequence[Field] = (),
         callbacks: Sequence[Callback] = (),
+        communicator: Communicator = SERIAL,
     ) -> Run:
         """Prepare a case in a new folder, and write its initial state.
 
@@ -81,16 +87,20 @@ class Run:
         report             called after every row of history
         progress           called with a line of text for each part of the preparation
         fields, callbacks  of the simulation, see `Simulation`
+        communicator       of the ranks that share the run; all of them call this. Rank 0 writes
         errors             InputError if the folder holds a run or cannot be written
         """
         folder, text = Path(folder), case.to_toml() if text is None else text
-        require_free(folder, text)
-        make_folder(folder)
+        history.require_shared(case, communicator.size)
+        communicator.by_first(lambda: _prepare_folder(folder, text))
         begun = clock.monotonic()
-        simulation = Simulation(case, progress, fields=fields, callbacks=callbacks)
+        simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
         simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # initial packing, compilation for it
-        grid = None if simulation.fluid is None else simulation.fluid.grid
-        written = RunFolder.create(folder, text, provenance(case.bed.seed), grid, quantities_of(simulation))
+        grid = None if simulation.fluid is None else simulation.fluid.grid.whole
+        about = provenance(case.bed.seed) | ({"ranks": communicator.size} if communicator.size > 1 else {})
+        written = folder_of_ranks(
+            communicator, lambda: RunFolder.create(folder, text, about, grid, quantities_of(simulation))
+        )
         run = cls(simulation, written, report)
         run._write_initial_state()
         return run
@@ -105,6 +115,7 @@ class Run:
         progress: Callable[[str], None] = lambda _: None,
         fields: Sequence[Field] = (),
         callbacks: Sequence[Callback] = (),
+        communicator: Communicator = SERIAL,
     ) -> Run:
         """Continue from the newest undamaged checkpoint of a folder, bit for bit; later snapshots and rows are dropped.
 
@@ -120,17 +131,20 @@ class Run:
         if state is not None and until is not None and until < state["time"]:
             limit = f"at least {state['time']:.6g} s, the time of the run"
             raise InputError("until", until, limit, "a run only continues forward")
-        written = RunFolder.reopen(folder)
+        written = folder_of_ranks(communicator, lambda: RunFolder.reopen(folder))
         overrides = ({} if state is None else state["overrides"]) | ({} if until is None else {"run.until": until})
         case = Case.from_text(written.case_text, str(folder / "case.toml"), overrides)
         if state is None:
             written.drop_after(-1.0)
-            run = cls(Simulation(case, progress, fields=fields, callbacks=callbacks), written, report)
+            begun = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
+            run = cls(begun, written, report)
             run._write_initial_state()
             return run
         try:
-            _require_measures(written, case)
-            simulation = Simulation.restored(case, state["simulation"], fields=fields, callbacks=callbacks)
+            communicator.by_first(lambda: _require_measures(written, case))
+            simulation = Simulation.restored(
+                case, state["simulation"], fields=fields, callbacks=callbacks, communicator=communicator
+            )
         except (KeyError, IndexError, TypeError, InputError) as failure:
             if before["status"] != "running":
                 written.finish(before["status"], before["message"])
@@ -139,7 +153,7 @@ class Run:
             remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
             raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
         simulation.wall.seconds.update(written.about.get("wall_time", {}))
-        if simulation.particle_solver.collisions is not None:
+        if simulation.particle_solver.collisions is not None and communicator.rank == 0:
             simulation.particle_solver.collisions.put_back(state["collisions"])
         written.drop_after(simulation.time)
         return cls(simulation, written, report)
@@ -167,14 +181,14 @@ class Run:
     def _rows(self) -> Iterator[tuple[float, bool]]:
         """Time of each row of history that is left [s], and whether a snapshot is due."""
         number = math.floor(self.simulation.time / self.interval / (_SAME * _SAME))
-        while not self._stop and self.simulation.time < self.end * _SAME:
+        while not self._stopped() and self.simulation.time < self.end * _SAME:
             number += 1
             time = min(number * self.interval, self.end)
             yield time, number % self.rows_per_snapshot == 0 or time == self.end
 
     def _advance(self, target: float) -> None:
         """Step to a time [s], or until the run is stopped."""
-        while not self._stop and self.simulation.time < target * _SAME:
+        while not self._stopped() and self.simulation.time < target * _SAME:
             try:
                 self.simulation.step(target)
             except (InputError, UnstableStep) as failure:
@@ -183,6 +197,10 @@ class Run:
                 self._pace_from = clock.monotonic(), self.simulation.time
             if clock.monotonic() - self._reported_at > REPORT_EVERY:
                 self._report()
+
+    def _stopped(self) -> bool:
+        """Whether the run is to stop, on all ranks."""
+        return self._stop.agreed(self.simulation.communicator)
 
     def _fail(self, failure: Exception) -> NoReturn:
         """Report a failed step; name the particle that caused it if there is one."""
@@ -245,12 +263,17 @@ class Run:
         with simulation.wall.part("snapshots"):
             fluid = None
             if simulation.fluid is not None:
-                fluid = {name: getattr(simulation.fluid, name) for name in RECORDED}
-            collisions = None if solver.collisions is None else solver.collisions.take()
-            particles = simulation.particles.snapshot()
-            self.folder.write_snapshot(simulation.time, solver.steps, fluid, particles, collisions)
-        if clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE:
+                fluid = {name: simulation.fluid.whole(name) for name in RECORDED}
+            collisions = None if solver.collisions is None else self._gathered(solver.collisions.take())
+            self.folder.write_snapshot(simulation.time, solver.steps, fluid, simulation.snapshot(), collisions)
+        due = clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE
+        if simulation.communicator.broadcast(due):
             self._write_checkpoint()
+
+    def _gathered(self, collisions: np.ndarray) -> np.ndarray:
+        """The collisions of all ranks, on rank 0, in the order of their ends."""
+        rows = self.simulation.communicator.gathered(collisions)
+        return rows if self.simulation.communicator.size == 1 else np.sort(rows, order=["end", "first", "second"])
 
     def _write_checkpoint(self) -> None:
         """Write the full state, with the intervals, which would otherwise follow from a new end."""
@@ -259,11 +282,17 @@ class Run:
             plan = {"run.until": self.end, "run.every": self.every, "run.history_every": self.interval}
             state: dict[str, Any] = {"time": simulation.time, "overrides": plan, "simulation": simulation.checkpoint()}
             if simulation.particle_solver.collisions is not None:
-                state["collisions"] = simulation.particle_solver.collisions.table
+                state["collisions"] = self._gathered(simulation.particle_solver.collisions.table)
             self.folder.write_checkpoint(state)
         self.folder.note("wall_time", dict(simulation.wall.seconds))
         self._checkpoint_at = clock.monotonic()
         self._checkpoint_cost = self._checkpoint_at - begin
+
+
+def _prepare_folder(folder: Path, text: str) -> None:
+    """Make the folder of a new run, before its preparation, which may take long."""
+    require_free(folder, text)
+    make_folder(folder)
 
 
 def quantities_of(simulation: Simulation) -> Quantities:

@@ -70,9 +70,18 @@ class Simulation:
         """Criterion that limited the last fluid step."""
         return self.time_steps.limiting
 
+    @property
+    def owned(self) -> Particles:
+        """The particles of this rank; `particles` has the ghosts of others too where several share a run."""
+        return self.particles.without_ghosts()
+
     def whole(self, name: str) -> np.ndarray:
         """A field of the particles of all ranks, for measures that need every particle."""
-        return self.communicator.joined(self.particles[name])
+        return self.communicator.joined(self.owned[name])
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """The fields of the particles that a snapshot contains; those of all ranks on rank 0, no rows on the others."""
+        return {name: self.communicator.gathered(array) for name, array in self.owned.snapshot().items()}
 
     def step(self, until: float = math.inf) -> None:
         """Make one fluid step and the particle steps within it; some step ends exactly at `until` [s]."""
@@ -80,12 +89,13 @@ class Simulation:
         with part("time steps"):
             step, substeps = self.time_steps.choose(until, self.steps)
         if self.fluid is not None and self.exchange is not None:
+            owned = self.owned
             with part("voidage and drag"):
-                terms = self.exchange.prepare(self.particles, step)
+                terms = self.exchange.prepare(owned, step)
             with part("fluid"):
                 self.fluid.step(step, *terms.fields)
             with part("forces of the fluid"):
-                forces = self.exchange.apply(self.particles, terms, self.gravity)
+                forces = self.exchange.apply(owned, terms, self.gravity)
             if self.energy is not None:
                 with part("energies"):
                     self.energy.after_fluid_step(terms, forces)
@@ -120,10 +130,16 @@ class Simulation:
 
     @classmethod
     def restored(
-        cls, case: Case, state: dict[str, Any], *, fields: Iterable[Field] = (), callbacks: Iterable[Callback] = ()
+        cls,
+        case: Case,
+        state: dict[str, Any],
+        *,
+        fields: Iterable[Field] = (),
+        callbacks: Iterable[Callback] = (),
+        communicator: Communicator = SERIAL,
     ) -> Simulation:
         """The simulation of a case as it was at a `checkpoint()`; it continues bit for bit."""
-        return cls(case, fields=fields, callbacks=callbacks, state=state)
+        return cls(case, fields=fields, callbacks=callbacks, state=state, communicator=communicator)
 
     def _restore(self, state: dict[str, Any], fields: list[Field]) -> float:
         """Take over a checkpoint; returns the particle step [s]."""

@@ -7,6 +7,8 @@ import threading
 from types import TracebackType
 from typing import Any
 
+from cfddem.backend.communicator import Communicator
+
 
 class StopRequest:
     """Catches SIGINT and SIGTERM inside a `with` block; true after the first one.
@@ -26,6 +28,11 @@ class StopRequest:
     def name(self) -> str:
         """Name of the signal."""
         return signal.Signals(self.signal).name
+
+    def agreed(self, communicator: Communicator) -> bool:
+        """Whether a rank has received a signal; then all ranks take it for theirs."""
+        self.signal = communicator.largest([self.signal])
+        return bool(self)
 
     def __enter__(self) -> StopRequest:
         if threading.current_thread() is threading.main_thread():

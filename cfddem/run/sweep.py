@@ -13,6 +13,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +95,7 @@ def sweep(
     *,
     overrides: Mapping[str, Any] | None = None,
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Callable[[Outcome], None] = lambda _: None,
 ) -> list[Outcome]:
     """Run a case for every combination of values.
@@ -103,21 +105,20 @@ def sweep(
     output     folder of the sweep: one folder per run, `sweep.csv`, `sweep.png`
     overrides  values that all runs share
     jobs       number of concurrent runs; if more than one, each uses one thread
+    scheduler  address of a dask scheduler whose workers make the runs, instead of this machine; they need the same
+               folders and packages
     progress   called after every run
     returns    outcomes, in the order of the values
     errors     InputError before any run starts
     """
-    from joblib import Parallel, delayed
-
     if jobs < 1:
         raise InputError("--jobs", jobs, "at least 1")
-    runs = _cases(path, over, overrides or {})
-    if output.exists() and not output.is_dir():
-        raise InputError("output", str(output), "a folder", "a file of that name exists")
-    output.mkdir(parents=True, exist_ok=True)
+    runs = cases_of(path, over, overrides or {})
+    make_output(output)
+    place = output.absolute() if scheduler else output  # workers have other working folders
     outcomes: dict[str, Outcome] = {}
-    work = (delayed(_one)(case, values, output / name, jobs > 1) for name, (case, values) in runs.items())
-    for outcome in Parallel(n_jobs=jobs, return_as="generator_unordered")(work):
+    work = [(case, values, place / name, jobs > 1) for name, (case, values) in runs.items()]
+    for outcome in _on_this_machine(work, jobs) if scheduler is None else _on_workers(work, scheduler):
         outcomes[outcome.name] = outcome
         progress(outcome)
         if outcome.status == "stopped":  # stopping one run stops the sweep
@@ -132,7 +133,43 @@ def sweep(
     return ordered
 
 
-def _cases(
+def make_output(output: Path) -> None:
+    """Make the folder of a sweep if it does not exist."""
+    if output.exists() and not output.is_dir():
+        raise InputError("output", str(output), "a folder", "a file of that name exists")
+    output.mkdir(parents=True, exist_ok=True)
+
+
+_Work = list[tuple[Case, dict[str, Any], Path, bool]]
+"""Arguments of `_one` for each run."""
+
+
+def _on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
+    """Outcomes as runs end, several runs at a time."""
+    from joblib import Parallel, delayed
+
+    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
+
+
+def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
+    """Outcomes as runs end on the workers of a dask scheduler, which decide how many run at a time."""
+    if find_spec("distributed") is None:
+        raise InputError("--scheduler", scheduler, "used with dask", "pip install 'cfddem[cluster]'")
+    from distributed import Client, as_completed
+
+    try:
+        client = Client(scheduler, timeout=30)
+    except (OSError, ValueError) as failure:
+        raise InputError(
+            "--scheduler", scheduler, "the address of a dask scheduler that answers", str(failure)
+        ) from None
+    with client:
+        futures = [client.submit(_one, *each[:3], True, pure=False, retries=1) for each in work]
+        for done in as_completed(futures):
+            yield done.result()
+
+
+def cases_of(
     path: Path, over: Mapping[str, Sequence[Any]], overrides: Mapping[str, Any]
 ) -> dict[str, tuple[Case, dict[str, Any]]]:
     """Case and changed values of every run, by its name."""

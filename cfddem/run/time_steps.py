@@ -7,7 +7,7 @@ import math
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
 from cfddem.case.schema import Case
-from cfddem.coupling.time_scales import COURANT, courant_step, crossing_rate, fluid_step_limits
+from cfddem.coupling.fluid_step_limits import COURANT, courant_step, crossing_rate, fluid_step_limits
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.time_scales import check_step

@@ -1,26 +1,45 @@
-"""Runs kept as folders: finished ones are read, interrupted ones are continued, missing ones are run."""
+"""Results that are kept: finished ones are read, missing ones are computed.
+
+A run is kept as its folder, and continued if it was interrupted; numbers are kept as a JSON file.
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run as Written
 from cfddem.io.reading import open_run
+from cfddem.run.progress import Status
 from cfddem.run.runner import Run
-from scenarios.validation.table import Progress
+from scenarios.validation.table import Progress, replacing
 
 
 def finished(case: Case, folder: Path, name: str, progress: Progress, changes: dict[str, Any]) -> Written:
     """The finished run of a case with changes, in its folder; runs or continues it where needed."""
     home = folder / name
 
-    def live(run: Run) -> None:
-        progress(f"{name}: {run.simulation.time:.3g} of {run.end:g} s")
+    def live(status: Status) -> None:
+        progress(f"{name}: {status.time:.3g} of {status.end:g} s")
 
     if not (home / "run.json").exists():
         Run.begin(case.with_(**changes), home, report=live, progress=progress).go()
     elif open_run(home).status != "finished":
         Run.resume(home, report=live, progress=progress).go()
     return open_run(home)
+
+
+def kept(path: Path, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Numbers by name from a file; computed and written where there is none.
+
+    Delete the file to compute them again.
+    """
+    if not path.exists():
+        numbers = compute()
+        with replacing(path) as fresh:
+            fresh.write_text(json.dumps(numbers, indent=1) + "\n")
+    found: dict[str, Any] = json.loads(path.read_text())
+    return found

@@ -1,13 +1,14 @@
 """Speed of one version of the package over that of another, measured in turns in one run.
 
-    python tests/benchmarks/compare_versions.py OTHER [--rounds N] [--threads N] [NAME ...]
+    python tests/benchmarks/compare_versions.py OTHER [--rounds N] [--threads N] [--start] [NAME ...]
 
 OTHER is a checkout of the other version; this version is the checkout that holds this file. Both need the packages of
 this Python environment. Each version has a process of its own. The two take turns, so that what else the machine does
 slows both alike. NAME is one or more of the keys of MEASUREMENTS; all of them if none is given.
 
-Printed for each: processor time of this version over the other's, as ratio of medians, with the scatter of the ratios
-of single turns. Below 1 means that this version is faster.
+Printed for each: processor time of this version over the other's, as ratio of medians, with the standard error of the
+ratios of single turns. Below 1 means that this version is faster. With --start the first steps of a new process are
+measured instead: with an empty cache of compiled loops, and then once more with what the first start has left in it.
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 MEASUREMENTS = {
@@ -109,6 +113,36 @@ def compare(this: Path, other: Path, measurement: tuple[object, ...], rounds: in
     return times
 
 
+def start(checkout: Path, measurement: tuple[object, ...], cache: str, threads: int) -> float:
+    """Processor time of a process that makes one turn and ends [s]."""
+
+    def spent() -> float:
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+
+    before, earlier = spent(), os.environ.get("XDG_CACHE_HOME")
+    os.environ["XDG_CACHE_HOME"] = cache
+    try:
+        Version(checkout, (*measurement[:-1], 1), threads).close()
+    finally:
+        os.environ.pop("XDG_CACHE_HOME")
+        if earlier is not None:
+            os.environ["XDG_CACHE_HOME"] = earlier
+    return spent() - before
+
+
+def compare_starts(this: Path, other: Path, names: Iterable[str], threads: int) -> None:
+    """Print the processor time of the first and the second start of both versions."""
+    print(f"{'':28} {'first start':>23} {'second start':>23}")
+    for name in names:
+        text = f"{name:28}"
+        with tempfile.TemporaryDirectory() as cache:
+            for _ in range(2):
+                mine, theirs = (start(each, MEASUREMENTS[name], cache, threads) for each in (this, other))
+                text += f"   {mine:5.1f} s, other {theirs:5.1f} s"
+        print(text, flush=True)
+
+
 def main() -> None:
     """Compare the versions and print a line for each measurement."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -116,11 +150,15 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="; ".join(MEASUREMENTS))
     parser.add_argument("--rounds", type=int, default=10, help="turns of each version")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--start", action="store_true", help="measure starts instead of speed")
     given = parser.parse_intermixed_args()
-    this = Path(__file__).resolve().parents[2]
-    print(f"{'':28} {'time / other':>12} {'scatter':>8}")
+    this, other = Path(__file__).resolve().parents[2], given.other.resolve()
+    if given.start:
+        compare_starts(this, other, given.names or MEASUREMENTS, given.threads)
+        return
+    print(f"{'':28} {'time / other':>12} {'error':>8}")
     for name in given.names or MEASUREMENTS:
-        mine, theirs = compare(this, given.other.resolve(), MEASUREMENTS[name], given.rounds, given.threads)
+        mine, theirs = compare(this, other, MEASUREMENTS[name], given.rounds, given.threads)
         ratios = [a / b for a, b in zip(mine, theirs)]
         ratio = statistics.median(mine) / statistics.median(theirs)
         print(f"{name:28} {ratio:12.3f} {statistics.stdev(ratios) / len(ratios) ** 0.5:8.3f}", flush=True)

@@ -22,7 +22,7 @@ from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
-from cfddem.particles.state import Particles
+from cfddem.particles.state import Particles, added_mass
 from closures.registry import Law
 
 SAMPLED = Field(
@@ -105,12 +105,7 @@ class AddedMass:
         if self:
             particles.sampled_velocity = slip + particles.velocity
 
-    @staticmethod
-    def mass(particles: Particles) -> Array:
-        """Added mass of every particle (N,) [kg]; zero for fixed particles."""
-        free = particles.inverse_mass > 0.0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(free, 1.0 / particles.inverse_mass - particles.mass, 0.0)
+    mass = staticmethod(added_mass)
 
 
 @threaded

@@ -16,7 +16,7 @@ from cfddem.backend.compile import prange, threaded
 from cfddem.fluid.checks import refuse_nan
 from cfddem.fluid.grid import LOW, UNIT, Array
 from cfddem.fluid.momentum import row
-from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.fluid.pressure.ranks import pressure_equation
 from cfddem.fluid.pressure.regions import ClosedRegions
 from cfddem.fluid.state import FluidState
 
@@ -29,7 +29,9 @@ class Projection:
 
     def __init__(self, fluid: FluidState) -> None:
         self.fluid, grid, communicator = fluid, fluid.grid, fluid.communicator
-        self._equation = PressureEquation(grid, ClosedRegions.of(grid, fluid.boundaries, communicator), communicator)
+        closed_regions = ClosedRegions.of(grid, fluid.boundaries, communicator)
+        outlets = fluid.boundaries.outlets
+        self._equation = pressure_equation(grid, closed_regions, communicator, fluid.boundaries.periodic, outlets)
         self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
 
     def correct(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
@@ -41,11 +43,10 @@ class Projection:
         fresh  whether the mobility is new, and with it the coefficients of the equation
         """
         fluid, fields, equation, missing = self.fluid, self.fluid.fields, self._equation, self._missing
-        finest = equation.finest
+        ax, ay, az, anchor = equation.coefficients
         gather(
             velocity, fields.mobility, voidage, fields.new_voidage_rate, fluid.open_cells, fresh,
-            fluid.boundaries.periodic, fluid.face_areas, fluid.inverse_spacing, finest.ax, finest.ay, finest.az,
-            finest.anchor, missing,
+            fluid.boundaries.halo.ends, fluid.face_areas, fluid.inverse_spacing, ax, ay, az, anchor, missing,
         )  # fmt: skip
         if fresh:
             equation.prepare()
@@ -64,11 +65,12 @@ class Projection:
 
 @threaded
 def gather(
-    velocity, mobility, voidage, rate, open_cells, fresh, periodic, areas, inverse, ax, ay, az, anchor, b
+    velocity, mobility, voidage, rate, open_cells, fresh, ends, areas, inverse, ax, ay, az, anchor, b
 ):  # fmt: skip
     """Right-hand side of the pressure equation and, if fresh, its coefficients.
 
-    b = -(V d eps/dt + outflow of eps u) of every open cell (nz, ny, nx) [m3/s]; rate is d eps/dt, padded [1/s].
+    b = -(V d eps/dt + outflow of eps u) of every open cell (nz, ny, nx) [m3/s]; rate is d eps/dt, padded [1/s]; ends
+    (3, 2) tells where the box ends below and above along x, y, z.
     """
     nz, ny, nx = b.shape
     for k in prange(nz):
@@ -89,10 +91,10 @@ def gather(
                         a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
                         place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
                         # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
-                        if not periodic[d] and place == 0:
+                        if ends[d, 0] and place == 0:
                             held += 2.0 * a_below
                             a_below = 0.0
-                        if not periodic[d] and place == cells - 1:
+                        if ends[d, 1] and place == cells - 1:
                             held += 2.0 * a_above
                         if cells == 1:
                             a_below = 0.0

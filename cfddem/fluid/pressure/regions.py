@@ -36,7 +36,7 @@ class ClosedRegions(NamedTuple):
     @classmethod
     def of(cls, grid: Grid, boundaries: Boundaries, communicator: Communicator) -> ClosedRegions | None:
         """Closed regions of a grid with its boundaries; None if an outlet touches every region."""
-        region, count = label(grid.open)
+        region, count = label(grid.whole.open)
         links = list(range(count + 1))
 
         def root(n: int) -> int:
@@ -50,10 +50,10 @@ class ClosedRegions(NamedTuple):
                 for a, b in {(int(a), int(b)) for a, b in zip(first, last) if a and b}:
                     links[root(a)] = root(b)
         region = np.array([root(n) for n in range(count + 1)])[region]
-        for side in boundaries.sides:
+        for side in boundaries.box.sides:
             touched = side.layer(region, -1 if side.high else 0)[side.outlet[LOW:-HIGH, LOW:-HIGH]]
             region[np.isin(region, touched[touched > 0])] = 0
-        return cls.numbered(region.astype(np.int64), communicator)
+        return cls.numbered(grid.part(region).astype(np.int64), communicator)
 
     def sums(self, values: Array) -> Array:
         """Sum of a cell field (nz, ny, nx) over each region; the first sum is that of the cells outside of all."""

@@ -100,15 +100,19 @@ def random_packing(
     seed: int,
     shape: tuple[float, float, float] = (1.0, 1.0, 1.0),
     most_sweeps: int = 20_000,
+    periodic: tuple[bool, bool, bool] = (True, True, True),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pack spheres at random in a periodic box to a given solid fraction.
+    """Pack spheres at random in a box, periodic or between walls, to a given solid fraction.
 
-    Spheres start at random positions and are moved apart until no overlap exceeds :data:`OVERLAP_LIMIT`.
+    Spheres start at random positions and are moved apart until no overlap exceeds :data:`OVERLAP_LIMIT`. No sphere
+    overlaps a wall.
 
     diameters       (N,) [m]
     solid_fraction  up to about 0.62 for equal spheres [-]
     seed            of the initial positions
     shape           of the box, as ratios of its edges
+    most_sweeps     through all pairs, after which the packing is given up
+    periodic        along each axis; else the box ends at two walls
     returns         centres (N, 3) [m] and edges of the box (3,) [m]
 
     Raises PackingFailed if the fraction is not reached within `most_sweeps`.
@@ -119,23 +123,35 @@ def random_packing(
     volume = float(np.sum(np.pi / 6.0 * diameters**3)) / solid_fraction
     ratios = np.asarray(shape, float)
     box = ratios * (volume / np.prod(ratios)) ** (1.0 / 3.0)
-    position = np.random.default_rng(seed).uniform(0.0, 1.0, (len(diameters), 3)) * box
+    low, high = _centres_between_walls(diameters, box, np.array(periodic))
+    margin = np.where(periodic, 0.0, 0.5 * diameters[:, None])
+    position = margin + np.random.default_rng(seed).uniform(0.0, 1.0, (len(diameters), 3)) * (box - 2.0 * margin)
     spheres = make_particles(position, 0.5 * diameters, 1000.0)
-    skin = 0.2 * float(diameters.min())
+    skin, images = 0.2 * float(diameters.min()), np.where(periodic, box, np.inf)
     worst = np.inf
     for _ in range(most_sweeps // _SWEEPS + 1):
-        wrap(spheres.position, box)
-        graph = list_edges(spheres, wall_arrays(), 0.0, skin, box)
+        wrap(spheres.position, images)
+        graph = list_edges(spheres, wall_arrays(), 0.0, skin, images)
         worst = _push_apart(
-            spheres.view, graph.flat_graph, shifts(box).reshape(-1), _SWEEPS, 0.25 * skin, OVERLAP_LIMIT
-        )
+            spheres.view, graph.flat_graph, shifts(images).reshape(-1), low.reshape(-1), high.reshape(-1), _SWEEPS,
+            0.25 * skin, OVERLAP_LIMIT,
+        )  # fmt: skip
         if worst <= OVERLAP_LIMIT:
-            wrap(spheres.position, box)
+            wrap(spheres.position, images)
             return spheres.position, box
     raise PackingFailed(
         f"a solid fraction of {solid_fraction:g} leaves overlaps of {worst:.2g} radii (limit {OVERLAP_LIMIT:g}) after "
-        f"{most_sweeps} sweeps; ask for less than about 0.62, or a wider size distribution"
+        f"{most_sweeps} sweeps; ask for less than about 0.62, still less between walls, or a wider size distribution"
     )
+
+
+def _centres_between_walls(diameters: np.ndarray, box: np.ndarray, periodic: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Lowest and highest coordinates of centres, infinite along periodic axes, each (N, 3) [m]."""
+    largest = float(diameters.max())
+    for axis in np.flatnonzero(~periodic & (box < largest)):
+        raise InputError(f"shape[{axis}]", float(box[axis]), f"at least {largest:.3g} m, the largest diameter")
+    radius = 0.5 * diameters[:, None]
+    return np.where(periodic, -np.inf, radius), np.where(periodic, np.inf, box - radius)
 
 
 def largest_overlap(graph: Edges, gap: np.ndarray, radius: np.ndarray) -> float:
@@ -155,13 +171,16 @@ _SWEEPS = 25
 
 
 @serial
-def _push_apart(particles, edges, shift, sweeps, reach, limit):
-    """Move overlapping spheres apart, each by half of the overlap; returns the largest one left, over the radius."""
+def _push_apart(particles, edges, shift, low, high, sweeps, reach, limit):
+    """Move overlapping spheres apart, each by half of the overlap; returns the largest one left, over the radius.
+
+    low, high  bounds of every coordinate
+    """
     position, radius = particles.position, particles.radius
-    way = np.zeros_like(position)
+    move = np.zeros_like(position)
     worst = 0.0
     for sweep in range(sweeps + 1):
-        way[:] = 0.0
+        move[:] = 0.0
         worst = 0.0
         for k in range(edges.between_particles):
             i, j = 3 * int(edges.first[k]), 3 * int(edges.second[k])
@@ -177,12 +196,13 @@ def _push_apart(particles, edges, shift, sweeps, reach, limit):
                 for axis in range(3):
                     push = 0.5 * (overlap + 1e-6 * touch)
                     push *= (position[i + axis] - position[j + axis] + shift[image + axis]) / distance
-                    way[i + axis] += push
-                    way[j + axis] -= push
+                    move[i + axis] += push
+                    move[j + axis] -= push
         if worst <= limit or sweep == sweeps:
             return worst
-        for place in range(len(way)):
-            position[place] += min(max(way[place], -reach), reach)
+        for place in range(len(move)):
+            moved = position[place] + min(max(move[place], -reach), reach)
+            position[place] = min(max(moved, low[place]), high[place])
     return worst
 
 

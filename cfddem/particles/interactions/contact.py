@@ -55,6 +55,15 @@ def contact_state(kinematics, minimum_gap, step):
 
 
 @inline
+def friction_coefficient(row, minimum_gap):
+    """Of dry or of lubricated contacts."""
+    friction = row.friction
+    if FILM:
+        friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
+    return friction
+
+
+@inline
 def contact(kinematics, row, minimum_gap, spring, m, p, step):
     """Force on the first body, couple per radius on both, and the tangential spring and memory afterwards.
 
@@ -101,9 +110,7 @@ def contact(kinematics, row, minimum_gap, spring, m, p, step):
     mid_slip = minus(slip, times(ROLLING_MOBILITY * kick * stiffness, spring))
     mid_slip = times(1.0 / (1.0 + ROLLING_MOBILITY * kick * damping), mid_slip)
     pull = plus(times(stiffness, spring), times(damping, mid_slip))
-    friction = row.friction
-    if FILM:
-        friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
+    friction = friction_coefficient(row, minimum_gap)
     limit = coulomb_limit(friction, normal_force + 2.0 * held)  # adhesion adds to the load, Thornton (1991)
     size = math.sqrt(dot(pull, pull))
     sliding = size > limit

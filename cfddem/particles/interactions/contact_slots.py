@@ -34,6 +34,7 @@ def contact_choices(law: ContactLaw) -> dict[str, Any]:
         "pull_off": law.pull_off or _nothing,
         "adhesive_reach": law.reach or _nothing,
         "stored_energy": law.energy or _nothing,
+        "lost_energy": law.lost or _nothing,
     }
     places = _places(law)
     made = {slot: adapted(function, ARGUMENTS, places) for slot, function in functions.items()}

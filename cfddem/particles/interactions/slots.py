@@ -55,6 +55,7 @@ tangential_stiffness = Slot("tangential_stiffness")  # [N/m]
 secant_stiffness = Slot("secant_stiffness")  # force over overlap [N/m]
 tangent_stiffness = Slot("tangent_stiffness")  # derivative of the force [N/m]
 stored_energy = Slot("stored_energy")  # in the normal spring, below h_min times its share in the load [J]
+lost_energy = Slot("lost_energy")  # to hysteresis since the contact began [J]
 adhesive_reach = Slot("adhesive_reach")  # gap up to which adhesion holds a contact [m]
 read_memory = Slot("read_memory")  # (memory arrays, k) -> tuple of numbers
 write_memory = Slot("write_memory")  # (memory arrays, k, tuple, whether the solids touch)

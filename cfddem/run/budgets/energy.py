@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 from cfddem.coupling.exchange import CouplingTerms, Exchange, FluidForces
-from cfddem.coupling.work import CouplingWork
+from cfddem.coupling.work_on_particles import CouplingWork
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
+from cfddem.particles.energy_count import CHANNELS
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import kinetic_energy
-from cfddem.particles.work import CHANNELS
+from cfddem.particles.state import added_mass_energy, kinetic_energy
 
 STORED = {
     "kinetic": "of the particles' motion",
@@ -49,6 +49,7 @@ LOST = {
     "torque": "by the torque of the fluid on spin",
     "film": "by films",
     "contact_damping": "by the dashpots of contacts",
+    "hysteresis": "by the contact law, to plastic deformation",
     "friction": "by sliding",
     "rolling": "by rolling resistance",
 }
@@ -67,7 +68,7 @@ _OF_FLUID = {
     "drag_in_cells", "pressure_in_cells", "implicit_drag", "viscous", "convection", "lift_and_added_mass", "torque",
     *PASSED,
 }  # fmt: skip
-"""Lines of runs with a fluid."""
+"""Lines of runs with a fluid. `hysteresis` is a line of runs whose contact law loses energy by itself."""
 
 FIELDS = {
     **{f"energy_{name}": ("J", f"energy {text}, since the start") for name, text in STORED.items()},
@@ -135,7 +136,10 @@ class EnergyLedger:
         """The ledger now: a value for each column of `FIELDS` that applies to the run [J]."""
         stored, sums = self._stored(), self._totals()
         lines = {name: stored[name] - self.start[name] for name in stored}
-        names = [name for name in [*GAINED, *LOST, *PASSED] if self.fluid is not None or name not in _OF_FLUID]
+        absent = set() if self.fluid is not None else set(_OF_FLUID)
+        if self.particle_solver.laws.contact_law.lost is None:
+            absent.add("hysteresis")
+        names = [name for name in [*GAINED, *LOST, *PASSED] if name not in absent]
         lines |= {name: sums[name] for name in names}
         put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
         put_in += self.start.get("fluid_kinetic", 0.0) + max(-lines["potential"], 0.0)
@@ -186,10 +190,9 @@ class EnergyLedger:
         }
         if self.fluid is None or self.exchange is None:
             return stored
-        added = self.exchange.added_mass.mass(particles)
         return stored | {
             "fluid_kinetic": self.fluid.kinetic_energy(),
-            "added_mass": 0.5 * self.fluid.communicator.sum(added[:, None] * particles.velocity**2),
+            "added_mass": added_mass_energy(particles, self.fluid.communicator),
             # the fluid has used the voidage before the last step and a half
             "deferred_momentum": -(self._recent[0] + 0.5 * self._recent[1]),
         }

@@ -47,7 +47,7 @@ class FluidisedBed:
 
 def glass(velocity: float) -> Case:
     """The case of the gallery at another velocity [m/s], in a column high enough."""
-    return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.08})
+    return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.04})
 
 
 def alumina(velocity: float) -> Case:
@@ -66,8 +66,10 @@ def alumina(velocity: float) -> Case:
             "column.cell": 0.008,
             "bed.diameter": 3.087e-3,
             "bed.count": 2000,
+            "bed.start": "poured",
             "laws.drag": "wen_yu",
             "run.reference_speed": 0.1,
+            "run.particle_step": None,
         }
     )
 
@@ -93,7 +95,7 @@ def alginate(velocity: float) -> Case:
 
 
 STUDIES = {
-    "glass": Study(glass, (0.030, 0.037, 0.045), 1.5, 2.0),
+    "glass": Study(glass, (0.030, 0.037, 0.045), 0.7, 1.5),
     "alumina": Study(alumina, (0.12, 0.157033, 0.20, 0.26), 2.0, 2.0),
     "alginate": Study(alginate, (0.006, 0.009, 0.012), 6.0, 4.0),
 }

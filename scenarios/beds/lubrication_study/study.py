@@ -1,6 +1,7 @@
-"""Effect of lubrication films on a liquid bed: no film, smooth, rough and soft spheres, in two viscosities.
+"""Effect of lubrication films on a liquid bed: no film, smooth, rough and soft spheres, in several viscosities.
 
-Each bed is run from several seeds, and with two stiffnesses of the softened contact. Runs are kept as folders:
+Each bed is run from several seeds. Two viscosities are run with two stiffnesses of the softened contact; two others,
+for which agitation was measured, with and without it. Runs are kept as folders:
 interrupted runs are continued, and finished runs are not repeated.
 """
 
@@ -37,7 +38,10 @@ SPHERES: dict[str, dict[str, Any]] = {
 """Changes to the case file, which describes the smooth spheres."""
 
 VISCOSITIES = (1.0e-3, 4.0e-3)
-"""[Pa s]"""
+"""[Pa s]; Re_m = 157 and 22, outside of the range in which agitation was measured."""
+
+AGITATED = (2.2e-3, 3.5e-3)
+"""[Pa s]; Re_m = 53 and 27, inside of it."""
 
 MODULI = (1.0e5, 4.0e5)
 """Moduli of the softened contact [Pa]."""
@@ -54,14 +58,19 @@ class Setting(NamedTuple):
     spheres: str
     viscosity: float  # [Pa s]
     modulus: float  # [Pa]
+    agitation: str = "none"
 
     @property
     def name(self) -> str:
         """Name for folders."""
-        return f"{self.spheres.replace(' ', '_')}-{1e3 * self.viscosity:g}mPas-{self.modulus:.0e}Pa"
+        bed = f"{self.spheres.replace(' ', '_')}-{1e3 * self.viscosity:g}mPas-{self.modulus:.0e}Pa"
+        return bed if self.agitation == "none" else f"{bed}-{self.agitation}"
 
 
-SETTINGS = [Setting(*each) for each in itertools.product(SPHERES, VISCOSITIES, MODULI)]
+SETTINGS = [
+    *(Setting(*each) for each in itertools.product(SPHERES, VISCOSITIES, MODULI)),
+    *(Setting(*each) for each in itertools.product(SPHERES, AGITATED, MODULI[:1], ("none", "free_spheres"))),
+]
 
 
 @dataclass(frozen=True)
@@ -93,6 +102,7 @@ def bed(setting: Setting, seed: int) -> Case:
         "fluid.viscosity": setting.viscosity,
         "material.sphere.contact_modulus": setting.modulus,
         "bed.seed": seed,
+        "laws.agitation": setting.agitation,
         **SPHERES[setting.spheres],
     })  # fmt: skip
     exponent, velocity = expansion_exponents(case)["Richardson-Zaki"]

@@ -41,10 +41,11 @@ def _of_bed(setting: Setting, beds: list[Outcome]) -> list[Row]:
     made = []
     for what, (name, unit, factor) in MEASURES.items():
         value, error, seeds = mean(beds, what)
-        note = f"standard error {factor * error:.2g} over {seeds} seeds"
+        note = f"standard error {factor * error:.2g} over {seeds} seeds" if seeds > 1 else "one seed"
         made.append(Row(f"{_named(setting)}: {name}", factor * value, unit=unit, note=note))
     return made
 
 
 def _named(setting: Setting) -> str:
-    return f"{setting.spheres}, {1e3 * setting.viscosity:g} mPa s"
+    moved = "" if setting.agitation == "none" else ", with agitation"
+    return f"{setting.spheres}, {1e3 * setting.viscosity:g} mPa s{moved}"

@@ -2,12 +2,14 @@
 
 The fit uses the autocovariance of the force in every other point of the matrix of resolved runs, in the time in which
 the suspension is even. The unresolved model is then run in the same boxes, and in fluidised beds; nothing is fitted to
-a granular temperature or a voidage.
+a granular temperature or a voidage. Every box and every bed is kept in a file of its own: a study that was stopped
+goes on where it was.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from cfddem.backend.compile import use_threads
 from closures.agitation import SHARES, TIMES, free_spheres
 from scenarios.beds.liquid_bed.study import STUDIES, FluidisedBed, fluidise
 from scenarios.validation.agitation.unresolved import run
+from scenarios.validation.kept_runs import kept
 from scenarios.validation.resolved_suspension import matrix
 from scenarios.validation.resolved_suspension.fitting import fit_levels, fit_shares
 from scenarios.validation.resolved_suspension.study import stored
@@ -33,7 +36,8 @@ COMPARED = {
 }
 """What is compared, and its name in a row."""
 
-STILL = {"laws.agitation": "none"}
+KEPT = (*COMPARED.values(), "averaged", "reynolds")
+"""Measured values of a box that are kept in its file."""
 
 PUBLISHED = {0.009: 0.635, 0.012: 0.703}
 """Velocity [m/s] and mean of the published voidages of alginate beads, where the law acts."""
@@ -42,9 +46,9 @@ PUBLISHED = {0.009: 0.635, 0.012: 0.703}
 def study(folder: Path, progress: Progress) -> list[Row]:
     """Fit, runs in the boxes of the resolved runs, and beds."""
     use_threads(1)  # the boxes are small
-    rows = [*fits(), *boxes(progress)]
+    rows = [*fits(), *boxes(folder, progress)]
     use_threads(None)
-    return rows + list(beds(progress))
+    return rows + list(beds(folder, progress))
 
 
 def even_rows() -> list[dict[str, Any]]:
@@ -74,7 +78,7 @@ def fits() -> Iterator[Row]:
     yield Row("pseudo-turbulence: correlation time", TIMES["pseudo_turbulence"], shares.time, 0.02, "d/w", note)
 
 
-def boxes(progress: Progress) -> Iterator[Row]:
+def boxes(folder: Path, progress: Progress) -> Iterator[Row]:
     """The unresolved model over the resolved runs, mean of the seeds; limits for points that are not fitted."""
     points: dict[str, list[dict[str, Any]]] = {}
     for row in even_rows():
@@ -83,40 +87,52 @@ def boxes(progress: Progress) -> Iterator[Row]:
         point, is_fitted = rows[0]["point"], fitted(rows[0])
         name = f"density ratio {point['density_ratio']:g}, solid fraction {point['solid_fraction']:g}"
         progress(name)
-        found = [run(row) for row in rows]
+        found = [_box(folder, row) for row in rows]
         for quantity, key in COMPARED.items():
             model, resolved = (float(np.mean([_value(each[key]) for each in some])) for some in (found, rows))
             note = f"{model:.3g} for {resolved:.3g}, {len(rows)} seeds" + (", fitted to its force" if is_fitted else "")
             yield Row(f"{name}: {quantity}", model / resolved, 1.0, None if is_fitted else LIMIT, note=note)
 
 
+def _box(folder: Path, row: dict[str, Any]) -> dict[str, Any]:
+    """What the unresolved model gives in the box of a resolved run."""
+
+    def compute() -> dict[str, Any]:
+        found = run(row)
+        return {name: found[name] for name in KEPT}
+
+    return kept(folder / f"box-{matrix.name(Point(**row['point']))}.json", compute)
+
+
 def _value(mean: Any) -> float:
     return float(mean[0] if isinstance(mean, list) else mean)
 
 
-def beds(progress: Progress) -> Iterator[Row]:
+def beds(folder: Path, progress: Progress) -> Iterator[Row]:
     """Beds of glass within the measured range, of alginate at its edge, of alumina far outside."""
-    glass, alginate, alumina = (STUDIES[name] for name in ("glass", "alginate", "alumina"))
-    for velocity in glass.velocities:
-        name = f"glass at {1e3 * velocity:g} mm/s"
+
+    def bed(beads: str, velocity: float, agitation: str) -> FluidisedBed:
+        name = f"bed-{beads}-{1e3 * velocity:g}-{agitation}"
         progress(name)
-        yield from _expansion(name, fluidise(glass, velocity), 0.02, None)
-        still = fluidise(glass, velocity, **STILL)
+        changes = {"laws.agitation": agitation}
+        return FluidisedBed(
+            **kept(folder / f"{name}.json", lambda: asdict(fluidise(STUDIES[beads], velocity, **changes)))
+        )
+
+    for velocity in STUDIES["glass"].velocities:
+        name, still = f"glass at {1e3 * velocity:g} mm/s", bed("glass", velocity, "none")
+        yield from _expansion(name, bed("glass", velocity, "free_spheres"), 0.02, None)
         yield Row(f"{name}, without agitation: voidage", still.voidage, still.balance)
         yield Row(f"{name}, without agitation: deviation of layers in time", still.layers)
     for velocity, published in PUBLISHED.items():
         name = f"alginate at {1e3 * velocity:g} mm/s"
-        progress(name)
-        moved, still = (
-            fluidise(alginate, velocity, **{"laws.agitation": law}).voidage for law in ("free_spheres", "none")
-        )
-        yield Row(f"{name}, without agitation: voidage", still, published, 0.015)
+        moved, quiet = (bed("alginate", velocity, law).voidage for law in ("free_spheres", "none"))
+        yield Row(f"{name}, without agitation: voidage", quiet, published, 0.015)
         yield Row(f"{name}: voidage", moved, published, 0.015)
-        farther = max(abs(moved - published) - abs(still - published), 0.0)
+        farther = max(abs(moved - published) - abs(quiet - published), 0.0)
         yield Row(f"{name}: farther from the published mean than without agitation", farther, 0.0, 0.005)
-    name = "alumina at 157 mm/s, an extrapolation"
-    progress(name)
-    yield from _expansion(name, fluidise(alumina, 0.157033, **{"laws.agitation": "free_spheres"}), 0.02, 0.03)
+    alumina = bed("alumina", 0.157033, "free_spheres")
+    yield from _expansion("alumina at 157 mm/s, an extrapolation", alumina, 0.02, 0.03)
 
 
 def _expansion(name: str, bed: FluidisedBed, limit: float, layers: float | None) -> Iterator[Row]:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from cfddem.case.schema import Case
-from cfddem.particles.solver import ParticleSolver
 from cfddem.run.simulation import Simulation
 from closures.drag_resolved import tenneti
+from scenarios.validation.resolved_suspension.impacts import new_impacts
 from scenarios.validation.resolved_suspension.measures import Series, measure
 from scenarios.validation.resolved_suspension.suspension import OVERLAP, Point, random_arrangement
 
@@ -93,7 +93,7 @@ def run(row: dict[str, Any], *, settle: float = 10.0, until: float = 60.0, **cha
         for look in range(LOOKS):
             velocity = particles.velocity[np.argsort(particles.id)]
             simulation.until((sample + (look + 1) / LOOKS) / SAMPLES * DIAMETER / SLIP)
-            touching, speeds = _impacts(simulation.particle_solver, velocity, touching)
+            touching, speeds = new_impacts(simulation.particle_solver, velocity, touching)
             hits, impact = hits + len(speeds), impact + float(speeds.sum())
         _note(series, simulation, point, hits, impact)
     return measure(point, series, settle, weight=ratio * point.weight)
@@ -122,22 +122,3 @@ def _note(series: Series, simulation: Simulation, point: Point, hits: float, imp
     series.position.append(particles.position[order] * length)
     series.collisions.append(hits)
     series.impact.append(impact * speed)
-
-
-def _impacts(solver: ParticleSolver, velocity: np.ndarray, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs whose solids touch, and the normal speeds of approach of those that came to touch since the last look.
-
-    velocity  of all spheres by id, before
-    touching  pairs that touched at the last look
-    """
-    edges, particles = solver.edges, solver.particles
-    pairs = slice(0, edges.between_particles)
-    close = np.flatnonzero(solver.gap[pairs] < edges.minimum_gap[pairs])
-    first, second = edges.first[close], edges.second[close]
-    i, j = particles.id[first].astype(np.int64), particles.id[second].astype(np.int64)
-    name = np.minimum(i, j) * particles.count + np.maximum(i, j)
-    fresh = ~np.isin(name, touching)
-    apart = particles.position[first[fresh]] - particles.position[second[fresh]]
-    apart -= solver.box * np.round(apart / solver.box)
-    apart /= np.linalg.norm(apart, axis=1, keepdims=True)
-    return name, -np.einsum("ij,ij->i", velocity[i[fresh]] - velocity[j[fresh]], apart)

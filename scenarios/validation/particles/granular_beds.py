@@ -37,7 +37,7 @@ def rest(
 ) -> Rest:
     """Pour a bed and observe it at rest.
 
-    Without resistance to rolling and twisting, grains roll and spin indefinitely; a yielding spring and a dashpot
+    Without resistance to rolling and twisting, spheres roll and spin indefinitely; a yielding spring and a dashpot
     resist here.
 
     width     of the square column [m]
@@ -98,11 +98,11 @@ def slope(
     )
     count = int(0.58 * math.prod(shape) * 6.0 / math.pi)
     places, box = random_packing(np.full(count, DIAMETER), 0.58, seed, shape)
-    grains = make_particles(
+    spheres = make_particles(
         places, 0.5 * DIAMETER, glass.density, viscosity=1e-3 if film else 0.0, fixed=places[:, 2] < DIAMETER
     )
     run = ParticleSolver(
-        grains,
+        spheres,
         pair_table([glass]),
         laws=Laws(
             film=film,

@@ -1,13 +1,13 @@
-r"""Free numbers of the agitation closure, fitted to the measured force on resolved spheres.
+r"""Free numbers of the laws of agitation, fitted to the measured force on resolved spheres.
 
 The closure writes the fluctuating force on a particle as
 
 .. math:: F'' = a_d\,b\,u'' + a_i\,c\,\frac{du''}{dt},\qquad c = \frac{m\,(1+C)\,m_f}{m + C\,m_f},
 
 b the drag coefficient and :math:`u''` the fluctuation of the fluid velocity that the particle sees, with variance R and
-the autocorrelation of a process of two times, :math:`\tau` and :math:`s\tau`,
+the autocorrelation of the run's process of two times, :math:`\tau_1 = 0.8\,\tau` and :math:`\tau_2 = 0.2\,\tau`,
 
-.. math:: \rho(t) = \frac{e^{-|t|/\tau} - s\,e^{-|t|/(s\tau)}}{1-s} .
+.. math:: \rho(t) = \frac{\tau_1\,e^{-|t|/\tau_1} - \tau_2\,e^{-|t|/\tau_2}}{\tau_1-\tau_2} .
 
 The autocovariance of F'' averaged over a window follows without simulation, and :math:`a_d`, :math:`a_i` and
 :math:`\tau` are fitted to it by least squares. The drag on a particle's own fluctuation v' must first be added to the
@@ -16,7 +16,6 @@ measured force: F'' = F' + b v'.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -24,19 +23,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from closures.added_mass import zuber
-from closures.agitation import pseudo_turbulence
-
-SMOOTHING = 0.2
-"""Second time of the process over the first, s."""
-
-
-class Fit(NamedTuple):
-    """Free numbers of the closure."""
-
-    drag: float  # a_d
-    inertia: float  # a_i
-    time: float  # tau, in the unit of the lags
-    residual: float  # root mean square of what is left, over the variance
+from closures.agitation import SHORT, pseudo_turbulence
 
 
 def seen_fluctuation(solid_fraction: float, reynolds: float) -> tuple[float, float]:
@@ -55,15 +42,14 @@ def inertia_coefficient(mass: float, displaced: float, solid_fraction: float) ->
     return mass * (1.0 + added) * displaced / (mass + added * displaced)
 
 
-def autocovariance(
-    lags: np.ndarray, window: float, drag: float, inertia: float, time: float, smoothing: float = SMOOTHING
-) -> np.ndarray:
+def autocovariance(lags: np.ndarray, window: float, drag: float, inertia: float, time: float) -> np.ndarray:
     """Autocovariance of the force averaged over a window, for a seen velocity of unit variance.
 
     drag, inertia  a_d b and a_i c
+    time           tau, in the unit of the lags
     """
-    times = np.array([time, smoothing * time])
-    shares = np.array([1.0, -smoothing]) / (1.0 - smoothing)
+    times = np.array([1.0 - SHORT, SHORT]) * time
+    shares = np.array([1.0 - SHORT, -SHORT]) / (1.0 - 2.0 * SHORT)
 
     def twice_integrated(t: np.ndarray) -> np.ndarray:
         t = np.abs(np.asarray(t, float))[:, None]
@@ -74,39 +60,6 @@ def autocovariance(
 
     ends = twice_integrated(lags + window) + twice_integrated(lags - window)
     return (ends - 2.0 * twice_integrated(lags)) / window**2
-
-
-def fit(
-    lags: np.ndarray,
-    covariances: Sequence[np.ndarray],
-    variances: Sequence[float],
-    window: float,
-    drag: float,
-    inertia: float,
-    smoothing: float = SMOOTHING,
-) -> Fit:
-    """Fit a_d, a_i and tau to the autocovariance of the force in several directions at once.
-
-    lags        of the covariances
-    covariances of the force averaged over the window, for each direction
-    variances   R of the seen velocity, for each direction
-    drag        b
-    inertia     c
-    """
-    scale = max(float(each[0]) for each in covariances)
-
-    def model(numbers: np.ndarray, variance: float) -> np.ndarray:
-        a_d, a_i, time = np.exp(numbers)
-        return variance * autocovariance(lags, window, a_d * drag, a_i * inertia, time, smoothing)
-
-    def missed(numbers: np.ndarray) -> np.ndarray:
-        parts = [model(numbers, r) - measured for r, measured in zip(variances, covariances)]
-        return np.concatenate(parts) / scale
-
-    starts = (np.array([0.0, -1.0, math.log(time)]) for time in (0.1, 0.3, 1.0, 3.0))
-    best = min((least_squares(missed, start) for start in starts), key=lambda found: float(found.cost))
-    a_d, a_i, time = np.exp(best.x)
-    return Fit(float(a_d), float(a_i) if inertia else 0.0, float(time), float(np.sqrt(np.mean(best.fun**2))))
 
 
 class Shares(NamedTuple):

@@ -22,6 +22,7 @@ from cfddem.particles.state import make_particles
 from closures.drag_resolved import tenneti
 from scenarios.validation.resolved_suspension.film import GRID_GAP, unresolved_film
 from scenarios.validation.resolved_suspension.flow import Flow, sphere_volume
+from scenarios.validation.resolved_suspension.impacts import new_impacts
 from scenarios.validation.resolved_suspension.spheres import exchange
 
 OVERLAP = 0.005
@@ -133,24 +134,8 @@ class Suspension:
         particles = self.solver.particles
         self.contact_impulse[:, :3] = self.mass * (particles.velocity - velocity)
         self.contact_impulse[:, 3:] = self.inertia * (particles.spin - spin)
-        self._note_impacts()
+        self.touching, self.impacts = new_impacts(self.solver, self.velocity, self.touching)
         self.steps += 1
-
-    def _note_impacts(self) -> None:
-        """Find the pairs whose solids have come to touch in this step, and their speeds of approach before it."""
-        edges, particles = self.solver.edges, self.solver.particles
-        pairs = slice(0, edges.between_particles)
-        close = np.flatnonzero(self.solver.gap[pairs] < edges.minimum_gap[pairs])
-        first, second = edges.first[close], edges.second[close]
-        name = np.minimum(first, second).astype(np.int64) * particles.count + np.maximum(first, second)
-        fresh = ~np.isin(name, self.touching)
-        i, j = first[fresh], second[fresh]
-        apart = particles.position[i] - particles.position[j]
-        span = np.where(np.isfinite(self.solver.box), self.solver.box, 1e30)
-        apart -= span * np.round(apart / span)
-        apart /= np.linalg.norm(apart, axis=1, keepdims=True)
-        self.impacts = -np.einsum("ij,ij->i", self.velocity[i] - self.velocity[j], apart)
-        self.touching = name
 
     @property
     def momentum(self) -> np.ndarray:

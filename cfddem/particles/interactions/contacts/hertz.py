@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cfddem.particles.interactions.contact_law import ContactLaw, register
-from cfddem.particles.step_limits import hertz_steps
+from cfddem.particles.step_criteria import hertz_steps
 from closures.contact import hertz_damping, hertz_force, hertz_stiffness, mindlin_stiffness, spring_energy
 from closures.timescales import overlap_period
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cfddem.particles.interactions.contact_law import ContactLaw, register
-from cfddem.particles.step_limits import stiffness_steps
+from cfddem.particles.step_criteria import stiffness_steps
 from closures.contact import linear_damping, spring_energy
 
 

@@ -79,10 +79,10 @@ def face_volumes(fluid: FluidState) -> Array:
         faces = fluid.grid.inner_faces(volumes[d], d)
         faces[:] = fluid.grid.cell_volume
         ends = np.moveaxis(faces, 2 - d, 0)
-        if fluid.boundaries.periodic[d]:
-            ends[-1] = 0.0
-        else:
-            ends[[0, -1]] *= 0.5
+        low, high = fluid.boundaries.halo.ends[d]
+        ends[fluid.boundaries.owned_faces(d) :] = 0.0
+        ends[0] *= 0.5 if low else 1.0
+        ends[-1] *= 0.5 if high else 1.0
     return np.asarray(volumes * fluid.faces.solved)
 
 
@@ -136,17 +136,18 @@ def _at_sides(fluid: FluidState) -> tuple[float, float, float]:
     pressed = brought = held = 0.0
     for side in fluid.boundaries.sides:
         inlet, outlet = np.isin(side.owner, side.inlets), _inner(side.outlet)
-        if inlet.any() or outlet.any():  # local: conditions of the whole box
+        if inlet.any() or outlet.any():  # local: this part of the side
             through, carried, against = _at_side(fluid, side, inlet, outlet)
             pressed += through
             brought += carried
             held += against
-    return pressed, brought, held
+    total = fluid.communicator.sum([pressed, brought, held], axis=())
+    return float(total[0]), float(total[1]), float(total[2])
 
 
 def _at_side(fluid: FluidState, side: Side, inlet: np.ndarray, outlet: np.ndarray) -> tuple[float, float, float]:
-    """The three numbers of `_at_sides` for one side."""
-    fields, h, d, total = fluid.fields, fluid.last_step, side.axis, fluid.communicator.sum
+    """The three numbers of `_at_sides` for one side, of this rank."""
+    fields, h, d = fluid.fields, fluid.last_step, side.axis
     cells = fluid.grid.cells[d]
     at_face, inside = (LOW + cells, LOW + cells - 1) if side.high else (LOW, LOW)
 
@@ -158,18 +159,18 @@ def _at_side(fluid: FluidState, side: Side, inlet: np.ndarray, outlet: np.ndarra
     voidage = layer(on_faces(fields.centred_voidage, d), at_face)
     flow = side.inward * voidage * mean * h * fluid.grid.face_area(d)  # volume that came in [m3]
     pressure = np.where(inlet, layer(fields.pressure, inside), _inner(side.pressure))
-    pressed = total((flow * pressure)[inlet | outlet])
+    pressed = float((flow * pressure)[inlet | outlet].sum())  # local: summed over the ranks by the caller
 
     carries = inlet | outlet & (flow < 0.0)  # what flows back through an outlet comes from rest
     across = sum(layer(fields.velocity[e], inside) ** 2 for e in range(3) if e != d)
     energy = 0.5 * fluid.density * flow * (mean**2 + np.where(outlet, across, 0.0))
-    brought = total(energy[carries])
+    brought = float(energy[carries].sum())  # local: summed over the ranks by the caller
 
     drag, momentum = layer(fields.drag, inside), layer(fields.drag_momentum[d], inside)
     theta = _implicitness(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
     acting = theta * new + (1.0 - theta) * old
     work = 0.5 * h * fluid.grid.cell_volume * (drag * acting - momentum) * acting
-    return pressed, brought, total(work[inlet])
+    return pressed, brought, float(work[inlet].sum())  # local: summed over the ranks by the caller
 
 
 def _inner(plane: np.ndarray) -> np.ndarray:

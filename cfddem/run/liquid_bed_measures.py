@@ -45,7 +45,8 @@ def collisional_pressure(simulation: Simulation) -> float:
     """Pressure of the contacts within the bed: a third of the sum of force times separation, over the volume."""
     solver, positions = simulation.particle_solver, simulation.particles.position
     edges, pairs = solver.edges, slice(0, solver.edges.between_particles)
-    touching = np.flatnonzero((edges.force[pairs] != 0.0).any(axis=1))  # local: components of a row
+    mine = edges.first[pairs] < simulation.particles.owned  # one rank counts a pair that two compute
+    touching = np.flatnonzero((edges.force[pairs] != 0.0).any(axis=1) & mine)  # local: components of a row
     apart = positions[edges.first[touching]] - positions[edges.second[touching]]
     box = np.where(np.isfinite(solver.box), solver.box, 0.0)
     apart -= box * np.rint(apart / np.maximum(box, np.finfo(float).tiny))

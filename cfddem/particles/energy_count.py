@@ -4,7 +4,9 @@ A force at an instant acts over the half kick before it and the half kick after 
 known, so the work of the force equals the gain of kinetic energy to round-off, and so does the work of a film's
 impulse. Energy stored in springs follows from the positions. Both agree to the accuracy of the time integration.
 
-Stored energies, stiffnesses and elastic forces are those of the run's contact law.
+Stored energies, stiffnesses and elastic forces are those of the run's contact law. They are evaluated again here and
+not stored by the pair loop: the mean velocity of a half kick is known only after all forces on a particle are summed,
+and runs that count no energy pay nothing.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
+from cfddem.particles.interactions.contact import friction_coefficient
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.slots import (
     FILM,
@@ -28,27 +31,30 @@ from cfddem.particles.interactions.slots import (
     contact_overlap,
     derive,
     elastic_force,
+    lost_energy,
     read_memory,
     stored_energy,
     tangential_stiffness,
 )
 from cfddem.particles.pair_graph import geometry
-from cfddem.particles.state import kinetic_energy
+from cfddem.particles.state import added_mass_energy, kinetic_energy
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, flat, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
 from closures.blend import contact_share
-from closures.friction import coulomb_limit, dry_or_lubricated
+from closures.friction import coulomb_limit
 
 if TYPE_CHECKING:
     from cfddem.particles.solver import ParticleSolver
 
-FILMS, DAMPING, SLIDING, TURNING, WALLS, STIFFENING, FALL = range(7)
-CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffening", "fall")
+FILMS, DAMPING, SLIDING, TURNING, WALLS, STIFFENING, FALL, HYSTERESIS = range(8)
+CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffening", "fall", "hysteresis")
 """Energy lost to films, dashpots, sliding and rolling; energy gained from moving walls, from tangential springs whose
-stiffness changes with the overlap, and from gravity."""
+stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
-WAY = Field("way", "m", 3, "scratch", meaning="distance over which forces acted in the last advance")
-PATH = Field("path", "m", 3, "scratch", meaning="displacement in the last advance")
+DISPLACEMENT = Field("displacement", "m", 3, "scratch", meaning="displacement in the last advance")
+WORK_DISPLACEMENT = Field(
+    "work_displacement", "m", 3, "scratch", meaning="displacement whose product with a force is its work"
+)
 
 ALMOST = 1.0 - 1e-9
 """A contact slides if its tangential force is this share of Coulomb's limit or more."""
@@ -58,13 +64,14 @@ class Count(NamedTuple):
     """State of the count between two steps, as compiled loops take it."""
 
     ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
-    way: np.ndarray  # (N, 3) distance moved during the half kicks around this instant [m]
-    turn: np.ndarray  # (N, 3) angle turned meanwhile [rad]
-    path: np.ndarray  # (N, 3) displacement of the particle in the step [m]
+    moved: np.ndarray  # (N, 3) distance moved during the half kicks around this instant [m]
+    turned: np.ndarray  # (N, 3) angle turned meanwhile [rad]
+    drifted: np.ndarray  # (N, 3) displacement of the particle in the step [m]
     spring: np.ndarray  # (n,) square of the tangential spring [m2]
     stiffness: np.ndarray  # (n,) tangential, times the share of the solids in the load [N/m]
     power: np.ndarray  # (n,) going into the tangential spring [W]
     held: np.ndarray  # (n,) energy of the normal spring [J]
+    yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
     totals: np.ndarray  # (CHUNKS, channels) [J]
 
 
@@ -73,8 +80,8 @@ class Energies:
 
     totals  energy of each of `CHANNELS` since the count began [J]
 
-    Fields of the particles, set in every `advance`: `way`, the distance over which the forces on each particle
-    have acted (N, 3) [m], and `path`, its displacement; they differ by the impulses of films.
+    Fields of the particles, set in every `advance`: `displacement` (N, 3) [m], and `work_displacement`, whose product
+    with a constant force is its work; they differ by the impulses of films.
     """
 
     def __init__(self, solver: ParticleSolver) -> None:
@@ -87,7 +94,7 @@ class Energies:
         self._work = specialise(_work, solver.choices)
         self.totals = np.zeros(len(CHANNELS))
         self.fed = 0.0  # energy of inserted particles less that of removed ones [J]
-        for field in (WAY, PATH):
+        for field in (DISPLACEMENT, WORK_DISPLACEMENT):
             solver.particles.declare(field)
         self._edges: Any = None
         self._count: Any = None
@@ -95,7 +102,7 @@ class Energies:
     def before(self, solver: ParticleSolver, step: float, first: bool) -> None:
         """Count before a step [s]; `first` of an advance, in which the present forces begin to act."""
         if first:
-            solver.particles.reset(WAY.name, PATH.name)
+            solver.particles.reset(DISPLACEMENT.name, WORK_DISPLACEMENT.name)
         if first or self._edges is not solver.edges:
             self._count = _room(solver) if self._edges is not solver.edges else self._count
             self._edges = solver.edges
@@ -119,6 +126,10 @@ class Energies:
         """Kinetic energy and that of the springs [J]."""
         return kinetic_energy(solver.particles, solver.communicator) + sum(self.springs(solver))
 
+    def of_all(self, solver: ParticleSolver) -> float:
+        """Energy that particles bring and take along: mechanical energy, and that of their added mass [J]."""
+        return self.mechanical(solver) + added_mass_energy(solver.particles, solver.communicator)
+
     def checkpoint(self) -> dict[str, Any]:
         """What has been counted."""
         return {"totals": self.totals.copy(), "fed": self.fed}
@@ -133,42 +144,45 @@ class Energies:
         count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
         count.totals[:] = 0.0
         gravity = np.array(solver.gravity, float)
-        _ways(particles, count, gravity, np.array(solver.free, float), step, before, after)
+        _motion(particles, count, gravity, np.array(solver.free, float), step, before, after)
         p = solver.laws.parameters
         self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
         self.totals += solver.communicator.sum(count.totals, axis=0)
         if before + after > 0.0:
-            solver.particles.way += self._count.way
+            solver.particles.work_displacement += self._count.moved
         if step > 0.0:
-            solver.particles.path += self._count.path
+            solver.particles.displacement += self._count.drifted
 
 
 def _room(solver: ParticleSolver) -> Count:
     number, count = len(solver.edges.first), solver.particles.count
-    ahead, way, turn, path = np.zeros((4, count, 3))
-    spring, stiffness, power, held = np.zeros((4, number))
-    return Count(ahead, way, turn, path, spring, stiffness, power, held, np.zeros((CHUNKS, len(CHANNELS))))
+    ahead, moved, turned, drifted = np.zeros((4, count, 3))
+    spring, stiffness, power, held, yielded = np.zeros((5, number))
+    totals = np.zeros((CHUNKS, len(CHANNELS)))
+    return Count(ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, totals)
 
 
 @threaded
-def _ways(particles, count, gravity, free, step, before, after):
-    """Distances over which forces act in the half kicks around this instant, and the work of gravity in the step."""
+def _motion(particles, count, gravity, free, step, before, after):
+    """Motion during the half kicks around this instant, in which forces act, and the work of gravity in the step."""
     number = len(particles.radius)
     for chunk in prange(CHUNKS):
         totals = count.totals[chunk]
         for i in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             gain = 0.5 * (after * after - before * before)
             force, torque = at(particles.force, i), at(particles.torque, i)
-            way = plus(times(before + after, at(particles.velocity, i)), times(gain * particles.inverse_mass[i], force))
-            put(count.way, i, way)
-            turn = plus(
+            moved = plus(
+                times(before + after, at(particles.velocity, i)), times(gain * particles.inverse_mass[i], force)
+            )
+            put(count.moved, i, moved)
+            turned = plus(
                 times(before + after, at(particles.spin, i)), times(gain * particles.inverse_inertia[i], torque)
             )
-            put(count.turn, i, turn)
+            put(count.turned, i, turned)
             if step > 0.0 and particles.inverse_mass[i] > 0.0:
                 drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], force))
                 drifted = (free[0] * drifted[0], free[1] * drifted[1], free[2] * drifted[2])
-                put(count.path, i, times(step, drifted))
+                put(count.drifted, i, times(step, drifted))
                 totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, drifted)
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
@@ -209,39 +223,38 @@ def _forget(k, count, totals, step):
     count.stiffness[k] = 0.0
     count.power[k] = 0.0
     count.held[k] = 0.0
+    count.yielded[k] = 0.0
 
 
 @inline
 def _moved(k, particles, edges, walls, count, duration):
     """Relative motion of two bodies over the half kicks around this instant.
 
-    returns  way, turn times radius and turn of the first body relative to the second; the rates of the first two;
-             the sum of the radii; the way of a wall
+    returns  displacement, rotation times radius and rotation of the first body relative to the second; the rates of
+             the first two; the sum of the radii; the displacement of a wall
     """
     i, j = edges.first[k], edges.second[k]
-    about = at(count.turn, i)
-    way, turn = at(count.way, i), times(particles.radius[i], about)
+    about = at(count.turned, i)
+    moved, turned = at(count.moved, i), times(particles.radius[i], about)
     velocity, surface_spin = at(particles.velocity, i), times(particles.radius[i], at(particles.spin, i))
     if k < edges.between_particles:
         radius = particles.radius[j]
-        other = at(count.turn, j)
-        way, turn = minus(way, at(count.way, j)), plus(turn, times(radius, other))
+        other = at(count.turned, j)
+        moved, turned = minus(moved, at(count.moved, j)), plus(turned, times(radius, other))
         velocity = minus(velocity, at(particles.velocity, j))
         surface_spin = plus(surface_spin, times(radius, at(particles.spin, j)))
-        return way, turn, minus(about, other), velocity, surface_spin, particles.radius[i] + radius, NOTHING
+        return moved, turned, minus(about, other), velocity, surface_spin, particles.radius[i] + radius, NOTHING
     surface = touched(edges, k, SURFACE)
     by_wall = times(duration, surface)
     about = minus(about, times(duration, at(walls.spin, walls.wall[j])))
-    return minus(way, by_wall), turn, about, minus(velocity, surface), surface_spin, particles.radius[i], by_wall
+    return minus(moved, by_wall), turned, about, minus(velocity, surface), surface_spin, particles.radius[i], by_wall
 
 
 @inline
 def _slides(row, minimum_gap, pressed, tangent):
     """Whether a contact is at Coulomb's limit."""
-    friction = row.friction
-    if FILM:
-        friction = dry_or_lubricated(minimum_gap, row.roughness_gap, row.friction, row.friction_lubricated)
-    return math.sqrt(dot(tangent, tangent)) >= ALMOST * coulomb_limit(friction, pressed)
+    limit = coulomb_limit(friction_coefficient(row, minimum_gap), pressed)
+    return math.sqrt(dot(tangent, tangent)) >= ALMOST * limit
 
 
 @inline
@@ -264,12 +277,12 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
     tangential = share * tangential_stiffness(equivalent, row, p, m, d)
     elastic = share * elastic_force(state, row, p, m, d)
     force, spring = at(memory.force, k), at(memory.spring, k)
-    way, turn, about, velocity, surface_spin, radii, by_wall = _moved(k, particles, edges, walls, count, duration)
+    moved, turned, about, velocity, surface_spin, radii, by_wall = _moved(k, particles, edges, walls, count, duration)
     stretch = distance / radii
-    pressed, approach = dot(force, normal), dot(way, normal)
+    pressed, approach = dot(force, normal), dot(moved, normal)
     slip = minus(across(velocity, normal), times(stretch, cross(surface_spin, normal)))
-    slid = minus(across(way, normal), times(stretch, cross(turn, normal)))
-    pulled = dot(force, way) + dot(at(memory.couple, k), turn) - pressed * approach
+    slid = minus(across(moved, normal), times(stretch, cross(turned, normal)))
+    pulled = dot(force, moved) + dot(at(memory.couple, k), turned) - pressed * approach
 
     totals[WALLS] += dot(force, by_wall)
     damped = (elastic - pressed) * approach - pulled - tangential * dot(spring, slid)
@@ -278,7 +291,10 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
     if ROLLING:
         totals[TURNING] -= dot(at(memory.moment, k), about)
     square, rate = dot(spring, spring), tangential * dot(spring, slip)
+    yielded = portion(edges, k) * lost_energy(state, row, p, m, d)
     if step > 0.0:
+        totals[HYSTERESIS] += yielded - count.yielded[k]
+        _note(k, memory, DAMPING, yielded - count.yielded[k])
         softer, was = count.stiffness[k], count.spring[k]
         kept = was * softer / tangential if RESCALED and tangential > softer else was
         taken = 0.25 * (softer + tangential) * (square - kept)
@@ -291,6 +307,7 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
     count.stiffness[k] = tangential
     count.power[k] = rate
     count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
+    count.yielded[k] = yielded
 
 
 @threaded

@@ -74,16 +74,16 @@ class CouplingWork:
         driving = model_a * particles.volume[:, None] * fluid.boundaries.driving
         rise = self._pressure_at(particles) - particles.pressure_before
         return ParticleWork(
-            drag=total(drag * particles.way),
+            drag=total(drag * particles.work_displacement),
             drag_on_fluid=self._drag_on_fluid,
-            fluctuating=total(particles[FLUCTUATING.name] * particles.way),
+            fluctuating=total(particles[FLUCTUATING.name] * particles.work_displacement),
             fluctuating_on_fluid=self._fluctuating_on_fluid,
-            explicit=total(explicit * particles.way),
-            agitation=total(agitation * particles.way),
+            explicit=total(explicit * particles.work_displacement),
+            agitation=total(agitation * particles.work_displacement),
             added=self._added,
-            weight=total(weight * particles.path),
-            driving=total(driving * particles.way),
-            pressure=total((pressure - driving) * particles.way),
+            weight=total(weight * particles.displacement),
+            driving=total(driving * particles.work_displacement),
+            pressure=total((pressure - driving) * particles.work_displacement),
             displaced=-total(model_a * particles.volume * rise),
         )
 

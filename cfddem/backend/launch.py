@@ -1,0 +1,94 @@
+"""Processes of a run: how many an MPI launcher has started, and how to start them. Nothing here imports MPI."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError
+
+SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "MPI_LOCALNRANKS", "PALS_SIZE")
+"""Variables in which launchers state the number of processes: MPICH and its relatives, Open MPI, Intel MPI, Cray."""
+
+TERMINAL = "CFDDEM_TERMINAL"
+"""Set where ranks were started from a terminal, which they do not see themselves."""
+
+INSTALL = "pip install 'cfddem[cluster]', or build mpi4py against the MPI of the machine"
+
+
+def launched() -> int:
+    """Number of processes that the launcher of this process has started; 1 without a launcher."""
+    for name in SIZES:
+        if os.environ.get(name, "").isdigit():
+            return int(os.environ[name])
+    if "PMIX_RANK" in os.environ:  # srun --mpi=pmix
+        return int(os.environ.get("SLURM_STEP_NUM_TASKS", "1"))
+    return 1
+
+
+def several_ranks() -> bool:
+    """Whether this process is one of several that can exchange messages."""
+    return launched() > 1 and find_spec("mpi4py") is not None
+
+
+def communicator() -> Communicator:
+    """The communicator of this process: over MPI if a launcher has started several, else the serial one.
+
+    errors  InputError if there are several processes and mpi4py is missing, or was built for another MPI than that of
+            the launcher
+    """
+    started = launched()
+    if started == 1:
+        return SERIAL
+    require_mpi4py(started)
+    from cfddem.backend.mpi import Ranks
+
+    ranks = Ranks()
+    if ranks.size != started:
+        limit = f"{started}, the number of processes started"
+        raise InputError("ranks", ranks.size, limit, "launcher and mpi4py belong to different MPIs: use one of them")
+    return ranks
+
+
+def require_mpi4py(ranks: int) -> None:
+    """Refuse several ranks without mpi4py."""
+    if find_spec("mpi4py") is None:
+        raise InputError("ranks", ranks, "1 without mpi4py", INSTALL)
+
+
+def find_launcher() -> Path:
+    """The program mpiexec: that of the Python environment, else the first on the path.
+
+    errors  InputError if there is none
+    """
+    beside = Path(sys.executable).parent
+    found = shutil.which("mpiexec", path=str(beside)) or shutil.which("mpiexec") or shutil.which("mpirun")
+    if found is None:
+        raise InputError("mpiexec", None, "on the path", INSTALL)
+    return Path(found)
+
+
+def launch_command(ranks: int, command: Sequence[str], environment: Mapping[str, str] = os.environ) -> list[str]:
+    """The command line that runs a command on several ranks of this machine.
+
+    Open MPI gets the options that it needs for more ranks than cores and for the user root; MPICH needs none.
+    """
+    program = find_launcher()
+    options = []
+    if is_open_mpi(program):
+        options = ["--oversubscribe"] if ranks > (os.cpu_count() or 1) else []
+        if os.geteuid() == 0 and "OMPI_ALLOW_RUN_AS_ROOT" not in environment:
+            options.append("--allow-run-as-root")
+    return [str(program), *options, "-n", str(ranks), *command]
+
+
+def is_open_mpi(program: Path) -> bool:
+    """Whether a launcher is that of Open MPI."""
+    answer = subprocess.run([program, "--version"], capture_output=True, text=True, check=False)
+    return any(name in answer.stdout for name in ("Open MPI", "OpenRTE", "PRRTE"))

@@ -1,0 +1,112 @@
+"""Cells that the particles of a rank reach: its own cells, and ghosts of the cells of its neighbours.
+
+In a run of one process these are the cells of the grid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from cfddem.backend.errors import RunFailed
+from cfddem.fluid.block import THINNEST
+from cfddem.fluid.grid import Array, Grid
+
+LAYERS = THINNEST
+"""Layers of ghosts beyond a border. A particle may lie half a cell less beyond its rank's cells: it moves until the
+next neighbour list, and is mapped where it was two fluid steps ago."""
+
+
+class Reach:
+    """The cells that the particles of a rank reach.
+
+    grid      cells of the rank
+    periodic  whether x, y, z are periodic
+
+    Attributes: `shape` (nz, ny, nx), ghosts included; `origin`, lowest corner of these cells [m].
+    """
+
+    def __init__(self, grid: Grid, periodic: Sequence[bool] | np.ndarray) -> None:
+        self.grid, self.periodic, self.borders = grid, np.array(periodic, bool), grid.borders(periodic)
+        self._ghosts = np.zeros(3, np.int64)
+        for each in self.borders:
+            self._ghosts[each.axis] = LAYERS
+        nx, ny, nz = (int(n) for n in np.array(grid.cells) + 2 * self._ghosts)
+        self.shape = (nz, ny, nx)
+        self.origin = np.array(grid.origin) - self._ghosts * np.array(grid.spacing)
+
+    def homes(self) -> np.ndarray:
+        """Flat index of the cell that receives a deposit, for every cell and a layer around all (nz+2, ny+2, nx+2).
+
+        It is the cell itself, the nearest open cell of a solid one, or that of the cell whose value a ghost takes.
+        """
+        whole, counts = self.grid.whole, self.grid.whole.cells
+        lines = []
+        for first, n, ghosts, count, repeats in zip(
+            self.grid.first, self.grid.cells, self._ghosts, counts, self.periodic
+        ):
+            cells = np.arange(first - ghosts - 1, first + n + ghosts + 1)
+            if not repeats:
+                cells = np.clip(cells, 0, count - 1)
+            elif not ghosts:
+                cells %= count
+            lines.append(cells)
+        homes = np.array(np.meshgrid(*lines[::-1], indexing="ij"))
+        if whole.solid is not None:
+            nearest_open = distance_transform_edt(whole.solid, sampling=whole.spacing[::-1], return_indices=True)[1]
+            at = tuple(homes % np.array(counts[::-1])[:, None, None, None])
+            homes += nearest_open[:, *at] - np.array(at)
+        begin = (np.array(self.grid.first) - self._ghosts)[::-1, None, None, None]
+        # a particle cannot reach a home so deep in the solid that it lies outside
+        inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
+        return np.ravel_multi_index(tuple(inside), self.shape).astype(np.int64)
+
+    def placed(self, position: Array, radius: Array | None = None) -> Array:
+        """Positions (N, 3) [m] as periodic images that lie nearest to the cells of the rank.
+
+        radius  of particles that reach beyond their centres (N,) [m]
+        errors  RunFailed for a particle beyond the ghosts
+        """
+        for each in self.borders:
+            axis, grid = each.axis, self.grid
+            begin, h = grid.origin[axis], grid.spacing[axis]
+            end, around = begin + grid.cells[axis] * h, 0.0 if radius is None else radius
+            if self.periodic[axis]:
+                length, position = grid.whole.size[axis], position.copy()
+                position[:, axis] -= length * np.rint((position[:, axis] - 0.5 * (begin + end)) / length)
+            place = position[:, axis]
+            below = 0.0 if each.below is None else np.max(begin - place + around, initial=0.0)  # local: own particles
+            above = 0.0 if each.above is None else np.max(place - end + around, initial=0.0)  # local: own particles
+            farthest = max(float(below), float(above))
+            if not farthest <= (LAYERS - 0.5) * h:
+                raise RunFailed(
+                    f"a particle reaches {farthest / h:.3g} cells beyond the cells of its rank, must be at most "
+                    f"{LAYERS - 0.5}; take larger cells, or a smaller run.fluid_step"
+                )
+        return position
+
+    def collected(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx) of the rank's cells: what was deposited on them, also by other ranks.
+
+        fields  on the cells of this rank and its ghosts; ghosts are added to the cells that they stand for
+        """
+        for each in self.borders:
+            each.add(fields, LAYERS)
+        return fields if not self.borders else np.ascontiguousarray(self._inner(fields))
+
+    def spread(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx) of the rank's cells, with ghosts; the adjoint of `collected`."""
+        if not self.borders:
+            return fields
+        made = np.zeros((len(fields), *self.shape))
+        self._inner(made)[:] = fields
+        for each in self.borders:
+            each.fill(made, LAYERS, LAYERS)
+        return made
+
+    def _inner(self, fields: Array) -> Array:
+        """View of fields without ghosts."""
+        x, y, z = (slice(int(ghosts), int(ghosts) + n) for ghosts, n in zip(self._ghosts, self.grid.cells))
+        return fields[:, z, y, x]

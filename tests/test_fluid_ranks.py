@@ -1,0 +1,234 @@
+"""The fluid on several ranks: fields, pressure iterations and checkpoints are those of one process."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from in_process_ranks import on_ranks
+from test_fluid_pressure import CASES, equation
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError
+from cfddem.fluid.block import Block, Division, divide
+from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs
+from cfddem.fluid.grid import Array, Grid, outside_cylinder
+from cfddem.fluid.halo import Borders
+from cfddem.fluid.pressure import ranks as shared
+from cfddem.fluid.pressure.regions import ClosedRegions
+from cfddem.fluid.solver import FluidSolver
+
+
+@pytest.fixture(autouse=True)
+def _small_grids_are_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several levels of these small grids are divided, too."""
+    monkeypatch.setattr(shared, "SMALL", 100)
+
+
+def cut(cells: int, ranks: int) -> tuple[int, ...]:
+    """Layers in unequal parts, so that borders lie at odd and even layers."""
+    return 0, *(cells * n // ranks + (n == 1 and cells > 4 * ranks) for n in range(1, ranks)), cells
+
+
+# ---------------------------------------------------------------- pressure
+
+
+def solved_on_ranks(case: dict[str, Any], axis: int, ranks: int) -> tuple[tuple[Array, int], tuple[Array, int]]:
+    """Pressure and iterations of one process, and of several ranks."""
+    grid, system, b = equation(**case)
+    limit, division = 1e-10 * np.abs(b).max(), Division(axis, cut(grid.cells[axis], ranks))
+    periodic = np.array(case.get("periodic", (False, False, False)))
+
+    def program(communicator: Communicator) -> tuple[Array, int]:
+        block = Block(grid, division, communicator)
+        closed = None
+        if not case.get("anchored", True):
+            closed = ClosedRegions.numbered(block.part(grid.open.astype(np.int64)), communicator)
+        own = shared.pressure_equation(block, closed, communicator, periodic, np.array([False, False, True]))
+        for mine, whole in zip(own.coefficients, system.coefficients):
+            mine[:] = block.part(whole)
+        own.prepare()
+        x, iterations = own.solve(block.part(b), limit)
+        return block.joined(x), iterations
+
+    return system.solve(b, limit), on_ranks(ranks, program)[-1]
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_pressure_and_iterations_are_those_of_one_process(case: dict[str, Any], ranks: int) -> None:
+    """For cuts along each axis that has enough cells."""
+    for axis, cells in enumerate(case["cells"]):
+        if cells >= 4 * ranks:
+            (alone, iterations), (x, others) = solved_on_ranks(case, axis, ranks)
+            assert others == iterations
+            assert np.abs(x - alone).max() < 1e-8 * np.abs(alone).max()
+
+
+def test_without_messages_the_pressure_needs_more_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ghosts that are not filled between two colours are a different, slower iteration."""
+    filled = []
+
+    def seldom(self: Borders, *arguments: Any) -> None:
+        filled.append(0)
+        if len(filled) % 3:
+            fill(self, *arguments)
+
+    fill = Borders.fill
+    (_, iterations), _ = solved_on_ranks(CASES["box"], 2, 1)
+    monkeypatch.setattr(Borders, "fill", seldom)
+    try:
+        _, (_, others) = solved_on_ranks(CASES["box"], 2, 2)
+    except Exception:  # it may not converge at all
+        others = 10 * iterations
+    assert others > iterations
+
+
+# ---------------------------------------------------------------- fluid
+
+SIZES = (0.1, 0.1, 0.12)
+
+FLOWS: dict[str, tuple[Grid, dict[str, Any], dict[str, Any]]] = {
+    "jet": (
+        Grid((12, 10, 13), SIZES),
+        {"z_low": [NoSlip(), Inlet(0.4, where=discs([(0.6, 0.5)], 0.62))], "z_high": Outlet()},
+        {},
+    ),
+    "driven along x, with eddies": (
+        Grid((13, 9, 12), SIZES),
+        {
+            "z_low": Inlet(lambda x, y, z, t: 0.3 + 0.1 * np.sin(6 * x)), "z_high": Outlet(),
+            "x_low": Periodic(1.0), "x_high": Periodic(1.0),
+        },
+        {"smagorinsky": 0.1},
+    ),
+    "cylinder, model B": (
+        Grid((12, 12, 10), SIZES).with_solid(outside_cylinder((0.6, 0.6, 0), 0.5)),
+        {"z_low": Inlet(0.3, where=lambda x, y, z: (x - 0.6) ** 2 + (y - 0.6) ** 2 < 0.25), "z_high": Outlet(2.0)},
+        {"model": "B"},
+    ),
+    "periodic": (Grid((10, 9, 11), SIZES), {side: Periodic() for side in SIDES}, {}),
+    "stirred": (Grid((10, 9, 10), SIZES), {"z_high": NoSlip(velocity=(1.0, 0.2, 0.0)), "x_low": FreeSlip()}, {}),
+    "outlets at the sides": (
+        Grid((10, 9, 10), SIZES),
+        {"x_low": Inlet(0.2), "x_high": Outlet(), "y_low": Outlet(1.0)},
+        {"convection": "central"},
+    ),
+}  # fmt: skip
+
+
+def fluid_of(name: str, communicator: Communicator = SERIAL, division: Division | None = None) -> FluidSolver:
+    """A fluid of `FLOWS`, or the part of a rank."""
+    whole, sides, others = FLOWS[name]
+    grid = whole if division is None else Block(whole, division, communicator)
+    fluid = FluidSolver(
+        grid, sides, density=1.2, viscosity=1.8e-3, tolerance=1e-11, communicator=communicator, **others
+    )
+    fluid.set_voidage(grid.part(np.random.default_rng(0).uniform(0.4, 0.9, whole.shape)))
+    return fluid
+
+
+def advanced(fluid: FluidSolver, steps: int = 2) -> None:
+    """Steps with a voidage, drag and source that vary from cell to cell."""
+    grid, rng = fluid.grid, np.random.default_rng(1)
+    shape = grid.whole.shape
+
+    def vectors(scale: float) -> Array:
+        return np.moveaxis(grid.part(rng.normal(0.0, scale, (3, *shape))), 0, -1)
+
+    for _ in range(steps):
+        voidage = fluid.voidage.copy()
+        if fluid.boundaries.has_outlet:
+            voidage += grid.part(rng.uniform(-1e-3, 1e-3, shape))
+        fluid.step(2e-3, voidage, grid.part(rng.uniform(0.0, 500.0, shape)), vectors(50.0), vectors(5.0))
+
+
+def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str, Array]:
+    """State, forces, budgets and values at points of a fluid, of the whole box."""
+    grid, total = fluid.grid, fluid.communicator.sum
+    points = np.random.default_rng(2).uniform(0.0, 1.0, (100, 3)) * np.array(grid.whole.size)
+    mine = np.ones(len(points), bool)
+    if division is not None:
+        planes = division.planes(grid.whole)
+        mine = np.searchsorted(planes, points[:, division.axis], side="right") == fluid.communicator.rank
+    values = np.zeros((len(points), 9))
+    values[mine] = np.concatenate(
+        [f(points[mine]) for f in (fluid.velocity_at, fluid.pressure_gradient_at, fluid.viscous_force_at)], axis=1
+    )
+    return fluid.checkpoint() | {
+        "viscous force": grid.joined(fluid.cell_viscous_force()),
+        "pressure gradient": grid.joined(fluid.cell_pressure_gradient()),
+        "drag": grid.joined(np.moveaxis(fluid.drag_exchange(), -1, 0)),
+        "ledger": np.array([line for name, line in fluid.momentum_ledger().items() if name != "change"]),
+        "work": np.array(fluid.work()),
+        "kinetic energy": np.array(fluid.kinetic_energy()),
+        "rates": np.array(fluid.rates()),
+        "points": total(values, axis=()),
+    }
+
+
+@pytest.mark.parametrize(("axis", "ranks"), [(0, 3), (1, 2), (2, 3)])
+@pytest.mark.parametrize("name", FLOWS)
+def test_a_divided_fluid_is_the_whole_one(name: str, axis: int, ranks: int) -> None:
+    """Fields, forces, budgets and values at points after two steps, to the tolerance of the pressure."""
+    division = Division(axis, cut(FLOWS[name][0].cells[axis], ranks))
+
+    def program(communicator: Communicator) -> dict[str, Array]:
+        part = fluid_of(name, communicator, division)
+        advanced(part)
+        return everything(part, division)
+
+    alone = fluid_of(name)
+    advanced(alone)
+    expected, found = everything(alone), on_ranks(ranks, program)
+    for state in found:
+        for each, value in expected.items():
+            scale = max(np.abs(value).max(), 1e-12)
+            assert np.abs(np.asarray(state[each]) - value).max() < 1e-8 * scale, each
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_checkpoint_of_three_ranks_goes_on_with_fewer(ranks: int) -> None:
+    """The state after four steps, two of them on three ranks."""
+    name = "driven along x, with eddies"
+
+    def half(communicator: Communicator) -> dict[str, Any]:
+        part = fluid_of(name, communicator, Division(0, cut(13, 3)))
+        advanced(part)
+        return part.checkpoint()
+
+    state = on_ranks(3, half)[1]
+
+    def rest(communicator: Communicator) -> dict[str, Any]:
+        part = fluid_of(name, communicator, Division(0, cut(13, ranks)) if ranks > 1 else None)
+        part.restore(state)
+        advanced(part)
+        return part.checkpoint()
+
+    whole = fluid_of(name)
+    advanced(whole)
+    advanced(whole)
+    expected, found = whole.checkpoint(), on_ranks(ranks, rest)[0]
+    for each, value in expected.items():
+        assert np.abs(found[each] - value).max() <= 1e-8 * np.abs(value).max(), each
+
+
+# ---------------------------------------------------------------- division
+
+
+def test_a_grid_is_divided_across_the_bed_by_particles() -> None:
+    """Equal numbers of particles, at least three layers of cells, the longer horizontal axis first."""
+    grid = Grid((20, 8, 40), (0.1, 0.1, 0.1))
+    assert divide(grid, 4) == Division(0, (0, 5, 10, 15, 20))
+    assert divide(grid, 10) == Division(2, tuple(range(0, 41, 4)))
+    crowded = np.array([[0.95, 0.4, 0.1]] * 90 + [[1.95, 0.4, 0.1]] * 10)
+    assert divide(grid, 2, crowded).starts[1] in (9, 10)
+    assert divide(grid, 2, crowded).planes(grid)[0] <= 1.0
+    with pytest.raises(InputError, match="at most 13"):
+        divide(grid, 14)
