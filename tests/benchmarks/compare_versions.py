@@ -38,7 +38,7 @@ WORKER = """
 import json, sys, time
 try:
     from cfddem.backend.compile import use_threads
-except ImportError:  # before 0.3
+except ImportError:  # an earlier version had other names
     from cfddem.kernels import use_threads
 kind, size, film, steps, threads = json.loads(sys.argv[1])
 use_threads(threads)
