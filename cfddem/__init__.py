@@ -9,8 +9,8 @@ __version__ = "0.1.0"
 
 _MODULES = {
     "Box": "cfddem.particles.walls.shapes",
-    "BridgeLaws": "cfddem.particles.interactions.bridge_loops",
-    "Bridges": "cfddem.particles.interactions.bridge",
+    "BridgeLaws": "cfddem.particles.interactions.bridge_law",
+    "coat": "cfddem.particles.interactions.bridge",
     "Case": "cfddem.case.schema",
     "CfddemError": "cfddem.backend.errors",
     "Cone": "cfddem.particles.walls.shapes",

@@ -1,9 +1,11 @@
 """Agitation: fluctuations of the fluid velocity and of the drag force in a suspension of spheres.
 
 An unresolved simulation gives all particles at one position the same mean force. In a real suspension neighbours
-disturb the flow, and the force differs between particles. This file has two published descriptions: the velocity
-fluctuation of the fluid (pseudo-turbulence), and a fluctuating force. Re_m = (1 - phi) rho |w| d / eta, with the local
-mean slip velocity w. A case chooses a law of the kind `agitation`; laws of the kind `fluctuation` are its parts.
+disturb the flow, and the force differs between particles. This file has two published descriptions, the velocity
+fluctuation of the fluid (`pseudo_turbulence`) and a fluctuating force (`force_deviation`, `force_rate`); a fit to this
+project's resolved simulations (`free_spheres`); and an estimate of the resulting motion (`agitated_temperature`).
+Re_m = (1 - phi) rho |w| d / eta, with the local mean slip velocity w. A case chooses a law of the kind `agitation`;
+laws of the kind `fluctuation` are its parts.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from closures.kinetic_theory import radial_distribution
 from closures.registry import law
 
 _SOURCE = "Mehrabadi, Tenneti, Garg & Subramaniam, J. Fluid Mech. 770 (2015) 210"
-
+_LATTANZI = "Lattanzi, Tavanashad, Subramaniam & Capecelatro, Phys. Rev. Fluids 7 (2022) 014301"
 
 _RESOLVED = "resolved simulations of free spheres, scenarios/validation/resolved_suspension"
 
@@ -174,11 +176,24 @@ def agitated_temperature(
     return math.sqrt(low * high)
 
 
-@law(
-    "fluctuation",
-    "Lattanzi, Tavanashad, Subramaniam & Capecelatro, Phys. Rev. Fluids 7 (2022) 014301",
-    solid_fraction=(0.1, 0.4),
-)
+@law("fluctuation", _LATTANZI, reynolds=(0.0, 1000.0))
+def isolated_drag_factor(reynolds: float) -> float:
+    r"""Drag factor of the isolated sphere to which `force_deviation` refers.
+
+    .. math:: F = 1 + 0.15\,Re_m^{0.687}
+
+    reynolds  Re_m, of the mean slip [-]
+    returns   F [-]
+
+    Range: Re_m < 1000; without the upper branch of :func:`closures.drag_single.schiller_naumann`.
+
+    >>> isolated_drag_factor(1.0)
+    1.15
+    """
+    return float(1.0 + 0.15 * reynolds**0.687)
+
+
+@law("fluctuation", _LATTANZI, solid_fraction=(0.1, 0.4))
 def force_deviation(solid_fraction: float) -> float:
     r"""Standard deviation of the force on fixed spheres over the drag of an isolated sphere at the mean slip velocity.
 
@@ -186,7 +201,7 @@ def force_deviation(solid_fraction: float) -> float:
               6.52\,\phi - 22.56\,\phi^2 + 49.90\,\phi^3
 
     solid_fraction  phi [-]
-    returns         sigma_F over the drag of an isolated sphere [-]
+    returns         sigma_F over the drag of an isolated sphere, whose factor is `isolated_drag_factor` [-]
 
     Range: 0.1 < phi < 0.4. The deviation is along the slip velocity; Osnes et al. (2023) found 0.44 to 0.83 of it
     across.
@@ -198,11 +213,7 @@ def force_deviation(solid_fraction: float) -> float:
     return 6.52 * phi - 22.56 * phi**2 + 49.90 * phi**3
 
 
-@law(
-    "fluctuation",
-    "Lattanzi, Tavanashad, Subramaniam & Capecelatro, Phys. Rev. Fluids 7 (2022) 014301",
-    solid_fraction=(0.0, 0.63),
-)
+@law("fluctuation", _LATTANZI, solid_fraction=(0.0, 0.63))
 def force_rate(solid_fraction: float, diameter: float, granular_temperature: float) -> float:
     r"""Decorrelation rate of a fluctuating force: the collision frequency of a particle by kinetic theory.
 

@@ -31,7 +31,7 @@ def reynolds_in_balance(archimedes: float, voidage: float, drag: Drag) -> float:
         return 0.0
 
     def excess(reynolds: float) -> float:
-        return 18.0 * reynolds * drag(reynolds, voidage) / voidage - archimedes
+        return _excess(reynolds, voidage, drag, archimedes)
 
     low = high = archimedes / 18.0
     while excess(high) < 0.0:
@@ -58,7 +58,7 @@ def voidage_in_balance(archimedes: float, reynolds: float, drag: Drag, packed_vo
     """
 
     def excess(voidage: float) -> float:
-        return 18.0 * reynolds * drag(reynolds, voidage) / voidage - archimedes
+        return _excess(reynolds, voidage, drag, archimedes)
 
     if excess(packed_voidage) <= 0.0:
         return packed_voidage
@@ -197,6 +197,11 @@ def inversion_velocity(
 
     low, high = 0.0, min(terminal_velocities)
     return _root(excess, low, high) if excess(low) * excess(high) < 0.0 else float("nan")
+
+
+def _excess(reynolds: float, voidage: float, drag: Drag, archimedes: float) -> float:
+    """Drag beyond the buoyant weight, in units of Ar."""
+    return 18.0 * reynolds * drag(reynolds, voidage) / voidage - archimedes
 
 
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:

@@ -85,6 +85,55 @@ def deforming_potential(gap: float, film: float) -> float:
     return math.log(share) + 3.0 * math.log(2.0 - share) + 2.0 / (2.0 - share) - 2.0
 
 
+@law(
+    "bridge", "Pitois, Moucheront & Chateau, J. Colloid Interface Sci. 231 (2000) 26; rederived from Reynolds' equation"
+)
+def pitois_share(gap: float, reduced_radius: float, volume: float) -> float:
+    r"""Resistance of a bridge of constant volume over that of an immersed pair; its edge is free of pressure.
+
+    .. math:: \left(1-\frac{1}{\sqrt{1+\ell^2/h^2}}\right)^2,\qquad \ell^2 = \frac{V}{\pi R^*}
+
+    The liquid fills the gap h + r^2/2R* up to the height H with pi R* (H^2 - h^2) = V; the share is (1 - h/H)^2.
+
+    gap             h, surface to surface, >= 0 [m]
+    reduced_radius  R* [m]
+    volume          V, of the whole bridge, > 0 [m3]
+    returns         share of A/h [-]; 1 at contact
+
+    Range: V << R*^3. Falls as (V/(2 pi R* h^2))^2 at large gaps.
+
+    >>> round(pitois_share(math.sqrt(1.0 / (3.0 * math.pi)), 1.0, 1.0), 12)      # H = 2 h
+    0.25
+    """
+    square = volume / (math.pi * reduced_radius)
+    edge = math.sqrt(gap * gap + square)
+    # 1 - h/H, written without cancellation
+    return (square / (edge * (edge + gap))) ** 2
+
+
+@law("bridge", "integral over the gap of the resistance of Pitois et al. (2000)")
+def pitois_potential(gap: float, reduced_radius: float, volume: float) -> float:
+    r"""Potential of a bridge of constant volume; its impulse between two gaps is -A times the difference of L.
+
+    .. math:: L = \ln\frac{4x\sqrt{1+x^2}}{(x+\sqrt{1+x^2})^2},\qquad x = h\sqrt{\frac{\pi R^*}{V}}
+
+    gap             h, > 0 [m]
+    reduced_radius  R* [m]
+    volume          V, of the whole bridge, > 0 [m3]
+    returns         L [-]; 0 at an infinite gap
+
+    Range: V << R*^3.
+
+    >>> round(pitois_potential(0.75 / math.sqrt(math.pi), 1.0, 1.0), 12) == round(math.log(15.0 / 16.0), 12)
+    True
+    """
+    x = gap * math.sqrt(math.pi * reduced_radius / volume)
+    root = math.sqrt(1.0 + x * x)
+    if x > 0.5:
+        return math.log1p(-1.0 / (root + x) ** 4)
+    return math.log(4.0 * x * root) - 2.0 * math.log(x + root)
+
+
 @law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis (2023), eq. (4)")
 def davis_tangential(viscosity: float, reduced_radius: float, gap: float, film: float) -> float:
     r"""Resistance of a bridge to sliding, from the shear stress over the area of the bridge.
@@ -125,43 +174,6 @@ def nase_tangential(viscosity: float, reduced_radius: float, gap: float, film: f
     if gap > film:
         return 0.0
     return 6.0 * math.pi * viscosity * reduced_radius * (8.0 / 15.0 * math.log(reduced_radius / gap) + 0.9588)
-
-
-@law("bridge", "Punch et al., AIChE J. 69 (2023) e17989, eq. (12)")
-def zero_cut(resistance: float, gap: float, minimum_gap: float) -> float:
-    r"""Resistance of a film that carries no load below the minimum gap.
-
-    .. math:: c\ (h \ge h_{min}),\qquad 0\ (h < h_{min})
-
-    resistance   c, of the film at the gap h [kg/s]
-    gap          h [m]
-    minimum_gap  h_min [m]
-    returns      resistance, the same unit [kg/s]
-
-    Range: any.
-
-    >>> zero_cut(2.0, 0.1, 0.2), zero_cut(2.0, 0.3, 0.2)
-    (0.0, 2.0)
-    """
-    return resistance if gap >= minimum_gap else 0.0
-
-
-@law("bridge", "Punch et al., AIChE J. 69 (2023) e17989, eq. (13)")
-def constant_cut(gap: float, minimum_gap: float) -> float:
-    r"""Gap at which to evaluate a film whose resistance stays constant below the minimum gap.
-
-    .. math:: \max(h, h_{min})
-
-    gap          h [m]
-    minimum_gap  h_min [m]
-    returns      gap [m]
-
-    Range: any.
-
-    >>> constant_cut(-0.1, 0.2), constant_cut(0.3, 0.2)
-    (0.2, 0.3)
-    """
-    return max(gap, minimum_gap)
 
 
 @law("bridge", "Davis & Sitison, Phys. Rev. Fluids 5 (2020) 054305; Davis (2023), eq. (3)")

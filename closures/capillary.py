@@ -167,15 +167,17 @@ def pendular_pull(
     surface_tension  sigma [N/m]
     contact_angle    theta [rad]
     reduced_radius   R* [m]
-    volume           V, of the liquid in the bridge, > 0 [m3]
+    volume           V, of the liquid in the bridge [m3]
     gap              h; negative values count as 0 [m]
-    returns          F, attractive [N]
+    returns          F, attractive; 0 without liquid [N]
 
     Range: V << R*^3; too high for larger volumes.
 
     >>> round(pendular_pull(0.073, 0.0, 0.25e-3, 1e-12, 0.0) * 1e6, 1)       # 2 pi R sigma of two spheres of 0.5 mm
     229.3
     """
+    if volume == 0.0:
+        return 0.0
     apart = max(gap, 0.0)
     reach = math.sqrt(volume / (math.pi * reduced_radius))
     share = 1.0 - apart / math.sqrt(apart * apart + reach * reach)
@@ -202,6 +204,8 @@ def pendular_energy(
     >>> pendular_energy(0.073, 0.0, 0.25e-3, 1e-12, 0.0)
     0.0
     """
+    if volume == 0.0:
+        return 0.0
     reach = math.sqrt(volume / (math.pi * reduced_radius))
     # (h + l) - sqrt(h^2 + l^2), written without cancellation
     way = 2.0 * gap * reach / (gap + reach + math.sqrt(gap * gap + reach * reach))

@@ -89,3 +89,43 @@ def capillary(viscosity: float, speed: float, surface_tension: float) -> float:
     0.001
     """
     return viscosity * speed / surface_tension
+
+
+@law("number", "Nase, Vargas, Abatan & McCarthy, Powder Technol. 116 (2001) 214, doi:10.1016/S0032-5910(00)00398-3")
+def granular_bond(surface_tension: float, contact_angle: float, reduced_radius: float, weight: float) -> float:
+    r"""Granular Bond number: largest pull of a liquid bridge over the weight of a particle.
+
+    .. math:: Bo_g = \frac{4\pi R^*\sigma\cos\theta}{m\,g}
+
+    surface_tension  sigma [N/m]
+    contact_angle    theta [rad]
+    reduced_radius   R* [m]
+    weight           m g, of the particle, without buoyancy in a gas [N]
+    returns          Bo_g [-]; above about 1 bridges carry particles
+
+    Range: any. Water between glass beads of 1 mm:
+
+    >>> round(granular_bond(0.0728, 0.0, 0.25e-3, 2500.0 * math.pi / 6.0 * 1e-9 * 9.81), 1)
+    17.8
+    """
+    return 4.0 * math.pi * reduced_radius * surface_tension * math.cos(contact_angle) / weight
+
+
+@law("number", "Ennis, Tardos & Pfeffer, Powder Technol. 65 (1991) 257, doi:10.1016/0032-5910(91)80189-P; rederived")
+def ennis_critical_stokes(restitution: float, film: float, roughness: float) -> float:
+    r"""Critical Stokes number of two coated particles: slower ones stick by the viscosity of their films.
+
+    .. math:: St^* = \left(1+\frac1e\right)\ln\frac{h_0}{h_a}
+
+    restitution  e, dry [-]
+    film         h_0, thickness of the liquid on each particle [m]
+    roughness    h_a, height of the asperities on each particle, < h_0 [m]
+    returns      St*, for the relative speed in :func:`stokes`; 0 for films that do not cover the asperities [-]
+
+    Range: films of constant resistance A/h on the way in and out, no capillarity. Ennis writes
+    St = 8 rho a u/(9 eta) with half the relative speed u, the same number.
+
+    >>> round(ennis_critical_stokes(1.0, math.e, 1.0), 12)
+    2.0
+    """
+    return (1.0 + 1.0 / restitution) * math.log(max(film / roughness, 1.0))

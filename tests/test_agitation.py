@@ -172,7 +172,7 @@ def test_the_power_of_agitation_is_a_line_of_the_energy_ledger() -> None:
     particles, exchange, ledger = simulation.particles, simulation.exchange, simulation.energy
     for _ in range(150):
         simulation.step()
-    resistance = exchange.prepare(particles, simulation.last_step).drag.conductance
+    resistance = exchange.prepare(particles, simulation.last_step).drag
     began, start, lost = ledger.row(), simulation.time, 0.0
     for _ in range(300):
         simulation.step()
@@ -204,7 +204,7 @@ def test_a_mixture_gets_no_net_drag() -> None:
     for _ in range(5):
         simulation.step()
     terms = simulation.exchange.prepare(simulation.particles, simulation.last_step)
-    force = terms.drag.conductance[:, None] * terms.agitation.velocity
+    force = terms.drag[:, None] * terms.agitation.velocity
     for each in (force, terms.agitation.force):
         assert np.abs(each.sum(axis=0)).max() < 1e-12 * np.abs(each).sum()
 

@@ -1,12 +1,10 @@
-"""Commands on several ranks under MPI: the files of one process, stops, failures, and what is refused."""
+"""Commands on several ranks under MPI: the files of one process, and what is refused."""
 
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -19,6 +17,7 @@ from cluster import HERE, environment, needs_mpi
 from command_line import cfddem
 
 from cfddem.backend.launch import launch_command
+from cfddem.cli.doctor import _processes
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
 
@@ -57,23 +56,6 @@ material.glass = {density = 2500.0, youngs_modulus = 6e10, contact_modulus = 1e7
 column = {width = 0.03, depth = 0.015, height = 0.04, cell = 0.005}
 bed = {diameter = 2e-3, count = 300, start = "suspended", inlet_velocity = 0.03}
 run = {until = 0.01, every = 0.005, history_every = 0.002}
-"""
-
-FAILING = """
-import os, signal, sys
-from cfddem.backend.launch import communicator
-from cfddem.cli.app import main
-from cfddem.run.simulation import Simulation
-step, rank = Simulation.step, communicator().rank
-def failing(self, until):
-    if self.time > 0.006 and rank == 1:
-        if sys.argv[1] == "kill":
-            os.kill(os.getpid(), signal.SIGKILL)
-        raise ValueError("something unforeseen")
-    step(self, until)
-Simulation.step = failing
-sys.argv[1:] = sys.argv[2:]
-main()
 """
 
 
@@ -163,58 +145,22 @@ def test_a_bed_on_ranks_is_that_of_one_process(tmp_path: Path) -> None:
         assert moved.max() < 1e-7  # single precision
 
 
-@pytest.mark.parametrize(
-    ("how", "message"), [("raise", "cfddem: rank 1: ValueError: something unforeseen"), ("kill", "")]
-)
-def test_one_rank_that_fails_ends_all(case: Path, tmp_path: Path, how: str, message: str) -> None:
-    """Within 30 s of the last snapshot; the folder can be resumed."""
-    program = tmp_path / "failing.py"
-    program.write_text(FAILING)
-    words = ["run", str(case), "-o", str(tmp_path / "run")]
-    command = launch_command(2, [sys.executable, str(program), how, *words])
-    done = subprocess.run(command, env=environment(), capture_output=True, text=True, timeout=600, check=False)
-    written = max(each.stat().st_mtime for each in (tmp_path / "run" / "data").iterdir())
-    assert done.returncode != 0 and time.time() - written < 30
-    assert message in done.stderr
-    assert not [each for each in (tmp_path / "run").rglob("*") if each.name.startswith(".") and each.suffix == ".h5"]
-    resumed = cfddem("resume", str(tmp_path / "run"), "--until", "0.01")
-    assert resumed.returncode == 0, resumed.stderr
-    assert open_run(tmp_path / "run").status == "finished"
-
-
-def test_a_scheduler_stops_all_ranks_with_a_checkpoint(case: Path, tmp_path: Path) -> None:
-    """SIGTERM to the launcher."""
-    run = tmp_path / "run"
-    words = ["run", str(case), "-o", str(run), "--ranks", "2", "--set", "run.until=100", "--set", "run.every=0.001"]
-    process = subprocess.Popen([sys.executable, "-m", "cfddem", *words], env=environment(), stderr=subprocess.PIPE)
-    until = time.monotonic() + 600.0
-    while not (run / "data" / "00000001.h5").exists() and time.monotonic() < until:
-        time.sleep(0.1)
-    process.send_signal(signal.SIGTERM)
-    _, message = process.communicate(timeout=60)
-    assert process.returncode == 128 + signal.SIGTERM, message
-    assert b"stopped by SIGTERM" in message and message.count(b"continue with") == 1
-    assert open_run(run).status == "stopped" and checkpoint.exists(run)
-
-
-def test_what_ranks_cannot_share_is_refused_by_its_key(case: Path, tmp_path: Path) -> None:
-    """Before anything runs, once, with exit code 2."""
-    done = cfddem(
-        "run",
-        str(case),
-        "-o",
-        str(tmp_path / "run"),
-        "--ranks",
-        "2",
-        "--set",
-        "run.energy_budget=true",
-        folder=tmp_path,
-    )
-    assert done.returncode == 2 and done.stderr.count("run.energy_budget") == 1
+def test_more_ranks_than_can_share_the_cells_are_refused(case: Path, tmp_path: Path) -> None:
+    """Before anything runs, once, with exit code 2; and a number of ranks that the launcher has not started."""
+    (tmp_path / "bed.toml").write_text(BED)
+    done = cfddem("run", "bed.toml", "-o", "run", "--ranks", "3", folder=tmp_path)
+    assert done.returncode == 2 and done.stderr.count("ranks = 3: must be at most 2 for 6 x 3 x 8 cells") == 1
     assert not (tmp_path / "run").exists()
     done = subprocess.run(
         launch_command(2, [sys.executable, "-m", "cfddem", "run", str(case), "--ranks", "3"]),
         env=environment() | {"PYTHONPATH": str(HERE.parent)}, cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2 and "--ranks = 3: must be 2" in done.stderr
-    assert os.listdir(tmp_path) == []
+    assert os.listdir(tmp_path) == ["bed.toml"]
+
+
+def test_the_doctor_tries_two_ranks() -> None:
+    """Messages, a sum, and a fluid step whose pressure is that of one process."""
+    answer = _processes(quick=False)
+    assert answer.ok, answer.text
+    assert "between neighbours" in answer.text and "pressure as in one process" in answer.text

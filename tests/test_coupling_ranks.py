@@ -45,7 +45,8 @@ ALL_FORCES = {f"laws__{name}": True for name in ("lift", "torque", "viscous_stre
 
 BEDS = {
     "all forces": case_of(
-        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__agitation="pseudo_turbulence", **ALL_FORCES
+        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__agitation="pseudo_turbulence", run__energy_budget=True,
+        **ALL_FORCES
     ),
     "crossing a periodic border": case_of(
         BEADS, column__sides="periodic", column__ends="periodic", bed__inlet_velocity=0.0,
@@ -77,6 +78,7 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
     volume = simulation.communicator.sum(simulation.owned.volume)
     return particles | simulation.fluid.checkpoint() | {
         "history": np.array([row[name] for name in measured]),
+        "energy": np.array([row[name] for name in row if name.startswith("energy_")] or [0.0]),
         "imbalance": np.array([row["momentum_imbalance"], row["volume_imbalance"], solids / volume - 1.0]),
     }  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cfddem.backend.errors import InputError, RunFailed
-from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, pulse, ramp, rectangle, switch_on
+from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, ramp, rectangle
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.fluid.solver import FluidSolver
 
@@ -124,10 +124,8 @@ def test_sides_left_out_are_walls_or_planes_of_symmetry():
 
 
 def test_time_functions_and_regions_have_their_values():
-    """Step, ramp, pulse; discs and rectangles of a distributor."""
-    assert [switch_on(1.0)(t) for t in (0.9, 1.0)] == [0.0, 1.0]
+    """Ramp; discs and rectangles of a distributor."""
     assert [ramp(1.0, 3.0)(t) for t in (0.0, 2.0, 4.0)] == [0.0, 0.5, 1.0]
-    assert [pulse(1.0, 2.0)(t) for t in (0.5, 1.0, 2.0)] == [0.0, 1.0, 0.0]
     x, y = np.meshgrid([0.1, 0.3], [0.1, 0.3])
     assert discs([(0.1, 0.1), (0.3, 0.3)], 0.05)(x, y, 0 * x).tolist() == [[True, False], [False, True]]
     assert rectangle((0, 0, -1), (0.2, 1, 1))(x, y, 0 * x).tolist() == [[True, False], [True, False]]

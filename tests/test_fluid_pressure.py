@@ -144,10 +144,9 @@ fluid.set_voidage(voidage)
 for _ in range(4):
     voidage = voidage + rng.uniform(-1e-3, 1e-3, grid.shape)
     fluid.step(1e-3, voidage, rng.uniform(0, 500, grid.shape))
-points = rng.uniform(0, 0.1, (50, 3))
 print(np.abs(fluid.velocity).max(), hash(fluid.velocity.tobytes()), hash(fluid.pressure.tobytes()),
-      hash(fluid.drag_exchange().tobytes()), hash(fluid.pressure_gradient_at(points).tobytes()),
-      hash(fluid.viscous_force_at(points).tobytes()))
+      hash(fluid.drag_exchange().tobytes()), hash(fluid.cell_pressure_gradient().tobytes()),
+      hash(fluid.cell_viscous_force().tobytes()))
 """
 
 

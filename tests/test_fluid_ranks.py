@@ -157,10 +157,8 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
     if division is not None:
         planes = division.planes(grid.whole)
         mine = np.searchsorted(planes, points[:, division.axis], side="right") == fluid.communicator.rank
-    values = np.zeros((len(points), 9))
-    values[mine] = np.concatenate(
-        [f(points[mine]) for f in (fluid.velocity_at, fluid.pressure_gradient_at, fluid.viscous_force_at)], axis=1
-    )
+    velocity = np.zeros((len(points), 3))
+    velocity[mine] = fluid.velocity_at(points[mine])
     return fluid.checkpoint() | {
         "viscous force": grid.joined(fluid.cell_viscous_force()),
         "pressure gradient": grid.joined(fluid.cell_pressure_gradient()),
@@ -169,7 +167,7 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
         "work": np.array(fluid.work()),
         "kinetic energy": np.array(fluid.kinetic_energy()),
         "rates": np.array(fluid.rates()),
-        "points": total(values, axis=()),
+        "points": total(velocity, axis=()),
     }
 
 

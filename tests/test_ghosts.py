@@ -23,8 +23,8 @@ from cfddem.particles import listing
 from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.ghosts import Slabs
 from cfddem.particles.initial.packing import random_packing
-from cfddem.particles.interactions.bridge import Bridges
-from cfddem.particles.interactions.bridge_loops import BridgeLaws
+from cfddem.particles.interactions.bridge import coat
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -37,6 +37,16 @@ STEEL = Material(density=7800, youngs_modulus=20e6, poisson=0.3, restitution=0.9
 DIAMETER, STEP = 1e-3, 2e-6
 WET = Laws(film=True, rolling="spring_dashpot")
 DRY = Laws(rolling="spring_dashpot")
+
+
+def slow(*values: bool) -> Any:
+    """Parameters of a test whose loops take long to compile."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+BRIDGES = BridgeLaws(
+    viscosity=5e-3, surface_tension=0.05, film="deforming", cut="constant", tangential="davis", minimum_gap=1e-6
+)
 
 
 def bed(count: int = 300, film: bool = False, fast: float = 0.5) -> tuple[Particles, np.ndarray]:
@@ -66,17 +76,19 @@ def floor_of_triangles(size: np.ndarray) -> Mesh:
 def state(run: ParticleSolver) -> dict[str, np.ndarray]:
     """Particles of this rank, and what their pairs remember, with ids."""
     rows = slice(run.particles.owned)
-    kept = {name: array[rows].copy() for name, array in run.particles.arrays.items()}
+    kept = {name: array[rows].copy() for name, array in run.particles.lasting().items()}
     first = run.edges.first < run.particles.owned
     pairs = {name: array[first].copy() for name, array in run.edges.checkpoint().items() if name in run.edges}
     return kept | pairs | {"ends": run.edges.ends(run.particles.id)[first]}
 
 
 def joined(states: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """The particles of all ranks by id, and the pairs in contact or with a film."""
+    """The particles of all ranks by id, and the pairs in contact, with a film or with a bridge."""
     whole = {name: np.concatenate([each[name] for each in states]) for name in states[0]}
     ends = whole["ends"]
-    lasting = (whole["spring"] != 0.0).any(axis=1) | (whole.get("resistance", np.zeros(len(ends))) > 0.0)
+    lasting = (whole["spring"] != 0.0).any(axis=1)
+    for name in ("resistance", "bridge_film"):
+        lasting |= whole.get(name, np.zeros(len(ends))) > 0.0
     pairs, particles = np.flatnonzero(lasting), np.argsort(whole["id"])
     pairs = pairs[np.lexsort(ends[pairs].T[::-1])]
     return {name: each[pairs if len(each) == len(ends) else particles] for name, each in whole.items()}
@@ -89,10 +101,14 @@ def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -
         assert np.array_equal(one[name], other[name], equal_nan=True), name
 
 
-def settings(film: bool, walls: bool) -> tuple[Particles, dict[str, Any]]:
+def settings(film: bool, walls: bool, liquid: bool = False) -> tuple[Particles, dict[str, Any]]:
     """Particles and what else the solver takes: a periodic box, or a box of walls with a mesh as its floor."""
     spheres, box = bed(film=film)
-    given: dict[str, Any] = {"laws": WET if film else DRY, "gravity": (0.0, 0.0, -9.81)}
+    laws = WET if film else DRY
+    if liquid:
+        laws = laws._replace(bridge=BRIDGES)
+        coat(spheres, np.random.default_rng(4).uniform(0.0, 2e-5, spheres.count))
+    given: dict[str, Any] = {"laws": laws, "gravity": (0.0, 0.0, -9.81)}
     if not walls:
         return spheres, given | {"box": tuple(box)}
     sides: list[Wall] = [Box(low=(0.0, 0.0, -DIAMETER), high=tuple(box)), floor_of_triangles(box)]
@@ -126,17 +142,14 @@ def test_bits_do_not_depend_on_sorting(monkeypatch: pytest.MonkeyPatch) -> None:
     assert_same_bits(joined([state(sorted_run)]), plain)
 
 
-def test_bridges_do_not_depend_on_the_order_of_rows() -> None:
-    """Liquid, volumes and velocities."""
-    spheres, given = settings(False, False)
+@pytest.mark.parametrize(("film", "walls"), [slow(False, False), (True, True)])
+def test_bridges_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> None:
+    """Liquid, bridges and velocities."""
+    spheres, given = settings(film, walls, liquid=True)
     mixed = spheres.copy(np.random.default_rng(5).permutation(spheres.count))
-    states = []
-    for each in (spheres, mixed):
-        laws = BridgeLaws(viscosity=1e-3, surface_tension=0.07, every=2)
-        run = finished(each, given, 150, bridges=Bridges(each, 1e-5, laws))
-        assert run.bridges is not None and run.bridges.formed > run.bridges.count > 100
-        states.append(joined([state(run)]) | {"volume": run.bridges.joined.volume})
-    assert_same_bits(*states)
+    plain = finished(spheres, given, 200)
+    assert plain.bridges is not None and plain.bridges.formed > plain.bridges.count > 100
+    assert_same_bits(joined([state(finished(mixed, given, 200))]), joined([state(plain)]))
 
 
 # ---------------------------------------------------------------- ranks
@@ -148,10 +161,14 @@ def divided(size: int, axis: int, length: float) -> Slabs:
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
-@pytest.mark.parametrize(("film", "walls"), [(False, False), (True, False), (False, True), (True, True)])
-def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, ranks: int) -> None:
+@pytest.mark.parametrize(
+    ("film", "walls", "liquid"),
+    [(False, False, False), (True, False, False), (False, True, False), (True, True, False),
+     slow(False, False, True), (True, True, True)],
+)  # fmt: skip
+def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, liquid: bool, ranks: int) -> None:
     """Over several lists, with particles that change their rank and pairs across the planes and the periodic border."""
-    spheres, given = settings(film, walls)
+    spheres, given = settings(film, walls, liquid)
     length = float(spheres.position[:, 0].max())
 
     def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int]:
@@ -171,6 +188,37 @@ def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, ra
     assert sum(moved for _, moved, _ in results) > 2
     assert all(ghosts > 20 for _, _, ghosts in results)
     assert_same_bits(joined([each for each, _, _ in results]), joined([state(whole)]))
+
+
+@pytest.mark.parametrize(
+    ("film", "walls", "liquid"),
+    [slow(False, True, False), slow(True, False, False), slow(False, True, True), slow(True, False, True)],
+)
+def test_ranks_count_the_energies_of_one_process(film: bool, walls: bool, liquid: bool) -> None:
+    """Every channel, stored energy, and what each recorded collision has lost; pairs change their rank meanwhile."""
+    spheres, given = settings(film, walls, liquid)
+    length = float(spheres.position[:, 0].max())
+
+    def program(communicator: Communicator) -> tuple[np.ndarray, np.ndarray]:
+        if communicator.size > 1:
+            given["division"] = divided(communicator.size, 0, length)
+        run = finished(spheres.copy(), given, 0, communicator=communicator, energies=True, record=True)
+        assert run.energies is not None and run.collisions is not None
+        for _ in range(3):
+            run.advance(STEP, 70)
+        assert run.lists.made > 3
+        mine = run.collisions.table
+        lost = np.stack([mine[name] for name in mine.dtype.names if name.startswith("lost_to_")], axis=1)
+        names = np.stack([mine["first"], mine["second"], mine["end"]], axis=1)
+        rows = communicator.joined(np.concatenate([names, lost], axis=1))
+        stored = [*run.energies.springs(run), run.energies.bridges(run)]
+        return np.append(run.energies.totals, stored), rows[np.lexsort(rows[:, 2::-1].T)]
+
+    expected, collisions = program(SERIAL)
+    assert len(collisions) > 30 and np.nanmax(np.abs(collisions[:, 3:])) > 0.0
+    for found, rows in on_ranks(3, program):
+        assert found == pytest.approx(expected, rel=1e-10, abs=1e-12 * np.abs(expected).max())
+        assert np.array_equal(rows, collisions, equal_nan=True)
 
 
 def test_particles_come_and_go_on_ranks_as_in_one_process() -> None:
@@ -222,10 +270,10 @@ def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 2), (3, 2), (3, 1)])
-@pytest.mark.parametrize("film", [False, True])
-def test_a_checkpoint_goes_on_with_another_number_of_ranks(film: bool, before: int, after: int) -> None:
+@pytest.mark.parametrize(("film", "liquid"), [(False, False), (True, False), slow(False, True)])
+def test_a_checkpoint_goes_on_with_another_number_of_ranks(film: bool, liquid: bool, before: int, after: int) -> None:
     """With moving triangles, between two lists; the bits are those of a run without a stop."""
-    spheres, given = settings(film, True)
+    spheres, given = settings(film, True, liquid)
     given["walls"] = [given["walls"][0], replace(given["walls"][1], velocity=(0.1, 0.0, 0.3))]
     length = float(spheres.position[:, 0].max())
 
@@ -270,16 +318,17 @@ def test_a_failure_on_one_rank_stops_all() -> None:
 
 
 def test_what_ranks_cannot_share_is_refused() -> None:
-    """An energy budget, space that is not divided, and a number of planes that does not fit."""
+    """An earlier run, space that is not divided, and a number of planes that does not fit."""
     spheres, given = settings(False, False)
+    before = finished(spheres, given, 0)
 
     def program(communicator: Communicator) -> None:
         with pytest.raises(InputError, match="planes"):
             finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, []))
         with pytest.raises(InputError, match="division"):
             finished(spheres.copy(), given, 0, communicator=communicator)
-        with pytest.raises(InputError, match="energies"):
-            finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, [1e-3]), energies=True)
+        with pytest.raises(InputError, match="after"):
+            finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, [1e-3]), after=before)
 
     on_ranks(2, program)
 

@@ -22,8 +22,8 @@ from cfddem.backend.errors import InputError
 def reductions(communicator: Communicator, values: list[np.ndarray]) -> dict[str, Any]:
     """What a rank gets from all calls."""
     rank, mine = communicator.rank, values[communicator.rank]
-    incoming = [np.zeros((len(each), 2)) for each in values]
-    communicator.swap([np.stack([mine, mine + n], axis=1) for n in range(communicator.size)], incoming)
+    incoming = {n: np.zeros((len(each), 2)) for n, each in enumerate(values)}
+    communicator.swap({n: np.stack([mine, mine + n], axis=1) for n in range(communicator.size)}, incoming)
     return {
         "sum": communicator.sum(mine),
         "columns": communicator.sum(np.stack([mine[:1], mine[-1:]], axis=1), axis=0),
@@ -62,7 +62,9 @@ def test_all_ranks_get_the_same_bits_in_the_order_of_ranks() -> None:
         assert np.array_equal(each["flags"], np.concatenate([v[:n] > 0.0 for n, v in enumerate(values)]))
         assert np.array_equal(each["joined"], np.concatenate(values)) and each["first"] == "rank 1"
         assert each["broadcast"] == {"from": 1} and each["exchange"] == [(n, rank) for n in range(3)]
-        assert all(np.array_equal(got, np.stack([v, v + rank], axis=1)) for got, v in zip(each["swap"], values))
+        assert all(
+            np.array_equal(got, np.stack([v, v + rank], axis=1)) for got, v in zip(each["swap"].values(), values)
+        )
 
 
 def test_one_process_imports_no_mpi() -> None:

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from disturbed_runs import TINY
+from in_process_ranks import on_ranks
 
 from cfddem import measure, open_run
 from cfddem.analysis.report import report
@@ -75,6 +76,16 @@ def test_a_run_is_resumed_with_the_measures_it_began_with(tmp_path: Path) -> Non
     measure("m/s")(mean_speed)
     Run.resume(tmp_path / "run", until=0.01).go()
     assert len(open_run(tmp_path / "run").history["mean_speed"]) == 11
+
+
+def test_a_measure_of_one_process_is_refused_where_ranks_resume_a_run(tmp_path: Path) -> None:
+    """By its name, as at the start of a run; the folder stays as it was."""
+    measure("m/s")(mean_speed)
+    Run.begin(Case.from_text(SHORT), tmp_path / "run").go()
+    with pytest.raises(InputError, match="measure = 'mean_speed': must be right on several ranks"):
+        on_ranks(2, lambda communicator: Run.resume(tmp_path / "run", until=0.01, communicator=communicator))
+    assert open_run(tmp_path / "run").status == "finished"
+    Run.resume(tmp_path / "run", until=0.009).go()
 
 
 def test_the_name_of_a_built_in_measure_is_refused() -> None:

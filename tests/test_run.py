@@ -9,13 +9,14 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from disturbed_runs import TINY, kill_and_go_on, long_enough, same_record, same_state
 
 from cfddem import open_run
-from cfddem.backend.communicator import SERIAL
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError, RunFailed, RunStopped
 from cfddem.case.schema import Case
@@ -25,6 +26,7 @@ from cfddem.io.writer import RunFolder
 from cfddem.run import runner
 from cfddem.run.progress import Status
 from cfddem.run.runner import Run
+from cfddem.run.stopping import StopRequest
 
 
 def begin(folder: Path, text: str = TINY, report: Callable[[Status], None] = lambda _: None) -> Run:
@@ -247,3 +249,18 @@ def test_ten_kills_of_a_real_run_leave_it_whole_and_its_end_unchanged(tmp_path: 
     begin(tmp_path / "whole", long_enough(10)).go()
     same_state(tmp_path / "run", tmp_path / "whole")
     same_record(tmp_path / "run", tmp_path / "whole")
+
+
+def test_a_signal_that_comes_while_ranks_agree_is_not_lost() -> None:
+    """The call that is under way does not know of it; the next one does."""
+
+    class Late(Communicator):
+        def _combine(self, local: Any, operation: Any) -> Any:
+            if not stop:
+                os.kill(os.getpid(), signal.SIGTERM)
+            return local
+
+    stop = StopRequest()
+    with stop:
+        assert not stop.agreed(Late())
+        assert stop.agreed(Late()) and stop.name == "SIGTERM"

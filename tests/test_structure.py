@@ -110,6 +110,25 @@ def functions() -> Iterator[tuple[str, ast.FunctionDef]]:
                     yield file, node
 
 
+# ---------------------------------------------------------------- compiled loops
+
+
+def test_parallel_loops_write_to_members_through_helpers_only() -> None:
+    """On all threads, a loop loses assignments such as `particles.liquid[i] = x`, which numba takes as dead."""
+    lost = []
+    for name, path in modules().items():
+        for node in ast.walk(tree(path)):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            if {each.id for each in node.decorator_list if isinstance(each, ast.Name)} & {"part", "either", "threaded"}:
+                for each in ast.walk(node):
+                    targets = each.targets if isinstance(each, ast.Assign) else [getattr(each, "target", None)]
+                    for target in targets:
+                        if isinstance(target, ast.Subscript) and isinstance(target.value, ast.Attribute):
+                            lost.append(f"{name}:{each.lineno}: {ast.unparse(each)}")  # type: ignore[attr-defined]
+    assert not lost, "\n".join(lost)
+
+
 # ---------------------------------------------------------------- rooms and imports
 
 

@@ -13,6 +13,7 @@ from types import ModuleType
 import h5py
 import numpy as np
 import pytest
+from command_line import call
 
 from cfddem.backend.errors import InputError
 from cfddem.plotting import curves as plots
@@ -28,6 +29,11 @@ def test_a_row_fails_only_by_a_limit() -> None:
     assert Row("e", 0.5, 0.4, 0.05).verdict == "FAILS"
     assert Row("e", 0.5, 0.4).verdict == "report"
     assert Row("e", math.nan, 0.4, 0.05).verdict == "FAILS"
+
+
+def test_the_help_lists_every_target() -> None:
+    told = " ".join(call("validate", "--help").out.replace("\u2502", " ").split())
+    assert all(f"{name}," in told or f"{name} or all" in told for name in validation.TARGETS)
 
 
 def test_the_worst_of_many_points_is_shown_and_all_are_kept() -> None:

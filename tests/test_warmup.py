@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from cfddem.backend.compile import serial
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.run import warmup
@@ -29,6 +30,25 @@ def test_a_machine_that_has_run_a_fluid_is_not_new(monkeypatch: pytest.MonkeyPat
     with warmup.warmup(case):
         pass
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert warmup.is_new()
+
+
+@serial
+def compiled(number: float) -> float:
+    return 2.0 * number
+
+
+@serial
+def never_called(number: float) -> float:
+    return 3.0 * number
+
+
+def test_the_loop_that_is_sought_in_the_cache_may_have_any_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its name in the cache follows from the function."""
+    compiled(1.0)
+    monkeypatch.setattr(warmup, "transport", compiled)
+    assert not warmup.is_new()
+    monkeypatch.setattr(warmup, "transport", never_called)
     assert warmup.is_new()
 
 

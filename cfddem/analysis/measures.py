@@ -14,10 +14,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from cfddem.backend.errors import InputError
+from cfddem.particles.state import sphere_volume
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,7 +40,7 @@ def bed_height(position: Array, radius: Array, share: float = 0.99) -> float:
         raise InputError("share", share, "between 0 and 1")
     if len(radius) == 0:
         return float("nan")
-    centre, volume = np.asarray(position)[:, 2], _volume(radius)
+    centre, volume = np.asarray(position)[:, 2], sphere_volume(np.asarray(radius, float))
     order = np.argsort(centre)
     below = np.cumsum(volume[order])
     wanted = share * below[-1]
@@ -54,10 +55,6 @@ def bed_height(position: Array, radius: Array, share: float = 0.99) -> float:
         lower = centre <= guess
         return float((centre[lower] + radius[lower]).max())
     return float(brentq(excess, guess - 2.0 * reach, guess + 2.0 * reach, xtol=1e-12 * reach, rtol=1e-15))
-
-
-def _volume(radius: ArrayLike) -> Array:
-    return np.asarray(4.0 / 3.0 * np.pi * np.asarray(radius, float) ** 3)
 
 
 def _volume_below(height: float, centre: Array, radius: Array) -> Array:

@@ -11,6 +11,7 @@ from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.fluid.grid import Grid
 from cfddem.io.reading import Run
+from cfddem.particles.state import sphere_volume
 
 MOST_SNAPSHOTS = 40
 """Largest number of snapshots that are averaged."""
@@ -61,7 +62,7 @@ def _of_particles(
     upward, downward, energy, freedoms = np.zeros((4, layers))
     for place in chosen:
         particles = run.particles(place)
-        volume = 4.0 / 3.0 * np.pi * particles["radius"].astype(float) ** 3
+        volume = sphere_volume(particles["radius"].astype(float))
         flux = solids_flux(particles["position"], particles["velocity"], volume, edges, area)
         upward += flux.up / len(chosen)
         downward += flux.down / len(chosen)

@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.analysis.bed_laws import weight_over_floor
+from cfddem.analysis.defluidisation import defluidisation
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
+from cfddem.preflight.bed_estimate import estimate_bed
 from closures.registry import Law
 
 REMEDY = "choose a law with a wider range (cfddem explain)"
@@ -30,7 +33,24 @@ def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], la
         *_range_warnings(run, case, begin),
         *(f"{row['law']}: {row['outside_range']}" for row in laws if row["outside_range"]),
         *_series_warnings(measures),
+        *_defluidised(run, case),
     ]
+
+
+def _defluidised(run: Run, case: Case) -> Iterator[str]:
+    """A wet bed that has come to rest, or lets the gas pass, at a velocity that fluidises the dry bed."""
+    weight, history = weight_over_floor(case), run.history
+    if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:
+        return
+    inlet, time = case.bed.inlet_velocity, history["time"]
+    speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
+    found = defluidisation(
+        time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
+        speed > estimate_bed(case).onset,
+    )  # fmt: skip
+    if found is not None:
+        yield str(found)
 
 
 def last_value(run: Run, name: str) -> int:

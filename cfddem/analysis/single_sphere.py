@@ -40,6 +40,8 @@ def compared_with_drag_law(run: Run, case: Case) -> Iterator[tuple[str, float, f
     speeds = slip @ direction
     sphere = (case.bed.diameter, density, fluid.density, fluid.viscosity, drag, strength)
     yield f"terminal velocity by {law.name}", float(speeds[-1]), terminal_velocity(*sphere), "m/s"
+    if case.laws.history != "none":
+        return  # the equation of motion has a memory
     transverse = np.abs(slip - np.outer(speeds, direction)).max()
     if transverse > ALIGNED * np.abs(slip).max():
         return

@@ -7,11 +7,14 @@ and `swap` for speed.
 
 Each method first reduces the array of this rank with NumPy, in NumPy's order, and then combines the ranks in the order
 of their numbers. All ranks get the same bits. All ranks must make the same calls in the same order.
+
+A line that reduces an array of this rank alone, on purpose, says so with a comment `# local: reason`.
+`tests/test_communicator.py` forbids other reductions without a communicator in the code of the solver.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -102,27 +105,33 @@ class Communicator:
             try:
                 value = function()
             except CfddemError as failure:
+                self.wait()
                 self.broadcast((None, (str(failure), failure.exit_code)))
                 raise
+        self.wait()
         value, told = self.broadcast((value, told))
         if told is not None:
             raise failure_elsewhere(*told)
         return value  # type: ignore[no-any-return]
 
+    def wait(self) -> None:
+        """Wait until all ranks have come here, without keeping a processor busy."""
+
     def exchange(self, parcels: Sequence[Value]) -> list[Value]:
         """Give parcel n to rank n, for every rank; returns what the ranks gave to this one, in their order."""
         return list(parcels)
 
-    def swap(self, outgoing: Sequence[np.ndarray], incoming: Sequence[np.ndarray]) -> None:
-        """Send array n to rank n, for every rank, and fill array n of `incoming` with what rank n sends to this one.
+    def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
+        """Send an array to each of some ranks, and fill those of `incoming` with what these ranks send to this one.
 
-        Both sides know the sizes. Faster than `exchange`, for what is sent in every step.
+        Both sides know the sizes. Faster than `exchange`, for what is sent to few ranks in every step.
 
-        outgoing  contiguous arrays, one for each rank; those without elements are not sent
-        incoming  contiguous arrays of the same sizes as those that the ranks send to this one
+        outgoing  contiguous arrays, by the rank that gets each
+        incoming  contiguous arrays of the same sizes as those that ranks send to this one, by the rank that sends each
         """
-        for into, values in zip(incoming, self.exchange([each.copy() for each in outgoing])):
-            into[...] = values
+        given = self.exchange([outgoing[rank].copy() if rank in outgoing else None for rank in range(self.size)])
+        for rank, into in incoming.items():
+            into[...] = given[rank]
 
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         """Combine the values of all ranks, in the order of the ranks; the value of this rank if it is the only one."""

@@ -1,8 +1,14 @@
 """How a loop is compiled, cached and threaded.
 
-`@serial` compiles a loop once and keeps the machine code between runs; `@threaded` does the same for a
-loop written with `prange`. Neither allows the compiler to reorder arithmetic: results are the same bits
-on any number of threads, and a NaN stays a NaN.
+    serial         a loop; the machine code is kept between runs
+    threaded       a loop over `prange` that runs on all threads; kept between runs
+    either         a loop over `prange` for one thread, or for all where `law_set.specialise` compiles it so; kept
+    part           a loop over `prange` that is part of a larger one, and is kept with that; for threads as `either`
+    threaded_part  the same, on all threads
+    inline         a helper, compiled into the loops that call it
+
+None of them lets the compiler reorder arithmetic: results are the same bits on any number of threads, and a NaN stays a
+NaN.
 """
 
 from __future__ import annotations
@@ -17,6 +23,7 @@ from numba.core import event
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.backend.errors import InputError
+from cfddem.backend.shared_cache import kept_on_disk
 
 __all__ = [
     "CHUNKS",
@@ -52,17 +59,17 @@ _INLINE: dict[str, Any] = {
 
 def serial(function: Callable[..., Any]) -> Any:
     """Compile a serial loop; kept on disk."""
-    return _marked(njit(cache=True, error_model="numpy")(function), serial)
+    return _marked(kept_on_disk(njit(error_model="numpy")(function)), serial)
 
 
 def threaded(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` that runs on all threads; kept on disk."""
-    return _marked(njit(cache=True, error_model="numpy", parallel=True)(function), threaded)
+    return _marked(kept_on_disk(njit(error_model="numpy", parallel=True)(function)), threaded)
 
 
 def either(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` for one thread; `law_set.specialise` can compile it for all threads."""
-    return _marked(njit(cache=True, error_model="numpy")(function), either)
+    return _marked(kept_on_disk(njit(error_model="numpy")(function)), either)
 
 
 def part(function: Callable[..., Any]) -> Any:

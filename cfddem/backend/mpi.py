@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,9 @@ from cfddem.backend.errors import RunFailed
 _KINDS: dict[type, str] = {bool: "?", int: "q", float: "d"}
 _PLAIN = struct.Struct("8s8s")
 _TAG = 1
+
+PAUSE = 0.01
+"""Time between two looks at whether the other ranks have come [s]."""
 
 TRIAL, TRIES = 20_000, 50
 """Numbers in a message of `try_out`, about those of 2000 ghosts, and how often it is sent."""
@@ -42,16 +45,20 @@ class Ranks(Communicator):
         """See `Communicator.broadcast`."""
         return self.world.bcast(value, root)  # type: ignore[no-any-return]
 
+    def wait(self) -> None:
+        """See `Communicator.wait`."""
+        arrived = self.world.Ibarrier()
+        while not arrived.Test():
+            time.sleep(PAUSE)
+
     def exchange(self, parcels: Sequence[Value]) -> list[Value]:
         """See `Communicator.exchange`."""
         return list(self.world.alltoall(list(parcels)))
 
-    def swap(self, outgoing: Sequence[np.ndarray], incoming: Sequence[np.ndarray]) -> None:
+    def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
         """See `Communicator.swap`."""
-        others = [rank for rank in range(self.size) if rank != self.rank]
-        requests = [self.world.Irecv(incoming[n], n, _TAG) for n in others if incoming[n].size]
-        requests += [self.world.Isend(outgoing[n], n, _TAG) for n in others if outgoing[n].size]
-        incoming[self.rank][...] = outgoing[self.rank]
+        requests = [self.world.Irecv(into, rank, _TAG) for rank, into in incoming.items()]
+        requests += [self.world.Isend(values, rank, _TAG) for rank, values in outgoing.items()]
         MPI.Request.Waitall(requests)
 
     def joined(self, rows: np.ndarray) -> np.ndarray:
@@ -105,8 +112,8 @@ def try_out(world: Any = None) -> str:
     found = (ranks.size + 1) * ranks.size // 2
     if ranks.sum([ranks.rank + 1]) != found:
         raise RunFailed(f"the sum over {ranks.size} ranks is not {found}: launcher and mpi4py belong to different MPIs")
-    outgoing = [np.full(TRIAL, 1.0 + ranks.rank) for _ in range(ranks.size)]
-    incoming = [np.zeros(TRIAL) for _ in range(ranks.size)]
+    outgoing = {rank: np.full(TRIAL, 1.0 + ranks.rank) for rank in range(ranks.size)}
+    incoming = {rank: np.zeros(TRIAL) for rank in range(ranks.size)}
     times = np.empty((2, TRIES))
     for n in range(TRIES):
         begin = time.perf_counter()
@@ -114,7 +121,7 @@ def try_out(world: Any = None) -> str:
         middle = time.perf_counter()
         ranks.largest([1.0])
         times[:, n] = middle - begin, time.perf_counter() - middle
-    if not all(np.all(values == 1.0 + rank) for rank, values in enumerate(incoming)):
+    if not all(np.all(values == 1.0 + rank) for rank, values in incoming.items()):
         raise RunFailed("ranks received other values than were sent")
     swap, reduce = 1e6 * np.median(times, axis=1)
     library = MPI.Get_library_version().strip("\0").splitlines()[0].strip()

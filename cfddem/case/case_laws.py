@@ -64,6 +64,10 @@ class CaseLaws(Checked):
         description="added-mass coefficient C_m in C_m rho_f V, 0.5 for a single sphere [-]; "
         "or a law of the voidage: zuber, another name, or a function",
     )
+    history: Literal["none", "mei_adrian", "basset"] = Field(
+        "none",
+        description="history force: of a single sphere at finite Re by Mei and Adrian, or in creeping flow by Basset",
+    )
     lift: bool = Field(False, description="Saffman-Mei shear lift and Magnus spin lift")
     torque: bool = Field(False, description="hydrodynamic torque against spin relative to the fluid")
     viscous_stress: bool = Field(False, description="force V div(tau) on particles; model A only")

@@ -82,7 +82,7 @@ def read_value(text: str) -> Any:
 
 
 def full_key(key: str) -> str:
-    """The key with its table; the table may be left out if only one table has the key.
+    """The key with its table; the table may be left out if only one table has the key, [liquid] and [spray] aside.
 
     >>> full_key("seed"), full_key("fluid.viscosity"), full_key("title")
     ('bed.seed', 'fluid.viscosity', 'title')
@@ -96,6 +96,8 @@ def full_key(key: str) -> str:
     }
     tables.pop("material")  # its keys need the name of the solid: material.NAME.density
     found = [f"{name}.{key}" for name, words in tables.items() if key in words]
+    if len(found) > 1:
+        found = [each for each in found if not each.startswith(("liquid.", "spray."))] or found
     if len(found) > 1:
         raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
     if not found and key in Material.model_fields:

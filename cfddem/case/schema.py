@@ -18,6 +18,7 @@ from cfddem.backend.law_choice import BUILT_IN, chosen
 from cfddem.case.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
 from cfddem.case.case_laws import AgitationFactors, CaseLaws
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
+from cfddem.case.liquid import Liquid, Spray, check_wet
 from cfddem.case.materials import Checked, Fluid, Material
 from cfddem.case.toml_text import parse, read_text, set_value
 from closures.agitation import SHARES, TIMES, free_spheres
@@ -115,6 +116,8 @@ class Case(Checked):
     material: dict[str, Material] = Field(min_length=1, description="solids by name")
     column: Column
     bed: Bed
+    liquid: Liquid | None = Field(None, description="liquid on the particles, which forms bridges between them")
+    spray: Spray | None = Field(None, description="zone where drops of the liquid land on the particles")
     laws: CaseLaws = CaseLaws.model_validate({})
     run: CaseRun
 
@@ -136,6 +139,11 @@ class Case(Checked):
     def _a_random_packing_fills_a_box(self) -> Case:
         if self.bed.start == "packed" and self.column.shape == "cylinder":
             raise InputError("bed.start", "packed", '"poured" or "suspended" in a cylinder', "a packing fills a box")
+        return self
+
+    @model_validator(mode="after")
+    def _liquid_goes_with_the_rest(self) -> Case:
+        check_wet(self)
         return self
 
     @property

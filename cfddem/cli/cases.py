@@ -6,12 +6,16 @@ import json as _json
 import sys
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from cfddem.cli.printing import announce_compilation, with_colour
 from cfddem.cli.ranks import on_ranks
+
+if TYPE_CHECKING:
+    from cfddem.backend.communicator import Communicator
+    from cfddem.case.schema import Case
 
 CASE = "case file or gallery name; default: the only TOML file here"
 SET = "KEY=VALUE that replaces a value of the case; may be repeated"
@@ -125,18 +129,10 @@ def run(
         return
     from cfddem.case.schema import Case
     from cfddem.case.toml_text import read_text
-    from cfddem.preflight.summary import refuse_errors
 
     described = Case.from_toml(path, overrides(set or []))
     communicator = on_ranks(ranks, threads)
-    if communicator.size > 1:
-        from cfddem.run.build import require_parallel
-
-        require_parallel(described, communicator.size)
-    for issue in refuse_errors(described).issues if communicator.rank == 0 else ():
-        print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
-    from cfddem.analysis.report import report as summary
-    from cfddem.analysis.report_text import lines
+    _refuse_or_warn(described, communicator)
     from cfddem.backend.compile import use_threads
     from cfddem.run.progress import live_line
     from cfddem.run.runner import Run
@@ -151,10 +147,29 @@ def run(
                 described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator
             )
         prepared.go()
-    if communicator.rank > 0:
-        return
+    if communicator.rank == 0:
+        _print_report(folder)
+        print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
+
+
+def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
+    """Refuse a case with errors, or one that ranks cannot share; print its warnings."""
+    from cfddem.preflight.summary import refuse_errors
+
+    if communicator.size > 1:
+        from cfddem.run.build import require_parallel
+
+        require_parallel(described, communicator.size)
+    for issue in refuse_errors(described).issues if communicator.rank == 0 else ():
+        print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
+
+
+def _print_report(folder: Path) -> None:
+    """Print the report of a run."""
+    from cfddem.analysis.report import report as summary
+    from cfddem.analysis.report_text import lines
+
     print("\n".join(lines(summary(folder))))
-    print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
 
 
 def resume(

@@ -26,8 +26,8 @@ run = {until = 0.01, every = 0.01}
 LARGEST_IMBALANCE = 1e-9
 """Largest relative imbalance of momentum exchange and volume in the test run [-]."""
 
-TIME_FOR_RANKS = 60.0
-"""Time in which two ranks must have exchanged a message [s]."""
+TIME_FOR_RANKS = 120.0
+"""Time in which two ranks must have exchanged messages and shared a fluid step [s]."""
 
 LEAST_DISK = 1e9
 """Free disk space below which the doctor objects [byte]."""
@@ -58,10 +58,10 @@ def examine(quick: bool = False) -> Iterator[Answer]:
     yield _compiled_loops()
     yield from _law_packages()
     yield _disk(Path())
-    yield _processes(quick)
     if not quick:
         yield _rendering()
         yield _test_run()
+    yield _processes(quick)
 
 
 def _threads() -> Answer:
@@ -105,14 +105,14 @@ def _disk(folder: Path) -> Answer:
 
 
 def _processes(quick: bool) -> Answer:
-    """Whether a run can be shared by several processes: mpi4py, a launcher, and a message between two ranks."""
+    """Whether a run can be shared by several processes: mpi4py, a launcher, messages and a fluid step of two ranks."""
     from cfddem.backend import launch
     from cfddem.backend.errors import InputError
 
     if find_spec("mpi4py") is None:
         return Answer("processes", True, f"one; for runs on several ranks: {launch.INSTALL}")
     try:
-        command = launch.launch_command(2, [sys.executable, "-m", "cfddem.backend.mpi"])
+        command = launch.launch_command(2, [sys.executable, "-m", "cfddem.cli.ranks_trial"])
     except InputError as failure:
         return Answer("processes", False, str(failure))
     if quick:

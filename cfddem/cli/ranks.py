@@ -16,6 +16,10 @@ PATIENCE = 3.0
 """How long a rank that fails waits for the others to fail too, before it ends them [s]."""
 
 
+FORWARDED = 0.3
+"""Time for the launcher to pass a message on, before it ends all ranks [s]."""
+
+
 def on_ranks(ranks: int | None, threads: int | None) -> Communicator:
     """The communicator of a command; starts the command again on several ranks if they are asked for.
 
@@ -67,5 +71,6 @@ def end_together(message: str, code: int) -> NoReturn:
         text = message or traceback.format_exc()
         print("\n".join(f"cfddem: {where}{line}" for line in text.splitlines()), file=sys.stderr, flush=True)
     if not together:
+        time.sleep(FORWARDED)
         world.Abort(code)
     sys.exit(code)

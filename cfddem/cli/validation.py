@@ -11,15 +11,13 @@ from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.printing import announce_compilation
+from scenarios.validation.targets import ONLY_IF_NAMED, TARGETS
 
 
 def validate(
     target: Annotated[
         str,
-        Parameter(
-            help="binary-collision, particles, fluid, coupling, beds, lubrication, wet, wet-tumbler, waves, resolved "
-            "or all; all leaves out resolved, which takes up to a day"
-        ),
+        Parameter(help=f"{', '.join(TARGETS)} or all; all leaves out {', '.join(ONLY_IF_NAMED)}, which can take a day"),
     ] = "all",
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"], help="folder for figures, tables and histories")] = Path(
@@ -32,7 +30,6 @@ def validate(
     Example: cfddem validate binary-collision
     """
     announce_compilation()
-    from scenarios.validation.table import ONLY_IF_NAMED, TARGETS
     from scenarios.validation.table import validate as run
 
     if target != "all" and target not in TARGETS:
@@ -49,6 +46,7 @@ def bench(
     particles: Annotated[int, Parameter(help="1000, 10000, 100000 or 1000000")] = 10_000,
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
+    bridges: Annotated[bool, Parameter(help="with a liquid bridge on every contact", negative="")] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
     """Measure the speed of this machine: a dense bed of spheres (dem) or a gas bed of 24 750 spheres (bed).
@@ -61,7 +59,7 @@ def bench(
 
     if target not in ("dem", "bed"):
         raise InputError("target", target, nearest(target, ["dem", "bed"]))
-    result = dense_bed.bench(particles, threads, film) if target == "dem" else gas_bed.bench(threads)
+    result = dense_bed.bench(particles, threads, film, bridges) if target == "dem" else gas_bed.bench(threads)
     if json:
         print(_json.dumps(result))
     else:

@@ -5,8 +5,9 @@ The force of the fluid on a particle of volume V and diameter d, at the velocity
 .. math:: \text{model A:}\quad b(u-v) - V\nabla p' - \rho V g, \qquad b = 3\pi\eta d\,\varepsilon F
 .. math:: \text{model B:}\quad \tfrac{1}{\varepsilon}\, b(u-v) - \rho V g
 
-with F(Re, eps) the drag factor of the drag law. Added mass, lift and viscous stress are added on request. Drag is
-implicit on both sides, see :mod:`cfddem.coupling.transfer`; all other forces are explicit.
+with F(Re, eps) the drag factor of the drag law. Added mass, history force, lift and viscous stress are optional.
+Drag and the newest part of the history force are implicit on both sides, see :mod:`cfddem.coupling.transfer`; all other
+forces are explicit.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from cfddem.coupling.forces.agitation import (
     neighbourhood_mean,
 )
 from cfddem.coupling.forces.drag import Drag
+from cfddem.coupling.forces.history import History, HistoryTerms
 from cfddem.coupling.forces.lift import lift_force
 from cfddem.coupling.forces.pressure import PressureForce
 from cfddem.coupling.forces.torque import turn_with_fluid
@@ -52,17 +54,19 @@ class CouplingTerms(NamedTuple):
 
     cell_map: ParticleCellMap
     flow: SampledFlow
-    drag: ImplicitCoefficients
+    drag: Array  # conductance of the drag (N,) [kg/s]
+    implicit: ImplicitCoefficients  # of drag and history force
     explicit: Array  # forces known before the fluid's step: lift, viscous stress, added mass (N, 3) [N]
     added: Array  # change of the added mass of every particle at the start of the step (N,) [kg]
     voidage: Array  # of the cells (nz, ny, nx)
     source: Array | None  # force on the fluid (nz, ny, nx, 3) [N/m3]
     agitation: AgitationTerms | None = None
+    history: HistoryTerms | None = None
 
     @property
     def step(self) -> float:
         """Length of the fluid step [s]."""
-        return self.drag.step
+        return self.implicit.step
 
     @property
     def fluctuating_force(self) -> Array:
@@ -73,7 +77,7 @@ class CouplingTerms(NamedTuple):
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
         """Arguments of `FluidSolver.step` after the length of the step."""
-        return self.voidage, self.drag.cell_conductance, self.drag.cell_product, self.source
+        return self.voidage, self.implicit.cell_conductance, self.implicit.cell_product, self.source
 
 
 class FluidForces(NamedTuple):
@@ -84,14 +88,7 @@ class FluidForces(NamedTuple):
     weight: Array  # less buoyancy
     explicit: Array  # lift, viscous stress, added mass
     agitation: Array  # by the acceleration of the fluctuation, or the fluctuating force; without that in the drag
-
-
-class DragWork(NamedTuple):
-    """Work of drag in a fluid step at the velocity with which the fluid acts on every particle."""
-
-    whole: float  # [J]
-    fluctuating: Array  # drag of the fluctuation of the fluid velocity (N, 3) [N]
-    of_fluctuation: float  # work of that part [J]
+    history: Array
 
 
 class Exchange:
@@ -107,6 +104,7 @@ class Exchange:
     viscous_stress   V div(tau), in model A only
     self_disturbance correct the sampled velocity and voidage for what each particle causes itself
     agitation        fluctuating force from the flow around the neighbours; None for none
+    history          history force; None for none
     """
 
     def __init__(
@@ -122,10 +120,11 @@ class Exchange:
         torque: bool = False,
         viscous_stress: bool = False,
         agitation: PseudoTurbulence | FluctuatingForce | None = None,
+        history: History | None = None,
     ) -> None:
         self.fluid, self.kernel = fluid, kernel
         self.lift, self.torque, self.viscous_stress = lift, torque, viscous_stress and fluid.model == "A"
-        self.drag, self.agitation = Drag(drag, fluid.model), agitation
+        self.drag, self.agitation, self.history = Drag(drag, fluid.model), agitation, history
         self.self_disturbance = SelfDisturbance(kernel) if self_disturbance else None
         self.flow = FlowSampler(fluid, kernel, self.self_disturbance, self.drag.needs_sizes)
         self.pressure, self.added_mass = PressureForce(fluid, kernel), added_mass or AddedMass(0.0, fluid.density)
@@ -146,7 +145,8 @@ class Exchange:
         declared = self.momentum.declare(particles)
         modes = () if self.self_disturbance is None else self.self_disturbance.fields
         random = () if self.agitation is None else self.agitation.fields
-        for field in (*self.pressure.fields, *self.added_mass.fields, *modes, *random):
+        past = () if self.history is None else self.history.fields
+        for field in (*self.pressure.fields, *self.added_mass.fields, *modes, *random, *past):
             particles.declare(field)
             declared.append(field.name)
         self._stored = tuple(declared)
@@ -168,22 +168,30 @@ class Exchange:
         deferred = self._deferred_force(particles, step)
         heavier = self.added_mass.update(particles, flow.voidage)
         transverse = self._transverse_force(particles, cell_map, flow.slip)
-        not_seen = flow.disturbance  # part of the cells' velocity that does not act on the particle
-        around = agitation = None
+        around = agitation = history = None
         if self.agitation is not None:
             around = self._neighbourhood(particles, cell_map, flow, solid)
             flow, agitation = around.flow, self.agitation.terms(particles, around, step)
-            not_seen = not_seen - agitation.velocity
-        known = None if around is None else around.conductance
-        drag = self.momentum.prepare(particles, cell_map, flow, step, not_seen, known)
+        drag = self.drag.conductance(particles, flow) if around is None else around.conductance
+        if self.history is not None:
+            history = self.history.terms(particles, flow, drag, inertia(particles), step, last_step)
+        not_seen = _not_seen(flow, drag, agitation, history)
+        conductance = drag if history is None else drag + history.conductance
+        implicit = self.momentum.prepare(particles, cell_map, flow, step, not_seen, conductance)
         added = np.zeros_like(transverse)
         if self.added_mass and last_step > 0.0:
             added = self.added_mass.force(particles, flow, change_along(fluid, kernel, cell_map, flow.slip), last_step)
-        source, fluctuating = None, None if agitation is None else agitation.force
-        if self.added_mass or self.lift or self.viscous_stress or fluctuating is not None:
-            lost = deferred - added - transverse
-            source = self._source(cell_map, lost if fluctuating is None else lost - fluctuating)
-        return CouplingTerms(cell_map, flow, drag, transverse + added, heavier, 1.0 - solid, source, agitation)
+        lost = deferred - added - transverse
+        for each in (agitation, history):
+            if each is not None and each.force is not None:
+                lost = lost - each.force
+        explicit = self.added_mass or self.lift or self.viscous_stress or history is not None
+        source = None
+        if explicit or (agitation is not None and agitation.force is not None):
+            source = self._source(cell_map, lost)
+        return CouplingTerms(
+            cell_map, flow, drag, implicit, transverse + added, heavier, 1.0 - solid, source, agitation, history
+        )
 
     def apply(self, particles: Particles, terms: CouplingTerms, gravity: Array) -> FluidForces:
         """Store in `particles.applied` the force on every particle until the next fluid step; returns its parts.
@@ -193,13 +201,16 @@ class Exchange:
         gravity  (3,) [m/s2]; weight and buoyancy are part of the force
         """
         fluid, cell_map, step = self.fluid, terms.cell_map, terms.step
+        received = self.momentum.apply(particles, cell_map, terms.implicit, *fluid.drag_response())
+        drag, history = self._drag_and_history(particles, terms, received)
         excess_mass = particles.mass - fluid.density * cell_map.volume
         forces = FluidForces(
-            drag=self.momentum.apply(particles, cell_map, terms.drag, *fluid.drag_response()),
+            drag=drag,
             pressure=self.pressure.force(particles, cell_map),
             weight=np.stack([excess_mass * each for each in gravity], axis=-1),
             explicit=terms.explicit,
             agitation=terms.fluctuating_force,
+            history=history,
         )
         _replace(particles.applied, forces, particles.force)
         self.pressure.store(particles, cell_map)
@@ -208,22 +219,11 @@ class Exchange:
             gained = turn_with_fluid(particles, vorticity_at(fluid, self.kernel, cell_map), fluid.density, step)
             self.spin_work = fluid.communicator.sum(gained)
         if self.self_disturbance is not None and fluid.viscous:
-            screening = terms.drag.conductance * terms.flow.others / (fluid.density * terms.flow.voidage)
+            screening = terms.drag * terms.flow.others / (fluid.density * terms.flow.voidage)
             self.self_disturbance.advance(
-                particles, cell_map, terms.flow.slip, forces.drag, screening, fluid.density, step
+                particles, cell_map, terms.flow.slip, drag + history, screening, fluid.density, step
             )
         return forces
-
-    def drag_work(self, particles: Particles, terms: CouplingTerms) -> DragWork:
-        """Work of the last drag impulse at the velocity with which the fluid acts on every particle."""
-        kernel, drag, total = self.kernel, particles.drag_impulse / terms.step, self.fluid.communicator.sum
-        weight = kernel.smooth(np.moveaxis(self.fluid.drag_response()[0], -1, 0))
-        conductance = kernel.gather(terms.cell_map.stencil, weight) * terms.drag.implicit[:, None]
-        acting = terms.drag.target + drag / np.maximum(conductance, 1e-300)
-        if terms.agitation is None:
-            return DragWork(terms.step * total(drag * acting), np.zeros_like(drag), 0.0)
-        fluctuating = conductance * terms.agitation.velocity
-        return DragWork(terms.step * total(drag * acting), fluctuating, terms.step * total(fluctuating * acting))
 
     @property
     def outside(self) -> int:
@@ -303,6 +303,20 @@ class Exchange:
             return np.zeros((particles.count, 3))
         return self.added_mass.deferred_momentum(particles) / step
 
+    def _drag_and_history(self, particles: Particles, terms: CouplingTerms, received: Array) -> tuple[Array, Array]:
+        """Drag and history force on every particle (N, 3), (N, 3) [N].
+
+        received  from the implicit transfer (N, 3) [N]
+        """
+        if self.history is None or terms.history is None:
+            return received, np.zeros_like(received)
+        of_slip = received
+        if terms.agitation is not None:
+            of_slip = received - terms.drag[:, None] * terms.agitation.velocity
+        newest = of_slip * (terms.history.conductance / np.maximum(terms.implicit.conductance, 1e-300))[:, None]
+        self.history.store(particles, newest, terms.history, terms.step)
+        return received - newest, newest + terms.history.force
+
     def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
         source = self.kernel.smooth(self.kernel.deposit(cell_map, force)) / self.fluid.grid.cell_volume
@@ -325,3 +339,16 @@ def inertia(particles: Particles) -> Array:
     """Mass and added mass of every particle (N,) [kg]; infinite for fixed particles."""
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / particles.inverse_mass)
+
+
+def _not_seen(flow: SampledFlow, drag: Array, agitation: AgitationTerms | None, history: HistoryTerms | None) -> Array:
+    """Part of the cells' velocity that does not act on every particle (N, 3) [m/s].
+
+    It is the velocity that the particle causes itself, less the fluctuation, which acts through the drag alone.
+    """
+    if agitation is None:
+        return flow.disturbance
+    if history is None:
+        return flow.disturbance - agitation.velocity
+    share = drag / np.maximum(drag + history.conductance, 1e-300)
+    return flow.disturbance - share[:, None] * agitation.velocity

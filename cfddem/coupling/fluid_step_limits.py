@@ -1,6 +1,6 @@
 """Limits of the fluid step of a coupled run, for estimates before the run and for every step of it.
 
-Nothing is compiled here. The limits of the fluid alone are in :mod:`cfddem.fluid.stability`, those of the particles
+Nothing is compiled here. The limits of the fluid alone are in :mod:`cfddem.fluid.step_limit`, those of the particles
 in :mod:`cfddem.particles.step_criteria`.
 """
 

@@ -30,6 +30,7 @@ from cfddem.coupling import kernel_loops as loops
 from cfddem.coupling.reach import Reach
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.halo import Halo
+from cfddem.particles.state import sphere_volume
 
 MAPPINGS = ("linear", "centroid", "divided")
 """First stage: a cube as large as a cell around the centre; the cell of the centre; equal pieces of the sphere, each in
@@ -111,8 +112,9 @@ class FilterKernel:
         slabs = max(self.reach.shape[0] // SLAB, 1)
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         loops.sort_into_slabs(position, self._origin[2], self._inverse[2], SLAB, order, start)
-        volume = (4.0 / 3.0) * math.pi * radius**3
-        return ParticleCellMap(position.copy(), radius, volume, order, start, self.stencil(position, radius))
+        return ParticleCellMap(
+            position.copy(), radius, sphere_volume(radius), order, start, self.stencil(position, radius)
+        )
 
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""

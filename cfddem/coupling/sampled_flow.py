@@ -45,20 +45,26 @@ class FlowSampler:
 
         solid  solid fraction of the cells (nz, ny, nx)
         """
-        kernel, fluid, count = self.kernel, self.fluid, particles.count
-        velocity = kernel.smooth(np.moveaxis(fluid.velocity, -1, 0))
-        gathered = kernel.gather(cell_map.stencil, np.concatenate([velocity, solid[None]]))
-        if self.self_disturbance is None:
-            modes, own = np.zeros((count, 0, 3)), np.zeros(count)
-        else:
-            modes, own = particles["disturbance_modes"], self.self_disturbance.solid(cell_map)
-        (slip, disturbance), (voidage, reynolds, others) = np.empty((2, count, 3)), np.empty((3, count))
+        gathered, (modes, own) = self._gathered(cell_map, solid), self._own(particles, cell_map)
+        slip, disturbance = np.empty((2, particles.count, 3))
+        voidage, reynolds, others = np.empty((3, particles.count))
         _sample(
             gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, modes, own,
-            fluid.density, slip, disturbance, voidage, reynolds, others,
+            self.fluid.density, slip, disturbance, voidage, reynolds, others,
         )  # fmt: skip
         ratio = self._diameter_ratio(particles, cell_map, solid)
         return SampledFlow(slip, disturbance, voidage, reynolds, others, ratio)
+
+    def _gathered(self, cell_map: ParticleCellMap, solid: Array) -> Array:
+        """Mean velocity of the fluid and solid fraction around every particle (N, 4) [m/s], [-]."""
+        velocity = self.kernel.smooth(np.moveaxis(self.fluid.velocity, -1, 0))
+        return self.kernel.gather(cell_map.stencil, np.concatenate([velocity, solid[None]]))
+
+    def _own(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
+        """What every particle adds itself: modes of its disturbance (N, modes, 3) [m/s], and solid fraction (N,)."""
+        if self.self_disturbance is None:
+            return np.zeros((particles.count, 0, 3)), np.zeros(particles.count)
+        return particles["disturbance_modes"], self.self_disturbance.solid(cell_map)
 
     def _diameter_ratio(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Diameter of every particle over the Sauter mean around it (N,) [-]; 1 unless sizes are sampled.

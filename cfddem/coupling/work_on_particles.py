@@ -16,11 +16,21 @@ from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
 
 FORCES = tuple(
-    Field(f"work_of_{name}", "N", 3, "scratch", meaning=f"force of the fluid on the particle: {name}")
+    Field(f"force_of_{name}", "N", 3, "scratch", meaning=f"force of the fluid on the particle: {name}")
     for name in FluidForces._fields
 )
-FLUCTUATING = Field("work_of_fluctuation", "N", 3, "scratch", meaning="drag of the fluctuation of the fluid velocity")
+FLUCTUATING = Field("force_of_fluctuation", "N", 3, "scratch", meaning="drag of the fluctuation of the fluid velocity")
 PRESSURE = Field("pressure_before", "Pa", role="scratch", meaning="fluid pressure before the particles moved")
+
+
+class ImplicitWork(NamedTuple):
+    """Work of drag and history force in a fluid step at the velocity with which the fluid acts on every particle."""
+
+    drag: float  # [J]
+    fluctuating: Array  # drag of the fluctuation of the fluid velocity (N, 3) [N]
+    of_fluctuation: float  # work of that part of the drag [J]
+    history: float  # of the implicit part of the history force [J]
+    explicit_history: float  # of the rest [J]
 
 
 class ParticleWork(NamedTuple):
@@ -30,6 +40,9 @@ class ParticleWork(NamedTuple):
     drag_on_fluid: float  # of the same force at the velocity with which the fluid acts
     fluctuating: float  # part of the drag by the fluctuation of the fluid velocity
     fluctuating_on_fluid: float  # of the same part at the velocity with which the fluid acts
+    history: float
+    history_on_fluid: float  # of the implicit part of the same force at the velocity with which the fluid acts
+    explicit_history_on_fluid: float  # of its other part
     explicit: float  # lift, viscous stress and added mass
     agitation: float  # other forces of agitation
     added: float  # kinetic energy that a change of the added mass has given to the particles
@@ -51,16 +64,17 @@ class CouplingWork:
         self.exchange, self.gravity = exchange, gravity
         for field in (*FORCES, FLUCTUATING, PRESSURE):
             particles.declare(field)
-        self._step = self._drag_on_fluid = self._fluctuating_on_fluid = self._added = 0.0
+        self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0)
+        self._added = 0.0
         self._pressure = np.zeros(0)  # of the cells, smoothed by the kernel (1, nz, ny, nx) [Pa]
 
     def begin(self, particles: Particles, terms: CouplingTerms, forces: FluidForces) -> None:
-        """After `Exchange.apply`, before the particles move."""
+        """After `Exchange.apply`, before the particles move; `particles` are those of this rank, without ghosts."""
         total = self.exchange.fluid.communicator.sum
         pressure = np.ascontiguousarray(self.exchange.fluid.pressure)[None]
-        self._step, self._pressure = terms.step, self.exchange.kernel.smooth(pressure)
-        self._drag_on_fluid, fluctuating, self._fluctuating_on_fluid = self.exchange.drag_work(particles, terms)
-        particles[FLUCTUATING.name][:] = fluctuating
+        self._pressure = self.exchange.kernel.smooth(pressure)
+        self._on_fluid = self._implicit_work(particles, terms, forces)
+        particles[FLUCTUATING.name][:] = self._on_fluid.fluctuating
         self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
         for field, force in zip(FORCES, forces):
             particles[field.name][:] = force
@@ -70,14 +84,17 @@ class CouplingWork:
         """After the particles have moved."""
         fluid, total = self.exchange.fluid, self.exchange.fluid.communicator.sum
         model_a = float(fluid.model == "A")
-        drag, pressure, weight, explicit, agitation = (particles[field.name] for field in FORCES)
+        drag, pressure, weight, explicit, agitation, history = (particles[field.name] for field in FORCES)
         driving = model_a * particles.volume[:, None] * fluid.boundaries.driving
         rise = self._pressure_at(particles) - particles.pressure_before
         return ParticleWork(
             drag=total(drag * particles.work_displacement),
-            drag_on_fluid=self._drag_on_fluid,
+            drag_on_fluid=self._on_fluid.drag,
             fluctuating=total(particles[FLUCTUATING.name] * particles.work_displacement),
-            fluctuating_on_fluid=self._fluctuating_on_fluid,
+            fluctuating_on_fluid=self._on_fluid.of_fluctuation,
+            history=total(history * particles.work_displacement),
+            history_on_fluid=self._on_fluid.history,
+            explicit_history_on_fluid=self._on_fluid.explicit_history,
             explicit=total(explicit * particles.work_displacement),
             agitation=total(agitation * particles.work_displacement),
             added=self._added,
@@ -86,6 +103,25 @@ class CouplingWork:
             pressure=total((pressure - driving) * particles.work_displacement),
             displaced=-total(model_a * particles.volume * rise),
         )
+
+    def _implicit_work(self, particles: Particles, terms: CouplingTerms, forces: FluidForces) -> ImplicitWork:
+        """Work of drag and history force on the fluid."""
+        kernel, fluid, received = self.exchange.kernel, self.exchange.fluid, particles.drag_impulse / terms.step
+        weight = kernel.smooth(np.moveaxis(fluid.drag_response()[0], -1, 0))
+        conductance = kernel.gather(terms.cell_map.stencil, weight) * terms.implicit.implicit[:, None]
+        acting = terms.implicit.target + received / np.maximum(conductance, 1e-300)
+
+        def work(force: Array) -> float:
+            return terms.step * float(fluid.communicator.sum(force * acting))
+
+        drag, history, explicit, fluctuating = received, 0.0, 0.0, np.zeros_like(received)
+        if terms.history is not None:
+            drag, explicit = forces.drag, work(terms.history.force)
+            history = work(forces.history - terms.history.force)
+        if terms.agitation is not None:
+            share = terms.drag / np.maximum(terms.implicit.conductance, 1e-300)
+            fluctuating = share[:, None] * conductance * terms.agitation.velocity
+        return ImplicitWork(work(drag), fluctuating, work(fluctuating), history, explicit)
 
     def _pressure_at(self, particles: Particles) -> Array:
         """Pressure at every particle, by the weights of the deposit (N,) [Pa]."""

@@ -24,8 +24,9 @@ Role = Literal["state", "memory", "scratch"]
 """`state` describes the row itself, `memory` is what a law stores from step to step, `scratch` is valid within a step.
 Checkpoints hold state and memory, not scratch."""
 
-Phase = Literal["start", "film", "motion"]
-"""When ghost rows receive values: at the start of an advance, before the film impulses, after the drift."""
+Phase = Literal["start", "film", "bridge", "motion", "liquid", "work"]
+"""When ghost rows receive values: at the start of an advance, before the film impulses and those
+of bridges, after the drift, before new bridges fill, and before work is counted."""
 
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]
 """Value in new rows: a number, or a function of the table and the new rows (k,) that returns their values."""
@@ -42,7 +43,7 @@ class Field:
     initial     value in new rows, see `Initial`; a field whose initial value is a function is declared after the fields
                 that the function reads
     dtype       of the numbers
-    halo        when ghost rows receive the values of their owners, see `Phase`; only when they are made if empty
+    halo        phases in which ghosts are updated, see `Phase`; empty: only copied when the ghost is made
     snapshot    whether snapshots contain the field
     meaning     long name in snapshots and tables
     """

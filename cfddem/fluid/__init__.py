@@ -10,10 +10,11 @@ halo         fills the ghosts of padded fields
 momentum     the terms of the momentum balance (models A and B); predictor
 viscosity    effective viscosity, with the sub-grid viscosity
 pressure/    the pressure equation: conjugate gradients with a multigrid preconditioner; projection; closed regions
-stability    rates that limit a step
+stability    rates of the flow that limit a step
+step_limit   the largest stable step at these rates; nothing compiled
 checks       checks of input and of divergence
 state        the fields and their values in cells and at points
 budgets      momentum, drag and energy of the step just made
-work         the work of each term of the momentum balance
+work_of_terms  the work of each term of the momentum balance
 solver       the step
 """

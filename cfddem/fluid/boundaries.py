@@ -256,7 +256,7 @@ class Boundaries:
 
     def fill_velocity(self, velocity: Array) -> None:
         """Set the boundary faces and ghosts of a velocity (3, nz, ny, nx)."""
-        self.halo.fill_faces(velocity, extend=False)
+        self.halo.fill_faces(velocity)
         for side in self.sides:
             cells = self.grid.cells[side.axis]
             fill_side(velocity, side.axis, side.high, cells, side.wall, side.mirror, side.outlet)

@@ -5,27 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.fluid.grid import Array
-from cfddem.fluid.momentum import drag_seen
 from cfddem.fluid.state import FluidState, on_faces
 from cfddem.fluid.work_of_terms import Works, kinetic_energy, works
 
 
 class FluidBudgets(FluidState):
     """A fluid that accounts for its momentum and energy; nothing here advances it."""
-
-    def drag_response(self) -> tuple[Array, Array]:
-        """How the implicit drag of the last step saw the fluid, cell by cell.
-
-        returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
-                 the implicit drag has seen [m/s]
-        """
-        fields = self.fields
-        weight, seen = np.empty((*self.grid.shape, 3)), np.empty((*self.grid.shape, 3))
-        drag_seen(
-            fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
-            self.density, self.last_step, self.model_b, weight, seen,
-        )  # fmt: skip
-        return weight, seen
 
     def drag_exchange(self) -> Array:
         r"""Momentum that drag gave to the fluid over the last step, cell by cell (nz, ny, nx, 3) [N s].

@@ -1,4 +1,4 @@
-"""How cells divide a box, and the viscous limit of a step. Importing this module compiles nothing."""
+"""How cells divide a box. Importing this module compiles nothing."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from cfddem.backend.errors import InputError
-
-VISCOUS = 0.8
-"""Largest step of the fluid, over the viscous time of a cell [-]."""
 
 
 def cell_counts(size: Sequence[float], cell: float | Sequence[float]) -> tuple[int, int, int]:

@@ -62,19 +62,9 @@ class Periodic(Condition):
     pressure_gradient: float = 0.0
 
 
-def switch_on(at: float = 0.0) -> Callable[[float], float]:
-    """Time factor 0 before `at` [s], 1 from then on."""
-    return lambda t: 1.0 if t >= at else 0.0
-
-
 def ramp(begin: float, end: float) -> Callable[[float], float]:
     """Time factor that rises linearly from 0 at `begin` to 1 at `end` [s]."""
     return lambda t: min(max((t - begin) / (end - begin), 0.0), 1.0)
-
-
-def pulse(begin: float, end: float) -> Callable[[float], float]:
-    """Time factor 1 from `begin` up to `end` [s], 0 otherwise."""
-    return lambda t: 1.0 if begin <= t < end else 0.0
 
 
 def discs(centres: Sequence[Sequence[float]], diameter: float, axis: int = 2) -> Region:

@@ -37,7 +37,7 @@ AT_CENTRES = np.full((1, 3), 0.5)
 """Where in its cell a component is stored, in cell widths along x, y, z."""
 
 
-def layers(axis: int, which: int | slice) -> tuple[Any, ...]:
+def layers(axis: int, which: int | slice | list[int]) -> tuple[Any, ...]:
     """Index of layers of cells normal to x, y or z (axis 0, 1, 2) in the last three axes of an array."""
     return (Ellipsis, which, *(slice(None),) * axis)
 

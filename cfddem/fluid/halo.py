@@ -71,9 +71,6 @@ def fill_ghosts(fields, low, counts, periodic, extend):
                             field[ghost, j, i] = field[inside, j, i]
 
 
-_NOTHING = np.zeros(0)
-
-
 class Borders:
     """The borders of a rank's cells with those of its neighbours along one axis.
 
@@ -116,7 +113,7 @@ class Borders:
 
     def _swapped(self, down: np.ndarray, up: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
         """Give layers to the neighbours below and above; returns what these give: as `up`, and as `down`."""
-        sent, got = [_NOTHING] * self.communicator.size, [_NOTHING] * self.communicator.size
+        sent, got = dict[int, np.ndarray](), dict[int, np.ndarray]()
         below, above, size = self.below, self.above, down.size
         if below is not None:
             sent[below], got[below] = np.ascontiguousarray(down, float).reshape(-1), np.empty(up.size)
@@ -177,12 +174,10 @@ class Halo:
         for each in self.borders:
             each.fill(fields, self.low, self.high)
 
-    def fill_faces(self, vector: Array, extend: bool = True) -> None:
-        """Fill the ghosts of a face field (3, nz, ny, nx); the faces on the sides of the box are not ghosts.
-
-        extend  whether to fill the ghosts beyond sides that are not periodic; if not, boundary conditions do
-        """
-        fill_ghosts(vector, self.low, self._faces, self._wraps, self.ends & extend)
+    def fill_faces(self, vector: Array) -> None:
+        """Fill the ghosts of a face field (3, nz, ny, nx), but those beyond sides that are not periodic, which boundary
+        conditions fill; the faces on the sides of the box are not ghosts."""
+        fill_ghosts(vector, self.low, self._faces, self._wraps, np.zeros_like(self.ends))
         self.fill_borders(vector)
 
     def padded(self, values: ArrayLike, outside: float | None = None) -> Array:

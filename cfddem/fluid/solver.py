@@ -34,8 +34,9 @@ from cfddem.fluid.conditions import Condition
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.momentum import predict, transport
 from cfddem.fluid.pressure.projection import Projection
-from cfddem.fluid.stability import FlowRates, Rates, StepLimit, step_limit
+from cfddem.fluid.stability import FlowRates
 from cfddem.fluid.state import FluidProperties
+from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
 
 LOOSE = 1e-6
 """Pressure tolerance of the first stage: it only shapes the convecting flux of the second."""
@@ -251,7 +252,7 @@ class FluidSolver(FluidBudgets):
     def largest_step(self, courant: float = 0.5) -> StepLimit:
         """The largest step that is stable now, and why; infinite with the criterion "none" where nothing limits it.
 
-        courant  C of :func:`cfddem.fluid.stability.step_limit`; Heun's scheme with the limiter is bounded up to 1. A
+        courant  C of :func:`cfddem.fluid.step_limit.step_limit`; Heun's scheme with the limiter is bounded up to 1. A
                  direction one cell thick without walls that stick does not count
         """
         return step_limit(self.rates(), courant)

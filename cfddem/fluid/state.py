@@ -17,7 +17,7 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import checked_viscosity
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, sample
-from cfddem.fluid.momentum import transport
+from cfddem.fluid.momentum import drag_seen, transport
 from cfddem.fluid.viscosity import EffectiveViscosity
 
 
@@ -154,12 +154,30 @@ class FluidState:
     # ------------------------------------------------------------ values in cells
 
     def cell_pressure_gradient(self) -> Array:
-        """grad p' of every cell, mean of its two faces as the momentum balance sees them (3, nz, ny, nx) [Pa/m]."""
+        """grad p' of every cell, mean of its two faces as the momentum balance sees them (3, nz, ny, nx) [Pa/m].
+
+        Add rho g for the gradient of the static pressure.
+        """
         return self._in_cells(self._pressure_gradient())
 
     def cell_viscous_force(self) -> Array:
-        """div tau of every cell, mean of its two faces (3, nz, ny, nx) [N/m3]."""
+        """div tau of every cell, the stress of the fluid between the particles (not times eps), mean of its two faces
+        (3, nz, ny, nx) [N/m3]."""
         return self._in_cells(self._stress_between_particles())
+
+    def drag_response(self) -> tuple[Array, Array]:
+        """How the implicit drag of the last step saw the fluid, cell by cell.
+
+        returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
+                 the implicit drag has seen [m/s]
+        """
+        fields = self.fields
+        weight, seen = np.empty((*self.grid.shape, 3)), np.empty((*self.grid.shape, 3))
+        drag_seen(
+            fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
+            self.density, self.last_step, self.model_b, weight, seen,
+        )  # fmt: skip
+        return weight, seen
 
     def _in_cells(self, faces: Array) -> Array:
         """Mean over the two faces of every cell; a face without an unknown takes the value of the other one."""
@@ -203,10 +221,6 @@ class FluidState:
         """Velocity at points (N, 3) [m], tri-linear between faces: (N, 3) [m/s]."""
         return self._at(self.fields.velocity, AT_FACES, points)
 
-    def pressure_gradient_at(self, points: Array) -> Array:
-        """grad p' at points (N, 3) [m]: (N, 3) [Pa/m]. Add rho g for the gradient of the static pressure."""
-        return self._at(self._continued(self._pressure_gradient()), AT_FACES, points)
-
     def viscosity_at(self, points: Array) -> Array:
         """mu at points (N, 3) [m], tri-linear between centres: (N,) [Pa s]."""
         viscosity = self.fields.viscosity
@@ -215,14 +229,6 @@ class FluidState:
             return np.full(len(points), most)  # free of the rounding of an interpolation
         return self._at(viscosity[None], AT_CENTRES, points)[:, 0]
 
-    def viscous_force_at(self, points: Array) -> Array:
-        """div tau, the stress of the fluid between the particles (not times eps), at points (N, 3): (N, 3) [N/m3]."""
-        return self._at(self._continued(self._stress_between_particles()), AT_FACES, points)
-
-    def cell_value_at(self, field: Array, points: Array) -> Array:
-        """A cell field (nz, ny, nx) at points (N, 3) [m], tri-linear between centres: (N,)."""
-        return self._at(self.boundaries.halo.padded(field)[None], AT_CENTRES, points)[:, 0]
-
     def _at(self, fields: Array, place: Array, points: Array) -> Array:
         points = np.ascontiguousarray(points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3:
@@ -230,17 +236,6 @@ class FluidState:
         values = np.empty((len(points), len(fields)))
         sample(fields, place, points, np.array(self.grid.origin), self.inverse_spacing, values)
         return values
-
-    def _continued(self, vector: Array) -> Array:
-        """Extend values on the faces of the momentum balance to the faces without one, at walls and inlets."""
-        self.boundaries.halo.fill_borders(vector)
-        for d in range(3):
-            known, axis = self.faces.solved[d] > 0.0, 2 - d
-            above, below = np.roll(known, -1, axis), np.roll(known, 1, axis)
-            nearest = np.where(above, np.roll(vector[d], -1, axis), np.where(below, np.roll(vector[d], 1, axis), 0.0))
-            vector[d] = np.where(known, vector[d], nearest)
-        self.boundaries.halo.fill_faces(vector)
-        return vector
 
 
 def on_faces(cells: Array, axis: int) -> Array:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cfddem.fluid.grid import HIGH, LOW, Array
+from cfddem.fluid.momentum import implicitness
 from cfddem.fluid.sides import Side
 from cfddem.fluid.state import FluidState, on_faces
 
@@ -122,13 +123,9 @@ def _drag(fluid: FluidState, d: int) -> tuple[Array, Array]:
     left = share * (share + model_b * (1.0 - share))
     beta = 0.5 * (right * fields.drag + left * np.roll(fields.drag, 1, axis))
     pull = 0.5 * (right * fields.drag_momentum[d] + left * np.roll(fields.drag_momentum[d], 1, axis))
-    theta = _implicitness(beta * fluid.last_step / (fluid.density * face))
+    theta = implicitness.py_func(beta * fluid.last_step / (fluid.density * face))
     acting = theta * fields.velocity[d] + (1.0 - theta) * fields.other_velocity[d]
     return pull - beta * acting, acting
-
-
-def _implicitness(stiffness: Array) -> Array:
-    return (1.0 + stiffness) / (2.0 + stiffness)
 
 
 def _at_sides(fluid: FluidState) -> tuple[float, float, float]:
@@ -167,7 +164,7 @@ def _at_side(fluid: FluidState, side: Side, inlet: np.ndarray, outlet: np.ndarra
     brought = float(energy[carries].sum())  # local: summed over the ranks by the caller
 
     drag, momentum = layer(fields.drag, inside), layer(fields.drag_momentum[d], inside)
-    theta = _implicitness(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
+    theta = implicitness.py_func(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
     acting = theta * new + (1.0 - theta) * old
     work = 0.5 * h * fluid.grid.cell_volume * (drag * acting - momentum) * acting
     return pressed, brought, float(work[inlet].sum())  # local: summed over the ranks by the caller

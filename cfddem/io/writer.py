@@ -3,7 +3,8 @@
     run/
       run.json               format, status, grid, quantities with units, versions, seed
       case.toml              the case as it was run
-      data/00000012.h5       one snapshot: /fluid/<name> (1, nz, ny, nx[, 3]), /particles/Points (n, 3) and <name>
+      data/00000012.h5       one snapshot: /fluid/<name> (1, nz, ny, nx[, 3]), /particles/Points (n, 3) and <name>,
+                             /collisions/<name> (c,)
       run.vtkhdf             all snapshots as one series for ParaView, pyvista and h5py
       history.h5             one dataset per column
       checkpoint/            full states to resume from

@@ -12,7 +12,7 @@ from cfddem.particles.interactions.kinematics import (
     pair_viscosity,
     relative_velocity,
 )
-from cfddem.particles.interactions.slots import FILM
+from cfddem.particles.interactions.slots import BRIDGE, FILM
 from cfddem.particles.pair_graph import geometry
 from cfddem.particles.vectors import across, at, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
@@ -46,6 +46,16 @@ COLLISION_FIELDS = (
 COLLISION = np.dtype([(field.name, field.dtype, field.shape) for field in COLLISION_FIELDS], align=True)
 """One row of the record."""
 
+WET_COLLISION_FIELDS = (
+    *COLLISION_FIELDS,
+    Field("wet", dtype=bool, meaning="1 if a liquid bridge joined the bodies"),
+    Field("lost_to_bridge", "J", meaning="energy dissipated by the bridge; NaN without an energy budget"),
+)
+"""Columns of the record where particles carry liquid; a collision lasts as long as a bridge."""
+
+WET_COLLISION = np.dtype([(field.name, field.dtype, field.shape) for field in WET_COLLISION_FIELDS], align=True)
+"""One row of the record where particles carry liquid."""
+
 FIELDS = (
     Field("begin", "s", role="memory", initial=np.nan, meaning="time at which the collision began; NaN outside one"),
     Field("begin_speed", "m/s", role="memory", meaning="normal speed at the start"),
@@ -54,6 +64,12 @@ FIELDS = (
     Field("lost", "J", 3, "memory", initial=np.nan, meaning="energy lost to film, dashpot, friction since the start"),
 )
 """Memory of pairs whose collisions are recorded; `lost` is NaN where energies are not counted."""
+
+WET_FIELDS = (
+    Field("wet", role="memory", dtype=bool, meaning="a bridge has joined the bodies since the start"),
+    Field("lost_to_bridge", "J", role="memory", initial=np.nan, meaning="energy lost to the bridge since the start"),
+)
+"""Further memory where particles carry liquid."""
 
 NOT_COUNTED = (np.nan, np.nan, np.nan)
 
@@ -68,6 +84,8 @@ def move_event(memory, k, to):
         memory.closest_gap[to] = memory.closest_gap[k]
         put(memory.begin_slip, to, at(memory.begin_slip, k))
         put(memory.lost, to, at(memory.lost, k))
+        if BRIDGE:
+            memory.wet[to], memory.lost_to_bridge[to] = memory.wet[k], memory.lost_to_bridge[k]
     memory.begin[k] = np.nan
 
 
@@ -80,7 +98,10 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
     known = not np.isnan(memory.begin[k])
     if known and gap < memory.closest_gap[k]:
         memory.closest_gap[k] = gap
-    if known == (gap <= reach) or portion(edges, k) == 0.0:
+    inside = gap <= reach
+    if BRIDGE and memory.bridge_film[k] > 0.0:
+        inside = memory.wet[k] = True
+    if known == inside or portion(edges, k) == 0.0:
         return count
     normal = times(1.0 / distance, separation)
     velocity = relative_velocity(k, particles, edges)
@@ -89,6 +110,8 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
         memory.begin[k], memory.begin_speed[k], memory.closest_gap[k] = time, normal_speed, gap
         put(memory.begin_slip, k, tangential)
         put(memory.lost, k, NOT_COUNTED)
+        if BRIDGE:
+            memory.wet[k], memory.lost_to_bridge[k] = memory.bridge_film[k] > 0.0, np.nan
         return count
 
     row, materials = rows[count], pair_row(k, particles, edges, walls, table)
@@ -115,6 +138,8 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
     sideways = dot(before, before)
     row.restitution_tangential = dot(tangential, before) / sideways if sideways > 0.0 else np.nan
     row.lost_to_film, row.lost_to_contact, row.lost_to_friction = at(memory.lost, k)
+    if BRIDGE:
+        row.wet, row.lost_to_bridge = memory.wet[k], memory.lost_to_bridge[k]
     row.closest_gap, row.weight = memory.closest_gap[k], 1.0
     memory.begin[k] = np.nan
     return count + 1 if i < particles.owned else count  # the owner of the first body keeps the row

@@ -15,27 +15,29 @@ _FIRST, _SECOND, _SPREAD = (np.uint64(odd) for odd in (0x9E3779B97F4A7C15, 0xC2B
 class CollisionRecord:
     """A growing table of collisions, filled by the particle loop.
 
-    `table` is a structured array of dtype :data:`cfddem.particles.collision_events.COLLISION`. Above `most` rows the
-    table is thinned out evenly; the weight of a row is the number of collisions that it represents.
+    `table` is a structured array of dtype :data:`cfddem.particles.collision_events.COLLISION`, with liquid of
+    `WET_COLLISION`. Above `most` rows the table is thinned out evenly; the weight of a row is the number of collisions
+    that it represents.
 
-    most  rows to keep until they are taken
+    most   rows to keep until they are taken
+    dtype  of a row
     """
 
-    def __init__(self, most: int = MOST) -> None:
-        self.most = most
+    def __init__(self, most: int = MOST, dtype: np.dtype = COLLISION) -> None:
+        self.most, self.dtype = most, dtype
         self._kept: list[np.ndarray] = []
         self._count, self._share = 0, 1  # rows kept; one of how many collisions is
-        self._rows = np.zeros(0, COLLISION)
+        self._rows = np.zeros(0, self.dtype)
 
     @property
     def table(self) -> np.ndarray:
         """All collisions that have ended, in the order of their ends."""
-        return np.concatenate([np.zeros(0, COLLISION), *self._kept])
+        return np.concatenate([np.zeros(0, self.dtype), *self._kept])
 
     def room(self, edges: int) -> np.ndarray:
         """Rows for the loop to write to; enough for one collision of every edge."""
         if len(self._rows) < 2 * edges:
-            self._rows = np.zeros(2 * edges + 64, COLLISION)
+            self._rows = np.zeros(2 * edges + 64, self.dtype)
         return self._rows
 
     def keep(self, count: int) -> None:
@@ -58,7 +60,7 @@ class CollisionRecord:
 
     def put_back(self, rows: np.ndarray) -> None:
         """Put earlier rows back, as after a restart."""
-        kept = np.array(rows, COLLISION)
+        kept = np.array(rows, self.dtype)
         self._kept, self._count = [kept], len(kept)
         self._share = int(kept["weight"].max(initial=1.0))  # local: record of this rank
 

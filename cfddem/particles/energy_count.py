@@ -4,6 +4,8 @@ A force at an instant acts over the half kick before it and the half kick after 
 known, so the work of the force equals the gain of kinetic energy to round-off, and so does the work of a film's
 impulse. Energy stored in springs follows from the positions. Both agree to the accuracy of the time integration.
 
+Of several ranks, both owners of a pair keep its count; the owner of the first body adds it to the totals.
+
 Stored energies, stiffnesses and elastic forces are those of the run's contact law. They are evaluated again here and
 not stored by the pair loop: the mean velocity of a half kick is known only after all forces on a particle are summed,
 and runs that count no energy pay nothing.
@@ -20,6 +22,8 @@ from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
+from cfddem.particles.energy_of_bridges import BridgeEnergies
+from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.slots import (
@@ -72,13 +76,14 @@ class Count(NamedTuple):
     power: np.ndarray  # (n,) going into the tangential spring [W]
     held: np.ndarray  # (n,) energy of the normal spring [J]
     yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
-    totals: np.ndarray  # (CHUNKS, channels) [J]
+    totals: np.ndarray  # (2, CHUNKS, channels); the second half is of pairs that another rank adds [J]
 
 
 class Energies:
     """The energy account of a particle solver.
 
-    totals  energy of each of `CHANNELS` since the count began [J]
+    channels  names of the channels: `CHANNELS`, and those of bridges where there are any
+    totals    energy of each channel since the count began [J]
 
     Fields of the particles, set in every `advance`: `displacement` (N, 3) [m], and `work_displacement`, whose product
     with a constant force is its work; they differ by the impulses of films.
@@ -92,7 +97,9 @@ class Energies:
         if laws.film and laws.integrator != "drift":
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
         self._work = specialise(_work, solver.choices)
-        self.totals = np.zeros(len(CHANNELS))
+        self._bridges = None if laws.bridge is None else BridgeEnergies(solver)
+        self.channels = CHANNELS if self._bridges is None else (*CHANNELS, *self._bridges.channels)
+        self.totals = np.zeros(len(self.channels))
         self.fed = 0.0  # energy of inserted particles less that of removed ones [J]
         for field in (DISPLACEMENT, WORK_DISPLACEMENT):
             solver.particles.declare(field)
@@ -104,11 +111,13 @@ class Energies:
         if first:
             solver.particles.reset(DISPLACEMENT.name, WORK_DISPLACEMENT.name)
         if first or self._edges is not solver.edges:
-            self._count = _room(solver) if self._edges is not solver.edges else self._count
-            self._edges = solver.edges
+            if self._edges is not solver.edges:
+                self._make_room(solver)
             self._pass(solver, 0.0, 0.0, 0.5 * step if first else 0.0)
         particles = solver.particles
         self._count.ahead[:] = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
+        if self._bridges is not None:
+            self._bridges.before(solver, step, self._count.ahead)
 
     def after(self, solver: ParticleSolver, step: float, last: bool) -> None:
         """Count after a step [s]; `last` of an advance."""
@@ -116,15 +125,21 @@ class Energies:
 
     def springs(self, solver: ParticleSolver) -> tuple[float, float]:
         """Energy of the normal and of the tangential springs [J]."""
-        if self._edges is not solver.edges:
-            self._edges, self._count = solver.edges, _room(solver)
-            self._pass(solver, 0.0, 0.0, 0.0)
-        total = solver.communicator.sum
-        return total(self._count.held), 0.5 * total(self._count.stiffness * self._count.spring)
+        self._renew(solver)
+        count, total, mine = self._count, solver.communicator.sum, solver.edges.first < solver.particles.owned
+        return total(count.held[mine]), 0.5 * total((count.stiffness * count.spring)[mine])
+
+    def bridges(self, solver: ParticleSolver) -> float:
+        """Energy of the pull of liquid bridges, from contact [J]."""
+        if self._bridges is None:
+            return 0.0
+        self._renew(solver)
+        return self._bridges.held(solver)
 
     def mechanical(self, solver: ParticleSolver) -> float:
-        """Kinetic energy and that of the springs [J]."""
-        return kinetic_energy(solver.particles, solver.communicator) + sum(self.springs(solver))
+        """Kinetic energy, and that of springs and bridges [J]."""
+        stored = sum(self.springs(solver)) + self.bridges(solver)
+        return kinetic_energy(solver.particles, solver.communicator) + stored
 
     def of_all(self, solver: ParticleSolver) -> float:
         """Energy that particles bring and take along: mechanical energy, and that of their added mass [J]."""
@@ -139,7 +154,20 @@ class Energies:
         self.totals, self.fed = np.array(state["totals"]), float(state["fed"])
         self._edges = None
 
+    def _renew(self, solver: ParticleSolver) -> None:
+        """Evaluate stored energy where the neighbour list is new."""
+        if self._edges is not solver.edges:
+            self._make_room(solver)
+            self._pass(solver, 0.0, 0.0, 0.0)
+
+    def _make_room(self, solver: ParticleSolver) -> None:
+        """Begin with another neighbour list."""
+        self._edges, self._count = solver.edges, _room(solver)
+        if self._bridges is not None:
+            self._bridges.make_room(solver)
+
     def _pass(self, solver: ParticleSolver, step: float, before: float, after: float) -> None:
+        solver.lists.ghosts.refresh("work")
         particles, edges, memory, walls, shift = solver.views
         count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
         count.totals[:] = 0.0
@@ -147,7 +175,11 @@ class Energies:
         _motion(particles, count, gravity, np.array(solver.free, float), step, before, after)
         p = solver.laws.parameters
         self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
-        self.totals += solver.communicator.sum(count.totals, axis=0)
+        self.totals[: len(CHANNELS)] += solver.communicator.sum(count.totals[0], axis=0)
+        if self._bridges is not None:
+            done, by_walls = self._bridges.count(solver, step, before, after)
+            self.totals[len(CHANNELS) :] += done
+            self.totals[WALLS] += by_walls
         if before + after > 0.0:
             solver.particles.work_displacement += self._count.moved
         if step > 0.0:
@@ -158,7 +190,7 @@ def _room(solver: ParticleSolver) -> Count:
     number, count = len(solver.edges.first), solver.particles.count
     ahead, moved, turned, drifted = np.zeros((4, count, 3))
     spring, stiffness, power, held, yielded = np.zeros((5, number))
-    totals = np.zeros((CHUNKS, len(CHANNELS)))
+    totals = np.zeros((2, CHUNKS, len(CHANNELS)))
     return Count(ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, totals)
 
 
@@ -167,7 +199,7 @@ def _motion(particles, count, gravity, free, step, before, after):
     """Motion during the half kicks around this instant, in which forces act, and the work of gravity in the step."""
     number = len(particles.radius)
     for chunk in prange(CHUNKS):
-        totals = count.totals[chunk]
+        totals = count.totals[0, chunk]
         for i in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             gain = 0.5 * (after * after - before * before)
             force, torque = at(particles.force, i), at(particles.torque, i)
@@ -183,7 +215,8 @@ def _motion(particles, count, gravity, free, step, before, after):
                 drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], force))
                 drifted = (free[0] * drifted[0], free[1] * drifted[1], free[2] * drifted[2])
                 put(count.drifted, i, times(step, drifted))
-                totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, drifted)
+                if i < particles.owned:
+                    totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, drifted)
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
 
@@ -314,10 +347,10 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
 def _work(particles, edges, memory, walls, count, shift, table, p, step, before, after):
     """Count what films have done in the step, contacts in the half kicks around this instant, and what springs hold."""
     number, pairs = len(edges.first), edges.between_particles
-    near = edges.near if FILM else pairs
+    near = may_touch(edges)
     for chunk in prange(CHUNKS):
-        totals = count.totals[chunk]
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
             if FILM and step > 0.0:
                 lost, by_wall = _film_works(k, particles, edges, memory, count, step)
                 totals[FILMS] += lost

@@ -22,7 +22,7 @@ from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Phase
-from cfddem.particles.integrate import finish_step, move, start_step
+from cfddem.particles.integrate import film_kick, find_bridge_changes, finish_step, move, start_step, start_steps
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 
@@ -134,8 +134,8 @@ class Divided(Whole):
         if len(division.planes) + 1 != communicator.size:
             raise InputError("planes", len(division.planes), f"{communicator.size - 1}, one fewer than ranks")
         self.division, self.communicator, self.balance = division, communicator, balance
-        self._sent: list[np.ndarray] = []  # owned rows that each rank has as ghosts
-        self._received: list[slice] = []  # rows of the ghosts from each rank
+        self._sent: dict[int, np.ndarray] = {}  # owned rows that a rank has as ghosts
+        self._received: dict[int, slice] = {}  # rows of the ghosts from a rank
         self._ids = np.zeros(0, np.int64)  # of all rows, as the last list was made
         self._order = np.zeros(0, np.int64)  # rows in the order of these ids
         self._arrived: list[dict[str, np.ndarray]] = []
@@ -170,18 +170,17 @@ class Divided(Whole):
 
     def renew(self, particles: Particles, reach: float, box: np.ndarray) -> np.ndarray:
         """See `Whole.renew`."""
-        size, rank = self.communicator.size, self.communicator.rank
-        self._sent = [np.zeros(0, np.int64) for _ in range(size)]
-        parcels: list[Any] = [None] * size
-        for other in self.division.near(rank, reach, box):
-            self._sent[other] = np.flatnonzero(self.division.distance(particles.position, other, box) < reach)
-            parcels[other] = particles.copy(self._sent[other]).arrays
-        self._received = []
-        for ghosts in self.communicator.exchange(parcels):
-            begin = particles.count
+        self._sent, self._received = {}, {}
+        parcels: list[Any] = [None] * self.communicator.size
+        for other in self.division.near(self.communicator.rank, reach, box):
+            rows = np.flatnonzero(self.division.distance(particles.position, other, box) < reach)
+            if len(rows):
+                self._sent[other], parcels[other] = rows, particles.copy(rows).arrays
+        for other, ghosts in enumerate(self.communicator.exchange(parcels)):
             if ghosts is not None:
+                begin = particles.count
                 particles.add_ghosts(particles.rows_from(ghosts))
-            self._received.append(slice(begin, particles.count))
+                self._received[other] = slice(begin, particles.count)
         old_row = self._known(particles.id[particles.owned :])
         self._listed(particles)
         return old_row
@@ -196,17 +195,18 @@ class Divided(Whole):
         """See `Whole.refresh`."""
         arrays = [_as_words(self._particles[name]) for name in self._particles.halo_fields(phase)]
         width = sum(array.shape[1] for array in arrays)
-        outgoing = [np.empty(width * len(rows), np.int32) for rows in self._sent]
-        incoming = [np.empty(width * (rows.stop - rows.start), np.int32) for rows in self._received]
-        for rows, buffer in zip(self._sent, outgoing):
+        outgoing = {rank: np.empty(width * len(rows), np.int32) for rank, rows in self._sent.items()}
+        places = self._received.items()
+        incoming = {rank: np.empty(width * (rows.stop - rows.start), np.int32) for rank, rows in places}
+        for rank, buffer in outgoing.items():
             end = 0
-            for array in arrays if len(rows) else ():
-                end = _pack(array, rows, buffer, end)
+            for array in arrays:
+                end = _pack(array, self._sent[rank], buffer, end)
         self.communicator.swap(outgoing, incoming)
-        for place, buffer in zip(self._received, incoming):
+        for rank, buffer in incoming.items():
             end = 0
-            for array in arrays if len(buffer) else ():
-                ghosts = array[place]
+            for array in arrays:
+                ghosts = array[self._received[rank]]
                 begin, end = end, end + ghosts.size
                 ghosts[...] = buffer[begin:end].reshape(ghosts.shape)
 
@@ -252,9 +252,10 @@ class StepsWithGhosts:
     """
 
     def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Whole, communicator: Communicator) -> None:
-        loops = (start_step, move, finish_step)
-        self.start, self.move, self.finish = (specialise(loop, choices, threads) for loop in loops)
-        self.films, self.recording = choices["DRIFTING"], choices["RECORD"]
+        loops = (start_steps, start_step, film_kick, move, find_bridge_changes, finish_step)
+        made = [specialise(loop, choices, threads) for loop in loops]
+        self.begin, self.start, self.film_kick, self.move, self.find_bridge_changes, self.finish = made
+        self.films, self.bridges, self.recording = choices["DRIFTING"], choices["BRIDGE"], choices["RECORD"]
         self.ghosts, self.communicator = ghosts, communicator
 
     def __call__(self, *arguments: Any) -> tuple[int, float, int]:
@@ -262,17 +263,37 @@ class StepsWithGhosts:
         *pairs, p, free, gravity, step, steps, origin, reach, time, log = arguments
         particles, edges = pairs[:2]
         self.ghosts.refresh("start")
+        if self.bridges:
+            self.begin(particles)
         largest, done, noted, full = 0.0, 0, 0, False
         if steps == 0:
-            self.finish(*pairs, p, free, gravity, 0.0, time, log, noted)
+            self.finish(self._changes(pairs, p, free), *pairs, p, free, gravity, 0.0, time, log, noted)
         while done < steps and not full and largest < reach * reach:
             self.start(particles, step)
-            if self.films:
-                self.ghosts.refresh("film")
-            moved = self.move(*pairs, free, step, origin)
+            self._impulses(pairs, step)
+            moved = self.move(*pairs, p, free, step, origin)
             self.ghosts.refresh("motion")
             done += 1
-            noted = self.finish(*pairs, p, free, gravity, step, time + done * step, log, noted)
+            changes = self._changes(pairs, p, free)
+            noted = self.finish(changes, *pairs, p, free, gravity, step, time + done * step, log, noted)
             largest = self.communicator.largest([largest, moved])
             full = self.recording and self.communicator.any(len(log) - noted < len(edges.first))
         return done, largest, noted
+
+    def _impulses(self, pairs: list[Any], step: float) -> None:
+        """Give ghosts what film and bridge impulses need; with both, films act here, else as particles move."""
+        if self.films:
+            self.ghosts.refresh("film")
+        if self.bridges and self.films:
+            self.film_kick(*pairs, step)
+        if self.bridges:
+            self.ghosts.refresh("bridge")
+
+    def _changes(self, pairs: list[Any], p: tuple[float, ...], free: Any) -> int:
+        """Number of bridges that form and break, found before ghosts receive liquid; -1 without bridges."""
+        if not self.bridges:
+            return -1
+        particles, edges, memory, walls, shift, _, cutoff_ratio = pairs
+        changes: int = self.find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
+        self.ghosts.refresh("liquid")
+        return changes

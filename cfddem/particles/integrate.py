@@ -5,9 +5,13 @@ A step consists of these phases:
     kick                 half a step by the forces of the last step
     [halo: velocity, film rate]
     film impulses        of every pair, then of every particle
+    [halo: velocity, spin, load of bridges]
+    bridge impulses      likewise
     drift                new positions; walls move
-    [halo: position, velocity, spin]
+    [halo: position, velocity, spin, thickness of the liquid]
     walls                geometry of every particle and wall
+    [halo: liquid for new bridges]
+    bridges              those that form and break, and the pull of all
     pairs                films, contacts and rolling of every edge
     sum                  force and torque of every particle over its own edges, in a fixed order
     kick                 the other half
@@ -24,10 +28,14 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
+from cfddem.particles.interactions.bridge import apply_bridge_impulses, find_bridge_impulses, renew_bridges
+from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.film import film_force, film_impulse, update_edge_film
 from cfddem.particles.interactions.kinematics import wall_kinematics
 from cfddem.particles.interactions.pair_loops import edge_contact
 from cfddem.particles.interactions.slots import (
+    ADHESIVE,
+    BRIDGE,
     DRIFTING,
     FILM,
     RECORD,
@@ -38,28 +46,26 @@ from cfddem.particles.interactions.slots import (
     pair_forces,
     update_films,
 )
+from cfddem.particles.pair_graph import edge_role
 from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
 from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
 
 
 @inline
-def _role(edge):
-    """Row of an incident edge, and 1 where the particle is its first body, -1 where it is its second."""
-    second = np.int64(edge) >> 63
-    return np.uint64(np.int64(edge) ^ second), 1.0 + 2.0 * second
-
-
-@inline
 def gather_forces(i, particles, edges, memory, gravity, near):
     """Sum what the edges of particle i do to it, with weight and outside force; pairs from `near` on do not touch."""
     force, couple, moment, resistance = at(particles.applied, i), NOTHING, NOTHING, 0.0
+    load = 0.0
     for place in range(edges.start[i], edges.start[i + 1]):
-        k, sign = _role(edges.incident[place])
+        k, sign = edge_role(edges.incident[place])
+        if BRIDGE and memory.bridge_film[k] > 0.0:
+            load += memory.bridge_resistance[k]
+            force = plus(force, times(sign, at(memory.bridge_force, k)))
         if FILM:
             resistance += memory.resistance[k]
-            if near <= k < edges.between_particles:
-                continue
+        if (FILM or BRIDGE) and near <= k < edges.between_particles:
+            continue
         force = plus(force, times(sign, at(memory.force, k)))
         couple = plus(couple, at(memory.couple, k))
         if ROLLING:
@@ -70,6 +76,8 @@ def gather_forces(i, particles, edges, memory, gravity, near):
     put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
     if FILM:
         particles.film_rate[i] = particles.inverse_mass[i] * resistance
+    if BRIDGE:
+        particles.bridge_load[i] = load
 
 
 @inline
@@ -86,7 +94,7 @@ def apply_film_impulses(i, particles, edges, memory):
     """Give particle i the impulses of its films."""
     impulse = (0.0, 0.0, 0.0)
     for place in range(edges.start[i], edges.start[i + 1]):
-        k, sign = _role(edges.incident[place])
+        k, sign = edge_role(edges.incident[place])
         impulse = plus(impulse, times(sign, at(memory.impulse, k)))
     put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
 
@@ -134,13 +142,20 @@ def find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_rat
 
 
 @part
+def apply_all_film_impulses(particles, edges, memory):
+    """Give every particle the impulses of its films, before bridges act on what these leave."""
+    for i in prange(particles.owned):
+        apply_film_impulses(i, particles, edges, memory)
+
+
+@part
 def drift_particles(particles, edges, memory, free, step, origin):
     """Apply the impulses of films and move the particles; returns the largest squared distance from the origin."""
     farthest, count = np.zeros(CHUNKS), particles.owned
     for chunk in prange(CHUNKS):
         far = 0.0
         for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            if DRIFTING:
+            if DRIFTING and not BRIDGE:
                 apply_film_impulses(i, particles, edges, memory)
             far = larger(far, drift(i, particles, free, step, origin))
         farthest[chunk] = far
@@ -178,13 +193,20 @@ def add_film_forces(particles, edges, memory, walls, shift, table, cutoff_ratio)
 
 
 @inline
+def may_touch(edges):
+    """Number of leading edges between particles that may touch; those after them have films and bridges alone."""
+    if DRIFTING or (BRIDGE and not FILM and not ADHESIVE):
+        return edges.near
+    return edges.between_particles
+
+
+@inline
 def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step):
     """Films, contacts and rolling of all edges at the present positions.
 
     step  by which springs have moved since the last forces; 0 at the start [s]
     """
-    pairs, number = edges.between_particles, len(edges.first)
-    near = edges.near if DRIFTING else pairs
+    pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
     kinds, rows = np.uint64(len(table)), table.reshape(-1)
     if FILM:
         update_films(near, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
@@ -201,7 +223,7 @@ def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, 
 @part
 def sum_forces(particles, edges, memory, gravity, step):
     """Sum the forces on the particles, and kick them by half a step."""
-    near = edges.near if DRIFTING else edges.between_particles
+    near = may_touch(edges)
     for i in prange(particles.owned):
         gather_forces(i, particles, edges, memory, gravity, near)
         if step > 0.0:
@@ -212,10 +234,20 @@ def sum_forces(particles, edges, memory, gravity, step):
 
 
 @serial
-def move(particles, edges, memory, walls, shift, table, cutoff_ratio, free, step, origin):
-    """Film impulses and drift, and the motion of walls; returns the square of the largest displacement."""
-    if DRIFTING:
+def film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Give the particles the impulses of their films, where those of bridges follow."""
+    find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+    apply_all_film_impulses(particles, edges, memory)
+
+
+@serial
+def move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step, origin):
+    """Impulses and drift, and the motion of walls; returns the square of the largest displacement."""
+    if DRIFTING and not BRIDGE:
         find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+    if BRIDGE:
+        find_bridge_impulses(particles, edges, memory, shift, p, step)
+        apply_bridge_impulses(particles, edges, memory)
     largest = drift_particles(particles, edges, memory, free, step, origin)
     if WALLS:
         largest = larger(largest, advance_walls(walls, step) ** 2)
@@ -224,11 +256,25 @@ def move(particles, edges, memory, walls, shift, table, cutoff_ratio, free, step
     return largest
 
 
-@inline
-def act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step):
-    """Walls, pairs and sums at the present positions, and the second half of the kick."""
+@serial
+def find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio):
+    """Walls at the present positions, and where bridges form and break; returns the number of these changes."""
     if WALLS:
         wall_contacts(particles, edges, memory.minimum_gap, walls, free, cutoff_ratio)
+    return find_changes(particles, edges, memory, walls, shift, p) if BRIDGE else 0
+
+
+@serial
+def act_bridges(changes, particles, edges, memory, walls, shift, p):
+    """Form and break bridges, of which `find_bridge_changes` has found the number, and find the pull of all."""
+    if changes > 0:
+        exchange_liquid(particles, edges, memory, walls, shift, p)
+    renew_bridges(particles, edges, memory, shift, p)
+
+
+@inline
+def act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step):
+    """Pairs and sums at the present positions, and the second half of the kick."""
     find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step)
     sum_forces(particles, edges, memory, gravity, step)
 
@@ -257,12 +303,19 @@ def integrate(
     """
     largest, done, noted, full = 0.0, 0, 0, False
     half = step if steps > 0 else 0.0
+    if BRIDGE:
+        renew_thickness(particles)
     while True:
         if steps > 0:
             kick_particles(particles, step)
-            moved = move(particles, edges, memory, walls, shift, table, cutoff_ratio, free, step, origin)
+            if DRIFTING and BRIDGE:
+                film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+            moved = move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step, origin)
             largest = larger(largest, moved)
             done += 1
+        changes = find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
+        if BRIDGE:
+            act_bridges(changes, particles, edges, memory, walls, shift, p)
         act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, half)
         if RECORD:
             now = time + done * step
@@ -276,14 +329,27 @@ def integrate(
 
 
 @serial
+def start_steps(particles):
+    """What particles need before the first step, of liquid that has come from outside."""
+    if BRIDGE:
+        renew_thickness(particles)
+
+
+@serial
 def start_step(particles, step):
     """The first half of the kick."""
     kick_particles(particles, step)
 
 
 @serial
-def finish_step(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, time, log, noted):
-    """See `act` and `record`; returns the number of rows written."""
+def finish_step(
+    changes, particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, time, log, noted
+):
+    """Find and act on bridges, unless found (`changes`); act, and record; returns the number of rows written."""
+    if changes < 0:
+        changes = find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
+    if BRIDGE:
+        act_bridges(changes, particles, edges, memory, walls, shift, p)
     act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step)
     if RECORD:
         noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted)

@@ -319,6 +319,13 @@ def _gaps(edges, particles, walls, shift, result):
 
 
 @inline
+def edge_role(incident):
+    """Row of an incident edge, and 1 where the particle is its first body, -1 where it is its second."""
+    second = np.int64(incident) >> 63
+    return np.uint64(np.int64(incident) ^ second), 1.0 + 2.0 * second
+
+
+@inline
 def between(i, j, image, position, shift):
     """Separation from particle j to the image of particle i."""
     # the three digits of the image by integer arithmetic, which is faster than a table
@@ -340,10 +347,3 @@ def geometry(k, particles, edges, shift):
         return separation, distance, distance - (particles.radius[i] + particles.radius[j])
     distance = touched_distance(edges, k)
     return times(distance, touched(edges, k, NORMAL)), distance, distance - particles.radius[i]
-
-
-def wall_forces(edges: Edges, walls: Walls) -> np.ndarray:
-    """Contact force of the particles on each wall, without impulses of films (M, 3) [N]."""
-    result = np.zeros((len(walls.sweep), 3))
-    np.subtract.at(result, walls.wall[edges.second[edges.between_particles :]], edges.force[edges.between_particles :])
-    return result

@@ -13,23 +13,26 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.stopwatch import Stopwatch
-from cfddem.particles.collision_events import COLLISION
+from cfddem.particles.collision_events import COLLISION, WET_COLLISION, WET_FIELDS
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.energy_count import Energies
 from cfddem.particles.ghosts import Slabs, StepsWithGhosts
 from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
-from cfddem.particles.interactions.bridge import Bridges
+from cfddem.particles.interactions.bridge_reach import bridge_reach_ratio, films_outgrow, release_bridges
+from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.pair_loops import loop_choices
+from cfddem.particles.interactions.wall_liquid import with_room
 from cfddem.particles.listing import NeighbourLists, rows_before
 from cfddem.particles.named_state import named_state, restored_list
-from cfddem.particles.pair_graph import Edges, Graph, gaps, shifts, wall_forces
+from cfddem.particles.pair_graph import Edges, Graph, gaps, shifts
 from cfddem.particles.state import Particles
 from cfddem.particles.time_scales import TimeScales, check_step, time_scales
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restored_walls, wall_arrays
+from cfddem.particles.walls.load import wall_forces
 from cfddem.particles.walls.mesh_contacts import wall_contacts
 from cfddem.particles.walls.nearest_point import Walls
 from cfddem.particles.walls.shapes import Wall
@@ -55,7 +58,6 @@ class ParticleSolver:
     skin     allowance of the neighbour list; tuned during the run if not given [m]
     sort_every  sort particles by position at every this many lists, from 1000 particles on
     record   record collisions, in `collisions`
-    bridges  liquid bridges between the particles, :class:`cfddem.particles.interactions.bridge.Bridges`
     energies  count energy by channel, in `energies`; slows the run down
     check_steps  refuse time steps above the stability limit
     after    an earlier run over the same particles and walls, whose pair memory is taken over
@@ -78,7 +80,6 @@ class ParticleSolver:
         skin: float | None = None,
         sort_every: int = 5,
         record: bool = False,
-        bridges: Bridges | None = None,
         energies: bool = False,
         check_steps: bool = True,
         after: ParticleSolver | None = None,
@@ -90,13 +91,14 @@ class ParticleSolver:
         self.walls = wall_arrays(walls)
         self.laws = laws or Laws()
         self.laws.check()
-        if energies and bridges is not None:
-            raise InputError("energies", True, "false with liquid bridges", "what these do is not counted")
-        for name, each in (("bridges", bridges), ("energies", energies or None), ("after", after)):
+        wall_share = self.laws.bridge.wall_share if self.laws.bridge is not None else 0.0
+        for name, each in (("after", after), ("wall_share", wall_share or None)):
             if communicator.size > 1 and each is not None:
                 raise InputError(name, None, "absent in a run of several processes")
-        self.pair_fields = [*self.laws.fields(), *(RECORD_FIELDS if record else ())]
-        kept_apart = {field.name for field in RECORD_FIELDS}
+        wet = self.laws.bridge is not None
+        recorded = (*RECORD_FIELDS, *(WET_FIELDS if wet else ())) if record else ()
+        self.pair_fields = [*self.laws.fields(), *recorded]
+        kept_apart = self.laws.kept_apart | {field.name for field in recorded}
         choices = self.laws.choices() | {"WALLS": bool(walls), "RECORD": record}
         self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart)
         self._parameters, self._loop, self._threads = self.laws.parameters, _NO_LOOP, False
@@ -107,23 +109,24 @@ class ParticleSolver:
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
         self.time, self.steps = 0.0, 0
-        self.collisions = CollisionRecord() if record else None
-        self.bridges = bridges
+        self.collisions = CollisionRecord(dtype=WET_COLLISION if wet else COLLISION) if record else None
+        self.bridges = None if self.laws.bridge is None else Bridges(self)
         self.wall = Stopwatch()
         self.lists = NeighbourLists(
             self.pair_fields, table, self.box, communicator=communicator, division=division, balance=balance,
             skin=skin, sort_every=sort_every,
         )  # fmt: skip
+        for field in self.laws.particle_fields():
+            particles.declare(field)
         self.particles = self.lists.own(particles)
+        self._reach = self._find_reach()  # of the list, over R* [-]
         self._take_list(
             self.lists.first(
-                self.particles, self.walls, self._reach_ratio, *rows_before(self.particles, after, self.laws.film)
+                self.particles, self.walls, self._reach, *rows_before(self.particles, after, self.laws.film)
             )
         )
         self._outside = 0
         self.refresh()
-        if bridges is not None:
-            bridges.update(self._views[1], self.box)
         self.energies = Energies(self) if energies else None
 
     @property
@@ -131,10 +134,10 @@ class ParticleSolver:
         """Particles, graph, memory of pairs and walls as compiled loops take them, and shifts of periodic images."""
         return self._views
 
-    @property
-    def _reach_ratio(self) -> float:
+    def _find_reach(self, after: Particles | None = None) -> float:
+        """Reach that the next list must have; `after` a change to these particles."""
         reach = self.laws.cutoff_ratio if self.laws.film else 0.0
-        return reach if self.bridges is None else max(reach, self.bridges.reach_ratio)
+        return reach if self.bridges is None else max(reach, bridge_reach_ratio(self, after))
 
     @property
     def gap(self) -> np.ndarray:
@@ -185,21 +188,9 @@ class ParticleSolver:
         Raises UnstableStep if the step is above the stability limit of contacts, and RunFailed, with the particle, if
         a position is NaN, or a particle has left the domain or was pressed through another body.
         """
-        if self.bridges is None:
-            self._advance(step, steps)
-            return
-        while steps > 0:
-            several = min(self.bridges.laws.every, steps)
-            self.bridges.kick(self.box, 0.5 * several * step, backwards=False)
-            self._advance(step, several)
-            self.bridges.update(self._views[1], self.box)
-            self.bridges.kick(self.box, 0.5 * several * step, backwards=True)
-            self.wall.lap("liquid bridges")
-            steps -= several
-
-    def _advance(self, step: float, steps: int) -> None:
-        """Advance by a number of steps without bridges."""
         self.wall.start()
+        if self.bridges is not None and films_outgrow(self, self._reach):
+            self._relist()
         counting, first = self.energies, True
         while steps > 0:
             if self._checking and step > self._accepted:
@@ -238,10 +229,12 @@ class ParticleSolver:
             "walls": checkpoint_walls(self.walls),
             "listed_walls": self._listed_walls,
             **({} if self.energies is None else {"energies": self.energies.checkpoint()}),
-            **({} if self.bridges is None else {"bridges": self.bridges.checkpoint()}),
             "lists": self.lists.checkpoint(),
-            "counters": {"time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": outside},
-        }
+            "counters": {
+                "time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": outside,
+                **({} if self.bridges is None else self.bridges.counters(self._reach)),
+            },
+        }  # fmt: skip
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()` of a solver with the same particles, walls and laws, with the same bits.
@@ -250,17 +243,17 @@ class ParticleSolver:
         """
         walls, listed_walls = state["walls"], state.get("listed_walls", state["walls"])
         self.lists.restore(state["lists"])
-        found = restored_list(state, self.particles, self.edges, self.lists, listed_walls, self._reach_ratio)
+        counters = state["counters"]
+        if self.bridges is not None:
+            self._reach = self.bridges.restore(counters)
+        found = restored_list(state, self.particles, self.edges, self.lists, listed_walls, self._reach)
         self.particles, edges, origin = found
         self.lists.count(self.particles)
-        counters = state["counters"]
         self.time, self.steps = float(counters["time"]), int(counters["steps"])
         self._next_id = max(self._next_id, self.communicator.largest(self.particles.id, default=-1) + 1)
         self._accepted = float(counters["accepted"])
         self._outside = int(counters["outside"]) if self.communicator.rank == 0 else 0
         self.walls, touch = restored_walls(walls), edges.touch.copy()
-        if self.bridges is not None:
-            self.bridges.restore(state["bridges"])
         self._take_list(edges)
         self._origin[:], self._listed_walls = origin, listed_walls
         self.walls.travel[:], self.edges.touch[:] = walls["travel"], touch
@@ -283,19 +276,21 @@ class ParticleSolver:
     def _take_list(self, edges: Edges) -> None:
         """Use a new neighbour list: note the positions it was made at, and make the arrays that loops take."""
         self.edges, self._owned = edges, self.particles.owned
+        if self.laws.bridge is not None and self.laws.bridge.wall_share > 0.0:
+            self.walls = with_room(self.walls, len(edges.first) - edges.between_particles)
         self._origin, self._listed_walls = self.particles.position.copy(), checkpoint_walls(self.walls)
         self._views = (
-            self.particles.view, edges.flat_graph, edges.memory, flat(self.walls), shifts(self.box).reshape(-1),
+            self.particles.view_with(self.laws.particle_fields()), edges.flat_graph, edges.memory, flat(self.walls),
+            shifts(self.box).reshape(-1),
         )  # fmt: skip
         self.walls.travel[:] = 0.0
-        if self.bridges is not None:
-            self.bridges.take(self.particles)
         if len(self.walls.kind):
             particles, graph, memory, walls, _ = self._views
-            wall_contacts(particles, graph, memory.minimum_gap, walls, self.free, self._reach_ratio)
+            wall_contacts(particles, graph, memory.minimum_gap, walls, self.free, self._reach)
 
     def _relist(self) -> None:
         """Make a new neighbour list; memory and present forces of pairs are carried over."""
+        self._reach = self._find_reach()
         self.particles.drop_ghosts()
         self._renew(np.arange(self.particles.count, dtype=np.int32), self.steps)
         if self.lists.made % CHECK_EVERY == 0:
@@ -304,7 +299,7 @@ class ParticleSolver:
     def _renew(self, old_row: np.ndarray, steps: int | None = None) -> None:
         """Make a new neighbour list; arguments as of `NeighbourLists.renewed`."""
         self._outside += self.edges.uses_outside(self._owned)
-        fresh = self.lists.renewed(self.particles, self.walls, self._reach_ratio, old_row, self.edges, steps=steps)
+        fresh = self.lists.renewed(self.particles, self.walls, self._reach, old_row, self.edges, steps=steps)
         self._take_list(fresh)
 
     def insert(self, fresh: Particles) -> np.ndarray:
@@ -319,6 +314,8 @@ class ParticleSolver:
         fresh.id[:] = ids
         joined = self.particles.copy(slice(count))
         added = joined.append(self.lists.own(fresh))
+        if self.bridges is not None:
+            self.bridges.feed(joined.liquid[added])
         self._exchange(joined, np.append(np.arange(count), np.full(len(added), -1)))
         return ids
 
@@ -333,8 +330,11 @@ class ParticleSolver:
         if self.communicator.all(gone):
             raise InputError("gone", number, f"fewer than all {number} particles")
         if self.bridges is not None:
-            self.bridges.release(gone)
+            release_bridges(self, gone)
+            self.bridges.forget(gone)
         taken: Particles = self.particles.copy(np.flatnonzero(gone))
+        if self.bridges is not None:
+            self.bridges.feed(-taken.liquid)
         if number:
             stay = np.flatnonzero(~gone)
             self._exchange(self.particles.copy(stay), stay)
@@ -347,9 +347,8 @@ class ParticleSolver:
         """
         counting = self.energies
         had = 0.0 if counting is None else counting.of_all(self)
+        self._reach = self._find_reach(made)
         self.particles = made
-        if self.bridges is not None:
-            self.bridges.take(made)
         self.lists.count(made)
         self._renew(old_row.astype(np.int32))
         self._accepted, self.lists.listed_at = 0.0, self.steps

@@ -8,10 +8,12 @@ the owned rows; loops over pairs run over all pairs with an owned member.
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
@@ -19,24 +21,44 @@ from cfddem.data.fields import Field, Phase, Table
 
 PARTICLE_FIELDS = (
     Field("position", "m", 3, halo=("start", "motion"), snapshot=True, meaning="position of the centre"),
-    Field("velocity", "m/s", 3, halo=("start", "film", "motion"), snapshot=True, meaning="velocity"),
-    Field("spin", "rad/s", 3, halo=("start", "motion"), snapshot=True, meaning="angular velocity"),
+    Field("velocity", "m/s", 3, halo=("start", "film", "bridge", "motion", "work"), snapshot=True, meaning="velocity"),
+    Field("spin", "rad/s", 3, halo=("start", "bridge", "motion", "work"), snapshot=True, meaning="angular velocity"),
     Field("radius", "m", halo=("start",), snapshot=True, meaning="radius"),
     Field("density", "kg/m3", meaning="density"),
-    Field("inverse_mass", "1/kg", halo=("start",), meaning="1/m, 0 for a particle that nothing moves"),
+    Field("inverse_mass", "1/kg", halo=("start",), meaning="1/(m + added mass), 0 for a particle that nothing moves"),
     Field("inverse_inertia", "1/(kg m2)", meaning="1/I, 0 for a particle that nothing moves"),
     Field("material", "1", dtype=np.int32, halo=("start",), meaning="row of the pair table"),
     Field("id", "1", dtype=np.int64, snapshot=True, meaning="name of the particle, which never changes"),
     Field("viscosity", "Pa s", halo=("start",), meaning="viscosity of the fluid around the particle, for its films"),
-    Field("applied", "N", 3, meaning="applied force: of gravity, the fluid, the user"),
-    Field("force", "N", 3, snapshot=True, meaning="sum of all forces at the last step"),
-    Field("torque", "N m", 3, meaning="sum of all torques at the last step"),
+    Field("applied", "N", 3, meaning="external force; gravity of the particle solver is added to it"),
+    Field("force", "N", 3, halo=("work",), snapshot=True, meaning="sum of all forces at the last step"),
+    Field("torque", "N m", 3, halo=("work",), meaning="sum of all torques at the last step"),
     Field("film_rate", "1/s", halo=("film",), meaning="resistance of all films of the particle over its mass"),
 )
-"""Fields of every particle; laws and users may declare more."""
+"""Fields of every particle; laws and users may declare more.
 
-ParticleArrays = namedtuple("ParticleArrays", [*(field.name for field in PARTICLE_FIELDS), "owned"])  # type: ignore[misc]
-"""The arrays of these fields, as compiled loops take them, and the number of owned rows."""
+With a fluid the coupling sets `applied` in every fluid step, weight and buoyancy included, and the particle solver has
+no gravity of its own. Without a fluid it is the user's.
+"""
+
+_ARRAYS = "ParticleArrays__"
+
+
+@cache
+def arrays_class(names: tuple[str, ...]) -> Any:
+    """The type of the arrays of these fields as compiled loops take them, and the number of owned rows.
+
+    Its name lists the fields, for loops that the compile cache has kept from another process: see `__getattr__`.
+    """
+    made = namedtuple(_ARRAYS + "__".join(names), [*names, "owned"])  # type: ignore[misc]
+    made.__module__ = __name__
+    return globals().setdefault(made.__name__, made)
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith(_ARRAYS):
+        return arrays_class(tuple(name.removeprefix(_ARRAYS).split("__")))
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 class Particles(Table):
@@ -84,7 +106,13 @@ class Particles(Table):
     @property
     def view(self) -> Any:
         """The arrays of `PARTICLE_FIELDS` as loops take them: vectors one after the other; nothing is copied."""
-        return ParticleArrays(*(self[field.name].reshape(-1) for field in PARTICLE_FIELDS), owned=self.owned)  # type: ignore[call-arg]
+        return self.view_with(())
+
+    def view_with(self, fields: Iterable[Field]) -> Any:
+        """The arrays of `PARTICLE_FIELDS` and of more declared fields, as loops take them."""
+        names = (*(field.name for field in PARTICLE_FIELDS), *(field.name for field in fields))
+        made = arrays_class(names)
+        return made(*(self[name].reshape(-1) for name in names), owned=self.owned)
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """Rows of the particles (N, ...) in the order of their ids; zero for ids that are gone."""
@@ -96,14 +124,18 @@ class Particles(Table):
     @property
     def volume(self) -> np.ndarray:
         """Volume of each particle (N,) [m3]."""
-        volume: np.ndarray = (4.0 / 3.0) * np.pi * self.radius**3
-        return volume
+        return sphere_volume(self.radius)
 
     @property
     def mass(self) -> np.ndarray:
         """Mass of each particle (N,) [kg]."""
         mass: np.ndarray = self.density * (4.0 / 3.0) * np.pi * self.radius**3
         return mass
+
+
+def sphere_volume(radius: np.ndarray) -> np.ndarray:
+    """Volume of spheres (N,) [m3]."""
+    return np.asarray((4.0 / 3.0) * np.pi * radius**3)
 
 
 def rows_of(ids: np.ndarray, among: np.ndarray, order: np.ndarray) -> np.ndarray:
@@ -121,15 +153,15 @@ def rows_of(ids: np.ndarray, among: np.ndarray, order: np.ndarray) -> np.ndarray
 
 
 def make_particles(
-    position: np.ndarray,
-    radius: np.ndarray | float,
-    density: np.ndarray | float,
+    position: ArrayLike,
+    radius: ArrayLike,
+    density: ArrayLike,
     *,
-    velocity: np.ndarray | float = 0.0,
-    spin: np.ndarray | float = 0.0,
-    material: np.ndarray | int = 0,
-    viscosity: np.ndarray | float = 0.0,
-    fixed: np.ndarray | bool = False,
+    velocity: ArrayLike = 0.0,
+    spin: ArrayLike = 0.0,
+    material: ArrayLike = 0,
+    viscosity: ArrayLike = 0.0,
+    fixed: ArrayLike = False,
 ) -> Particles:
     """Make particles from what distinguishes them.
 
@@ -141,34 +173,34 @@ def make_particles(
     viscosity of the fluid around the particles [Pa s]
     fixed     (N,) or one for all: particles that nothing moves
     """
-    position = np.ascontiguousarray(np.atleast_2d(np.asarray(position, float)))
-    count = len(position)
+    places = np.ascontiguousarray(np.atleast_2d(np.asarray(position, float)))
+    count = len(places)
 
-    def scalars(value: np.ndarray | float, dtype: type = float) -> np.ndarray:
+    def scalars(value: ArrayLike, dtype: type = float) -> np.ndarray:
         return np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype), (count,))).copy()
 
-    def vectors(value: np.ndarray | float) -> np.ndarray:
+    def vectors(value: ArrayLike) -> np.ndarray:
         return np.ascontiguousarray(np.broadcast_to(np.asarray(value, float), (count, 3))).copy()
 
-    radius, density = scalars(radius), scalars(density)
-    for field, values in (("radius", radius), ("density", density)):
+    radii, densities = scalars(radius), scalars(density)
+    for field, values in (("radius", radii), ("density", densities)):
         refused = np.flatnonzero(~((values > 0) & np.isfinite(values)))
         if len(refused):
             raise InputError(f"{field} of particle {refused[0]}", float(values[refused[0]]), "above 0")
-    mass = density * (4.0 / 3.0) * np.pi * radius**3
+    mass = densities * (4.0 / 3.0) * np.pi * radii**3
     free = ~scalars(fixed, bool)
     return Particles(
         PARTICLE_FIELDS,
         count,
         {
-            "position": position,
+            "position": places,
             "velocity": vectors(velocity),
             "spin": vectors(spin),
-            "radius": radius,
-            "density": density,
+            "radius": radii,
+            "density": densities,
             "inverse_mass": free / mass,
-            "inverse_inertia": free / (0.4 * mass * radius**2),
-            "material": scalars(material, np.int32),  # type: ignore[arg-type]
+            "inverse_inertia": free / (0.4 * mass * radii**2),
+            "material": scalars(material, np.int32),
             "id": np.arange(count),
             "viscosity": scalars(viscosity),
         },

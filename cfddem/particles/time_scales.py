@@ -7,12 +7,22 @@ import math
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
-from cfddem.backend.compile import serial
+from cfddem.backend.compile import inline, serial
 from cfddem.backend.law_choice import FILM_ARGUMENTS, called_by_name
 from cfddem.backend.law_set import specialise
+from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
 from cfddem.particles.interactions.laws import Laws
-from cfddem.particles.interactions.slots import FILM, ContactState, derive, read_memory, tangent_stiffness
+from cfddem.particles.interactions.slots import (
+    BRIDGE,
+    BRIDGE_PULL,
+    FILM,
+    ContactState,
+    bridge_pull,
+    derive,
+    read_memory,
+    tangent_stiffness,
+)
 from cfddem.particles.pair_graph import Edges, memory_class
 from cfddem.particles.state import Particles
 from cfddem.particles.step_criteria import STABLE, TimeScales, check_step, crossing_step
@@ -48,7 +58,8 @@ def time_scales(
             strongest = _film_strength(laws, viscosity, radius, float(row["roughness_gap"]))
             film = min(film, 2.0 * timescales.film_time(mass, strongest, float(row["roughness_gap"])))
     largest_rate = specialise(_largest_rate, laws.choices())
-    remembered = ("minimum_gap", *(field.name for field in laws.contact_law.memory))
+    of_bridges = ("bridge_film", "bridge_volume", "bridge_gap") if laws.bridge is not None else ()
+    remembered = ("minimum_gap", *of_bridges, *(field.name for field in laws.contact_law.memory))
     memory = memory_class(remembered)(*(edges[name] for name in remembered))
     rate = largest_rate(particles.view, edges.flat_graph, memory, walls, gap, table, laws.parameters)
     overlap = STABLE / math.sqrt(max(rate, 1e-300))
@@ -75,11 +86,28 @@ def _lightest_pairs(particles: Particles, table: np.ndarray) -> list[tuple[float
     return found
 
 
+@inline
+def _bridge_stiffness(k, gap, particles, edges, memory, p):
+    """Slope of the pull of the bridge of edge k over its gap, to one side [N/m]."""
+    radius, _ = pair_mass_and_radius(k, particles, edges)
+    change = 1e-3 * memory.bridge_film[k]
+    far = max(gap, change)
+    pulls = bridge_pull(bridge_state(k, far - change, radius, memory, p)) - bridge_pull(
+        bridge_state(k, far, radius, memory, p)
+    )
+    return abs(pulls) / change
+
+
 @serial
 def _largest_rate(particles, edges, memory, walls, gap, table, p):
-    """Bound of the contacts' squared angular frequency: twice the stiffness on a particle over its mass."""
+    """Bound of the squared angular frequency: twice the stiffness of contacts and pulls on a particle over its mass."""
     stiffness = np.zeros(len(particles.radius))
     for k in range(len(gap)):
+        if BRIDGE and BRIDGE_PULL and memory.bridge_film[k] > 0.0:
+            stiff = _bridge_stiffness(k, gap[k], particles, edges, memory, p)
+            stiffness[edges.first[k]] += stiff
+            if k < edges.between_particles:
+                stiffness[edges.second[k]] += stiff
         separated = memory.minimum_gap[k] if FILM else 0.0
         overlap = separated - gap[k]
         if overlap <= 0.0:

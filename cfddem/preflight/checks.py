@@ -14,6 +14,7 @@ from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel
 from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 
 SOFT_OVERLAP, LARGEST_OVERLAP = 0.02, 0.1
 """Overlap over the diameter: above the first a warning, above the second an error [-]."""
@@ -30,7 +31,12 @@ DAY, YEAR = 86_400.0, 365.0 * 86_400.0
 
 
 def find_issues(
-    case: Case, bed: BedEstimate, collision: CollisionEstimate, steps: StepEstimate, cost: CostEstimate
+    case: Case,
+    bed: BedEstimate,
+    collision: CollisionEstimate,
+    wet: WetEstimate | None,
+    steps: StepEstimate,
+    cost: CostEstimate,
 ) -> list[Issue]:
     """All errors and warnings of a case, errors first; a particle larger than the column hides all others."""
     too_large = list(check_particle_size(case))
@@ -42,6 +48,7 @@ def find_issues(
         *check_positions(case),
         *check_overlap(case, collision),
         *check_surface_laws(case),
+        *check_wet(case, wet),
         *check_steps(case, steps),
         *check_cost(case, cost),
     ]
@@ -108,10 +115,12 @@ def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
 def check_surface_laws(case: Case) -> Iterator[Issue]:
     """Check that contact law and rolling resistance have material properties, and that no property is unused."""
     laws, contact = case.laws, case.laws.contact_law
-    if contact.adhesive and case.has_films:
+    if contact.adhesive and (case.has_films or case.liquid is not None):
+        liquid = "bridges" if case.liquid is not None else "films"
+        remedy = "leave out [liquid]" if case.liquid is not None else 'set laws.lubrication = "none"'
         yield Issue(
-            "error", "laws.contact", f"{contact.name} holds for dry solids, but films form between particles",
-            'set laws.lubrication = "none", or another contact law',
+            "error", "laws.contact", f"{contact.name} holds for dry solids, but {liquid} form between particles",
+            f"{remedy}, or another contact law",
         )  # fmt: skip
     if case.run.energy_budget and contact.energy is None:
         yield Issue(

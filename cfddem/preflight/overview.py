@@ -13,6 +13,7 @@ from cfddem.preflight.cost_estimate import CostEstimate
 from cfddem.preflight.issue import WIDTH
 from cfddem.preflight.mixture import bed_drag, net_downward_forces
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
 
 
@@ -33,13 +34,19 @@ class Row:
 
 
 def overview(
-    case: Case, bed: BedEstimate, collision: CollisionEstimate, steps: StepEstimate, cost: CostEstimate
+    case: Case,
+    bed: BedEstimate,
+    collision: CollisionEstimate,
+    wet: WetEstimate | None,
+    steps: StepEstimate,
+    cost: CostEstimate,
 ) -> tuple[Row, ...]:
     """All rows of the overview in order."""
     return (
         *_particles_and_flow(case, bed),
         *_species(case, bed),
         *_collisions_and_film(case, collision),
+        *_bridges(wet),
         *_time_scales(case, bed, steps),
         *_expected(case, bed),
         *_cost(cost),
@@ -104,6 +111,25 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate) -> Iterator[R
         yield Row(group, "overlap / diameter, real", collision.real_overlap / diameter, "", "with the real modulus")
     resting = collision.resting_overlap / diameter
     yield Row(group, "overlap / diameter, at rest", resting, "", "under the weight of the bed")
+
+
+def _bridges(wet: WetEstimate | None) -> Iterator[Row]:
+    if wet is None:
+        return
+    group = "liquid bridges"
+    yield Row(group, "liquid / particle volume", wet.content, "", "at the start, all particles")
+    yield Row(group, "film thickness", wet.film, "m", "on a wet particle")
+    yield Row(group, "bridge volume / R^3", wet.volume_ratio, "", "between two wet particles")
+    carried = "; bridges carry particles" * (wet.bond > 1.0)
+    yield Row(group, "Bo_g", wet.bond, "", f"granular Bond number{carried}")
+    yield Row(group, "Ca", wet.capillary, "", "capillary number at the collision speed")
+    yield Row(group, "St, liquid", wet.stokes, "", "Stokes number at the collision speed")
+    yield Row(group, "critical St, Ennis", wet.ennis, "", "(1 + 1/e) ln(film / minimum gap)")
+    yield Row(group, "critical St, film of the case", wet.critical, "", wet.regime)
+    yield Row(group, "rupture gap", wet.rupture, "m", "slow separation")
+    yield Row(group, "capillary time", wet.capillary_time, "s", "period of a pair held by its bridge")
+    yield Row(group, "film crossing time", wet.crossing_time, "s", "resistance does not limit the step")
+    yield Row(group, "viscous time", wet.relaxation_time, "s", "of a pair at the minimum gap")
 
 
 def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Row]:

@@ -19,6 +19,7 @@ from cfddem.preflight.cost_estimate import estimate_cost
 from cfddem.preflight.issue import WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.step_estimate import estimate_steps
+from cfddem.preflight.wet_estimate import estimate_wet
 
 
 class PreflightError(CfddemError):
@@ -87,10 +88,11 @@ def preflight(case: Case) -> Preflight:
     try:
         bed = estimate_bed(case)
         collision = estimate_collision(case, bed)
+        wet = estimate_wet(case, collision)
         steps = estimate_steps(case, bed)
         cost = estimate_cost(case, bed, steps)
-        issues = find_issues(case, bed, collision, steps, cost)
-        return Preflight(title, overview(case, bed, collision, steps, cost), tuple(issues))
+        issues = find_issues(case, bed, collision, wet, steps, cost)
+        return Preflight(title, overview(case, bed, collision, wet, steps, cost), tuple(issues))
     except InputError as failure:
         reason = f"{'' if failure.value is None else f'{failure.value!r} '}must be {failure.limit}"
         key = failure.field.replace("grid.", "column.")

@@ -17,15 +17,18 @@ from cfddem.case.schema import Case, Column
 from cfddem.coupling.exchange import Exchange
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
+from cfddem.coupling.forces.history import History
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.ghosts import Slabs
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.spray import Spray, box, cone
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
 from cfddem.run.initial_particles import SPECIES, particles_of, periodic_box, periodic_directions
@@ -61,7 +64,6 @@ def parts_of(
         spheres = communicator.by_first(lambda: particles_of(case, table, walls, laws))
     if case.bed.species:
         spheres.declare(SPECIES)
-    require_parallel(case, communicator.size)
     cells = None
     if case.fluid is not None and communicator.size > 1:
         cells = divide(grid_of(case.column), communicator.size, spheres.position)
@@ -88,10 +90,12 @@ def parts_of(
 
 
 def require_parallel(case: Case, ranks: int) -> None:
-    """Refuse what several ranks cannot share yet, by its key."""
-    if ranks > 1 and case.run.energy_budget:
-        limit = "false in a run of several processes"
-        raise InputError("run.energy_budget", True, limit, "count energies in a run of one process")
+    """Refuse what several ranks cannot share, by its key, before anything is prepared."""
+    if ranks > 1 and case.liquid is not None and case.liquid.wall_share > 0.0:
+        limit = "0 in a run of several processes"
+        raise InputError("liquid.wall_share", case.liquid.wall_share, limit, "liquid on walls is for one process")
+    if ranks > 1 and case.fluid is not None:
+        divide(grid_of(case.column), ranks)
 
 
 def division_of(case: Case, spheres: Particles, ranks: int, cells: Division | None) -> Slabs | None:
@@ -147,6 +151,7 @@ def flow_of(
         torque=case.laws.torque,
         viscous_stress=case.laws.viscous_stress,
         agitation=agitation_of(case, fluid, kernel, added_mass),
+        history=None if case.laws.history == "none" else History(case.laws.history, fluid.density, fluid.model),
     )
     return fluid, exchange
 
@@ -202,8 +207,45 @@ def laws_of(case: Case) -> Laws:
         contact=laws.contact_law,
         rolling=laws.rolling_resistance,
         rolling_damping=laws.rolling_damping,
+        bridge=bridge_laws_of(case),
         **own,
     )
+
+
+def bridge_laws_of(case: Case) -> BridgeLaws | None:
+    """Laws of the liquid bridges; None without a liquid."""
+    liquid = case.liquid
+    if liquid is None:
+        return None
+    return BridgeLaws(
+        viscosity=liquid.viscosity,
+        surface_tension=liquid.surface_tension,
+        contact_angle=math.radians(liquid.contact_angle),
+        pull=liquid.pull,
+        film=liquid.film,
+        tangential=liquid.tangential,
+        cut=liquid.cut,
+        rupture=liquid.rupture,
+        redistribution=liquid.redistribution,
+        minimum_gap=liquid.minimum_gap or max(materials_of(case)["roughness_gap"].ravel().tolist()),
+        wall_share=liquid.wall_share,
+        wall_film=liquid.wall_thickness,
+        wall_patch=case.bed.diameter if liquid.wall_share > 0.0 else 0.0,
+    )
+
+
+def spray_of(case: Case, communicator: Communicator = SERIAL) -> Spray | None:
+    """The spray of a case; None without one."""
+    given = case.spray
+    if given is None:
+        return None
+    first, second = given.extremes
+    if given.zone == "cone":
+        zone = cone(first, given.axis, math.radians(given.angle), given.length or 0.0)
+    else:
+        zone = box(first, second - first)
+    end = math.inf if given.end is None else given.end
+    return Spray(given.rate, given.drop_volume, zone, case.bed.seed, given.begin, end, communicator=communicator)
 
 
 def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

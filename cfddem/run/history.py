@@ -28,7 +28,7 @@ from cfddem.case.schema import Case
 from cfddem.io.quantities import TIME, Quantity
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
-from cfddem.run import liquid_bed_measures
+from cfddem.run import liquid_bed_measures, wet_measures
 from cfddem.run.budgets import conservation, energy
 from cfddem.run.liquid_bed_measures import BED, cells_of, open_area
 from cfddem.run.simulation import Simulation
@@ -147,6 +147,14 @@ def _is_mixture(case: Case) -> bool:
     return bool(case.bed.species)
 
 
+def _is_wet(case: Case) -> bool:
+    return case.liquid is not None
+
+
+def _is_sprayed(case: Case) -> bool:
+    return case.spray is not None
+
+
 # ---------------------------------------------------------------- the bed
 
 
@@ -159,7 +167,7 @@ def fluid_steps(simulation: Simulation) -> float:
 @measure("m")
 def bed_height(simulation: Simulation) -> float:
     """Height below which 99 % of the particle volume lies."""
-    return measures.bed_height(simulation.whole("position"), simulation.whole("radius"))
+    return liquid_bed_measures.bed_height(simulation)
 
 
 @measure("1", when=_is_fluid_bed)
@@ -202,7 +210,7 @@ def wall_load(simulation: Simulation) -> float:
 @measure("m2/s2", when=_is_bed)
 def granular_temperature(simulation: Simulation) -> float:
     """Granular temperature, a third of the mean square of the velocity fluctuations."""
-    return measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).mean
+    return liquid_bed_measures.granular_temperature(simulation).mean
 
 
 for _unit, _function in liquid_bed_measures.MEASURES:
@@ -283,6 +291,14 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
 
 
 _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
+
+
+# ---------------------------------------------------------------- liquid
+
+
+for _kind, _found in ((_is_wet, wet_measures.MEASURES), (_is_sprayed, wet_measures.OF_SPRAY)):
+    for _unit, _group, _function in _found:
+        measure(_unit, group=_group, when=_kind)(_function)
 
 
 # ---------------------------------------------------------------- conservation

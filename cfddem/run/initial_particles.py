@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.case.liquid import Liquid
 from cfddem.case.particle_properties import ParticleProperties, particle_properties
 from cfddem.case.schema import Case, Column
 from cfddem.data.fields import Field
@@ -15,6 +16,7 @@ from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import loose_places
 from cfddem.particles.initial.packing import lattice, random_packing
 from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, poured_bed
+from cfddem.particles.interactions.bridge import LIQUID
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.state import Particles
 from cfddem.particles.state import make_particles as make_bodies
@@ -23,6 +25,9 @@ from cfddem.particles.walls.shapes import Wall
 SPECIES = Field("species", dtype=np.int32, snapshot=True, meaning="number of the species, in the order of the case")
 """Declared on the particles of a mixture."""
 
+_WET = 1
+"""Random numbers that choose the wet particles; others use the seed alone."""
+
 
 def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Laws) -> Particles:
     """The particles of a case at the start."""
@@ -30,7 +35,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     diameters = properties.diameter
     if bed.start == "poured":
         spheres = poured_bed(
-            table, diameters, properties.density, walls, *_filling_box(case, float(diameters.max())),
+            table, diameters, properties.density, walls, *_filling_box(case),
             box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
             gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
             at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
@@ -54,8 +59,21 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     )  # fmt: skip
     if bed.species:
         made.declare(SPECIES, properties.species)
+    if case.liquid is not None:
+        made.declare(LIQUID, liquid_of(case.liquid, made.radius, bed.seed))
     _must_be_inside(made.position, case.column.size)
     return made
+
+
+def liquid_of(liquid: Liquid, radius: Array, seed: int) -> Array:
+    """Liquid on every particle at the start (N,) [m3]; which particles are wet depends on the seed only.
+
+    radius  (N,) [m]
+    """
+    volume, count = liquid.volume_on(radius), len(radius)
+    dry = count - round(liquid.share_of_wet_particles * count)
+    volume[np.random.default_rng((seed, _WET)).permutation(count)[:dry]] = 0.0
+    return volume
 
 
 def _suspended(count: int, largest: float, column: Column, seed: int) -> Array:
@@ -79,7 +97,7 @@ def _suspended(count: int, largest: float, column: Column, seed: int) -> Array:
 
 def _spread_evenly(case: Case, properties: ParticleProperties, walls: Sequence[Wall]) -> Array:
     """Places of particles of unequal size: a loose filling, stretched to the height of the column (N, 3) [m]."""
-    corner, size = _filling_box(case, float(properties.diameter.max()))
+    corner, size = _filling_box(case)
     places = loose_places(properties.diameter, walls, corner, size, case.bed.seed, _layer(case, properties))
     top, largest = float((places[:, 2] + 0.5 * properties.diameter).max()), float(properties.diameter.max())
     if top > size[2]:
@@ -102,7 +120,7 @@ def _must_be_inside(position: Array, size: tuple[float, float, float]) -> None:
         raise InputError(f"position of particle {row}", position[row].tolist(), f"inside the column, 0 to {size} m")
 
 
-def _filling_box(case: Case, largest: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+def _filling_box(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Corner and size of the box that particles are poured into [m]."""
     width, depth, height = case.column.size
     if case.column.shape == "box":

@@ -18,19 +18,19 @@ BED = (0.2, 0.8)
 
 def granular_temperature_along(simulation: Simulation) -> float:
     """Mean square of the velocity fluctuations along z."""
-    return float(measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).components[2])
+    return float(granular_temperature(simulation).components[2])
 
 
 def granular_temperature_across(simulation: Simulation) -> float:
     """Mean square of the velocity fluctuations along x or y, mean of the two."""
-    components = measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation)).components
+    components = granular_temperature(simulation).components
     return float(0.5 * (components[0] + components[1]))
 
 
 def layer_deviation(simulation: Simulation) -> float:
     """Standard deviation of the solid fraction of layers of 2.5 diameters within the bed."""
     case = simulation.case
-    low, high = (share * _bed_height(simulation) for share in BED)
+    low, high = (share * bed_height(simulation) for share in BED)
     count = int((high - low) / (LAYER * case.bed.diameter))
     if count < FEWEST_LAYERS:
         return math.nan
@@ -50,7 +50,7 @@ def collisional_pressure(simulation: Simulation) -> float:
     apart = positions[edges.first[touching]] - positions[edges.second[touching]]
     box = np.where(np.isfinite(solver.box), solver.box, 0.0)
     apart -= box * np.rint(apart / np.maximum(box, np.finfo(float).tiny))
-    volume = open_area(simulation.case) * _bed_height(simulation)
+    volume = open_area(simulation.case) * bed_height(simulation)
     return float(simulation.communicator.sum(edges.force[touching] * apart)) / (3.0 * volume)
 
 
@@ -85,5 +85,11 @@ def cells_of(simulation: Simulation) -> measures.Cells:
     return measures.cells_of(simulation.whole("position"), grid.shape, grid.spacing)
 
 
-def _bed_height(simulation: Simulation) -> float:
+def granular_temperature(simulation: Simulation) -> measures.GranularTemperature:
+    """Granular temperature of all particles, in the cells of the fluid."""
+    return measures.granular_temperature(simulation.whole("velocity"), cells_of(simulation))
+
+
+def bed_height(simulation: Simulation) -> float:
+    """Height below which 99 % of the particle volume lies [m]."""
     return measures.bed_height(simulation.whole("position"), simulation.whole("radius"))

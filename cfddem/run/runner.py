@@ -20,12 +20,19 @@ from cfddem.io import checkpoint
 from cfddem.io.folder import make_folder, read_about, require_free
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, of_fields
-from cfddem.io.silent import folder_of_ranks
+from cfddem.io.rank_folders import folder_of_ranks
 from cfddem.io.writer import RunFolder
-from cfddem.particles.collision_events import COLLISION_FIELDS
+from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
 from cfddem.particles.guard import guard
 from cfddem.run import history
 from cfddem.run.progress import Status
+from cfddem.run.resuming import (
+    case_to_continue,
+    require_forward,
+    require_measures,
+    restored,
+    status_restored_on_refusal,
+)
 from cfddem.run.simulation import Callback, Simulation
 from cfddem.run.stopping import StopRequest
 
@@ -128,35 +135,22 @@ class Run:
         folder = Path(folder)
         state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
         before = read_about(folder)
-        if state is not None and until is not None and until < state["time"]:
-            limit = f"at least {state['time']:.6g} s, the time of the run"
-            raise InputError("until", until, limit, "a run only continues forward")
+        require_forward(until, state)
+        case = case_to_continue(folder, state, until)
+        history.require_shared(case, communicator.size)
         written = folder_of_ranks(communicator, lambda: RunFolder.reopen(folder))
-        overrides = ({} if state is None else state["overrides"]) | ({} if until is None else {"run.until": until})
-        case = Case.from_text(written.case_text, str(folder / "case.toml"), overrides)
+        with status_restored_on_refusal(written, before):
+            if state is None:
+                simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
+            else:
+                communicator.by_first(lambda: require_measures(written, case))
+                simulation = restored(case, state, folder, fields, callbacks, communicator)
+                simulation.wall.seconds.update(written.about.get("wall_time", {}))
+        written.drop_after(-1.0 if state is None else simulation.time)
+        run = cls(simulation, written, report)
         if state is None:
-            written.drop_after(-1.0)
-            begun = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
-            run = cls(begun, written, report)
             run._write_initial_state()
-            return run
-        try:
-            communicator.by_first(lambda: _require_measures(written, case))
-            simulation = Simulation.restored(
-                case, state["simulation"], fields=fields, callbacks=callbacks, communicator=communicator
-            )
-        except (KeyError, IndexError, TypeError, InputError) as failure:
-            if before["status"] != "running":
-                written.finish(before["status"], before["message"])
-            if isinstance(failure, InputError):
-                raise
-            remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
-            raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure
-        simulation.wall.seconds.update(written.about.get("wall_time", {}))
-        if simulation.particle_solver.collisions is not None and communicator.rank == 0:
-            simulation.particle_solver.collisions.put_back(state["collisions"])
-        written.drop_after(simulation.time)
-        return cls(simulation, written, report)
+        return run
 
     # ------------------------------------------------------------ run
 
@@ -242,6 +236,12 @@ class Run:
         except KeyboardInterrupt:
             self.folder.finish("stopped", "within a step")
             raise
+        except SystemExit as end:
+            message = f"sys.exit({end.code!r}) was called within the run"
+            self.folder.finish("failed", message)
+            if self.simulation.communicator.size == 1:
+                raise
+            raise RunFailed(message) from end  # the other ranks would wait for this one forever
         except BaseException as failure:
             self.folder.finish("failed", str(failure) or type(failure).__name__)
             raise
@@ -298,17 +298,10 @@ def _prepare_folder(folder: Path, text: str) -> None:
 def quantities_of(simulation: Simulation) -> Quantities:
     """Unit and meaning of everything that a run of a simulation writes."""
     case = simulation.case
+    recorded = COLLISION_FIELDS if simulation.particle_solver.bridges is None else WET_COLLISION_FIELDS
     return {
         "history": history.all_columns(case),
         "particles": of_fields(field for field in simulation.particles.fields.values() if field.snapshot),
         "fluid": of_fields(field for field in FLUID_FIELDS if field.name in RECORDED),
-        "collisions": of_fields(COLLISION_FIELDS) if case.run.record_collisions else {},
+        "collisions": of_fields(recorded) if case.run.record_collisions else {},
     }
-
-
-def _require_measures(written: RunFolder, case: Case) -> None:
-    """Refuse to continue a history with other measures than it began with."""
-    before, now = {*written.last_row}, {*history.all_columns(case)}
-    if before and (odd := sorted((before - now) | (now - {*written.quantities["history"]}))):
-        remedy = "resume the run from the script that declares them"
-        raise InputError("measures", odd, "the same as when the run began", remedy)

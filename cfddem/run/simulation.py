@@ -13,7 +13,8 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.particles.state import Particles, particles_in
 from cfddem.run.budgets.energy import EnergyLedger
-from cfddem.run.build import parts_of
+from cfddem.run.budgets.liquid import LiquidBudget
+from cfddem.run.build import parts_of, spray_of
 from cfddem.run.time_steps import TimeSteps
 
 Callback = Callable[["Simulation"], None]
@@ -48,6 +49,8 @@ class Simulation:
         parts = parts_of(case, progress, particles, communicator)
         self.particle_solver, self.fluid, self.exchange = parts.particle_solver, parts.fluid, parts.exchange
         self.wall = self.particle_solver.wall
+        self.spray = spray_of(case, communicator)
+        self.liquid = None if case.liquid is None else LiquidBudget(self.particle_solver, self.spray)
         self.steps, self.last_step = 0, 0.0
         particle_step = None if state is None else self._restore(state, fields)
         for field in fields:
@@ -100,6 +103,9 @@ class Simulation:
                 with part("energies"):
                     self.energy.after_fluid_step(terms, forces)
         self.particle_solver.advance(step / substeps, substeps)
+        if self.spray is not None:
+            with part("spray"):
+                self.spray(self.owned, self.time)
         if self.energy is not None:
             with part("energies"):
                 self.energy.after_particle_steps()
@@ -126,6 +132,8 @@ class Simulation:
             parts |= {"fluid": self.fluid.checkpoint(), "exchange": self.exchange.checkpoint()}
         if self.energy is not None:
             parts |= {"energy": self.energy.checkpoint()}
+        if self.liquid is not None:
+            parts |= {"liquid": self.liquid.checkpoint()}
         return parts
 
     @classmethod
@@ -150,6 +158,8 @@ class Simulation:
         if self.fluid is not None and self.exchange is not None:
             self.fluid.restore(state["fluid"])
             self.exchange.restore(state["exchange"])
+        if self.liquid is not None:
+            self.liquid.restore(state["liquid"])
         self.steps = int(state["steps"])
         return float(state["particle_step"])
 

@@ -31,8 +31,10 @@ class StopRequest:
 
     def agreed(self, communicator: Communicator) -> bool:
         """Whether a rank has received a signal; then all ranks take it for theirs."""
-        self.signal = communicator.largest([self.signal])
-        return bool(self)
+        found = communicator.largest([self.signal])
+        if found:  # a signal that came during the call is found by the next one
+            self.signal = found
+        return bool(found)
 
     def __enter__(self) -> StopRequest:
         if threading.current_thread() is threading.main_thread():

@@ -48,7 +48,7 @@ class TimeSteps:
     def choose(self, until: float, steps: int) -> tuple[float, int]:
         """Length of the next fluid step [s], and the number of particle steps in it.
 
-        until  time at which some step must end exactly [s]
+        until  output time that must coincide with the end of a step [s]
         steps  number of fluid steps made so far
         """
         if steps % CHECK_EVERY == 0 and steps > 0:

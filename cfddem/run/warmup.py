@@ -11,16 +11,24 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Any
 
 import numpy as np
 
 from cfddem.case.schema import Case
+from cfddem.fluid.momentum import transport
 from closures.compiled import cache_folder
 
 
 def is_new() -> bool:
     """Whether the loops of the fluid are missing in the cache; one of them is checked."""
-    return not any(cache_folder().rglob("momentum.transport*.nbi"))
+    return not _is_cached(transport)
+
+
+def _is_cached(loop: Any) -> bool:
+    """Whether the cache holds a compiled loop, under the name of its file and its own."""
+    name = f"{loop.__module__.rpartition('.')[2]}.{loop.__qualname__}"
+    return any(cache_folder().rglob(f"{name}-*.nbi"))
 
 
 def _cores() -> int:

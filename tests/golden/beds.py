@@ -96,6 +96,7 @@ def settling_sphere() -> State:
             column__width=0.016,
             column__height=0.024,
             bed__positions=[[0.0083, 0.0079, 0.0171]],
+            laws__history="none",
         )
     )
 

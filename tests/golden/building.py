@@ -12,7 +12,7 @@ import numpy as np
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.io import checkpoint
-from cfddem.particles.interactions.bridge import Bridges
+from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -41,9 +41,10 @@ def particles(
     density = np.array([each.density for each in materials])[np.broadcast_to(of, (len(position),))]
     own = {name: state.pop(name) for name in ("velocity", "spin", "fixed") if name in state}
     made = make_particles(np.asarray(position, float), radius, density, material=of, viscosity=film, **own)
-    if "liquid" in state:
-        state["bridges"] = Bridges(made, *state.pop("liquid"))
     choices = {"film": film > 0.0} | state.pop("laws", {})
+    if "liquid" in state:
+        thickness, choices["bridge"] = state.pop("liquid")
+        coat(made, thickness)
     return ParticleSolver(made, pair_table(materials), laws=Laws(**choices), **state)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from cfddem.case.materials import Material
 from cfddem.particles.initial.packing import random_packing
-from cfddem.particles.interactions.bridge_loops import CONSTANT, DAVIS, DEFORMING, EVEN, NASE, STATIC, BridgeLaws
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.walls.shapes import Box, Plane
 from golden.building import particles, stirred_dense_bed
@@ -106,7 +106,7 @@ def bridges_pendular() -> State:
 @golden
 def bridges_deforming() -> State:
     laws = BridgeLaws(
-        viscosity=5.0, surface_tension=0.07, contact_angle=0.26, film=DEFORMING, tangential=DAVIS, minimum_gap=1e-6
+        viscosity=5.0, surface_tension=0.07, contact_angle=0.26, film="deforming", tangential="davis", minimum_gap=1e-6
     )
     return wet(laws)
 
@@ -114,8 +114,8 @@ def bridges_deforming() -> State:
 @golden
 def bridges_static() -> State:
     laws = BridgeLaws(
-        viscosity=0.5, surface_tension=0.07, film=STATIC, cut=CONSTANT, tangential=NASE, pull=EVEN,
-        minimum_gap=1e-6, every=4,
+        viscosity=0.5, surface_tension=0.07, film="static", cut="constant", tangential="nase", pull="constant",
+        rupture="film", minimum_gap=1e-6,
     )  # fmt: skip
     return wet(laws)
 

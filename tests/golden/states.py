@@ -98,11 +98,12 @@ def liquid(run: ParticleSolver) -> State:
     """Liquid in films and in bridges."""
     bridges = run.bridges
     assert bridges is not None
-    order = np.argsort(run.particles.id)
+    order, bodies = np.argsort(run.particles.id), bridges.bodies
+    sorted_bridges = np.lexsort(bodies.T[::-1])
     return {
-        "film_thickness": bridges.film[order],
-        "bridge_pair": np.stack([bridges.joined.first, bridges.joined.second], axis=1),
-        "bridge_volume": bridges.joined.volume.copy(),
+        "film_thickness": bridges.thickness[order],
+        "bridge_pair": bodies[sorted_bridges],
+        "bridge_volume": bridges.volume[sorted_bridges],
         "bridge_counts": np.array([bridges.formed, bridges.broken]),
     }
 

@@ -1,7 +1,8 @@
 r"""Added-mass force, :math:`C\rho V(Du/Dt - dv/dt)`.
 
-The inertia of a particle contains the added mass :math:`C\rho V` (`inverse_mass`), which is the second part of the
-force. What remains is :math:`C\rho V\,Du/Dt`, with the acceleration of the fluid that passes the particle,
+The part :math:`-C\rho V\,dv/dt` is moved to the left side of the equation of motion: `inverse_mass` is
+:math:`1/(m + C\rho V)`. What remains is :math:`C\rho V\,Du/Dt`, with the acceleration of the fluid that passes the
+particle,
 
 .. math:: \frac{Du}{Dt} = \frac{du}{dt} + ((u-v)\cdot\nabla)u
 
@@ -93,7 +94,7 @@ class AddedMass:
         return force
 
     def deferred_momentum(self, particles: Particles) -> Array:
-        """Momentum that added mass has taken from every particle; the fluid gets it in the next step (N, 3) [N s].
+        r""":math:`C\rho V\,\Delta v` over the last fluid step (N, 3) [N s]; the fluid loses or gains it one step late.
 
         C is still that of the step in which the particles have moved.
         """

@@ -40,7 +40,7 @@ from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
 from closures.added_mass import zuber
-from closures.agitation import SHORT, force_deviation, force_rate
+from closures.agitation import SHORT, force_deviation, force_rate, isolated_drag_factor
 from closures.registry import Law, law_of
 
 PROCESS = Field(
@@ -265,6 +265,12 @@ def _slip_numbers(slip, n, voidage, radius, viscosity, density):
     return size, direction, voidage[n] * density * size * 2.0 * radius[n] / max(viscosity[n], 1e-300)
 
 
+@inline
+def _along(process, n, direction):
+    """Component of a process along the mean slip."""
+    return process[n, 0] * direction[0] + process[n, 1] * direction[1] + process[n, 2] * direction[2]
+
+
 @threaded
 def _fluctuate(
     process, names, slip, voidage, radius, viscosity, ratio, density, shares, time_share, step, counter, ranges, seen
@@ -293,7 +299,7 @@ def _fluctuate(
         solid = 1.0 - voidage[n]
         along = size * math.sqrt(variance(solid, reynolds, 1.0, ratio[n]))
         across = size * math.sqrt(variance(solid, reynolds, 0.0, ratio[n]))
-        part = process[n, 0] * direction[0] + process[n, 1] * direction[1] + process[n, 2] * direction[2]
+        part = _along(process, n, direction)
         for k in range(3):
             parallel = along * part * direction[k]
             normal = across * (process[n, k] - part * direction[k])
@@ -326,9 +332,9 @@ def _fluctuate_force(
         process[n, 0] = kept * process[n, 0] + new * a
         process[n, 1] = kept * process[n, 1] + new * b
         process[n, 2] = kept * process[n, 2] + new * c
-        alone = 3.0 * math.pi * viscosity[n] * diameter * (1.0 + 0.15 * reynolds**0.687) * voidage[n] * size
+        alone = 3.0 * math.pi * viscosity[n] * diameter * isolated_drag_factor(reynolds) * voidage[n] * size
         deviation = force_deviation(solid) * alone
-        part = process[n, 0] * direction[0] + process[n, 1] * direction[1] + process[n, 2] * direction[2]
+        part = _along(process, n, direction)
         for k in range(3):
             normal = process[n, k] - part * direction[k]
             force[n, k] = deviation * (shares[0] * part * direction[k] + shares[1] * normal)

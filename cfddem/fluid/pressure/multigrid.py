@@ -59,6 +59,7 @@ class Level:
         self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
         self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
         self.sums = np.zeros(self.shape[0])
+        self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
 
     @property
     def coefficients(self) -> tuple[Array, Array, Array, Array]:
@@ -224,9 +225,9 @@ class PressureEquation:
         coarse = self.levels[depth + 1]
         smooth(*system, level.inverse, SWEEPS, False)
         apply(level.x, level.ax, level.ay, level.az, level.diagonal, level.image, level.sums)
-        restrict(level.b, level.image, level.factors, coarse.b)
+        restrict(level.b, level.image, level.factors, level.shift, coarse.b)
         self._cycle(depth + 1)
-        prolong(coarse.x, level.factors, level.x)
+        prolong(coarse.x, level.factors, level.shift, level.x)
         smooth(*system, level.inverse, SWEEPS, True)
 
     def _remove_means(self, values: Array) -> None:

@@ -86,30 +86,33 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
 
 
 @threaded
-def restrict(b, image, factors, coarse_b):
-    """Residual b - image of a level, summed over the cells that make one coarse cell."""
+def restrict(b, image, factors, shift, coarse_b):
+    """Residual b - image of a level, summed over the cells that make one coarse cell.
+
+    shift  along x, y, z; cell k lies in the coarse cell (k + shift) // factor
+    """
     nz, ny, nx = b.shape
     fx, fy, fz = factors[0], factors[1], factors[2]
     for kc in prange(coarse_b.shape[0]):
         for jc in range(coarse_b.shape[1]):
             for ic in range(coarse_b.shape[2]):
                 total = 0.0
-                for k in range(kc * fz, min(kc * fz + fz, nz)):
-                    for j in range(jc * fy, min(jc * fy + fy, ny)):
-                        for i in range(ic * fx, min(ic * fx + fx, nx)):
+                for k in range(max(kc * fz - shift[2], 0), min(kc * fz - shift[2] + fz, nz)):
+                    for j in range(max(jc * fy - shift[1], 0), min(jc * fy - shift[1] + fy, ny)):
+                        for i in range(max(ic * fx - shift[0], 0), min(ic * fx - shift[0] + fx, nx)):
                             total += b[k, j, i] - image[k, j, i]
                 coarse_b[kc, jc, ic] = total
 
 
 @threaded
-def prolong(coarse_x, factors, x):
-    """Add the coarse correction to every cell below it."""
+def prolong(coarse_x, factors, shift, x):
+    """Add the coarse correction to every cell below it; `shift` as of `restrict`."""
     nz, ny, nx = x.shape
     for k in prange(nz):
         for j in range(ny):
-            source = coarse_x[k // factors[2], j // factors[1]]
+            source = coarse_x[(k + shift[2]) // factors[2], (j + shift[1]) // factors[1]]
             for i in range(nx):
-                x[k, j, i] += source[i // factors[0]]
+                x[k, j, i] += source[(i + shift[0]) // factors[0]]
 
 
 @threaded

@@ -44,7 +44,7 @@ class Projection:
         """
         fluid, fields, equation, missing = self.fluid, self.fluid.fields, self._equation, self._missing
         ax, ay, az, anchor = equation.coefficients
-        gather(
+        assemble(
             velocity, fields.mobility, voidage, fields.new_voidage_rate, fluid.open_cells, fresh,
             fluid.boundaries.halo.ends, fluid.face_areas, fluid.inverse_spacing, ax, ay, az, anchor, missing,
         )  # fmt: skip
@@ -64,7 +64,7 @@ class Projection:
 
 
 @threaded
-def gather(
+def assemble(
     velocity, mobility, voidage, rate, open_cells, fresh, ends, areas, inverse, ax, ay, az, anchor, b
 ):  # fmt: skip
     """Right-hand side of the pressure equation and, if fresh, its coefficients.

@@ -14,12 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.backend.communicator import Communicator
-from cfddem.backend.compile import prange, threaded
 from cfddem.fluid.block import Block
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure.multigrid import SWEEPS, Level, PressureEquation, coarsen, hierarchy
-from cfddem.fluid.pressure.multigrid_loops import apply, colour_of, smooth_colour
+from cfddem.fluid.pressure.multigrid_loops import apply, colour_of, prolong, restrict, smooth_colour
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 SMALL = 5_000
@@ -41,33 +40,6 @@ def pressure_equation(
     if isinstance(grid, Block) and communicator.size > 1:
         return SharedPressureEquation(grid, grid.borders(periodic)[0], closed_regions, communicator, outlets)
     return PressureEquation(grid, closed_regions, communicator, outlets=outlets)
-
-
-@threaded
-def restrict_shared(residual, factors, shift, coarse_b):
-    """Residual of a level, summed over the cells that make one coarse cell; cell k lies in (k + shift) // factor."""
-    nz, ny, nx = residual.shape
-    fx, fy, fz = factors[0], factors[1], factors[2]
-    for kc in prange(coarse_b.shape[0]):
-        for jc in range(coarse_b.shape[1]):
-            for ic in range(coarse_b.shape[2]):
-                total = 0.0
-                for k in range(max(kc * fz - shift[2], 0), min(kc * fz - shift[2] + fz, nz)):
-                    for j in range(max(jc * fy - shift[1], 0), min(jc * fy - shift[1] + fy, ny)):
-                        for i in range(max(ic * fx - shift[0], 0), min(ic * fx - shift[0] + fx, nx)):
-                            total += residual[k, j, i]
-                coarse_b[kc, jc, ic] = total
-
-
-@threaded
-def prolong_shared(coarse_x, factors, shift, x):
-    """Add the coarse correction to every cell below it, ghosts included."""
-    nz, ny, nx = x.shape
-    for k in prange(nz):
-        for j in range(ny):
-            source = coarse_x[(k + shift[2]) // factors[2], (j + shift[1]) // factors[1]]
-            for i in range(nx):
-                x[k, j, i] += source[(i + shift[0]) // factors[0]]
 
 
 class SharedLevel(Level):
@@ -95,7 +67,6 @@ class SharedLevel(Level):
         shape[2 - self.axis] = self.stop - self.first + 2
         super().__init__((shape[0], shape[1], shape[2]), factors, outlets)
         merged = factors[self.axis] == 2
-        self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
         self.shift[self.axis] = int(merged and self.first % 2 == 0)
         self.straddled = bool(merged and (starts[1:-1] % 2).any())  # local: all ranks know all starts
         self.next_starts = -(-starts // factors[self.axis])
@@ -138,12 +109,21 @@ class SharedLevel(Level):
     def restrict_to(self, coarse: Level) -> None:
         """Write the right-hand side of the coarser grid."""
         apply(self.x, self.ax, self.ay, self.az, self.diagonal, self.image, self.sums)
-        np.subtract(self.b, self.image, out=self.image)
-        if self.straddled:
-            self.fill(self.image)
-        if self.stop == self.starts[-1]:
-            self.image[layers(self.axis, -1)] = 0.0  # the last coarse cell may have one fine cell only
-        restrict_shared(self.image, self.factors, self.shift, coarse.b)
+        self.take_residual_of_neighbours()
+        restrict(self.b, self.image, self.factors, self.shift, coarse.b)
+
+    def take_residual_of_neighbours(self) -> None:
+        """Write the residual of the ghosts to their right-hand side, for coarse cells that hold cells of two ranks."""
+        self.without_ghosts(self.image)
+        self.without_ghosts(self.b)
+        if not self.straddled:
+            return
+        below, ends, above = layers(self.axis, 0), layers(self.axis, [0, 1, -2, -1]), layers(self.axis, -1)
+        residual = self.b[ends] - self.image[ends]
+        self.fill(residual)
+        self.b[below] = residual[below]
+        if self.stop < self.starts[-1]:  # the last coarse cell may have one fine cell only
+            self.b[above] = residual[above]
 
     def gather_to(self, whole: Level, values: Array, target: Array) -> None:
         """Copy the cells of all ranks into an array of the same grid that every rank has."""
@@ -243,5 +223,5 @@ class SharedPressureEquation(PressureEquation):
         level.sweep(backward=False)
         level.restrict_to(coarse)
         self._cycle(depth + 1)
-        prolong_shared(coarse.x, level.factors, level.shift, level.x)
+        prolong(coarse.x, level.factors, level.shift, level.x)
         level.sweep(backward=True)

@@ -1,174 +1,239 @@
-"""Liquid bridges between the particles of a run.
+"""Liquid bridges of the edges: what bodies and pairs remember, resistance, impulse over a step, and pull.
 
-Every sphere carries liquid, the field `liquid`. A bridge forms where the films of two spheres overlap, from the liquid
-that each has in the shadow of the other. It breaks where it is stretched too far; half of its liquid goes to each
-sphere. In between it pulls and resists, by the laws of :class:`~cfddem.particles.interactions.bridge_loops.BridgeLaws`.
-Impulses are applied one bridge after the other, so bridges are for a run in one process.
+Every particle carries liquid, the field `liquid`. A bridge joins two particles, or a particle and a wall, from where
+their films touch until it is stretched too far (:mod:`~cfddem.particles.interactions.bridge_changes`).
+
+The resistance of a bridge acts by impulses between the kick and the drift, as films do: each body gives each of its
+bridges the part of its mass that the bridge has in the body's total resistance, and the pair so made is solved. Along
+the line of centres the resistance is integrated over the gap, so that impulses add up to the potential between the
+first gap and the last. Across it the solution is exact for a fixed gap. The pull is an ordinary force.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.compile import inline, part, prange
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.bridge_loops import BridgeLaws, Joined, kick, new_contacts, solid_gaps, survey
-from cfddem.particles.pair_graph import Graph
+from cfddem.particles.interactions.bridge_law import BridgeNumbers
+from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, speed_after_bridge
+from cfddem.particles.interactions.film import clamp_speed
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
+from cfddem.particles.interactions.slots import (
+    BRIDGE_FILM,
+    BRIDGE_PULL,
+    BRIDGE_SLIDING,
+    CUT_CONSTANT,
+    BridgeState,
+    bridge_pull,
+    bridge_resistance,
+    sliding_resistance,
+)
+from cfddem.particles.pair_graph import edge_role, geometry
 from cfddem.particles.state import Particles
-from closures.capillary import liquid_share
+from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
 
-LIQUID = Field("liquid", "m3", snapshot=True, meaning="volume of the liquid film on the particle, without bridges")
+LIQUID = Field(
+    "liquid", "m3", halo=("start",), snapshot=True, meaning="volume of the liquid film on the particle, without bridges"
+)
 
-_NONE = Joined(*(np.zeros(0, np.int64) for _ in range(2)), *(np.zeros(0) for _ in range(3)))
+PARTICLE_FIELDS = (
+    LIQUID,
+    Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
+    Field("bridge_load", "kg/s", halo=("bridge",), meaning="resistance of all bridges of the particle"),
+    Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),
+    Field("bridges_formed", dtype=np.int64, meaning="bridges that have formed, counted by the lower id"),
+    Field("bridges_broken", dtype=np.int64, meaning="bridges that have broken, counted by the lower id"),
+)
+"""Fields of particles that carry liquid."""
+
+FIELDS = (
+    Field("bridge_film", "m", role="memory", meaning="thickness of both films when the bridge formed; 0 without one"),
+    Field("bridge_volume", "m3", role="memory", meaning="volume of the liquid in the bridge"),
+    Field("bridge_gap", "m", role="memory", meaning="minimum gap of the bridge"),
+    Field("bridge_accounted", "m", role="memory", meaning="gap up to which the impulse of the bridge has been given"),
+    Field("bridge_resistance", "kg/s", role="memory", meaning="resistance of the bridge; 0 where it has none"),
+    Field("bridge_force", "N", 3, "memory", meaning="pull of the bridge on the first body"),
+    Field("bridge_impulse", "N s", 3, "scratch", meaning="impulse of the bridge in this step, on the first body"),
+    Field("bridge_couple", "N s", 3, "scratch", meaning="angular impulse per radius, the same on both bodies"),
+    Field(
+        "bridge_change", role="scratch", dtype=np.int8, meaning="1 where a bridge forms, -1 where one breaks, else 0"
+    ),
+)
+"""What pairs remember of their bridges."""
+
+FLAT = 1e100
+"""Radius of a wall, in the laws that share liquid [m]."""
 
 
-class Bridges:
-    """All bridges of a run, an argument of :class:`cfddem.particles.solver.ParticleSolver`.
+def film_volume(radius: np.ndarray, thickness: np.ndarray | float) -> np.ndarray:
+    """Volume of a layer of liquid all over a sphere (N,) [m3].
 
-    particles  the particles; they get the field `liquid`
-    film       thickness of the liquid on each at the start (N,), or one for all [m]
-    laws       laws of the bridges
+    radius     of the spheres (N,) [m]
+    thickness  of the layer (N,), or one for all [m]
     """
-
-    communicator: Communicator = SERIAL
-
-    def __init__(self, particles: Particles, film: np.ndarray | float, laws: BridgeLaws) -> None:
-        laws.check()
-        thickness = np.broadcast_to(np.asarray(film, float), (particles.count,))
-        refused = np.flatnonzero(~((thickness >= 0.0) & np.isfinite(thickness)))
-        if len(refused):
-            row = int(refused[0])
-            raise InputError(f"film of particle {particles.id[row]}", float(thickness[row]), "at least 0 and finite")
-        self.laws, self.joined = laws, _NONE
-        self.formed, self.broken = 0, 0
-        self._row = np.zeros(0, np.int64)
-        self.take(particles)
-        particles.declare(LIQUID)
-        particles.liquid = (
-            4.0 / 3.0 * np.pi * thickness * (thickness**2 + 3.0 * particles.radius * (thickness + particles.radius))
-        )
-
-    # ------------------------------------------------------------ state
-
-    @property
-    def count(self) -> int:
-        """Number of bridges."""
-        return len(self.joined.first)
-
-    @property
-    def film(self) -> np.ndarray:
-        """Thickness of the film of each sphere, without the liquid in bridges (N,) [m]."""
-        return _thickness(self._particles.liquid, self._particles.radius)
-
-    @property
-    def liquid(self) -> float:
-        """All liquid of the run, in films and bridges [m3]."""
-        return self.communicator.sum(self._particles.liquid) + self.communicator.sum(self.joined.volume)  # type: ignore[no-any-return]
-
-    @property
-    def agglomerates(self) -> np.ndarray:
-        """Number of the agglomerate that each sphere belongs to: spheres joined by bridges (N,), by row."""
-        count = self._particles.count
-        ends = self._row[self.joined.first], self._row[self.joined.second]
-        joined = coo_matrix((np.ones(self.count), ends), shape=(count, count))
-        return connected_components(joined, directed=False)[1]  # type: ignore[no-any-return]
-
-    @property
-    def reach_ratio(self) -> float:
-        """Largest gap at which two films can touch, over R* [-]; the range of neighbour lists."""
-        returned = self._particles.liquid.copy()
-        for end in (self.joined.first, self.joined.second):
-            np.add.at(returned, self._row[end], 0.5 * self.joined.volume)
-        radius = self._particles.radius
-        return 4.0 * self.communicator.largest(_thickness(returned, radius)) / self.communicator.smallest(radius)  # type: ignore[no-any-return]
-
-    def gaps(self, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gap of every bridge, and how far it can still be stretched (n,), (n,) [m]."""
-        gap, room = np.empty(self.count), np.empty(self.count)
-        survey(self.joined, self._row, self._particles.view, box, self.laws, gap, room)
-        return gap, room
-
-    # ------------------------------------------------------------ in a run
-
-    def kick(self, box: np.ndarray, span: float, backwards: bool) -> None:
-        """Give every sphere the impulses of its bridges over a time [s], in the order of bridges or in reverse."""
-        kick(self.joined, self._row, self._particles.view, box, self.laws, span, backwards)
-
-    def update(self, edges: Graph, box: np.ndarray) -> None:
-        """Break bridges that are stretched too far, and join spheres whose films overlap."""
-        self._break(self.gaps(box)[1] < 0.0)
-        self._form(edges, box)
-
-    def take(self, particles: Particles) -> None:
-        """Continue with these particles, the same ones in another order or others."""
-        self._particles = particles
-        self._row = np.full(max(self.communicator.largest(particles.id, default=-1) + 1, len(self._row)), -1, np.int64)
-        self._row[particles.id] = np.arange(particles.count)
-
-    def release(self, gone: np.ndarray) -> None:
-        """Break the bridges of particles that will be removed; each keeps its half of the liquid.
-
-        gone  rows of the particles (N,) bool
-        """
-        self._break(gone[self._row[self.joined.first]] | gone[self._row[self.joined.second]])
-
-    def checkpoint(self) -> dict[str, Any]:
-        """Everything that the next step depends on, besides the particles."""
-        kept = {name: each.copy() for name, each in self.joined._asdict().items()}
-        return {"joined": kept, "formed": self.formed, "broken": self.broken}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()`."""
-        self.joined = Joined(**{name: np.array(each) for name, each in state["joined"].items()})
-        self.formed, self.broken = int(state["formed"]), int(state["broken"])
-
-    def _break(self, broken: np.ndarray) -> None:
-        """Break bridges (n,) bool; half of the liquid of each goes to each sphere."""
-        count = int(np.count_nonzero(broken))  # local: bridges are for one process
-        if not count:
-            return
-        for end in (self.joined.first, self.joined.second):
-            np.add.at(self._particles.liquid, self._row[end[broken]], 0.5 * self.joined.volume[broken])
-        self.joined = Joined(*(each[~broken] for each in self.joined))
-        self.broken += count
-
-    def _form(self, edges: Graph, box: np.ndarray) -> None:
-        """Join spheres whose films overlap."""
-        most, particles = len(self._row), self._particles.view
-        keys = self.joined.first * most + self.joined.second
-        found, film = np.empty(64, np.int64), self.film
-        while (number := new_contacts(edges, particles, box, film, keys, most, found)) > len(found):
-            found = np.empty(number, np.int64)
-        if number == 0:
-            return
-        fresh = np.unique(found[:number])
-        first, second = fresh // most, fresh % most
-        rows = self._row[first], self._row[second]
-        volume = np.array([self._draw(int(i), int(j)) for i, j in zip(first, second)])
-        new = Joined(first, second, volume, film[rows[0]] + film[rows[1]], np.zeros(len(fresh)))
-        solid_gaps(new, self._row, particles, box, self.laws)
-        order = np.argsort(np.concatenate([keys, fresh]))
-        self.joined = Joined(*(np.concatenate(pair)[order] for pair in zip(self.joined, new)))
-        self.formed += len(fresh)
-
-    def _draw(self, i: int, j: int) -> float:
-        """Take the liquid of a new bridge from the films of its two spheres, by id; returns its volume [m3]."""
-        drawn = 0.0
-        for one, other in ((i, j), (j, i)):
-            radii = (float(self._particles.radius[self._row[each]]) for each in (one, other))
-            share = self._particles.liquid[self._row[one]] * liquid_share(*radii)
-            self._particles.liquid[self._row[one]] -= share
-            drawn += share
-        return drawn
+    volume: np.ndarray = 4.0 / 3.0 * np.pi * thickness * (thickness**2 + 3.0 * radius * (thickness + radius))
+    return volume
 
 
-def _thickness(volume: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Thickness of a layer of liquid all over a sphere (N,) [m]."""
-    swell = 3.0 * volume / (4.0 * np.pi * radius**3)
-    thickness: np.ndarray = radius * np.expm1(np.log1p(swell) / 3.0)
+def film_thickness(radius: np.ndarray, volume: np.ndarray) -> np.ndarray:
+    """Thickness of a layer of liquid all over a sphere (N,) [m]; see `film_volume`."""
+    thickness: np.ndarray = radius * np.expm1(np.log1p(3.0 * volume / (4.0 * np.pi * radius**3)) / 3.0)
     return thickness
+
+
+def coat(particles: Particles, thickness: np.ndarray | float) -> None:
+    """Give particles a film of liquid.
+
+    thickness  of the film on each (N,), or one for all [m]
+    """
+    films = np.broadcast_to(np.asarray(thickness, float), (particles.count,))
+    refused = np.flatnonzero(~((films >= 0.0) & np.isfinite(films)))
+    if len(refused):
+        row = int(refused[0])
+        raise InputError(f"film of particle {particles.id[row]}", float(films[row]), "at least 0 and finite")
+    particles.declare(LIQUID)
+    particles.liquid = film_volume(particles.radius, films)
+
+
+@inline
+def numbers_of(p):
+    """The numbers of the bridge laws, among those that loops take."""
+    return BridgeNumbers(p[-9], p[-8], p[-7], p[-6], p[-5], p[-4], p[-3], p[-2])
+
+
+@inline
+def bridge_state(k, gap, reduced_radius, memory, p, capillary_number=0.0):
+    """The bridge of edge k as its laws see it, at a gap."""
+    n = numbers_of(p)
+    return BridgeState(
+        gap, memory.bridge_film[k], memory.bridge_volume[k], reduced_radius, memory.bridge_gap[k],
+        n.viscosity, n.surface_tension, n.contact_angle, capillary_number, p,
+    )  # fmt: skip
+
+
+@inline
+def resistance_across(state):
+    """Resistance to sliding, cut below h_min as the film is."""
+    floor = held_gap(state)
+    if not BRIDGE_SLIDING or (state.gap < floor and not CUT_CONSTANT):
+        return 0.0
+    return sliding_resistance(at_gap(state, max(state.gap, floor)))
+
+
+@inline
+def resistance_along(state):
+    """Resistance along the line of centres, cut below h_min."""
+    floor = held_gap(state)
+    if not BRIDGE_FILM or (state.gap < floor and not CUT_CONSTANT):
+        return 0.0
+    return bridge_resistance(at_gap(state, max(state.gap, floor)))
+
+
+@inline
+def renew_bridge(k, particles, edges, memory, shift, p):
+    """Resistance and pull of the bridge of edge k at the present positions."""
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    state = bridge_state(k, gap, reduced_radius, memory, p)
+    memory.bridge_resistance[k] = resistance_along(state) + resistance_across(state)
+    if BRIDGE_PULL:
+        put(memory.bridge_force, k, times(-bridge_pull(state) / distance, separation))
+
+
+@part
+def renew_bridges(particles, edges, memory, shift, p):
+    """Resistance and pull of all bridges."""
+    for k in prange(len(edges.first)):
+        if memory.bridge_film[k] > 0.0:
+            renew_bridge(k, particles, edges, memory, shift, p)
+
+
+@inline
+def no_impulse(k, memory):
+    """The bridge of edge k gives no impulse in this step."""
+    put(memory.bridge_impulse, k, NOTHING)
+    put(memory.bridge_couple, k, NOTHING)
+
+
+@part
+def find_bridge_impulses(particles, edges, memory, shift, p, step):
+    """Impulses of all bridges over the coming step."""
+    for k in prange(len(edges.first)):
+        if memory.bridge_resistance[k] > 0.0:
+            bridge_impulse(k, particles, edges, memory, shift, p, step)
+        elif memory.bridge_film[k] > 0.0:
+            no_impulse(k, memory)
+
+
+@inline
+def _rates(k, particles, edges, memory, lever):
+    """Inverse masses that both bodies give the bridge of edge k, along and across the line of centres [1/kg].
+
+    lever  arm of the impulse over the radius [-]
+    """
+    i, j = edges.first[k], edges.second[k]
+    load = particles.bridge_load[i] / memory.bridge_resistance[k]
+    arm = lever * particles.radius[i]
+    along = load * particles.inverse_mass[i]
+    across_it = along + load * arm * arm * particles.inverse_inertia[i]
+    if k < edges.between_particles:
+        load = particles.bridge_load[j] / memory.bridge_resistance[k]
+        arm = lever * particles.radius[j]
+        along += load * particles.inverse_mass[j]
+        across_it += load * (particles.inverse_mass[j] + arm * arm * particles.inverse_inertia[j])
+    return along, across_it
+
+
+@inline
+def bridge_impulse(k, particles, edges, memory, shift, p, step):
+    """Impulse and couple of the bridge of edge k over the coming step.
+
+    Lever arms add up to the distance of the centres, so that angular momentum is kept.
+    """
+    i, j = edges.first[k], edges.second[k]
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    normal = times(1.0 / distance, separation)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    state = bridge_state(k, gap, reduced_radius, memory, p)
+    velocity = relative_velocity(k, particles, edges)
+    turning, radii = times(particles.radius[i], at(particles.spin, i)), particles.radius[i]
+    if k < edges.between_particles:
+        turning, radii = plus(turning, times(particles.radius[j], at(particles.spin, j))), radii + particles.radius[j]
+    lever = distance / radii
+    along, sideways = _rates(k, particles, edges, memory, lever)
+
+    speed = new_speed = dot(velocity, normal)
+    if BRIDGE_FILM:
+        new_speed = speed_after_bridge(speed, state, memory.bridge_accounted[k], step, along)
+        new_speed = clamp_speed(new_speed, speed)
+    memory.bridge_accounted[k] = gap + step * new_speed
+    impulse = times((new_speed - speed) / along, normal)
+    couple = NOTHING
+    if BRIDGE_SLIDING:
+        resistance = resistance_across(at_gap(state, gap + 0.5 * step * new_speed))
+        slip = minus(across(velocity, normal), times(lever, cross(turning, normal)))
+        drag = times(math.expm1(-step * resistance * sideways) / sideways, slip)
+        impulse = plus(impulse, drag)
+        couple = times(-lever, cross(normal, drag))
+    put(memory.bridge_impulse, k, impulse)
+    put(memory.bridge_couple, k, couple)
+
+
+@part
+def apply_bridge_impulses(particles, edges, memory):
+    """Give every particle the impulses of its bridges."""
+    for i in prange(particles.owned):
+        impulse, couple = NOTHING, NOTHING
+        for place in range(edges.start[i], edges.start[i + 1]):
+            k, sign = edge_role(edges.incident[place])
+            if memory.bridge_resistance[k] > 0.0:
+                impulse = plus(impulse, times(sign, at(memory.bridge_impulse, k)))
+                couple = plus(couple, at(memory.bridge_couple, k))
+        gain = times(particles.inverse_mass[i], impulse)
+        put(particles.velocity, i, plus(at(particles.velocity, i), gain))
+        gain = times(particles.inverse_inertia[i] * particles.radius[i], couple)
+        put(particles.spin, i, plus(at(particles.spin, i), gain))

@@ -10,7 +10,8 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
-from cfddem.particles.interactions import contact, film, rolling
+from cfddem.particles.interactions import bridge, contact, film, rolling
+from cfddem.particles.interactions.bridge_law import NO_BRIDGE, BridgeLaws
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
@@ -39,6 +40,7 @@ class Laws(NamedTuple):
     minimum_gap           a user's law of the minimum gap; the built-in elastohydrodynamic one if not given
     lubrication           a user's film: its resistance, or a
                           :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
+    bridge                laws of liquid bridges, where particles carry liquid
     """
 
     film: bool = False
@@ -51,10 +53,11 @@ class Laws(NamedTuple):
     rolling_damping: float = 0.3
     minimum_gap: Callable[..., float] | None = None
     lubrication: Callable[..., float] | FilmLaw | None = None
+    bridge: BridgeLaws | None = None
 
     def dry(self) -> Laws:
-        """The same laws without films."""
-        return self._replace(film=False, minimum_gap=None, lubrication=None)
+        """The same laws without films and bridges."""
+        return self._replace(film=False, minimum_gap=None, lubrication=None, bridge=None)
 
     def check(self) -> None:
         """Refuse unknown words, laws that cannot be compiled, and choices that exclude each other."""
@@ -65,6 +68,8 @@ class Laws(NamedTuple):
         check_contact_law(self.contact_law)
         if self.contact_law.adhesive and self.film:
             raise InputError("contact", self.contact_law.name, "a law without adhesion where there are films")
+        if self.bridge is not None:
+            self.bridge.check()
         for kind in OF_THE_PAIR_LOOP:
             if (law := getattr(self, kind)) is None:
                 continue
@@ -90,8 +95,9 @@ class Laws(NamedTuple):
 
     @property
     def parameters(self) -> tuple[float, ...]:
-        """Numbers that the loops take: those of the contact law, and the damping of rolling last."""
-        return (*self.contact_law.values, float(self.rolling_damping))
+        """Numbers that the loops take: those of the contact law, of bridges, and the damping of rolling last."""
+        of_bridges = () if self.bridge is None else self.bridge.numbers
+        return (*self.contact_law.values, *of_bridges, float(self.rolling_damping))
 
     def fields(self) -> list[Field]:
         """What pairs remember under these laws, and what the loops write for each pair."""
@@ -100,9 +106,20 @@ class Laws(NamedTuple):
             fields += film.FIELDS
         if self.rolling != "none":
             fields += rolling.FIELDS
+        if self.bridge is not None:
+            fields += bridge.FIELDS
         if self.minimum_gap is not None or self.lubrication is not None:
             fields.append(film.OUTSIDE)
         return fields
+
+    def particle_fields(self) -> tuple[Field, ...]:
+        """What particles remember under these laws, beyond the fields of every particle."""
+        return () if self.bridge is None else bridge.PARTICLE_FIELDS
+
+    @property
+    def kept_apart(self) -> set[str]:
+        """Fields that inactive triangles do not take over: there is one bridge, at the nearest of them."""
+        return set() if self.bridge is None else {field.name for field in bridge.FIELDS}
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
@@ -124,6 +141,7 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "USER_GAP": laws.minimum_gap is not None,
         "COUNT_GAP": False,
         "COUNT_FILM": False,
+        **(NO_BRIDGE if laws.bridge is None else laws.bridge.choices()),
     }
     if laws.minimum_gap is not None:
         entry = chosen("minimum_gap", laws.minimum_gap)

@@ -32,6 +32,21 @@ class FilmState(NamedTuple):
     cutoff_gap: float  # h_co [m]
 
 
+class BridgeState(NamedTuple):
+    """A liquid bridge, as the functions of its laws see it."""
+
+    gap: float  # [m]
+    film: float  # d, thickness of the liquid on both bodies together when the bridge formed [m]
+    volume: float  # of the liquid in the bridge [m3]
+    reduced_radius: float  # R* [m]
+    minimum_gap: float  # h_min [m]
+    viscosity: float  # [Pa s]
+    surface_tension: float  # [N/m]
+    contact_angle: float  # [rad]
+    capillary_number: float  # of the speed at which the bodies part [-]
+    p: tuple[float, ...]  # numbers of the laws, with those of a user's functions
+
+
 class GapState(NamedTuple):
     """An approach, as a law of the minimum gap sees it."""
 
@@ -89,6 +104,25 @@ COUNT_GAP = Slot("COUNT_GAP")  # uses of the law outside of its range are counte
 COUNT_FILM = Slot("COUNT_FILM")
 gap_outside = Slot("gap_outside")  # 1 where the law is used outside of its range, else 0
 film_outside = Slot("film_outside")
+
+# ---------------------------------------------------------------- liquid bridge; argument BridgeState
+
+BRIDGE = Slot("BRIDGE")  # bodies carry liquid, which forms bridges
+BRIDGE_FILM = Slot("BRIDGE_FILM")  # bridges resist along the line of centres
+BRIDGE_SLIDING = Slot("BRIDGE_SLIDING")  # bridges resist across it
+BRIDGE_PULL = Slot("BRIDGE_PULL")  # bridges attract
+BRIDGE_POTENTIAL = Slot("BRIDGE_POTENTIAL")  # the resistance along the line of centres has a potential
+BRIDGE_ENERGY = Slot("BRIDGE_ENERGY")  # the pull has a closed form of its energy
+CUT_CONSTANT = Slot("CUT_CONSTANT")  # below h_min the resistance is that at h_min, not zero
+WALL_LIQUID = Slot("WALL_LIQUID")  # walls carry liquid
+bridge_resistance = Slot("bridge_resistance")  # along the line of centres [kg/s]
+bridge_potential = Slot("bridge_potential")  # its integral over the gap [N s]
+sliding_resistance = Slot("sliding_resistance")  # across the line of centres [kg/s]
+bridge_pull = Slot("bridge_pull")  # [N]
+bridge_energy = Slot("bridge_energy")  # integral of the pull over the gap, from contact [J]
+bridge_rupture = Slot("bridge_rupture")  # largest gap of the bridge [m]
+drawn_share = Slot("drawn_share")  # (radius, other radius): part of a body's liquid that flows into a new bridge
+returned_share = Slot("returned_share")  # (radius, other radius): part of a broken bridge that the body gets
 
 # ---------------------------------------------------------------- loops
 

@@ -22,18 +22,8 @@ from cfddem.particles.walls.shapes import Mesh, Wall
 
 def wall_arrays(walls: Sequence[Wall] = ()) -> Walls:
     """Arrays of the given walls."""
-    pieces = [(number, *piece) for number, wall in enumerate(walls) for piece in wall.pieces()]
-    shape = np.zeros((len(pieces), NUMBERS))
-    for row, (_, _, numbers) in zip(shape, pieces):
-        row[: len(numbers)] = numbers
-    kind = np.array([kind for _, kind, _ in pieces], np.int8)
-    owner = np.array([number for number, _, _ in pieces], np.int32)
-    corner = np.full((len(pieces), 3), -1, np.int32)
-    low, width, number = np.zeros((len(walls), 3)), np.ones(len(walls)), np.zeros((len(walls), 3), np.int64)
-    for m, wall in enumerate(walls):
-        if isinstance(wall, Mesh):
-            corner[owner == m] = wall.triangles
-            low[m], width[m], number[m] = _cells(wall)
+    owner, kind, shape, corner = _pieces(walls)
+    low, width, number = _cells_of_meshes(walls)
     cells = np.prod(number, axis=1)
     made = Walls(
         kind=kind,
@@ -55,6 +45,8 @@ def wall_arrays(walls: Sequence[Wall] = ()) -> Walls:
         cell_offset=np.cumsum(cells) - cells,
         cell_start=np.zeros(int(cells.sum()) + 1, np.int64),
         cell_member=np.zeros(0, np.int32),
+        patch_count=np.zeros(1, np.int64),
+        patch_thickest=np.zeros(1),
     )
     return _with_cells(made) if len(made.single) < len(kind) else made
 
@@ -67,6 +59,30 @@ def checkpoint_walls(walls: Walls) -> dict[str, np.ndarray]:
 def restored_walls(kept: Mapping[str, np.ndarray]) -> Walls:
     """The walls of a `checkpoint_walls()`."""
     return Walls(**{name: np.array(each) for name, each in kept.items()})
+
+
+def _pieces(walls: Sequence[Wall]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Wall, kind, numbers, and corners if a triangle, of each piece (n,), (n,), (n, NUMBERS), (n, 3)."""
+    pieces = [(number, *piece) for number, wall in enumerate(walls) for piece in wall.pieces()]
+    owner = np.array([number for number, _, _ in pieces], np.int32)
+    kind = np.array([kind for _, kind, _ in pieces], np.int8)
+    shape = np.zeros((len(pieces), NUMBERS))
+    for row, (_, _, numbers) in zip(shape, pieces):
+        row[: len(numbers)] = numbers
+    corner = np.full((len(pieces), 3), -1, np.int32)
+    for m, wall in enumerate(walls):
+        if isinstance(wall, Mesh):
+            corner[owner == m] = wall.triangles
+    return owner, kind, shape, corner
+
+
+def _cells_of_meshes(walls: Sequence[Wall]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Lower corner, width and number of the cells of each wall (m, 3), (m,), (m, 3); no cells but of a mesh."""
+    low, width, number = np.zeros((len(walls), 3)), np.ones(len(walls)), np.zeros((len(walls), 3), np.int64)
+    for m, wall in enumerate(walls):
+        if isinstance(wall, Mesh):
+            low[m], width[m], number[m] = _cells(wall)
+    return low, width, number
 
 
 def _cells(mesh: Mesh) -> tuple[np.ndarray, float, np.ndarray]:

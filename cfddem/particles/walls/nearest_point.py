@@ -51,6 +51,10 @@ class Walls(NamedTuple):
     cell_offset: np.ndarray  # (M,) int64, first cell of a mesh in `cell_start`
     cell_start: np.ndarray  # (all cells + 1,) int64, where the triangles of a cell begin in `cell_member`
     cell_member: np.ndarray  # int32, pieces
+    patch_key: np.ndarray = np.zeros(0, np.int64)  # names of the patches whose liquid has changed, in ascending order
+    patch_liquid: np.ndarray = np.zeros(0)  # on each of them [m3]
+    patch_count: np.ndarray = np.zeros(1, np.int64)  # (1,) their number; arrays have room for more
+    patch_thickest: np.ndarray = np.zeros(1)  # (1,) largest thickness of the liquid on a patch so far [m]
 
 
 @inline
@@ -185,8 +189,12 @@ def _rotated(turned, m, a):
 @inline
 def in_frame(walls, m, place):
     """A position in the frame in which wall m was made."""
-    if walls.sweep[m] == 0.0:
-        return place
+    return place if walls.sweep[m] == 0.0 else carried_back(walls, m, place)
+
+
+@inline
+def carried_back(walls, m, place):
+    """A position in the frame that moves with the surface of wall m, also where the wall stays in place."""
     away = minus(place, plus(at(walls.shift, m), at(walls.centre, m)))
     back = plus(
         times(away[0], at(walls.turned, 3 * m)),
@@ -257,8 +265,6 @@ def advance_walls(walls, step):
     longest = 0.0
     for m in range(len(walls.sweep)):
         put(walls.shift, m, plus(at(walls.shift, m), times(step, at(walls.velocity, m))))
-        if walls.sweep[m] == 0.0:
-            continue
         walls.travel[m] += step * walls.sweep[m]
         longest = max(longest, walls.travel[m])
         spin = at(walls.spin, m)

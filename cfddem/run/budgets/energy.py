@@ -21,6 +21,7 @@ STORED = {
     "potential": "of the particles' weight, less buoyancy",
     "normal_springs": "of normal springs",
     "tangential_springs": "of tangential springs",
+    "bridges": "of the pull of liquid bridges, from contact",
     "fluid_kinetic": "of the fluid's motion",
     "added_mass": "of the fluid that moves with the particles, the added mass",
     "deferred_momentum": "that the pressure has given to particles and the fluid loses in the next two steps",
@@ -32,6 +33,7 @@ GAINED = {
     "driving": "by the mean pressure gradient of periodic sides",
     "walls": "by moving walls",
     "stiffening": "by tangential springs whose stiffness changes with the overlap",
+    "bridges_formed": "where liquid bridges form at a gap",
     "fed": "by inserted particles, less that of removed ones",
     "agitation": "by the fluctuating forces of the flow around neighbours, which moves particles at random",
     "model_b": "by the pressure on the volume of the particles, which model B gives to the fluid",
@@ -40,6 +42,7 @@ GAINED = {
 
 LOST = {
     "drag": "by drag, at the slip of the particles",
+    "history": "to the fluid by the history force",
     "drag_in_cells": "by drag, in velocity differences within the kernel and the cell",
     "pressure_in_cells": "where the pressure gradient at the particles differs from that of the cells",
     "implicit_drag": "by the implicit drag step",
@@ -48,6 +51,8 @@ LOST = {
     "lift_and_added_mass": "between fluid and particles by lift, viscous stress and added mass",
     "torque": "by the torque of the fluid on spin",
     "film": "by films",
+    "bridge": "by the resistance of liquid bridges",
+    "bridges_broken": "where liquid bridges break",
     "contact_damping": "by the dashpots of contacts",
     "hysteresis": "by the contact law, to plastic deformation",
     "friction": "by sliding",
@@ -64,11 +69,11 @@ PASSED = {
 """Energy that passes between the phases; the difference of two lines is lost."""
 
 _OF_FLUID = {
-    "fluid_kinetic", "added_mass", "deferred_momentum", "inflow", "driving", "agitation", "model_b", "drag",
+    "fluid_kinetic", "added_mass", "deferred_momentum", "inflow", "driving", "agitation", "model_b", "drag", "history",
     "drag_in_cells", "pressure_in_cells", "implicit_drag", "viscous", "convection", "lift_and_added_mass", "torque",
     *PASSED,
 }  # fmt: skip
-"""Lines of runs with a fluid. `hysteresis` is a line of runs whose contact law loses energy by itself."""
+"""Lines of runs with a fluid. `hysteresis` and `history` are lines of runs that have them."""
 
 FIELDS = {
     **{f"energy_{name}": ("J", f"energy {text}, since the start") for name, text in STORED.items()},
@@ -113,19 +118,21 @@ class EnergyLedger:
         sums["torque"] -= self.exchange.spin_work
         sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
         sums["pressure_from_fluid"] -= done.solids
-        self._coupling.begin(self.particle_solver.particles, terms, forces)
+        self._coupling.begin(self.particle_solver.particles.without_ghosts(), terms, forces)
 
     def after_particle_steps(self) -> None:
         """Add the work of the fluid on the particles."""
         if self._coupling is None:
             return
-        sums, done = self.sums, self._coupling.end(self.particle_solver.particles)
+        sums, done = self.sums, self._coupling.end(self.particle_solver.particles.without_ghosts())
         agitation = done.fluctuating - done.fluctuating_on_fluid
         sums["agitation"] += agitation + done.agitation
         sums["drag"] += done.drag_on_fluid - done.drag + agitation
-        sums["drag_to_particles"] += done.drag
-        sums["drag_in_cells"] -= done.drag_on_fluid
-        sums["lift_and_added_mass"] -= done.explicit + done.added
+        sums["drag_from_fluid"] += done.explicit_history_on_fluid
+        sums["drag_to_particles"] += done.drag + done.history
+        sums["drag_in_cells"] -= done.drag_on_fluid + done.history_on_fluid
+        sums["history"] += done.history_on_fluid + done.explicit_history_on_fluid - done.history
+        sums["lift_and_added_mass"] -= done.explicit + done.added + done.explicit_history_on_fluid
         sums["fallen"] += done.weight
         sums["driving"] += done.driving
         sums["pressure_to_particles"] += done.pressure
@@ -139,9 +146,14 @@ class EnergyLedger:
         absent = set() if self.fluid is not None else set(_OF_FLUID)
         if self.particle_solver.laws.contact_law.lost is None:
             absent.add("hysteresis")
+        if self.exchange is None or self.exchange.history is None:
+            absent.add("history")
+        if self.particle_solver.laws.bridge is None:
+            absent |= {"bridge", "bridges_formed", "bridges_broken"}
         names = [name for name in [*GAINED, *LOST, *PASSED] if name not in absent]
         lines |= {name: sums[name] for name in names}
         put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
+        put_in += self.start.get("bridges", 0.0)
         put_in += self.start.get("fluid_kinetic", 0.0) + max(-lines["potential"], 0.0)
         put_in += sum(max(lines[name], 0.0) for name in GAINED if name in lines)
         explained = sum(lines[name] for name in GAINED if name in lines)
@@ -169,7 +181,7 @@ class EnergyLedger:
         count = self.particle_solver.energies
         assert count is not None
         sums = dict(self.sums)
-        for name, total in zip(CHANNELS, count.totals):
+        for name, total in zip(count.channels, count.totals):
             if name in sums:
                 sums[name] += float(total)
         sums["fed"] += count.fed
@@ -183,16 +195,18 @@ class EnergyLedger:
         normal, tangential = count.springs(particle_solver)
         fallen = self.sums["fallen"] + float(count.totals[CHANNELS.index("fall")])
         stored = {
-            "kinetic": kinetic_energy(particles),
+            "kinetic": kinetic_energy(particles, particle_solver.communicator),
             "potential": -fallen,
             "normal_springs": normal,
             "tangential_springs": tangential,
         }
+        if particle_solver.bridges is not None:
+            stored["bridges"] = count.bridges(particle_solver)
         if self.fluid is None or self.exchange is None:
             return stored
         return stored | {
             "fluid_kinetic": self.fluid.kinetic_energy(),
-            "added_mass": added_mass_energy(particles, self.fluid.communicator),
+            "added_mass": added_mass_energy(particles, particle_solver.communicator),
             # the fluid has used the voidage before the last step and a half
             "deferred_momentum": -(self._recent[0] + 0.5 * self._recent[1]),
         }

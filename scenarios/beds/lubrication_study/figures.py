@@ -81,7 +81,7 @@ def regimes(home: Path, path: Path) -> None:
     """The regime maps of smooth, rough and soft spheres in both viscosities, all seeds together."""
     kinds = [spheres for spheres in SPHERES if spheres != "no film"]
     figure, axes = blank(len(VISCOSITIES), len(kinds), width=11.0, height=6.6, sharex=True, sharey=True)
-    shades = None
+    shades: Any = None
     for place, (viscosity, spheres) in enumerate((v, s) for v in VISCOSITIES for s in kinds):
         rows: dict[str, list[np.ndarray]] = {}
         for seed in SEEDS:

@@ -84,7 +84,7 @@ class Outcome:
     stokes: float  # median of the collisions; NaN without a film
     solids_meet: float  # share of the collisions in which they do; NaN without a film
     voidage: Array  # layer by layer
-    level: Array  # middle of each layer [m]
+    level: np.ndarray  # middle of each layer [m]
 
 
 class Mean(NamedTuple):

@@ -102,7 +102,9 @@ def release(case: Case) -> tuple[np.ndarray, np.ndarray]:
 
 
 def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
-    """Speed of the same sphere from rest by the equation of motion of its drag law, alone in an endless fluid [m/s]."""
+    """Speed of the same sphere from rest by its equation of motion, alone in an endless fluid (n,) [m/s]."""
+    if case.laws.history != "none":
+        return _with_memory(case, times, case.run.until / 600.0)
     assert case.fluid is not None and isinstance(case.laws.drag, str)
     law, gravity = REGISTRY["drag"][case.laws.drag].function, abs(case.laws.gravity[2])
     sphere = (case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, law, gravity)
@@ -110,6 +112,38 @@ def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
     for begin, end in pairwise(times):
         speeds.append(speed_after(end - begin, speeds[-1], *sphere, added_mass=case.laws.added_mass_at(1.0)))
     return np.array(speeds)
+
+
+def _with_memory(case: Case, times: np.ndarray, step: float) -> np.ndarray:
+    """The same with a history force, by the full convolution of its kernel at the present slip (n,) [m/s].
+
+    step  of the integration, much shorter than the memory [s]
+    """
+    assert case.fluid is not None and isinstance(case.laws.drag, str)
+    fluid, diameter, gravity = case.fluid, case.bed.diameter, abs(case.laws.gravity[2])
+    drag, law = REGISTRY["drag"][case.laws.drag].function, REGISTRY["history"][case.laws.history].function
+    kinematic, volume = fluid.viscosity / fluid.density, math.pi / 6.0 * diameter**3
+    weight = (case.solid.density - fluid.density) * volume * gravity
+    inertia = (case.solid.density + case.laws.added_mass_at(1.0) * fluid.density) * volume
+    stokes = 3.0 * math.pi * fluid.viscosity * diameter
+    nodes, shares = np.polynomial.legendre.leggauss(6)
+    ends = step * np.arange(round(times[-1] / step) + 1)
+    speeds = np.zeros(len(ends))
+    for n in range(1, len(ends)):
+        before = speeds[n - 1]
+        # mean of the kernel over every earlier step, with s = x^2 because the kernel is singular at 0
+        low, high = np.sqrt(step * np.arange(n)), np.sqrt(step * np.arange(1, n + 1))
+        roots = 0.5 * (high + low) + 0.5 * (high - low) * nodes[:, None]
+        values = np.vectorize(law)(roots**2, before, diameter, kinematic)
+        integral = ((high - low) * roots * values * shares[:, None]).sum(axis=0)
+        gained = np.diff(speeds[:n])[::-1]
+        remembered = stokes * float((integral[1:] * gained).sum()) / step
+        newest = stokes * integral[0] / step
+        friction = stokes * drag(fluid.density * diameter * before / fluid.viscosity, 1.0)
+        speeds[n] = (inertia / step * before + weight - remembered + newest * before) / (
+            inertia / step + friction + newest
+        )
+    return np.interp(times, ends, speeds)
 
 
 def mordant() -> Case:

@@ -16,8 +16,8 @@ from cfddem.io.reading import Run
 BED_HEIGHT = 0.2
 """H0, height of the bed at rest in the experiment [m]."""
 
-HEIGHTS = (0.15, 0.30, 0.45, 0.60, 0.75, 0.80)
-"""Heights over H0 at which the particle speed was measured."""
+HEIGHTS = tuple(BED_HEIGHT * share for share in (0.15, 0.30, 0.45, 0.60, 0.75, 0.80))
+"""Heights at which the particle speed was measured [m]."""
 
 SPOUTED = 2.0 / math.pi
 """Pressure drop over weight of a bed of the largest depth that spouts, by the theory of
@@ -45,8 +45,7 @@ def bed() -> Case:
 
 
 def profiles(
-    run: Run, width: float, begin: float, heights: Sequence[float] = tuple(BED_HEIGHT * each for each in HEIGHTS),
-    bin_width: float = 0.008,
+    run: Run, width: float, begin: float, heights: Sequence[float] = HEIGHTS, bin_width: float = 0.008,
 ) -> list[Profile]:  # fmt: skip
     """Particle velocities across the bed at some heights, averaged over the snapshots of a run.
 

@@ -203,15 +203,9 @@ def gondret(curves: Curves) -> Any:
     figure, axes = panels(height=4.2)
     model, measured = _of(curves, "gondret_2002/model"), _of(curves, "gondret_2002/measured")
     axes.plot(model["time"] * 1e3, model["gap"] * 1e3, color=BLUE, label="film, contact, weight less buoyancy")
+    around = _of(curves, "gondret_2002/surroundings")
+    axes.plot(around["time"] * 1e3, around["gap"] * 1e3, color=GREY, label="with drag, added mass and history force")
     axes.plot(measured["time"] * 1e3, measured["gap"] * 1e3, "o", color=RED, ms=5, label="Gondret et al. (2002)")
-    axes.text(
-        0.5,
-        0.06,
-        "no drag, added mass or history force in the model",
-        transform=axes.transAxes,
-        color=GREY,
-        ha="center",
-    )
     axes.set(xlim=(-6, 46), ylim=(0, 3.1))
     label(axes, "time after contact", "ms", "gap", "mm", "A 6 mm steel sphere bounces in silicone oil, St = 27")
     legend(axes, loc="upper right")

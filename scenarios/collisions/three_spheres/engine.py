@@ -1,8 +1,7 @@
-"""Three wet spheres in the particle engine: Cartesian coordinates, soft Hertz-Mindlin contacts, films as impulses.
+"""Three wet spheres in the particle engine: Cartesian coordinates, soft Hertz-Mindlin contacts, and liquid bridges.
 
-Spheres in the engine are larger by the minimum gap, so that dry contact begins where solids touch. Before and after
-each step, every pair with joined films receives the impulse of its film, exact for an isolated pair. Pairs are treated
-in one order and then in reverse.
+Spheres in the engine are larger by the minimum gap, so that dry contact begins where solids touch. The laws of the
+bridges are those of Davis (2023) with this gap added.
 """
 
 from __future__ import annotations
@@ -11,14 +10,16 @@ import math
 
 import numpy as np
 
-from cfddem.backend.compile import serial
+from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.particles.interactions.bridge import coat
+from cfddem.particles.interactions.bridge_law import BridgeFilm, BridgeLaws, BridgePull
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from closures import contact, timescales
-from closures.bridge import constant_capillary, davis_tangential, deforming_share
+from closures.bridge import constant_capillary, davis_tangential, deforming_potential, deforming_share
 from closures.lubrication import film_strength
 from scenarios.collisions.three_spheres.events import CONTACT, MEET, SEPARATE, Path
 from scenarios.collisions.three_spheres.motion import APART, FIRST, JOINED, SECOND, SPINS, STATE, Numbers
@@ -33,6 +34,24 @@ IMPACT_STEP = 0.02
 """Step in contact, over the Hertz time."""
 
 
+def _along(gap: float, film: float, viscosity: float, reduced_radius: float, touch: float) -> float:
+    apart, strength = gap + touch, film_strength(viscosity, reduced_radius - 0.25 * touch)
+    return strength * deforming_share(apart, film + touch) / apart
+
+
+def _potential(gap: float, film: float, viscosity: float, reduced_radius: float, touch: float) -> float:
+    strength = film_strength(viscosity, reduced_radius - 0.25 * touch)
+    return strength * deforming_potential(gap + touch, film + touch)
+
+
+def _sideways(gap: float, film: float, viscosity: float, reduced_radius: float, touch: float) -> float:
+    return davis_tangential(viscosity, reduced_radius - 0.25 * touch, gap + touch, film + touch)
+
+
+def _pull(gap: float, film: float, surface_tension: float, reduced_radius: float, touch: float) -> float:
+    return constant_capillary(surface_tension, reduced_radius - 0.25 * touch) if gap < film else 0.0
+
+
 def follow(state: np.ndarray, numbers: Numbers, until: float, overlap: float) -> Path:
     """Integrate to the end in the particle engine.
 
@@ -42,21 +61,16 @@ def follow(state: np.ndarray, numbers: Numbers, until: float, overlap: float) ->
     """
     film = numbers.film_ratio * DIAMETER
     touch, films = numbers.minimum_gap * film, film * np.array(numbers.films)
-    run, viscosity = _spheres(state, numbers, overlap * touch)
-    tension = 0.75 * viscosity * 0.25 * DIAMETER * SPEED * numbers.pull / film
+    run = _spheres(state, numbers, overlap * touch, films)
     stiffness = contact.hertz_stiffness(float(run.table[0, 0]["contact_modulus"]), 0.5 * float(run.particles.radius[0]))
     reduced_mass = 0.5 * float(run.particles.mass[0])
     short, long = IMPACT_STEP * timescales.hertz_time(reduced_mass, stiffness, SPEED), FILM_STEP * film / SPEED
-    body = run.particles
-    arrays = body.position, body.velocity, body.spin, body.inverse_mass, body.inverse_inertia
     path, pairs = Path(state.copy(), np.full(3, APART)), _pairs(run)
     times, states = [0.0], [_polar(run, film)]
     while run.time * SPEED / film < until:
         near = pairs[:, 0] - touch < 3.0 * long * np.maximum(pairs[:, 1], 0.1 * SPEED)
         step = short if near.any() else long
-        _apply_films(*arrays, viscosity, tension, films, 0.5 * DIAMETER, 0.5 * step)
         run.advance(step)
-        _apply_films(*arrays, viscosity, tension, films, 0.5 * DIAMETER, 0.5 * step)
         before, pairs = pairs, _pairs(run)
         times.append(run.time * SPEED / film)
         states.append(_polar(run, film))
@@ -69,8 +83,8 @@ def follow(state: np.ndarray, numbers: Numbers, until: float, overlap: float) ->
     return path
 
 
-def _spheres(state: np.ndarray, numbers: Numbers, overlap: float) -> tuple[ParticleSolver, float]:
-    """The spheres at the moment of impact, and the viscosity of their films."""
+def _spheres(state: np.ndarray, numbers: Numbers, overlap: float, films: np.ndarray) -> ParticleSolver:
+    """The spheres at the moment of impact, with films that add up to those of the pairs."""
     mass, film = DENSITY * math.pi / 6.0 * DIAMETER**3, numbers.film_ratio * DIAMETER
     radius = 0.5 * (DIAMETER + numbers.minimum_gap * film)
     stiffness = 1.25 * 0.5 * mass * SPEED**2 / overlap**2.5
@@ -89,9 +103,26 @@ def _spheres(state: np.ndarray, numbers: Numbers, overlap: float) -> tuple[Parti
     velocity = np.zeros((3, 3))
     velocity[0, 0] = SPEED / math.cos(angles[0])
     spheres = make_particles(places, radius, solid.density, velocity=velocity)
+    touch = numbers.minimum_gap * film
+    own = 0.5 * (np.array([[1, -1, 1], [1, 1, -1], [-1, 1, 1]]) @ (films - touch))  # of each sphere
+    if own.min() < 0.0:
+        limit = "films that three coated spheres can have: none above the sum of the others"
+        raise InputError("films of the pairs", str(tuple(numbers.films)), limit)
+    coat(spheres, own)
+    viscosity = 0.5 * mass * SPEED / (film_strength(1.0, 0.25 * DIAMETER) * numbers.stokes)
+    laws = BridgeLaws(
+        viscosity=viscosity,
+        surface_tension=0.75 * viscosity * 0.25 * DIAMETER * SPEED * numbers.pull / film,
+        film=BridgeFilm(_along, _potential),
+        cut="constant",
+        tangential=_sideways,
+        pull=BridgePull(_pull) if numbers.pull > 0.0 else "none",
+        rupture="film",
+        share="none",
+        parameters={"touch": touch},
+    )
     # the steps are chosen here: short in contact, long where only films act
-    run = ParticleSolver(spheres, pair_table([solid]), laws=Laws(film=False), check_steps=False)
-    return run, 0.5 * mass * SPEED / (film_strength(1.0, 0.25 * DIAMETER) * numbers.stokes)
+    return ParticleSolver(spheres, pair_table([solid]), laws=Laws(bridge=laws), check_steps=False)
 
 
 def _pairs(run: ParticleSolver) -> np.ndarray:
@@ -128,44 +159,3 @@ def _find_events(
                 share = before / (before - after)
                 speed = abs((1.0 - share) * pairs[0][pair, 1] + share * pairs[1][pair, 1]) / SPEED
                 path.events.append((kind, pair, times[0] + share * (times[1] - times[0]), float(speed)))
-
-
-@serial
-def _apply_films(position, velocity, spin, inverse_mass, inverse_inertia, viscosity, tension, films, radius, span):
-    """Apply the impulses of the films of all pairs over a time: half of it in one order of pairs, half in reverse."""
-    normal, slip = np.empty(3), np.empty(3)
-    for turn in range(6):
-        pair = turn if turn < 3 else 5 - turn
-        i, j, film = FIRST[pair], SECOND[pair], films[pair]
-        square = 0.0
-        for axis in range(3):
-            normal[axis] = position[j, axis] - position[i, axis]
-            square += normal[axis] ** 2
-        distance = math.sqrt(square)
-        gap = distance - 2.0 * radius
-        if gap >= film:
-            continue
-        reduced_radius, mobility = 0.5 * radius, inverse_mass[i] + inverse_mass[j]
-        opening = 0.0
-        for axis in range(3):
-            normal[axis] /= distance
-            opening += (velocity[j, axis] - velocity[i, axis]) * normal[axis]
-        for axis in range(3):
-            following, last = (axis + 1) % 3, (axis + 2) % 3
-            turning = spin[i, following] * normal[last] - spin[i, last] * normal[following]
-            turning += spin[j, following] * normal[last] - spin[j, last] * normal[following]
-            slip[axis] = velocity[i, axis] - velocity[j, axis] + opening * normal[axis] + radius * turning
-        resistance = film_strength(viscosity, reduced_radius) * deforming_share(gap, film) / gap
-        push = -opening * -math.expm1(-0.5 * span * resistance * mobility) / mobility
-        push -= 0.5 * span * constant_capillary(tension, reduced_radius)
-        mobility += radius**2 * (inverse_inertia[i] + inverse_inertia[j])
-        sliding = davis_tangential(viscosity, reduced_radius, gap, film)
-        drag = -math.expm1(-0.5 * span * sliding * mobility) / mobility
-        for axis in range(3):
-            impulse = push * normal[axis] + drag * slip[axis]
-            velocity[i, axis] -= inverse_mass[i] * impulse
-            velocity[j, axis] += inverse_mass[j] * impulse
-            following, last = (axis + 1) % 3, (axis + 2) % 3
-            couple = radius * drag * (normal[following] * slip[last] - normal[last] * slip[following])
-            spin[i, axis] -= inverse_inertia[i] * couple
-            spin[j, axis] -= inverse_inertia[j] * couple

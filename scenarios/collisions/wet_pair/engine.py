@@ -8,7 +8,8 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.case.materials import Material
-from cfddem.particles.interactions.bridge import Bridges
+from cfddem.particles.interactions.bridge import coat
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -29,9 +30,10 @@ IMPACT_STEP = 0.01
 MOST_STEPS = 2_000_000
 
 
-def follow(pair: Pair, solid: Material, angle: float, duration: float) -> Motion:
+def follow(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, duration: float) -> Motion:
     """Integrate in the particle engine until the bridge has ruptured or the time is over.
 
+    liquid    laws of the bridge
     angle     between velocity and line of centres at impact [deg]
     duration  [s]
     """
@@ -40,13 +42,14 @@ def follow(pair: Pair, solid: Material, angle: float, duration: float) -> Motion
     two = make_particles(
         np.array([[0.0, 0.0, 0.0], [apart, 0.0, 0.0]]), pair.radius, solid.density, velocity=np.array(velocity)
     )
-    bridges = Bridges(two, 0.5 * pair.film, pair.liquid)
+    coat(two, 0.5 * pair.film)
     # the steps are chosen here: they follow the film, whose resistance changes as it opens and closes
-    run = ParticleSolver(two, pair_table([solid]), laws=Laws(), bridges=bridges, check_steps=False)
+    run = ParticleSolver(two, pair_table([solid]), laws=Laws(bridge=liquid), check_steps=False)
+    assert run.bridges is not None
     stiffness = hertz_stiffness(pair.modulus, 0.5 * pair.radius)
     short = IMPACT_STEP * timescales.hertz_time(0.5 * pair.mass, stiffness, pair.speed)
     times, rows = [0.0], [_look(run)]
-    while bridges.count and run.time < duration:
+    while run.bridges.count and run.time < duration:
         gap, _, approach, *_ = rows[-1]
         long = FILM_STEP * pair.film / max(abs(approach), SLOWEST * pair.speed)
         run.advance(short if gap < 2.0 * long * abs(approach) else long)
@@ -54,7 +57,7 @@ def follow(pair: Pair, solid: Material, angle: float, duration: float) -> Motion
         rows.append(_look(run))
         if run.steps > MOST_STEPS:
             raise RunFailed(f"the pair is still in its film after {MOST_STEPS} steps, at t = {run.time:.6g} s")
-    return Motion(bridges.count == 0, np.array(times), *np.array(rows).T)
+    return Motion(run.bridges.count == 0, np.array(times), *np.array(rows).T)
 
 
 def _look(run: ParticleSolver) -> tuple[float, float, float, float, float]:

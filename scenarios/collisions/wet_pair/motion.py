@@ -14,7 +14,10 @@ from scipy.integrate import solve_ivp
 
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import RunFailed
-from cfddem.particles.interactions.bridge_loops import BridgeLaws, pull_of, resistances
+from cfddem.backend.law_set import specialise
+from cfddem.particles.interactions.bridge import resistance_across, resistance_along
+from cfddem.particles.interactions.bridge_law import BridgeLaws, BridgeNumbers
+from cfddem.particles.interactions.slots import BRIDGE_PULL, BridgeState, bridge_pull
 from closures.contact import hertz_damping, hertz_force, hertz_stiffness, mindlin_stiffness
 from closures.friction import coulomb_limit
 from scenarios.collisions.ode import ABSOLUTE, METHOD, RELATIVE, event
@@ -37,7 +40,7 @@ class Pair(NamedTuple):
     shear_modulus: float  # G* [Pa]
     damping_ratio: float  # of Tsuji's dashpot [-]
     friction: float  # [-]
-    liquid: BridgeLaws
+    liquid: BridgeNumbers
 
 
 class Motion(NamedTuple):
@@ -52,9 +55,10 @@ class Motion(NamedTuple):
     spin: np.ndarray  # of the first sphere [rad/s]
 
 
-def follow(pair: Pair, angle: float, duration: float) -> Motion:
+def follow(pair: Pair, laws: BridgeLaws, angle: float, duration: float) -> Motion:
     """Integrate until the films separate, the pair has turned a full circle or come to rest, or the time is over.
 
+    laws      of the bridge
     angle     between velocity and line of centres at impact [deg]
     duration  [s]
     """
@@ -62,15 +66,17 @@ def follow(pair: Pair, angle: float, duration: float) -> Motion:
     state[GAP] = state[APPROACH] = 1.0
     state[TURNING] = math.tan(math.radians(angle)) / (2.0 * pair.radius / pair.film + 1.0)
     unit = pair.film / pair.speed
+    choices = laws.choices()
+    slopes, active = specialise(rates, choices), specialise(activity, choices)
     found = solve_ivp(
-        lambda _, state: rates(state, pair),
+        lambda _, state: slopes(state, pair),
         (0.0, duration / unit),
         state,
         METHOD,
         events=[
             event(lambda _, state: state[GAP] - 1.0, 1),
             event(lambda _, state: abs(state[ANGLE]) - 2.0 * math.pi, 1),
-            event(lambda _, state: activity(state, pair) - STILL, -1),
+            event(lambda _, state: active(state, pair) - STILL, -1),
         ],
         rtol=RELATIVE,
         atol=ABSOLUTE,
@@ -97,9 +103,13 @@ def rates(state, pair):
     gap, approach, sliding = film * state[GAP], speed * state[APPROACH], slip(state, pair)
     reduced_radius, reduced_mass = 0.5 * pair.radius, 0.5 * pair.mass
     wetted = min(gap, film)  # only trial steps reach beyond the film
-    push, drag = resistances(wetted, film, pair.minimum_gap, reduced_radius, pair.liquid)
-    push = push * approach - pull_of(wetted, film, 0.0, reduced_radius, pair.liquid)
-    drag *= sliding
+    liquid = pair.liquid
+    bridge = BridgeState(
+        wetted, film, 0.0, reduced_radius, pair.minimum_gap,
+        liquid.viscosity, liquid.surface_tension, liquid.contact_angle, 0.0, (0.0,),
+    )  # fmt: skip
+    push = resistance_along(bridge) * approach - (bridge_pull(bridge) if BRIDGE_PULL else 0.0)
+    drag = resistance_across(bridge) * sliding
     stretching = 0.0
     if gap < 0.0:
         along, across, stretching = solid(-gap, approach, sliding, film * state[SPRING], pair)

@@ -20,14 +20,14 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.materials import Material
-from cfddem.particles.interactions.bridge_loops import BRIDGE_FILMS, CUTS, PULLS, TANGENTIALS, BridgeLaws
+from cfddem.particles.interactions.bridge_law import CUTS, TANGENTIALS, BridgeLaws
 from closures import contact
 from closures.lubrication import film_strength
 from closures.minimum_gap import glass_transition
 from scenarios.collisions.wet_pair.engine import follow as follow_in_engine
 from scenarios.collisions.wet_pair.motion import Motion, Pair, follow
 
-BRIDGES = {name: BRIDGE_FILMS[name] for name in ("deforming", "static")}
+BRIDGES = ("deforming", "static")
 SOLVERS = ("equations", "particles")
 
 TRANSITION_PRESSURES = {
@@ -108,15 +108,16 @@ def collide_wet(
     """
     given = dict(locals())
     _check(given)
-    pair = _pair(given)
+    laws = _laws(given)
+    pair = _pair(given, laws)
     if solver == "equations":
-        motion = follow(pair, angle, duration)
+        motion = follow(pair, laws, angle, duration)
     else:
         solid = Material(
             density=density, youngs_modulus=youngs_modulus, poisson=poisson, restitution=restitution, friction=friction
         )
-        motion = follow_in_engine(pair, solid, angle, duration)
-    bounces = motion.separated and (angle == 0.0 or follow(pair, 0.0, duration).separated)
+        motion = follow_in_engine(pair, laws, solid, angle, duration)
+    bounces = motion.separated and (angle == 0.0 or follow(pair, laws, 0.0, duration).separated)
     return WetPair(
         outcome="bounce" if bounces else "stick_rotate_separate" if motion.separated else "stick",
         restitution=-float(motion.approach[-1]) / pair.speed if motion.separated else 0.0,
@@ -150,35 +151,38 @@ def _check(given: Mapping[str, Any]) -> None:
             raise InputError(name, given[name], limit)
 
 
-def _pair(given: Mapping[str, Any]) -> Pair:
+def _laws(given: Mapping[str, Any]) -> BridgeLaws:
+    """The laws of the bridge, from the arguments of :func:`collide_wet`."""
+    pressure = given["glass_transition_pressure"]
+    return BridgeLaws(
+        viscosity=given["viscosity"],
+        surface_tension=given["surface_tension"],
+        film=given["bridge"],
+        cut=given["cut"],
+        tangential=given["tangential"],
+        pull="constant" if given["capillary"] else "none",
+        rupture="film",
+        transition_pressure=TRANSITION_PRESSURES[given["bridge"], given["cut"]] if pressure is None else pressure,
+    )
+
+
+def _pair(given: Mapping[str, Any], laws: BridgeLaws) -> Pair:
     """The constants of a pair, from the arguments of :func:`collide_wet`."""
     viscosity, radius, film = given["viscosity"], given["radius"], given["film"]
-    pressure = given["glass_transition_pressure"]
-    if pressure is None:
-        pressure = TRANSITION_PRESSURES[given["bridge"], given["cut"]]
     elastic = (given["youngs_modulus"], given["poisson"])
     mass = given["density"] * 4.0 / 3.0 * math.pi * radius**3
     speed = given["stokes"] * film_strength(viscosity, 0.5 * radius) / (0.5 * mass)
-    liquid = BridgeLaws(
-        viscosity=viscosity,
-        surface_tension=given["surface_tension"],
-        film=BRIDGES[given["bridge"]],
-        cut=CUTS[given["cut"]],
-        tangential=TANGENTIALS[given["tangential"]],
-        pull=PULLS["constant" if given["capillary"] else "none"],
-        transition_pressure=pressure,
-    )
     return Pair(
         speed=speed,
         film=film,
-        minimum_gap=glass_transition(viscosity, speed, pressure, 0.5 * radius, film),
+        minimum_gap=glass_transition(viscosity, speed, laws.transition_pressure, 0.5 * radius, film),
         radius=radius,
         mass=mass,
         modulus=contact.reduced_modulus(*elastic, *elastic),
         shear_modulus=contact.reduced_shear_modulus(*elastic, *elastic),
         damping_ratio=contact.damping_ratio(given["restitution"]),
         friction=given["friction"],
-        liquid=liquid,
+        liquid=laws.built_in,
     )
 
 

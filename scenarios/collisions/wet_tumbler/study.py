@@ -23,8 +23,9 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.particles.initial.packing import random_packing
-from cfddem.particles.interactions.bridge import Bridges
-from cfddem.particles.interactions.bridge_loops import BridgeLaws
+from cfddem.particles.interactions.bridge import coat
+from cfddem.particles.interactions.bridge_law import BridgeLaws
+from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -43,7 +44,7 @@ GRAIN = Material(
 """Glass whose contacts are softened, so that the steps are long; films feel the real modulus."""
 
 SUBSTEPS = 8
-"""Steps of the engine between two kicks of bridges and flow, which are much softer than contacts."""
+"""Steps of the engine between two kicks of the flow, which is much softer than contacts."""
 
 Progress = Callable[[float], None]
 
@@ -113,7 +114,7 @@ def tumble(
     _check(film_spread, capillary_number=capillary_number, until=until, film=film)
     surface_tension = viscosity * max(shear_rate, 1.0) * diameter / capillary_number
     thickness = film * (1.0 + film_spread * np.random.default_rng(seed).uniform(-1.0, 1.0, count))
-    liquid = BridgeLaws(viscosity, surface_tension, math.radians(contact_angle), every=SUBSTEPS)
+    liquid = BridgeLaws(viscosity, surface_tension, math.radians(contact_angle))
     run, bridges = _spheres(diameter, thickness, film, liquid, solid_fraction, seed)
     flow = Flow(run, shear_rate, drag_time)
     run.particles.velocity[:] = flow.speed
@@ -198,11 +199,11 @@ def _spheres(
     coated = diameter + 4.0 * film
     places, box = random_packing(np.full(len(thickness), coated), solid_fraction * (coated / diameter) ** 3, seed)
     spheres = make_particles(places, 0.5 * diameter, GRAIN.density, viscosity=liquid.viscosity)
-    bridges = Bridges(spheres, thickness, liquid)
-    laws = Laws(film=True, cutoff_ratio=2.0 * film / (0.25 * diameter))
-    return ParticleSolver(
-        spheres, pair_table([GRAIN]), laws=laws, box=(box[0], box[1], box[2]), bridges=bridges
-    ), bridges
+    coat(spheres, thickness)
+    laws = Laws(film=True, cutoff_ratio=2.0 * film / (0.25 * diameter), bridge=liquid)
+    run = ParticleSolver(spheres, pair_table([GRAIN]), laws=laws, box=(box[0], box[1], box[2]))
+    assert run.bridges is not None
+    return run, run.bridges
 
 
 def _momentum(run: ParticleSolver) -> np.ndarray:

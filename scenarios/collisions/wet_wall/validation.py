@@ -78,10 +78,10 @@ def sticking(_: Path, __: Curves) -> list[Row]:
         name = f"wet wall: {sphere} sticks, {liquid}, {film * 1e6:.0f} um{floor}"
         rows.append(Row(name, found, reference, 0.02 * reference, "m/s"))
     case = ("glass_1.74", "water")
-    for floor in (1e-6, FLOOR, 20e-6):
-        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=floor)
+    for least in (1e-6, FLOOR, 20e-6):
+        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least)
         rows.append(
-            Row(f"wet wall: glass_1.74 sticks, 400 um, singular, arc >= {floor * 1e6:.0f} um", found, unit="m/s")
+            Row(f"wet wall: glass_1.74 sticks, 400 um, singular, arc >= {least * 1e6:.0f} um", found, unit="m/s")
         )
     for options in ({"capillary_phases": "rebound"}, {"capillary_phases": "bridge"}, {"length_from": "wall"}):
         found = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, **options)

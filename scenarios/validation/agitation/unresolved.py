@@ -101,10 +101,12 @@ def run(row: dict[str, Any], *, settle: float = 10.0, until: float = 60.0, **cha
 
 def _hold_drag(simulation: Simulation, ratio: float) -> None:
     """Multiply the drag law, so that the mean drag is that of the resolved run."""
-    drag = simulation.exchange.drag
+    exchange = simulation.exchange
+    assert exchange is not None
+    drag = exchange.drag
     law = drag.conductance
     drag.conductance = lambda particles, flow: ratio * law(particles, flow)  # type: ignore[method-assign]
-    simulation.exchange.momentum.conductance = drag.conductance
+    exchange.momentum.conductance = drag.conductance
 
 
 def _note(series: Series, simulation: Simulation, point: Point, hits: float, impact: float) -> None:

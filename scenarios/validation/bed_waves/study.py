@@ -122,7 +122,8 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
     rate = complex(wave.growth, -number * wave.speed)
     simulation = Simulation(case)
     fluid, particles = simulation.fluid, simulation.particles
-    assert fluid is not None
+    exchange = simulation.exchange
+    assert fluid is not None and exchange is not None
     height = particles.position[:, 2]
     by_particles = START * -rate / (1j * number)  # complex amplitudes of the velocities
     by_fluid = START * smoothed * (1.0 - bed.voidage) * (rate + 1j * number * slip) / (1j * number * bed.voidage)
@@ -134,7 +135,7 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
     particles.velocity += _random_motion(case, particles.count)
     simulation.particle_solver.refresh()
     fluid.boundaries.driving[2] = (1.0 - bed.voidage) * (bed.density - bed.fluid_density) * bed.gravity
-    kernel = simulation.exchange.kernel
+    kernel = exchange.kernel
     fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(particles.position, particles.radius)))
     fluid.set_velocity((0.0, 0.0, lambda x, y, z: slip + (by_fluid * np.exp(1j * number * z)).real + 0.0 * x * y))
     times, components, temperatures = [], [], []
@@ -143,7 +144,7 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
         drift = float(particles.velocity[:, 2].mean())
         times.append(simulation.time)
         components.append(2.0 * np.exp(-1j * number * particles.position[:, 2]).mean())
-        cells = cells_of(particles.position, simulation.fluid.grid.shape, simulation.fluid.grid.spacing)
+        cells = cells_of(particles.position, fluid.grid.shape, fluid.grid.spacing)
         temperatures.append(granular_temperature(particles.velocity, cells).mean)
         if abs(components[-1]) > 1.3 * END or abs(drift) > 0.2 * slip:
             break

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
@@ -105,7 +106,7 @@ def cavity(reynolds: int, n: int, until: float) -> dict[str, Array]:
     return profiles
 
 
-def sound(line: str, reynolds: int) -> Array:
+def sound(line: str, reynolds: int) -> NDArray[np.bool_]:
     """Which entries of Ghia's tables are free of errors.
 
     Left out: v = -0.23827 at x = 0.9063 for Re 400, which breaks the curve through its neighbours (-0.22847 at

@@ -56,7 +56,8 @@ def rest(
     )
     settled, weight = run.time, GRAVITY * float(run.particles.mass.sum())
     poured, resting = kinetic_energy(run.particles) / fallen[-1], settled
-    energy, carried = [], []
+    energy: list[float] = []
+    carried: list[float] = []
     step = 0.5 * run.time_scales(0.1).recommended
     while len(energy) < samples:
         run.advance(step, max(1, int(watch / samples / step)))

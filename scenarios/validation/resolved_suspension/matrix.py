@@ -68,7 +68,7 @@ class Kept:
     def save(self, path: Path) -> None:
         """Write everything that the next step depends on; a kill leaves a whole file, this state or the one before."""
         suspension = self.suspension
-        state = {
+        state: dict[str, Any] = {
             "populations": suspension.flow.populations,
             "velocity": suspension.velocity,
             "spin": suspension.spin,

@@ -1,4 +1,4 @@
-"""The run folder as a rank sees it that writes nothing: rank 0 writes for all."""
+"""The run folder of each rank: rank 0 writes for all, the others write nothing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cfddem.io.quantities import Quantities
 from cfddem.io.writer import RunFolder
 
 
-class SilentFolder(RunFolder):
+class UnwrittenFolder(RunFolder):
     """A run folder whose writes do nothing."""
 
     def __init__(self, folder: Path, about: dict[str, Any], case_text: str, quantities: Quantities) -> None:
@@ -27,7 +27,7 @@ class SilentFolder(RunFolder):
 
 
 def folder_of_ranks(communicator: Communicator, make: Callable[[], RunFolder]) -> RunFolder:
-    """The folder that rank 0 makes, and a silent one on the other ranks; where rank 0 fails, all fail.
+    """The folder that rank 0 makes, and one without writing on the other ranks; where rank 0 fails, all fail.
 
     make  called on rank 0
     """
@@ -38,4 +38,4 @@ def folder_of_ranks(communicator: Communicator, make: Callable[[], RunFolder]) -
         return made[0].folder, made[0].about, made[0].case_text, made[0].quantities
 
     about = communicator.by_first(described)
-    return made[0] if made else SilentFolder(*about)
+    return made[0] if made else UnwrittenFolder(*about)

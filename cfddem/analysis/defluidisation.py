@@ -1,0 +1,78 @@
+"""Detector of defluidisation: from when a wet bed no longer moves, or no longer carries its weight, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Series = NDArray[np.float64]
+
+CARRIED = 0.8
+"""Pressure drop over weight below which gas passes the bed without carrying it [-]."""
+
+STILL = 0.1
+"""Granular temperature over its largest value so far, below which a bed has come to rest [-]."""
+
+SMOOTHED = 0.05
+"""Share of the series over which it is averaged before it is judged [-]."""
+
+
+@dataclass(frozen=True)
+class Defluidisation:
+    """When a bed stopped being fluidised, and what shows it."""
+
+    time: float  # [s]
+    rests: bool  # its particles hardly move relative to each other
+    passed: bool  # gas passes it without carrying its weight
+    largest_share: float  # of the particles in the largest agglomerate then [-]
+
+    def __str__(self) -> str:
+        signs = [
+            f"the granular temperature is below {100.0 * STILL:g} % of its maximum" * self.rests,
+            f"the pressure drop is below {100.0 * CARRIED:g} % of the weight" * self.passed,
+        ]
+        reasons = " and ".join(filter(None, signs))
+        held = f"; the largest agglomerate holds {100.0 * self.largest_share:.0f} % of the particles"
+        return f"defluidised from t = {self.time:.3g} s on: {reasons}{held}"
+
+
+def defluidisation(
+    time: Series, carried: Series, temperature: Series, largest_share: Series, blown: NDArray[np.bool_]
+) -> Defluidisation | None:
+    """The time from which on a bed is not fluidised although it is blown; None if it is fluidised at the end.
+
+    time           of the rows (n,) [s]
+    carried        pressure drop over weight (n,)
+    temperature    granular temperature (n,) [m2/s2]
+    largest_share  of the particles in the largest agglomerate (n,)
+    blown          the inlet velocity is above minimum fluidisation of the dry bed (n,)
+
+    >>> time = np.linspace(0.0, 1.0, 101)
+    >>> moving = np.where(time < 0.5, 1e-3, 1e-6)
+    >>> print(defluidisation(time, np.ones(101), moving, 0.9 * np.ones(101), time > 0.1))
+    defluidised from t = 0.53 s on: the granular temperature is below 10 % of its maximum; the largest agglomerate holds 90 % of the particles
+    """  # noqa: E501  the line is printed as one
+    rows = np.flatnonzero(blown & np.isfinite(carried) & np.isfinite(temperature))
+    width = max(1, round(SMOOTHED * len(rows)))
+    if len(rows) < 4 * width or rows[-1] != len(time) - 1:
+        return None
+    load, motion = (_averaged(series[rows], width) for series in (carried, temperature))
+    started = np.maximum.accumulate(load) >= CARRIED  # before, the bed is not fluidised yet
+    rests, passed = motion < STILL * np.maximum.accumulate(motion), (load < CARRIED) & started
+    failed = rests | passed
+    if not failed[-1]:
+        return None
+    first = len(failed) - int(np.argmin(failed[::-1])) if not failed.all() else 0
+    row = rows[first]
+    share = float(largest_share[row])
+    return Defluidisation(float(time[row]), bool(rests[first:].mean() > 0.5), bool(passed[first:].mean() > 0.5), share)
+
+
+def _averaged(series: Series, width: int) -> Series:
+    """Mean over this and the `width` - 1 rows before, fewer at the start."""
+    total = np.cumsum(np.concatenate([[0.0], series]))
+    end = np.arange(1, len(series) + 1)
+    begin = np.maximum(end - width, 0)
+    return np.asarray((total[end] - total[begin]) / (end - begin))

@@ -1,0 +1,183 @@
+"""The liquid on the particles of a case, its bridges, and the spray that brings more of it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cfddem.backend.errors import InputError
+from cfddem.case.bed import Point, Positive
+from cfddem.case.materials import Checked
+
+if TYPE_CHECKING:
+    from cfddem.case.schema import Case
+
+NonNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+AMOUNTS = ("thickness", "volume_per_particle", "liquid_fraction")
+"""Keys that give the liquid on a particle at the start."""
+
+SAME_VISCOSITY = 0.01
+"""A liquid fluid whose viscosity is that of the liquid within this is the same liquid [-]."""
+
+LIQUID = 100.0
+"""A fluid at least this dense counts as a liquid [kg/m3]."""
+
+
+class Liquid(Checked):
+    """Liquid on the particles: it forms bridges between particles and at walls."""
+
+    viscosity: NonNegative = Field(description="dynamic viscosity of the liquid [Pa s]")
+    surface_tension: NonNegative = Field(description="surface tension [N/m]")
+    contact_angle: float = Field(0.0, ge=0, le=180, description="contact angle on the solids [degrees]")
+    thickness: NonNegative | None = Field(None, description="thickness of the liquid film on a wet particle [m]")
+    volume_per_particle: NonNegative | None = Field(
+        None, description="volume of liquid on a wet particle, instead of a thickness [m3]"
+    )
+    liquid_fraction: NonNegative | None = Field(
+        None, description="volume of liquid on a wet particle over its own volume, instead of a thickness [-]"
+    )
+    share_of_wet_particles: Share = Field(1.0, description="share of the particles that are wet at the start [-]")
+    pull: Literal["willett", "rabinovich", "lambert", "pendular", "constant", "none"] = Field(
+        "willett", description="capillary force of a bridge"
+    )
+    film: Literal["pitois", "deforming", "static", "none"] = Field(
+        "pitois",
+        description="viscous resistance of a bridge along the line of centres, by its volume (pitois) or by the "
+        "thickness of the films",
+    )
+    tangential: Literal["davis", "nase", "none"] = Field("davis", description="resistance of a bridge to sliding")
+    cut: Literal["constant", "zero"] = Field(
+        "constant", description="resistance below the minimum gap: as at the minimum gap, or none"
+    )
+    rupture: Literal["capillary", "lian", "willett", "film"] = Field(
+        "capillary",
+        description="gap at which a bridge breaks: by volume and speed of separation, by volume (Lian, Willett), or "
+        "where the films part",
+    )
+    redistribution: Literal["half", "radius"] = Field(
+        "half", description="how the liquid of a broken bridge is shared: equally, or by the radii"
+    )
+    minimum_gap: Positive | None = Field(
+        None, description="smallest gap of the film; default: from the roughness of the materials [m]"
+    )
+
+    wall_share: Share = Field(
+        0.0,
+        description="share of the liquid on a wall below a particle, of its projected area, that flows into a new "
+        "bridge; 0: walls take no liquid [-]",
+    )
+    wall_thickness: NonNegative = Field(0.0, description="thickness of the liquid on the walls at the start [m]")
+
+    @model_validator(mode="after")
+    def _at_most_one_amount(self) -> Liquid:
+        given = [name for name in AMOUNTS if getattr(self, name) is not None]
+        if len(given) > 1:
+            raise InputError(given[1], getattr(self, given[1]), f"left out where {given[0]} is given")
+        if self.wall_thickness > 0.0 and self.wall_share == 0.0:
+            raise InputError("wall_share", 0.0, "above 0 where wall_thickness is given")
+        if self.volume_per_particle is not None and self.volume_per_particle >= 1e-3:
+            raise InputError("volume_per_particle", self.volume_per_particle, "below 1e-3 m3", "volumes are in m3")
+        return self
+
+    def volume_on(self, radius: np.ndarray) -> np.ndarray:
+        """Volume of liquid on wet particles (N,) [m3].
+
+        radius  (N,) [m]
+        """
+        if self.volume_per_particle is not None:
+            return np.full(np.shape(radius), self.volume_per_particle)
+        sphere = 4.0 / 3.0 * np.pi * np.asarray(radius) ** 3
+        if self.liquid_fraction is not None:
+            return np.asarray(self.liquid_fraction * sphere)
+        film = self.thickness or 0.0
+        return np.asarray(4.0 / 3.0 * np.pi * film * (film * film + 3.0 * radius * (film + radius)))
+
+
+class Spray(Checked):
+    """A zone where drops of the liquid land on the particles."""
+
+    rate: NonNegative = Field(description="volume of liquid sprayed per time [m3/s]")
+    drop_volume: Positive = Field(description="volume of a drop [m3]")
+    begin: NonNegative = Field(0.0, description="time at which the spray begins [s]")
+    end: Positive | None = Field(None, description="time at which it ends; default: the end of the run [s]")
+    zone: Literal["cone", "box"] = Field("cone", description="shape of the spray zone")
+    nozzle: Point | None = Field(None, description="tip of a cone [m]")
+    direction: Point = Field((0.0, 0.0, -1.0), description="axis of a cone, away from the nozzle")
+    angle: float = Field(40.0, gt=0, lt=180, description="full opening angle of a cone [degrees]")
+    length: Positive | None = Field(None, description="length of a cone along its axis [m]")
+    corner: Point | None = Field(None, description="lower corner of a box [m]")
+    size: tuple[Positive, Positive, Positive] | None = Field(None, description="edges of a box [m]")
+
+    @model_validator(mode="after")
+    def _zone_is_complete(self) -> Spray:
+        own, other = (("nozzle", "length"), ("corner", "size"))[:: 1 if self.zone == "cone" else -1]
+        for name in own:
+            if getattr(self, name) is None:
+                raise InputError(name, None, f'given for zone = "{self.zone}"')
+        for name in other:
+            if getattr(self, name) is not None:
+                raise InputError(name, getattr(self, name), f'left out for zone = "{self.zone}"')
+        if not math.hypot(*self.direction) > 0.0:
+            raise InputError("direction", self.direction, "a vector other than zero")
+        if self.end is not None and self.end <= self.begin:
+            raise InputError("end", self.end, f"after the beginning, {self.begin:g} s")
+        return self
+
+    @property
+    def axis(self) -> np.ndarray:
+        """Unit vector along the axis of a cone (3,)."""
+        return np.array(self.direction) / math.hypot(*self.direction)
+
+    @property
+    def extremes(self) -> np.ndarray:
+        """Two points that must lie in the column: tip and end of a cone's axis, or corners of a box (2, 3) [m]."""
+        if self.zone == "cone":
+            tip = np.array(self.nozzle)
+            return np.array([tip, tip + (self.length or 0.0) * self.axis])
+        corner = np.array(self.corner)
+        return np.array([corner, corner + np.array(self.size)])
+
+
+def check_wet(case: Case) -> None:
+    """Refuse a liquid, or a spray, that does not go with the rest of the case."""
+    liquid, spray, fluid = case.liquid, case.spray, case.fluid
+    if liquid is None:
+        if spray is not None:
+            raise InputError("spray", None, "left out where there is no liquid", "give the table [liquid]")
+        return
+    if spray is None and all(getattr(liquid, name) is None for name in AMOUNTS):
+        limit = f"given, or {' or '.join(AMOUNTS[1:])}"
+        raise InputError("liquid.thickness", None, limit, "only a case with [spray] may begin dry")
+    if fluid is not None and fluid.density >= LIQUID and _alike(fluid.viscosity, liquid.viscosity):
+        raise InputError(
+            "liquid.viscosity", liquid.viscosity, f"other than that of the fluid, {fluid.viscosity:g} Pa s",
+            "particles in a liquid have no bridges of the same liquid; leave out [liquid]",
+        )  # fmt: skip
+    if spray is not None:
+        _check_zone(spray, case.column.size, case.column.shape == "cylinder")
+
+
+def _alike(one: float, other: float) -> bool:
+    return abs(one - other) <= SAME_VISCOSITY * max(one, other)
+
+
+def _check_zone(spray: Spray, size: Point, round_column: bool) -> None:
+    """Refuse a spray zone outside the column."""
+    for name, place in zip(_KEYS[spray.zone], spray.extremes):
+        inside = all(0.0 <= each <= length for each, length in zip(place.tolist(), size))
+        if round_column and math.hypot(place[0] - 0.5 * size[0], place[1] - 0.5 * size[0]) > 0.5 * size[0]:
+            inside = False
+        if not inside:
+            where = ", ".join(f"{each:.4g}" for each in place)
+            limit = (
+                f"chosen so that the spray zone lies in the column, 0 to {', '.join(f'{each:g}' for each in size)} m"
+            )
+            raise InputError(f"spray.{name}", None, limit, f"it reaches to ({where}) m")
+
+
+_KEYS = {"cone": ("nozzle", "length"), "box": ("corner", "size")}

@@ -1,0 +1,203 @@
+"""Energy of liquid bridges: what their resistance takes, what their pull stores, and what forms and breaks with them.
+
+The pull of a bridge stores the work of separating its bodies from contact. A bridge that forms at a gap brings this
+energy along, and a bridge that breaks takes it away: both have a line of their own. Half kicks in which a new or an old
+pull acts alone belong to these lines, so that the account closes to the accuracy of the time integration.
+
+A pull in a stiff film gives particles energy in each kick that the impulse of the film takes again: more than passes at
+the speed at which they drift. The line of the resistance is therefore what pull and resistance together take beyond
+what the pull stores.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
+from cfddem.backend.law_set import specialise
+from cfddem.particles.interactions.bridge import bridge_state
+from cfddem.particles.interactions.bridge_changes import of_same_wall
+from cfddem.particles.interactions.bridge_solution import pull_energy
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius
+from cfddem.particles.interactions.slots import BRIDGE_PULL, RECORD
+from cfddem.particles.pair_graph import geometry
+from cfddem.particles.vectors import at, dot, flat, minus, plus, times
+from cfddem.particles.walls.nearest_point import SURFACE, touched
+
+if TYPE_CHECKING:
+    from cfddem.particles.solver import ParticleSolver
+
+CHANNELS = ("bridge", "bridges_formed", "bridges_broken")
+"""Energy lost to the resistance of bridges; energy gained where bridges form and lost where they break."""
+
+RESISTANCE, FORMED, BROKEN, BY_WALLS = range(4)
+
+
+class BridgeCount(NamedTuple):
+    """State of the count between two steps, as compiled loops take it."""
+
+    ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
+    spin_ahead: np.ndarray  # (N, 3) likewise [rad/s]
+    held: np.ndarray  # (n,) energy of the pull of each bridge [J]
+    pulled: np.ndarray  # (n,) work of the pull in the half kick after the last count [J]
+    totals: np.ndarray  # (2, CHUNKS, 4); the second half is of pairs that another rank adds [J]
+
+
+class BridgeEnergies:
+    """The energy account of the bridges of a particle solver.
+
+    channels  `CHANNELS`
+    """
+
+    channels = CHANNELS
+
+    def __init__(self, solver: ParticleSolver) -> None:
+        self._loop = specialise(_count_bridges, solver.choices)
+        self.make_room(solver)
+
+    def make_room(self, solver: ParticleSolver) -> None:
+        """Begin with another neighbour list."""
+        ahead, spin_ahead = np.zeros((2, solver.particles.count, 3))
+        held, pulled = np.zeros((2, len(solver.edges.first)))
+        self._state = BridgeCount(ahead, spin_ahead, held, pulled, np.zeros((2, CHUNKS, 4)))
+
+    def before(self, solver: ParticleSolver, step: float, ahead: np.ndarray) -> None:
+        """Keep what impulses of a step act on.
+
+        step   [s]
+        ahead  velocity after the first half kick (N, 3) [m/s]
+        """
+        particles = solver.particles
+        self._state.ahead[:] = ahead
+        gain = (0.5 * step * particles.inverse_inertia)[:, None] * particles.torque
+        self._state.spin_ahead[:] = particles.spin + gain
+
+    def count(self, solver: ParticleSolver, step: float, before: float, after: float) -> tuple[np.ndarray, float]:
+        """Count at this instant.
+
+        step           0 where no time has passed since the last count [s]
+        before, after  half kicks before and after this instant [s]
+        returns        energy of each channel (3,) and what moving walls have put in [J]
+        """
+        particles, edges, memory, walls, shift = solver.views
+        state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
+        state.totals[:] = 0.0
+        if step > 0.0 and len(walls.kind) > 0:
+            _follow_bridges(edges, memory, walls, state)
+        self._loop(particles, edges, memory, state, shift, solver.laws.parameters, step, before, after)
+        done = solver.communicator.sum(state.totals[0], axis=0)
+        return done[[RESISTANCE, FORMED, BROKEN]], float(done[BY_WALLS])
+
+    def held(self, solver: ParticleSolver) -> float:
+        """Energy of the pull of all bridges, from contact [J]."""
+        return float(solver.communicator.sum(self._state.held[solver.edges.first < solver.particles.owned]))
+
+
+@serial
+def _follow_bridges(edges, memory, walls, count):
+    """Move what is held for a bridge at a wall to the piece of the wall to which the bridge has passed."""
+    begin, number = edges.between_particles, len(edges.first)
+    while begin < number:
+        end, left, taken = begin, -1, -1
+        while end < number and of_same_wall(begin, end, edges, walls):
+            if memory.bridge_film[end] > 0.0 or memory.bridge_change[end] < 0:
+                taken = end
+            elif count.held[end] != 0.0:
+                left = end
+            end += 1
+        if left >= 0 and taken >= 0:
+            count.held[taken], count.pulled[taken] = count.held[left], count.pulled[left]
+            count.held[left], count.pulled[left] = 0.0, 0.0
+        begin = end
+
+
+@inline
+def _half_motion(i, particles, kick, sign):
+    """Motion of particle i in a half kick (sign 1: after this instant, -1: before it)."""
+    gain = times(0.5 * sign * kick * particles.inverse_mass[i], at(particles.force, i))
+    return times(kick, plus(at(particles.velocity, i), gain))
+
+
+@inline
+def _pulled(k, particles, edges, memory, kick, sign):
+    """Work of the pull of edge k in a half kick, and the part of it that a wall does."""
+    i, j = edges.first[k], edges.second[k]
+    moved, force = _half_motion(i, particles, kick, sign), at(memory.bridge_force, k)
+    if k < edges.between_particles:
+        return dot(force, minus(moved, _half_motion(j, particles, kick, sign))), 0.0
+    by_wall = dot(force, times(kick, touched(edges, k, SURFACE)))
+    return dot(force, moved) - by_wall, by_wall
+
+
+@inline
+def _mean_motion(i, particles, count, step):
+    """Mean velocity and spin of particle i while impulses act: between the two half kicks of the step."""
+    velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
+    spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
+    return times(0.5, plus(at(count.ahead, i), velocity)), times(0.5, plus(at(count.spin_ahead, i), spin))
+
+
+@inline
+def _resisted(k, particles, edges, memory, count, step):
+    """Energy that the resistance of edge k has taken in the step, and that a moving wall has put in through it."""
+    i, j = edges.first[k], edges.second[k]
+    impulse, couple = at(memory.bridge_impulse, k), at(memory.bridge_couple, k)
+    velocity, spin = _mean_motion(i, particles, count, step)
+    turned = particles.radius[i] * dot(couple, spin)
+    if k < edges.between_particles:
+        other, spin = _mean_motion(j, particles, count, step)
+        turned += particles.radius[j] * dot(couple, spin)
+        return -dot(impulse, minus(velocity, other)) - turned, 0.0
+    surface = touched(edges, k, SURFACE)
+    return -dot(impulse, minus(velocity, surface)) - turned, dot(impulse, surface)
+
+
+@inline
+def _note(k, memory, lost):
+    """Add what the bridge of edge k has lost to its collision, where one is recorded."""
+    if RECORD and not np.isnan(memory.begin[k]):
+        before = memory.lost_to_bridge[k]
+        memory.lost_to_bridge[k] = lost + (0.0 if np.isnan(before) else before)
+
+
+@inline
+def _count_bridge(k, particles, edges, memory, count, shift, p, step, before, after, totals):
+    """Count the bridge of edge k at this instant."""
+    bridged, change = memory.bridge_film[k] > 0.0, memory.bridge_change[k] if step > 0.0 else 0
+    if step > 0.0 and ((bridged and change <= 0) or change < 0):
+        lost, by_wall = _resisted(k, particles, edges, memory, count, step)
+        totals[RESISTANCE] += lost
+        totals[BY_WALLS] += by_wall
+        _note(k, memory, lost)
+    if change < 0:
+        totals[BROKEN] += count.held[k] - count.pulled[k]
+    held, pulled = count.held[k], count.pulled[k]
+    count.held[k] = 0.0
+    count.pulled[k] = 0.0
+    if not BRIDGE_PULL or not bridged:
+        return
+    _, _, gap = geometry(k, particles, edges, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    count.held[k] = pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
+    work, by_wall = _pulled(k, particles, edges, memory, before, -1.0)
+    totals[BY_WALLS] += by_wall
+    if change > 0:
+        totals[FORMED] += count.held[k] + work
+    elif step > 0.0 and held != 0.0 and memory.bridge_resistance[k] > 0.0:
+        surplus = pulled + work + count.held[k] - held
+        totals[RESISTANCE] -= surplus
+        _note(k, memory, -surplus)
+    count.pulled[k], by_wall = _pulled(k, particles, edges, memory, after, 1.0)
+    totals[BY_WALLS] += by_wall
+
+
+@threaded
+def _count_bridges(particles, edges, memory, count, shift, p, step, before, after):
+    """See `BridgeEnergies.count`."""
+    number = len(edges.first)
+    for chunk in prange(CHUNKS):
+        for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
+            _count_bridge(k, particles, edges, memory, count, shift, p, step, before, after, totals)

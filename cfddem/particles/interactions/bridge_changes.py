@@ -1,0 +1,272 @@
+"""Bridges form where films touch and break where they are stretched too far.
+
+All bridges that form in one step draw at once from the liquid at the beginning of the step, and what broken bridges
+return comes after that, so that the order of pairs does not matter. Edges write where bridges form and break,
+particles sum over their own edges in a fixed order.
+
+Loops over `prange` write through functions: the compiler for threads loses what they write into a structure themselves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
+from cfddem.particles.collision_events import move_event
+from cfddem.particles.interactions.bridge import FLAT, bridge_state, numbers_of
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
+from cfddem.particles.interactions.slots import RECORD, WALL_LIQUID, WALLS, bridge_rupture, drawn_share, returned_share
+from cfddem.particles.interactions.wall_liquid import thickest_wall, transfer_wall_liquid, wall_thickness
+from cfddem.particles.pair_graph import edge_role, geometry
+from cfddem.particles.vectors import NOTHING, at, dot, put
+from cfddem.particles.walls.nearest_point import touched_distance
+from closures.minimum_gap import glass_transition
+from closures.numbers import capillary
+
+
+@part
+def renew_thickness(particles):
+    """Thickness of the film on every particle, ghosts included."""
+    for i in prange(len(particles.radius)):
+        find_thickness(i, particles)
+
+
+@inline
+def find_thickness(i, particles):
+    """Thickness of the layer of liquid all over particle i."""
+    radius = particles.radius[i]
+    swell = 3.0 * particles.liquid[i] / (4.0 * math.pi * radius * radius * radius)
+    particles.film_thickness[i] = radius * math.expm1(math.log1p(swell) / 3.0)
+
+
+@inline
+def longest_gap(k, particles, edges, memory, shift, p):
+    """Gap at which the bridge of edge k breaks; it grows with the speed at which the bodies part."""
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    n = numbers_of(p)
+    parting = max(dot(relative_velocity(k, particles, edges), separation) / distance, 0.0)
+    number = capillary(n.viscosity, parting, n.surface_tension) if n.surface_tension > 0.0 else 0.0
+    state = bridge_state(k, gap, reduced_radius, memory, p, number)
+    return max(state.film, bridge_rupture(state))
+
+
+@serial
+def find_changes(particles, edges, memory, walls, shift, p):
+    """Mark where bridges form or break, and what each body has for new ones; returns the number of changes."""
+    changes = _pair_changes(particles, edges, memory, shift, p)
+    if WALLS:
+        changes += wall_changes(particles, edges, memory, walls, shift, p)
+    if changes > 0:
+        limit_shares(particles, edges, memory)
+    return changes
+
+
+@serial
+def exchange_liquid(particles, edges, memory, walls, shift, p):
+    """Let bridges form and break where they are marked; liquid goes from bodies to bridges and back."""
+    fill_bridges(particles, edges, memory, walls, shift, p)
+    if WALLS and WALL_LIQUID:
+        transfer_wall_liquid(particles, edges, memory, walls, p)
+    transfer_liquid(particles, edges, memory)
+    clear_bridges(edges, memory)
+
+
+@inline
+def _change(k, gap, film, particles, edges, memory, shift, p):
+    """1 where a bridge forms on edge k, -1 where one breaks, else 0.
+
+    film  thickness of the liquid on both bodies [m]
+    """
+    if memory.bridge_film[k] > 0.0:
+        parted = gap > memory.bridge_film[k] and gap > longest_gap(k, particles, edges, memory, shift, p)
+        return -1 if parted else 0
+    return 1 if film > 0.0 and gap < film else 0  # dry solids overlap without a bridge
+
+
+@inline
+def _mark_pair(k, particles, edges, memory, shift, p):
+    """Mark whether the bridge of a pair of particles forms or breaks; returns 1 if so."""
+    _, _, gap = geometry(k, particles, edges, shift)
+    film = particles.film_thickness[edges.first[k]] + particles.film_thickness[edges.second[k]]
+    change = _change(k, gap, film, particles, edges, memory, shift, p)
+    memory.bridge_change[k] = change
+    return change * change
+
+
+@part
+def _pair_changes(particles, edges, memory, shift, p):
+    """Mark the pairs of particles whose bridges form or break; returns their number."""
+    counts, number = np.zeros(CHUNKS, np.int64), edges.between_particles
+    for chunk in prange(CHUNKS):
+        count = 0
+        for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            count += _mark_pair(k, particles, edges, memory, shift, p)
+        counts[chunk] = count
+    return counts.sum()  # local: pairs of this rank
+
+
+@serial
+def wall_changes(particles, edges, memory, walls, shift, p):
+    """Mark where bridges at walls form or break, and move bridges to the nearest piece; returns their number.
+
+    A particle has at most one bridge with a wall, at the nearest of its pieces: it does not matter how many pieces
+    there are.
+    """
+    number, begin, count = len(edges.first), edges.between_particles, 0
+    while begin < number:
+        end, nearest, holder = begin, begin, -1
+        while end < number and of_same_wall(begin, end, edges, walls):
+            if touched_distance(edges, end) < touched_distance(edges, nearest):
+                nearest = end
+            if memory.bridge_film[end] > 0.0:
+                holder = end
+            memory.bridge_change[end] = 0
+            end += 1
+        if holder >= 0 and holder != nearest:
+            _move_bridge(memory, holder, nearest)
+            if RECORD:
+                move_event(memory, holder, nearest)
+        gap = touched_distance(edges, nearest) - particles.radius[edges.first[nearest]]
+        film = particles.film_thickness[edges.first[nearest]]
+        if gap < film + thickest_wall(walls, p):
+            film += wall_thickness(nearest, edges, walls, p)
+        change = _change(nearest, gap, film, particles, edges, memory, shift, p)
+        memory.bridge_change[nearest] = change
+        count += change * change
+        begin = end
+    return count
+
+
+@inline
+def of_same_wall(k, other, edges, walls):
+    """Whether two edges at walls are of the same particle and wall."""
+    same = edges.first[k] == edges.first[other]
+    return same and walls.wall[edges.second[k]] == walls.wall[edges.second[other]]
+
+
+@inline
+def _move_bridge(memory, k, to):
+    """Let the bridge of edge k continue at another piece of the same wall."""
+    memory.bridge_film[to], memory.bridge_volume[to] = memory.bridge_film[k], memory.bridge_volume[k]
+    memory.bridge_gap[to], memory.bridge_accounted[to] = memory.bridge_gap[k], memory.bridge_accounted[k]
+    put(memory.bridge_impulse, to, at(memory.bridge_impulse, k))
+    put(memory.bridge_couple, to, at(memory.bridge_couple, k))
+    clear_bridge(k, memory)
+
+
+@inline
+def _other_radius(k, i, particles, edges):
+    """Radius of the other body of edge k; that of a wall has no limit."""
+    if k >= edges.between_particles:
+        return FLAT
+    j = edges.second[k] if edges.first[k] == i else edges.first[k]
+    return particles.radius[j]
+
+
+@inline
+def _shares(i, particles, edges, memory):
+    """Sum of the shares of its liquid that the new bridges of particle i ask for."""
+    asked = 0.0
+    for place in range(edges.start[i], edges.start[i + 1]):
+        k, _ = edge_role(edges.incident[place])
+        if memory.bridge_change[k] > 0:
+            asked += drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
+    return asked
+
+
+@inline
+def _limit_share(i, particles, edges, memory):
+    particles.liquid_supply[i] = particles.liquid[i] / max(1.0, _shares(i, particles, edges, memory))
+
+
+@part
+def limit_shares(particles, edges, memory):
+    """Liquid of which each new bridge takes its share: less than there is where the shares add up to more than 1."""
+    for i in prange(particles.owned):
+        _limit_share(i, particles, edges, memory)
+
+
+@part
+def fill_bridges(particles, edges, memory, walls, shift, p):
+    """Volume, film and minimum gap of new bridges."""
+    for k in prange(len(edges.first)):
+        if memory.bridge_change[k] > 0:
+            _fill(k, particles, edges, memory, walls, shift, p)
+
+
+@inline
+def _fill(k, particles, edges, memory, walls, shift, p):
+    i, j = edges.first[k], edges.second[k]
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    volume = particles.liquid_supply[i] * drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
+    film = particles.film_thickness[i]
+    if k < edges.between_particles:
+        volume += particles.liquid_supply[j] * drawn_share(particles.radius[j], particles.radius[i])
+        film += particles.film_thickness[j]
+    else:
+        film += wall_thickness(k, edges, walls, p)
+    approach = max(-dot(relative_velocity(k, particles, edges), separation) / distance, 0.0)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    n = numbers_of(p)
+    glass = glass_transition(n.viscosity, approach, n.transition_pressure, reduced_radius, film)
+    memory.bridge_volume[k], memory.bridge_film[k] = volume, film
+    memory.bridge_gap[k] = max(glass, n.minimum_gap)
+    memory.bridge_accounted[k] = gap
+
+
+@part
+def transfer_liquid(particles, edges, memory):
+    """Take what new bridges have drawn from the liquid of every particle, and add what broken ones return."""
+    for i in prange(particles.owned):
+        _transfer(i, particles, edges, memory)
+
+
+@inline
+def _transfer(i, particles, edges, memory):
+    """See `transfer_liquid`, for particle i."""
+    drawn, returned, formed, broken = 0.0, 0.0, 0, 0
+    for place in range(edges.start[i], edges.start[i + 1]):
+        k, sign = edge_role(edges.incident[place])
+        change = memory.bridge_change[k]
+        if change > 0:
+            drawn += drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
+            formed += 1 if sign > 0.0 else 0
+        elif change < 0:
+            returned += _part_returned(k, sign, particles, edges, memory)
+            broken += 1 if sign > 0.0 else 0
+    if drawn > 0.0 or returned > 0.0:
+        particles.liquid[i] = max(particles.liquid[i] - particles.liquid_supply[i] * drawn, 0.0) + returned
+        find_thickness(i, particles)
+    particles.bridges_formed[i] += formed
+    particles.bridges_broken[i] += broken
+
+
+@inline
+def _part_returned(k, sign, particles, edges, memory):
+    """Liquid of the broken bridge of edge k that its first (sign 1) or second body gets [m3]."""
+    i, j = edges.first[k], edges.second[k]
+    volume = memory.bridge_volume[k]
+    if k >= edges.between_particles:
+        return returned_share(particles.radius[i], FLAT) * volume if WALL_LIQUID else volume
+    to_first = returned_share(particles.radius[i], particles.radius[j]) * volume
+    return to_first if sign > 0.0 else volume - to_first
+
+
+@part
+def clear_bridges(edges, memory):
+    """Forget bridges that have broken."""
+    for k in prange(len(edges.first)):
+        if memory.bridge_change[k] < 0:
+            clear_bridge(k, memory)
+
+
+@inline
+def clear_bridge(k, memory):
+    """Forget the bridge of edge k."""
+    memory.bridge_film[k] = 0.0
+    memory.bridge_volume[k] = 0.0
+    memory.bridge_resistance[k] = 0.0
+    put(memory.bridge_force, k, NOTHING)

@@ -1,0 +1,284 @@
+"""The laws of liquid bridges: which ones the user has chosen, and what they put into the slots of the loops.
+
+Each law is a word or a function of named arguments: gap, film, volume, reduced_radius, minimum_gap, viscosity,
+surface_tension, contact_angle, capillary_number, and the user's own `parameters`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, NamedTuple
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.law_set import adapted, check_compiles
+from cfddem.particles.interactions.slots import BridgeState
+from closures import bridge, capillary, capillary_pull, rupture
+from closures.lubrication import film_strength
+
+Function = Callable[..., float]
+
+
+@dataclass(frozen=True)
+class BridgeFilm:
+    """Resistance of a bridge along the line of centres.
+
+    resistance  force per rate of the gap [kg/s]
+    potential   its integral over the gap, as a function of the gap; Gauss' rule integrates if not given [N s]
+    """
+
+    resistance: Function
+    potential: Function | None = None
+
+
+@dataclass(frozen=True)
+class BridgePull:
+    """Attraction of a bridge.
+
+    force   as a function of the gap [N]
+    energy  its integral over the gap, from contact; Gauss' rule integrates if not given [J]
+    """
+
+    force: Function
+    energy: Function | None = None
+
+
+def _static(gap: float, film: float, viscosity: float, reduced_radius: float) -> float:
+    return film_strength(viscosity, reduced_radius) * bridge.static_share(gap, film) / gap
+
+
+def _static_potential(gap: float, film: float, viscosity: float, reduced_radius: float) -> float:
+    return film_strength(viscosity, reduced_radius) * bridge.static_potential(gap, film)
+
+
+def _deforming(gap: float, film: float, viscosity: float, reduced_radius: float) -> float:
+    return film_strength(viscosity, reduced_radius) * bridge.deforming_share(gap, film) / gap
+
+
+def _deforming_potential(gap: float, film: float, viscosity: float, reduced_radius: float) -> float:
+    return film_strength(viscosity, reduced_radius) * bridge.deforming_potential(gap, film)
+
+
+def _pitois(gap: float, volume: float, viscosity: float, reduced_radius: float) -> float:
+    if volume == 0.0:
+        return 0.0
+    return film_strength(viscosity, reduced_radius) * bridge.pitois_share(gap, reduced_radius, volume) / gap
+
+
+def _pitois_potential(gap: float, volume: float, viscosity: float, reduced_radius: float) -> float:
+    if volume == 0.0:
+        return 0.0
+    return film_strength(viscosity, reduced_radius) * bridge.pitois_potential(gap, reduced_radius, volume)
+
+
+def _constant(gap: float, film: float, surface_tension: float, reduced_radius: float) -> float:
+    return bridge.constant_capillary(surface_tension, reduced_radius) if gap < film else 0.0
+
+
+def _constant_energy(gap: float, film: float, surface_tension: float, reduced_radius: float) -> float:
+    return bridge.constant_capillary(surface_tension, reduced_radius) * min(gap, film)
+
+
+def _separation_of_films(film: float) -> float:
+    return film
+
+
+def _nothing(radius: float, other_radius: float) -> float:
+    return 0.0
+
+
+def _half(radius: float, other_radius: float) -> float:
+    return 0.5
+
+
+FILMS: dict[str, BridgeFilm | None] = {
+    "none": None,
+    "static": BridgeFilm(_static, _static_potential),
+    "deforming": BridgeFilm(_deforming, _deforming_potential),
+    "pitois": BridgeFilm(_pitois, _pitois_potential),
+}
+CUTS = ("zero", "constant")
+TANGENTIALS: dict[str, Function | None] = {
+    "none": None,
+    "davis": bridge.davis_tangential,
+    "nase": bridge.nase_tangential,
+}
+PULLS: dict[str, BridgePull | None] = {
+    "none": None,
+    "pendular": BridgePull(capillary.pendular_pull, capillary.pendular_energy),
+    "willett": BridgePull(capillary_pull.willett_pull, capillary_pull.willett_energy),
+    "rabinovich": BridgePull(capillary_pull.rabinovich_pull, capillary_pull.rabinovich_energy),
+    "lambert": BridgePull(capillary_pull.lambert_pull, capillary_pull.lambert_energy),
+    "constant": BridgePull(_constant, _constant_energy),
+}
+RUPTURES: dict[str, Function] = {
+    "capillary": capillary.rupture_length,
+    "lian": rupture.lian_rupture,
+    "willett": rupture.willett_rupture,
+    "film": _separation_of_films,
+}
+SHARES: dict[str, Function] = {"shi_mccarthy": capillary.liquid_share, "none": _nothing}
+REDISTRIBUTIONS: dict[str, Function] = {"half": _half, "radius": rupture.share_by_radius}
+
+_WORDS: dict[str, Mapping[str, Any]] = {
+    "film": FILMS,
+    "tangential": TANGENTIALS,
+    "pull": PULLS,
+    "rupture": RUPTURES,
+    "share": SHARES,
+    "redistribution": REDISTRIBUTIONS,
+}
+
+
+class BridgeNumbers(NamedTuple):
+    """Numbers of the laws, as compiled loops take them."""
+
+    viscosity: float  # [Pa s]
+    surface_tension: float  # [N/m]
+    contact_angle: float  # [rad]
+    minimum_gap: float  # [m]
+    transition_pressure: float  # [Pa]
+    wall_share: float  # [-]
+    wall_film: float  # [m]
+    wall_patch: float  # [m]
+
+
+@dataclass(frozen=True)
+class BridgeLaws:
+    """Laws of liquid bridges, an argument of :class:`~cfddem.particles.interactions.laws.Laws`.
+
+    viscosity            of the liquid; it also lengthens bridges that part fast [Pa s]
+    surface_tension      [N/m]
+    contact_angle        [rad]
+    film                 resistance along the line of centres: "none", "static", "deforming", "pitois", or a
+                         function
+    cut                  that resistance below h_min: "zero", or "constant" as at h_min
+    tangential           resistance to sliding: "none", "davis", "nase", or a function
+    pull                 attraction: "none", "pendular", "willett", "rabinovich", "lambert", "constant", or a function
+    rupture              gap at which the bridge breaks, not below that at which it formed: "capillary" by its volume
+                         and speed, "lian" or "willett" by its volume, "film" where the films separate, or a function
+    share                part of a body's liquid that flows into a new bridge: "shi_mccarthy", "none", or a function of
+                         radius and other_radius
+    redistribution       part of a broken bridge that a body gets: "half", "radius" by the radii, or a function
+                         of radius and other_radius
+    minimum_gap          h_min, at least [m]
+    transition_pressure  at which the liquid turns to glass, which sets h_min [Pa]
+    wall_share           part of the liquid on a wall, below a particle, that flows into a new bridge; 0 for walls that
+                         take no liquid [-]
+    wall_film            thickness of the liquid on the walls at the start [m]
+    wall_patch           edge of the patches of wall whose liquid is counted, for instance a particle diameter [m]
+    parameters           numbers of a user's functions, by name: another value compiles nothing anew
+    """
+
+    viscosity: float = 0.0
+    surface_tension: float = 0.0
+    contact_angle: float = 0.0
+    film: str | Function | BridgeFilm = "none"
+    cut: str = "zero"
+    tangential: str | Function = "none"
+    pull: str | Function | BridgePull = "pendular"
+    rupture: str | Function = "capillary"
+    share: str | Function = "shi_mccarthy"
+    redistribution: str | Function = "half"
+    minimum_gap: float = 0.0
+    transition_pressure: float = math.inf
+    wall_share: float = 0.0
+    wall_film: float = 0.0
+    wall_patch: float = 0.0
+    parameters: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def check(self) -> None:
+        """Refuse values that no liquid has, unknown words, and functions that cannot be compiled."""
+        for name in ("viscosity", "surface_tension", "minimum_gap", "wall_film", "wall_patch"):
+            if not 0.0 <= (value := getattr(self, name)) < math.inf:
+                raise InputError(name, value, "at least 0 and finite")
+        if not 0.0 <= self.contact_angle <= math.pi:
+            raise InputError("contact_angle", self.contact_angle, "0 to pi")
+        if not self.transition_pressure > 0.0:
+            raise InputError("transition_pressure", self.transition_pressure, "above 0")
+        if not 0.0 <= self.wall_share <= 1.0:
+            raise InputError("wall_share", self.wall_share, "0 to 1")
+        if self.wall_share == 0.0 and self.wall_film > 0.0:
+            raise InputError("wall_share", 0.0, "above 0 where walls have a film")
+        if self.wall_share > 0.0 and self.wall_patch == 0.0:
+            raise InputError("wall_patch", 0.0, "above 0 where walls carry liquid", "take a particle diameter")
+        for name, value in self.parameters.items():
+            if name in BridgeState._fields or not math.isfinite(value):
+                raise InputError(f"parameters.{name}", value, "a finite number with a name of its own")
+        if self.cut not in CUTS:
+            raise InputError("cut", self.cut, nearest(str(self.cut), CUTS))
+        if self.share == "none" and isinstance(self.pull, str) and self.pull not in ("none", "constant"):
+            raise InputError(
+                "share", "none", f"a law that fills bridges: the pull {self.pull!r} follows from the volume"
+            )
+        if self.share == "none" and self.film == "pitois":
+            raise InputError("share", "none", "a law that fills bridges: the film 'pitois' follows from the volume")
+        for name, words in _WORDS.items():
+            law = getattr(self, name)
+            if isinstance(law, str) and law not in words:
+                raise InputError(name, law, nearest(law, words))
+        for name, function in self._functions().items():
+            check_compiles(f"laws.bridge.{name}", function)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """The numbers that loops take: those of the user's functions, then `built_in`."""
+        return (*(float(each) for each in self.parameters.values()), *self.built_in)
+
+    @property
+    def built_in(self) -> BridgeNumbers:
+        """The numbers of all laws."""
+        return BridgeNumbers(*(float(getattr(self, name)) for name in BridgeNumbers._fields))
+
+    def choices(self) -> dict[str, Any]:
+        """What these laws put into the slots of the loops."""
+        of_bridge = {name: f"bridge.{name}" for name in BridgeState._fields[:-1]}
+        # the damping of rolling and the built-in numbers follow in p
+        first = -(len(self.parameters) + len(BridgeNumbers._fields) + 1)
+        of_bridge |= {name: f"bridge.p[{first + n}]" for n, name in enumerate(self.parameters)}
+        of_radii = {"radius": "radius", "other_radius": "other_radius"}
+        made: dict[str, Any] = {
+            "BRIDGE": True,
+            "CUT_CONSTANT": self.cut == "constant",
+            "WALL_LIQUID": self.wall_share > 0.0,
+        }
+        for slot, function in self._functions().items():
+            if slot in ("drawn_share", "returned_share"):
+                made[slot] = adapted(function, "radius, other_radius", of_radii)
+            else:
+                made[slot] = adapted(function, "bridge", of_bridge)
+        return made | {
+            "BRIDGE_FILM": "bridge_resistance" in made,
+            "BRIDGE_SLIDING": "sliding_resistance" in made,
+            "BRIDGE_PULL": "bridge_pull" in made,
+            "BRIDGE_POTENTIAL": "bridge_potential" in made,
+            "BRIDGE_ENERGY": "bridge_energy" in made,
+        }
+
+    def _functions(self) -> dict[str, Function]:
+        """Slot -> function."""
+        film, pull = self._law("film"), self._law("pull")
+        film = BridgeFilm(film) if callable(film) else film
+        pull = BridgePull(pull) if callable(pull) else pull
+        named = {
+            "bridge_resistance": film and film.resistance,
+            "bridge_potential": film and film.potential,
+            "sliding_resistance": self._law("tangential"),
+            "bridge_pull": pull and pull.force,
+            "bridge_energy": pull and pull.energy,
+            "bridge_rupture": self._law("rupture"),
+            "drawn_share": self._law("share"),
+            "returned_share": self._law("redistribution"),
+        }
+        return {slot: function for slot, function in named.items() if function is not None}
+
+    def _law(self, name: str) -> Any:
+        law = getattr(self, name)
+        return _WORDS[name][law] if isinstance(law, str) else law
+
+
+NO_BRIDGE: dict[str, Any] = {"BRIDGE": False}
+"""What a run without liquid puts into the slots."""
+
+assert {*BridgeNumbers._fields} <= {each.name for each in fields(BridgeLaws)}

@@ -1,0 +1,21 @@
+"""Targets of `cfddem validate`. Importing this module loads none of them."""
+
+from __future__ import annotations
+
+TARGETS: dict[str, str] = {
+    "binary-collision": "scenarios.collisions.immersed_pair.validation",
+    "particles": "scenarios.validation.particles.study",
+    "fluid": "scenarios.validation.fluid.study",
+    "coupling": "scenarios.validation.coupling",
+    "beds": "scenarios.validation.beds.study",
+    "lubrication": "scenarios.beds.lubrication_study.validation",
+    "wet-tumbler": "scenarios.collisions.wet_tumbler.validation",
+    "wet": "scenarios.validation.wet.study",
+    "waves": "scenarios.validation.bed_waves.study",
+    "agitation": "scenarios.validation.agitation.study",
+    "resolved": "scenarios.validation.resolved_suspension.study",
+}
+"""Name of each target, and the module that holds its `study`."""
+
+ONLY_IF_NAMED = ("resolved",)
+"""Targets that take up to a day; `all` leaves them out."""

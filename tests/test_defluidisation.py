@@ -1,0 +1,41 @@
+"""The detector of defluidisation, on made-up series."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cfddem.analysis.defluidisation import defluidisation
+
+TIME = np.linspace(0.0, 2.0, 201)
+SHARE = np.linspace(0.0, 1.0, 201)
+BLOWN = TIME > 0.2
+WAVES = 1.0 + 0.15 * np.sin(40.0 * TIME)
+MOTION = 1e-3 * (1.0 + 0.5 * np.sin(25.0 * TIME))
+
+
+def test_a_bubbling_bed_is_fluidised() -> None:
+    assert defluidisation(TIME, WAVES, MOTION, SHARE, BLOWN) is None
+
+
+def test_a_bed_that_comes_to_rest_is_found_with_its_time() -> None:
+    found = defluidisation(TIME, WAVES, np.where(TIME < 1.2, MOTION, 1e-6), SHARE, BLOWN)
+    assert found is not None and found.rests and not found.passed
+    assert found.time == pytest.approx(1.2, abs=0.1)
+    assert found.largest_share == pytest.approx(0.6, abs=0.05)
+    assert "granular temperature" in str(found) and "pressure drop" not in str(found)
+
+
+def test_channels_show_in_the_pressure_drop() -> None:
+    found = defluidisation(TIME, np.where(TIME < 0.8, WAVES, 0.5), MOTION, SHARE, BLOWN)
+    assert found is not None and found.passed and not found.rests
+    assert found.time == pytest.approx(0.8, abs=0.1)
+    assert "pressure drop is below 80 % of the weight" in str(found)
+
+
+def test_a_pause_and_a_bed_that_is_not_blown_are_no_defluidisation() -> None:
+    pause = np.where((TIME > 0.8) & (TIME < 1.2), 1e-6, MOTION)
+    assert defluidisation(TIME, WAVES, pause, SHARE, BLOWN) is None
+    stopped = np.where(TIME < 1.2, MOTION, 1e-6)
+    assert defluidisation(TIME, WAVES, stopped, SHARE, BLOWN & (TIME < 1.3)) is None
+    assert defluidisation(TIME[:3], WAVES[:3], MOTION[:3], SHARE[:3], BLOWN[:3]) is None
