@@ -160,3 +160,24 @@ def singh(stokes: float, film_ratio: float) -> float:
     slow = math.exp(-1.76) * stokes**0.17 * film_ratio**-0.16
     fast = math.exp(-0.90) * stokes**0.01 * film_ratio**-0.22
     return float(min(slow, fast))
+
+
+@law(
+    "restitution",
+    "Singh, Windows-Yule & Nair, arXiv:2603.23100 (2026): where the branches of eqs (21) and (22) meet",
+    film_ratio=(0.05, 0.143),
+)
+def singh_crossover(film_ratio: float) -> float:
+    r"""Stokes number at which the two branches of :func:`singh` meet.
+
+    .. math:: St^* = \exp\frac{1.76 - 0.90 + (0.16 - 0.22)\ln\gamma}{0.17 - 0.01}
+
+    film_ratio  gamma, film thickness over diameter of the bead [-]
+    returns     St* [-]
+
+    Range: 0.05 < gamma < 0.143, that of the fit.
+
+    >>> round(singh_crossover(0.1))
+    512
+    """
+    return math.exp((1.76 - 0.90 + (0.16 - 0.22) * math.log(film_ratio)) / (0.17 - 0.01))

@@ -1,10 +1,22 @@
-"""One thread for every test that does not ask for more, so that tests run alike on a busy machine."""
+"""One thread for every test that does not ask for more, and the order of the files."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import pytest
+
+LONGEST = (
+    "test_docs", "test_golden", "test_user_laws", "test_ghosts", "test_resolved_suspension", "test_wall_bridges",
+    "test_many_bridges", "test_run", "test_bridges", "test_wet_beds",
+)  # fmt: skip
+"""Files that take longest, most of it to compile loops. They come first, so that two workers end together."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first."""
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -53,6 +53,32 @@ record_collisions = true
 """
 """It has films from the start and contacts after a few milliseconds, and takes a second."""
 
+WET = (
+    TINY.replace("density = 1000.0", "density = 1.2", 1)
+    .replace("viscosity = 2e-3", "viscosity = 1.8e-5", 1)
+    .replace("inlet_velocity = 0.02", "inlet_velocity = 0.8")
+    + """
+particle_step = 1e-5
+[liquid]
+viscosity = 5e-3
+surface_tension = 0.02
+liquid_fraction = 1e-3
+wall_share = 0.5
+wall_thickness = 1e-6
+[spray]
+rate = 1e-7
+drop_volume = 1e-13
+zone = "box"
+corner = [0.0, 0.0, 0.009]
+size = [0.012, 0.012, 0.009]
+[laws]
+drag = "beetstra"
+lubrication = "none"
+self_disturbance_correction = false
+"""
+)
+"""Wet beads in air under a spray: bridges form and break, walls carry liquid."""
+
 
 def same_state(left: Path, right: Path) -> None:
     """The last checkpoints are equal bit for bit."""
@@ -86,12 +112,12 @@ def same_record(left: Path, right: Path) -> None:
             assert np.array_equal(columns[name], twins[name], equal_nan=True), name
 
 
-def long_enough(kills: int) -> str:
+def long_enough(kills: int, case: str = TINY) -> str:
     """The case with an end late enough for so many kills."""
-    return TINY.replace("until = 0.024", f"until = {0.012 * kills:g}").replace("every = 0.004", "every = 0.002", 1)
+    return case.replace("until = 0.024", f"until = {0.012 * kills:g}").replace("every = 0.004", "every = 0.002", 1)
 
 
-def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
+def kill_and_go_on(folder: Path, kills: int, seed: int, case: str = TINY) -> int:
     """Kill a run at random instants, every other time while it loads, resume it after each, and at last let it finish.
 
     After every kill the folder can be opened and is complete up to its last snapshot.
@@ -99,7 +125,7 @@ def kill_and_go_on(folder: Path, kills: int, seed: int) -> int:
     returns  number of kills before the run finished
     """
     run, instants, hits = folder / "run", random.Random(seed), 0
-    (folder / "case.toml").write_text(long_enough(kills))
+    (folder / "case.toml").write_text(long_enough(kills, case))
     for number in range(kills):
         process = _started(folder)
         if number % 2:

@@ -56,6 +56,18 @@ def test_the_account_of_many_bridges_closes(laws: BridgeLaws, speed: float) -> N
     assert abs(remainder) < 1e-3 * put_in
 
 
+def test_the_account_does_not_depend_on_neighbour_lists() -> None:
+    """The work of the pull in the half kick before a new list counts, too."""
+    counted = []
+    for skin in (None, 3e-6):
+        run, _ = swarm(60, THIN, speed=0.5, energies=True, skin=skin)
+        counted.append(ledger(run, 0.5 * run.time_scales(1.0).recommended, 200)[1])
+    assert run.lists.made > 50
+    within = 1e-9 * max(counted[0].values())
+    for name, energy in counted[0].items():
+        assert counted[1][name] == pytest.approx(energy, abs=within), name
+
+
 def test_a_moving_wall_puts_energy_in_through_its_bridges() -> None:
     """A plane slides below wet spheres and drags them along."""
     draw = np.random.default_rng(1)

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from cfddem.backend.errors import InputError
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from closures import bridge, capillary_pull, numbers, rupture
 
 YADE = Path(__file__).parent / "data" / "yade_capillary.csv"
@@ -108,6 +110,14 @@ def test_redistribution_keeps_all_liquid() -> None:
         assert law(first, second) + law(second, first) == pytest.approx(1.0, rel=1e-15)
         assert law(first, first) == 0.5
     assert rupture.share_by_contact_angle(0.2, 2.5) == 1.0
+
+
+def test_angles_on_walls_are_those_on_particles_unless_given() -> None:
+    laws = BridgeLaws(contact_angle=0.3, wall_contact_angle=1.2, redistribution="contact_angle")
+    assert laws.built_in.wall_contact_angle == 1.2
+    assert BridgeLaws(contact_angle=0.3).built_in.wall_contact_angle == 0.3
+    with pytest.raises(InputError, match="wall_contact_angle"):
+        BridgeLaws(wall_contact_angle=4.0).check()
 
 
 def test_rupture_laws_meet_for_a_small_volume() -> None:

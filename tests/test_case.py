@@ -15,6 +15,7 @@ import tomli_w
 from example_case import MIXTURE, TEXT
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from test_case_walls import HOPPER
 
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery, overrides
@@ -81,9 +82,12 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
         ),
         ({"bed.inlet_velocity": -0.1}, "bed.inlet_velocity = -0.1: must be at least 0"),
         ({"bed.inlet_velocity": [[0, 0.1], [1, -0.2]]}, "bed.inlet_velocity = -0.2: must be at least 0"),
-        ({"bed.diametr": 1e-3}, "must be one of diameter and 15 more (did you mean 'diameter'?)"),
+        ({"bed.diametr": 1e-3}, "must be one of diameter and 17 more (did you mean 'diameter'?)"),
         ({"laws.drag": "wenyu"}, "(did you mean 'wen_yu'?); cfddem explain lists all laws"),
-        ({"laws.lubrication": "nijsen"}, "must be one of nijssen, none"),  # and laws that other tests have registered
+        (
+            {"laws.lubrication": "nijsen"},
+            "must be one of nijssen, nijssen_full",
+        ),  # and laws that other tests have registered
         ({"laws.added_mass": "zubr"}, "(did you mean 'zuber'?); cfddem explain lists all laws"),
         ({"laws.added_mass": -0.5}, "laws.added_mass = -0.5: must be zero or positive, or the name of a law"),
         ({"column.viscosity": 1e-3}, "viscosity belongs to fluid"),
@@ -256,9 +260,10 @@ ENDINGS = [
 @st.composite
 def mutated_files(draw: st.DrawFn) -> bytes:
     """A case file with a few random changes of values, keys, text and bytes."""
-    values = copy.deepcopy(tomllib.loads(draw(st.sampled_from([TEXT, MIXTURE]))))
+    values = copy.deepcopy(tomllib.loads(draw(st.sampled_from([TEXT, MIXTURE, HOPPER]))))
     tables = [values, *(each for each in values.values() if isinstance(each, dict)), *values["material"].values()]
     tables += values["bed"].get("species", {}).values()
+    tables += [each for several in values.values() if isinstance(several, list) for each in several]
     known = [name for part in Case.model_json_schema()["$defs"].values() for name in part["properties"]]
     for _ in range(draw(st.integers(0, 4))):
         table = draw(st.sampled_from(tables))

@@ -9,7 +9,7 @@ from cfddem.analysis.defluidisation import defluidisation
 
 TIME = np.linspace(0.0, 2.0, 201)
 SHARE = np.linspace(0.0, 1.0, 201)
-BLOWN = TIME > 0.2
+BLOWN = np.where(TIME > 0.2, 0.5, 0.0)  # m/s above minimum fluidisation
 WAVES = 1.0 + 0.15 * np.sin(40.0 * TIME)
 MOTION = 1e-3 * (1.0 + 0.5 * np.sin(25.0 * TIME))
 
@@ -37,5 +37,18 @@ def test_a_pause_and_a_bed_that_is_not_blown_are_no_defluidisation() -> None:
     pause = np.where((TIME > 0.8) & (TIME < 1.2), 1e-6, MOTION)
     assert defluidisation(TIME, WAVES, pause, SHARE, BLOWN) is None
     stopped = np.where(TIME < 1.2, MOTION, 1e-6)
-    assert defluidisation(TIME, WAVES, stopped, SHARE, BLOWN & (TIME < 1.3)) is None
+    assert defluidisation(TIME, WAVES, stopped, SHARE, BLOWN * (TIME < 1.3)) is None
     assert defluidisation(TIME[:3], WAVES[:3], MOTION[:3], SHARE[:3], BLOWN[:3]) is None
+
+
+def test_a_bed_that_never_moved_is_found() -> None:
+    """It carries its weight as one piece, or gas passes it, from the start."""
+    found = defluidisation(TIME, np.ones(201), np.full(201, 1e-6), SHARE, BLOWN)
+    assert found is not None and found.rests and not found.passed and found.time < 0.25
+    found = defluidisation(TIME, np.full(201, 0.6), np.full(201, 1e-6), SHARE, BLOWN)
+    assert found is not None and found.rests and found.passed
+
+
+def test_a_short_dip_at_the_end_is_no_defluidisation() -> None:
+    dip = np.where(TIME > 1.9, 0.5, WAVES)
+    assert defluidisation(TIME, dip, MOTION, SHARE, BLOWN) is None

@@ -78,9 +78,13 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
+LONG = {"user-law", "contact-law", "wet-particles", "cluster"}
+"""Pages with many laws, each of which is compiled."""
+
+
 def is_long(page: Path) -> bool:
     """Whether a page takes too long for a test that is not marked slow."""
-    return "scenarios" in page.parts and page.parent.name not in QUICK
+    return page.stem in LONG or ("scenarios" in page.parts and page.parent.name not in QUICK)
 
 
 def pages_with(mark: str | None) -> list[Any]:

@@ -15,7 +15,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
-from cfddem.particles.energy_count import CHANNELS
+from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.initial.packing import lattice
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table

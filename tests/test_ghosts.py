@@ -142,7 +142,7 @@ def test_bits_do_not_depend_on_sorting(monkeypatch: pytest.MonkeyPatch) -> None:
     assert_same_bits(joined([state(sorted_run)]), plain)
 
 
-@pytest.mark.parametrize(("film", "walls"), [slow(False, False), (True, True)])
+@pytest.mark.parametrize(("film", "walls"), [slow(False, False), slow(True, True)])
 def test_bridges_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> None:
     """Liquid, bridges and velocities."""
     spheres, given = settings(film, walls, liquid=True)

@@ -11,7 +11,11 @@ WITHIN = 1e-9
 """Largest difference, over the largest value of the array."""
 
 
-@pytest.mark.parametrize("name", RUNS)
+LONG = {"bridges_static", "bridges_deforming", "bridges_pendular"}
+"""Runs with laws that take long to compile."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in RUNS])
 def test_run_ends_as_it_did(name: str) -> None:
     """Every array agrees within 1e-9 of its largest value; integers exactly."""
     state = RUNS[name]()

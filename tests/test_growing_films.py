@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from wet_spheres import FILM, GRAIN, RADIUS, THIN, bridged
 
-from cfddem.particles.interactions.bridge import LIQUID, coat, film_volume
+from cfddem.particles.interactions.bridge import LIQUID, coat
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
+from closures.liquid_film import film_volume
 
 
 def test_spheres_wetted_after_the_start_form_their_bridge() -> None:

@@ -10,7 +10,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.particles import listing
-from cfddem.particles.interactions.bridge import apply_bridge_impulses, find_bridge_impulses
+from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
@@ -67,6 +67,7 @@ def after(steps: int) -> tuple[ParticleSolver, Bridges]:
     return run, bridges
 
 
+@pytest.mark.slow
 def test_the_same_bits_on_one_thread_and_on_two() -> None:
     before, states = use_threads(None), []
     try:
@@ -144,6 +145,7 @@ def sheared(steps: int) -> None:
     assert bridges.count > 3 * 200
 
 
+@pytest.mark.slow
 def test_syrup_is_stable_at_the_dry_step() -> None:
     sheared(2_000)
 

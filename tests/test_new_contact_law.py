@@ -17,7 +17,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
-from cfddem.particles.energy_count import CHANNELS
+from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named, register
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.laws import Laws
@@ -72,6 +72,7 @@ def test_restitution_is_the_root_of_the_ratio_of_stiffnesses(ratio: float, speed
     assert run.particles.velocity.sum(axis=0) == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_energy_lost_to_hysteresis_is_counted() -> None:
     """Head-on, it is all that the pair has lost; halfway, the spring holds what it will give back."""
     run = pair(energies=True, record=True)

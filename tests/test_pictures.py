@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import matplotlib as mpl
 import numpy as np
 import pytest
+from PIL import Image
 
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.io.export import export
@@ -20,9 +21,10 @@ from cfddem.io.writer import RunFolder
 from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import rendering
 from cfddem.plotting.curves import history
-from cfddem.plotting.panels import BUBBLE, Stage, _bubbles
+from cfddem.plotting.panels import BUBBLE, SINGLE, Stage, _bubbles, _scattered
 from cfddem.plotting.pictures import movie, picture
 from cfddem.plotting.window import scene, window
+from scenarios.beds.liquid_bed.movie import side_by_side
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
 QUANTITIES = {
@@ -96,6 +98,14 @@ def test_the_colour_shows_the_value_and_an_empty_image_is_white(renders):
     assert (drawn([], [], []) == 255).all()
 
 
+def test_agglomerates_have_a_colour_each_and_single_spheres_none():
+    values = _scattered(np.array([7, 7, 3, 12, 12, 12, 40]))
+    assert values[2] == values[6] == 0.0
+    assert values[0] == values[1] and values[3] == values[4] == values[5]
+    assert min(values[0], values[3]) > SINGLE and abs(values[0] - values[3]) > 0.05
+    assert _scattered(np.array([1, 12, 12]))[1] == values[3], "the same colour in all snapshots"
+
+
 # ---------------------------------------------------------------- pictures of a run
 
 
@@ -112,6 +122,16 @@ def test_picture_movie_and_window(renders, bed, tmp_path):
     plotter = scene(open_run(bed), off_screen=True)
     assert plotter.screenshot(return_img=True).std() > 1.0
     plotter.close()
+
+
+def test_beds_side_by_side(bed, tmp_path):
+    """The movie has a frame for each snapshot, and both beds are drawn."""
+    side_by_side({"one": bed, "other": bed}, tmp_path / "beds.gif")
+    with Image.open(tmp_path / "beds.gif") as drawn:
+        assert drawn.n_frames == len(open_run(bed).times)
+        frame = np.asarray(drawn.convert("L"))
+    half = frame.shape[1] // 2
+    assert (frame[:, :half] < 128).any() and (frame[:, half:] < 128).any()
 
 
 def test_a_film_as_mp4(renders, bed, tmp_path):

@@ -166,14 +166,14 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
             {"laws.drag": "ergun", "bed.inlet_velocity": 0.3, "column.height": 0.32},
             "warning",
             "laws.drag",
-            "was fitted to",
+            "its drag differs by",
         ),
         ({"fluid.viscosity": 0.0}, "error", "fluid.viscosity", "drag laws need a viscosity above 0"),
         ({"laws.gravity": [0, 0, 9.81]}, "error", "laws.gravity", "is not negative"),
         ({"column.width": 40.0, "column.cell": 0.16, "bed.count": 1_000_000_000}, "error", "bed.count", "GB of memory"),
         ({"run.until": 1e5}, "warning", "run.until", "days on one core"),
         ({"run.average_from": 5.0}, "warning", "run.average_from", "not before the end"),
-        ({"bed.diameter": 1e-200}, "error", "case", "SI units"),
+        ({"bed.diameter": 1e-200}, "error", "bed.diameter", "SI units"),
         ({"laws.contact": "jkr"}, "error", "laws.contact", "but films form"),
         (
             {"laws.rolling_resistance": "spring_dashpot"},
@@ -279,3 +279,21 @@ def test_json_holds_the_whole_result() -> None:
     assert summary["status"] == "error"
     assert summary["issues"][0]["key"] == "bed.inlet_velocity"
     assert summary["numbers"]["particles and flow"]["u_t"]["unit"] == "m/s"
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [
+        ({"bed.diameter": 1e12}, "bed.diameter"),
+        ({"material.glass.density": 1e300}, "material.glass.density"),
+        ({"bed.count": 10**400}, "bed.count"),
+        ({"column.height": 1e-300, "bed.start": "suspended"}, "column.cell"),
+        ({"fluid.viscosity": 1e300}, "fluid.viscosity"),
+    ],
+    ids=["diameter", "density", "count", "height", "viscosity"],
+)
+def test_values_beyond_all_correlations_are_named(given: dict[str, Any], key: str) -> None:
+    """One error with the key, and no traceback."""
+    text = gallery()["liquid-bed"].read_text()
+    errors = [each.key for each in preflight(Case.from_text(text, "x", given)).issues if each.severity == "error"]
+    assert errors[:1] == [key]

@@ -56,7 +56,7 @@ def yield_angle(run: ParticleSolver) -> float:
     return -float(run.gap[0]) / (2.25 * SLOWING * RADIUS)
 
 
-@pytest.mark.parametrize("linear", [False, True], ids=["Hertz", "linear"])
+@pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["Hertz", "linear"])
 @pytest.mark.parametrize("choice", CHOICES.values(), ids=CHOICES)
 def test_rolling_sphere_slows_down_at_five_sevenths(choice: str, linear: bool) -> None:
     """Torque mu_r R m g against rolling without sliding: 7/5 m a = mu_r m g, so a = 5/7 mu_r g, within 0.1 %."""

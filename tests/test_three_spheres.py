@@ -30,6 +30,7 @@ def test_published_numbers_hold(part, tmp_path) -> None:
     assert failed(part(tmp_path, {})) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.1])
 def test_the_particle_engine_with_soft_contacts_agrees(friction: float) -> None:
     """Cartesian coordinates, Hertz contacts, films laid over: times within 0.2 %, restitution within 0.005."""

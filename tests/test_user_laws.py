@@ -75,7 +75,14 @@ def stirred(count: int, **laws: Any) -> ParticleSolver:
     return run
 
 
-@pytest.mark.parametrize(("count", "integrator"), [(100, "drift"), (100, "verlet"), (1500, "drift")])
+@pytest.mark.parametrize(
+    ("count", "integrator"),
+    [
+        (100, "drift"),
+        pytest.param(100, "verlet", marks=pytest.mark.slow),
+        pytest.param(1500, "drift", marks=pytest.mark.slow),
+    ],
+)
 def test_a_users_law_gives_the_same_motion_as_the_same_built_in_law(
     register: Shelve, count: int, integrator: str
 ) -> None:
@@ -92,6 +99,7 @@ def test_a_users_law_gives_the_same_motion_as_the_same_built_in_law(
     assert built_in.edges.minimum_gap.max() > 1.1e-8  # some films are elastohydrodynamic
 
 
+@pytest.mark.slow
 def test_a_film_of_finite_extent_takes_the_impulse_of_its_potential(register: Shelve) -> None:
     """Head-on, in the lubricated drift: u = v0 + B L between where the film of 100 um begins and h_min."""
     glass = MATERIALS["glass"]
@@ -107,11 +115,16 @@ def test_a_film_of_finite_extent_takes_the_impulse_of_its_potential(register: Sh
 
 
 def test_the_minimum_gap_is_what_the_law_says(register: Shelve) -> None:
-    """Of the largest approach speed; at least that of asperities, at most a fiftieth of R*."""
+    """Of the largest approach speed."""
     own = register("minimum_gap", thick)
     run = collide(MATERIALS["steel_smooth"], velocity=0.05, stokes=40, minimum_gap=own)
     assert run.mechanism == "thick"
     assert run.minimum_gap == pytest.approx(1e-3 * 3.175e-3 * 1.5, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_the_minimum_gap_is_at_least_that_of_asperities_and_at_most_a_fiftieth_of_the_radius(register: Shelve) -> None:
+    """Whatever the law says."""
 
     def none_at_all(approach_speed: float) -> float:
         return 0.0 * approach_speed

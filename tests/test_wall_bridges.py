@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,13 +12,13 @@ from wet_spheres import ANGLE, FILM, GRAIN, RADIUS, TENSION, THIN, bridged, swar
 
 from cfddem.backend.errors import InputError
 from cfddem.particles.interactions import wall_liquid
-from cfddem.particles.interactions.bridge import film_volume
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
 from closures import capillary
+from closures.liquid_film import film_volume
 
 LAWS = replace(THIN, contact_angle=ANGLE, cut="zero")
 WET_WALLS = replace(LAWS, wall_share=0.5, wall_film=1e-5, wall_patch=2.0 * RADIUS)
@@ -57,7 +58,7 @@ def test_a_wall_pulls_as_a_sphere_of_infinite_radius(kind: str) -> None:
     """R* = R, half of the liquid of the sphere; it breaks at its rupture length, and the sphere gets all back."""
     wall, place, normal = KINDS[kind]
     run, bridges = above(wall, place)
-    liquid, volume = bridges.liquid, 0.5 * film_volume(np.array([RADIUS]), FILM)[0]
+    liquid, volume = bridges.liquid, 0.5 * film_volume(RADIUS, FILM)
     assert bridges.count == 1
     assert bridges.volume[0] == pytest.approx(volume, rel=1e-12)
     pull = capillary.pendular_pull(TENSION, ANGLE, RADIUS, volume, GAP)
@@ -86,6 +87,7 @@ def test_a_finer_triangulation_changes_nothing() -> None:
         assert np.abs(end - ends[0]).max() < 1e-6 * way
 
 
+@pytest.mark.slow
 def test_liquid_passes_between_particles_and_walls_and_is_kept() -> None:
     """Wet spheres that bounce in a box with wet walls; triangles as its floor."""
     run, bridges = swarm(
@@ -114,7 +116,7 @@ def test_liquid_passes_between_particles_and_walls_and_is_kept() -> None:
 def test_a_bridge_draws_a_disc_of_the_wall_and_returns_half() -> None:
     """At most what the patch has; the rest of the wall keeps its film."""
     run, bridges = above(Plane(), (0.0, 0.0, RADIUS + GAP), WET_WALLS)
-    own = 0.5 * film_volume(np.array([RADIUS]), FILM)[0]
+    own = 0.5 * film_volume(RADIUS, FILM)
     drawn = 0.5 * np.pi * RADIUS**2 * 1e-5
     assert bridges.volume[0] == pytest.approx(own + drawn, rel=1e-12)
     assert bridges.gained_by_walls == pytest.approx(-drawn, rel=1e-12)
@@ -123,6 +125,18 @@ def test_a_bridge_draws_a_disc_of_the_wall_and_returns_half() -> None:
     run.refresh()
     assert bridges.count == 0
     assert bridges.gained_by_walls == pytest.approx(0.5 * (own - drawn), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_a_wall_that_is_wetted_worse_leaves_more_liquid_on_the_particle() -> None:
+    laws = replace(WET_WALLS, redistribution="contact_angle", wall_contact_angle=1.2)
+    run, bridges = above(Plane(), (0.0, 0.0, RADIUS + GAP), laws)
+    volume, gained = bridges.volume[0], bridges.gained_by_walls
+    run.particles.position[0, 2] += RADIUS
+    run.refresh()
+    share = math.cos(1.2) / (math.cos(1.2) + math.cos(ANGLE))
+    assert bridges.gained_by_walls - gained == pytest.approx(share * volume, rel=1e-12)
+    assert share < 0.3
 
 
 @pytest.mark.parametrize("kind", ["belt", "drum"])
@@ -161,6 +175,7 @@ def test_more_patches_than_there_is_room_for_are_refused(monkeypatch: pytest.Mon
         above(Plane(), (0.0, 0.0, RADIUS + GAP), WET_WALLS)
 
 
+@pytest.mark.slow
 def test_energies_do_not_depend_on_the_triangulation() -> None:
     """A bridge that passes from triangle to triangle takes along the energy that is counted for it."""
     found = []

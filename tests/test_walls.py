@@ -307,7 +307,7 @@ def test_walls_repeat_in_a_periodic_box() -> None:
         (lambda: Cone(top_radius=1.0, length=0.0), "length"),
         (lambda: Box(low=(0.0, 0.0, 0.0), high=(1.0, 0.0, 1.0)), "high"),
         (lambda: Mesh(vertices=np.zeros((3, 3)), triangles=np.array([[0, 1, 2]])), "area"),
-        (lambda: Mesh.from_stl("nowhere.stl"), "exists"),
+        (lambda: Mesh.from_stl("nowhere.stl"), "readable"),
         (lambda: sphere([0.0, 0.0, 1.0], [Plane(material=3)]), "material of wall 0"),
     ],
 )

@@ -76,6 +76,11 @@ def refused(text: str = WET, given: dict[str, Any] | None = None) -> str:
     [
         ({"liquid.thickness": -1e-6}, "liquid.thickness = -1e-06: must be at least 0"),
         ({"liquid.liquid_fraction": 0.01}, "liquid.liquid_fraction = 0.01: must be left out where thickness is given"),
+        (
+            {"liquid.redistribution": "contact_angle"},
+            "liquid.redistribution = 'contact_angle': must be used with wall_share above 0",
+        ),
+        ({"liquid.wall_contact_angle": 50.0}, "liquid.wall_contact_angle = 50.0: must be left out without"),
         ({"liquid.contact_angle": 200.0}, "liquid.contact_angle = 200.0: must be at most 180"),
         ({"liquid.surface_tension": -0.02}, "liquid.surface_tension = -0.02: must be at least 0"),
         ({"liquid.share_of_wet_particles": 1.5}, "liquid.share_of_wet_particles = 1.5: must be at most 1"),

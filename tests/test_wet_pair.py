@@ -18,7 +18,11 @@ from scenarios.collisions.wet_pair import TRANSITION_PRESSURES, collide_wet
 from scenarios.validation.wet import study
 
 
-@pytest.mark.parametrize("part", [study.pairs, study.engine_pairs, study.thick_films], ids=lambda part: part.__name__)
+@pytest.mark.parametrize(
+    "part",
+    [study.pairs, pytest.param(study.engine_pairs, marks=pytest.mark.slow), study.thick_films],
+    ids=lambda part: part.__name__,
+)
 def test_converged_solutions_hold(part, tmp_path) -> None:
     """Restitution 0.003, spin 1 %, critical St_n 0.01; soft against hard contact 1 % and 2 %; in the engine 1 %."""
     assert failed(part(tmp_path, {})) == []

@@ -11,6 +11,7 @@ from cfddem.backend.errors import InputError
 from scenarios.collisions.wet_tumbler import tumble
 
 
+@pytest.mark.slow
 def test_stirred_spheres_conserve_momentum_number_and_liquid() -> None:
     result = tumble(0.05, 150, until=0.03, samples=10)
     assert result.momentum_error < 1e-12
@@ -22,6 +23,7 @@ def test_stirred_spheres_conserve_momentum_number_and_liquid() -> None:
     assert result.mean_size[-1] > 1.3
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_run() -> None:
     one, other = (tumble(0.05, 60, until=0.004, samples=2) for _ in range(2))
     assert np.array_equal(one.run.particles.position, other.run.particles.position)

@@ -9,10 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-Numbers = NDArray[np.integer]
+from cfddem.particles.agglomerates import Numbers, agglomerates
 
 
 class AgglomerateSizes(NamedTuple):
@@ -23,23 +21,10 @@ class AgglomerateSizes(NamedTuple):
     joined: float  # share of the particles that have a bridge to another
 
 
-def agglomerates(first: Numbers, second: Numbers, count: int) -> Numbers:
-    """Number of the agglomerate of each particle (N,), counted from 0.
-
-    first, second  rows of the particles that each bridge joins (n,)
-    count          number of particles N
-
-    >>> agglomerates(np.array([0, 3]), np.array([1, 1]), 5).tolist()
-    [0, 0, 1, 0, 2]
-    """
-    joined = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
-    return np.asarray(connected_components(joined, directed=False)[1])
-
-
 def sizes(belongs: Numbers) -> Numbers:
     """Number of particles in each agglomerate (k,).
 
-    belongs  of :func:`agglomerates`
+    belongs  of :func:`~cfddem.particles.agglomerates.agglomerates`
     """
     return np.bincount(belongs)
 

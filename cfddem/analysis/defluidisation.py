@@ -15,8 +15,16 @@ CARRIED = 0.8
 STILL = 0.1
 """Granular temperature over its largest value so far, below which a bed has come to rest [-]."""
 
+NEVER_MOVED = 1e-4
+"""Granular temperature over the square of the inlet velocity above minimum fluidisation, below which a bed rests [-].
+
+In bubbling beds it is a few thousandths."""
+
 SMOOTHED = 0.05
 """Share of the series over which it is averaged before it is judged [-]."""
+
+LASTING = 4
+"""Averages that a bed must fail one after the other, up to the end."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,8 @@ class Defluidisation:
 
     def __str__(self) -> str:
         signs = [
-            f"the granular temperature is below {100.0 * STILL:g} % of its maximum" * self.rests,
+            f"the granular temperature is below {100.0 * STILL:g} % of its maximum, or that of a moving bed"
+            * self.rests,
             f"the pressure drop is below {100.0 * CARRIED:g} % of the weight" * self.passed,
         ]
         reasons = " and ".join(filter(None, signs))
@@ -39,7 +48,7 @@ class Defluidisation:
 
 
 def defluidisation(
-    time: Series, carried: Series, temperature: Series, largest_share: Series, blown: NDArray[np.bool_]
+    time: Series, carried: Series, temperature: Series, largest_share: Series, excess: Series
 ) -> Defluidisation | None:
     """The time from which on a bed is not fluidised although it is blown; None if it is fluidised at the end.
 
@@ -47,22 +56,21 @@ def defluidisation(
     carried        pressure drop over weight (n,)
     temperature    granular temperature (n,) [m2/s2]
     largest_share  of the particles in the largest agglomerate (n,)
-    blown          the inlet velocity is above minimum fluidisation of the dry bed (n,)
+    excess         inlet velocity above minimum fluidisation of the dry bed; rows without are left out (n,) [m/s]
 
     >>> time = np.linspace(0.0, 1.0, 101)
     >>> moving = np.where(time < 0.5, 1e-3, 1e-6)
-    >>> print(defluidisation(time, np.ones(101), moving, 0.9 * np.ones(101), time > 0.1))
-    defluidised from t = 0.53 s on: the granular temperature is below 10 % of its maximum; the largest agglomerate holds 90 % of the particles
+    >>> print(defluidisation(time, np.ones(101), moving, 0.9 * np.ones(101), 0.5 * (time > 0.1)))
+    defluidised from t = 0.53 s on: the granular temperature is below 10 % of its maximum, or that of a moving bed; the largest agglomerate holds 90 % of the particles
     """  # noqa: E501  the line is printed as one
-    rows = np.flatnonzero(blown & np.isfinite(carried) & np.isfinite(temperature))
+    rows = np.flatnonzero((excess > 0.0) & np.isfinite(carried) & np.isfinite(temperature))
     width = max(1, round(SMOOTHED * len(rows)))
     if len(rows) < 4 * width or rows[-1] != len(time) - 1:
         return None
-    load, motion = (_averaged(series[rows], width) for series in (carried, temperature))
-    started = np.maximum.accumulate(load) >= CARRIED  # before, the bed is not fluidised yet
-    rests, passed = motion < STILL * np.maximum.accumulate(motion), (load < CARRIED) & started
+    load, motion, least = (_averaged(series[rows], width) for series in (carried, temperature, NEVER_MOVED * excess**2))
+    rests, passed = (motion < STILL * np.maximum.accumulate(motion)) | (motion < least), load < CARRIED
     failed = rests | passed
-    if not failed[-1]:
+    if not failed[-LASTING * width :].all():
         return None
     first = len(failed) - int(np.argmin(failed[::-1])) if not failed.all() else 0
     row = rows[first]

@@ -62,13 +62,13 @@ def _volume_below(height: float, centre: Array, radius: Array) -> Array:
     return np.pi / 3.0 * depth * depth * (3.0 * radius - depth)
 
 
-def layer_solid_fraction(position: Array, radius: Array, edges: Array, area: float) -> Array:
+def layer_solid_fraction(position: Array, radius: Array, edges: Array, area: float | Array) -> Array:
     """Solid fraction of horizontal layers. Spheres are cut at the edges of the layers.
 
     position  (N, 3) [m]
     radius    (N,) [m]
     edges     (n + 1,) of the layers, evenly spaced, ascending [m]
-    area      of the cross-section [m2]
+    area      of the cross-section, one for all layers or (n,) [m2]
     returns   (n,) [-]
 
     >>> layer_solid_fraction(np.array([[0.0, 0.0, 1.0]]), np.array([0.5]), np.array([0.0, 1.0, 2.0]), np.pi / 6.0)

@@ -40,7 +40,7 @@ def profiles_of(run: Run, case: Case, begin: float) -> Profiles | None:
     if not len(inside):
         return None
     chosen = inside[np.unique(np.linspace(0, len(inside) - 1, min(len(inside), MOST_SNAPSHOTS)).astype(int))].tolist()
-    grid = grid_of(case.column)
+    grid = grid_of(case)
     height = grid.origin[2] + (np.arange(grid.shape[0]) + 0.5) * grid.spacing[2]
     voidage = spread = None
     if "voidage" in run.fluid_fields:

@@ -16,6 +16,7 @@ from cfddem.analysis.series import block_average, stationarity
 from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.case.walls import with_surfaces_of
 from cfddem.io.reading import Run, open_run
 from cfddem.preflight.summary import preflight
 
@@ -50,7 +51,7 @@ def report(folder: Path) -> dict[str, Any]:
         "window": [begin, end],
         "measures": measures,
         "laws": laws,
-        "laws_note": expansion_note(laws),
+        "laws_note": expansion_note(laws, measures),
         "ledger": _ledger(run),
         "energy": energy,
         "energy_lines": _energy_lines(run, energy),
@@ -66,7 +67,7 @@ def report(folder: Path) -> dict[str, Any]:
 
 def case_of(run: Run) -> Case:
     """The case of a run."""
-    return Case.from_text(run.case_text, str(run.folder / "case.toml"))
+    return with_surfaces_of(Case.from_text(run.case_text, str(run.folder / "case.toml")), run.folder)
 
 
 def window_of(run: Run, case: Case) -> tuple[float, float]:
@@ -118,8 +119,9 @@ def _ledger(run: Run) -> dict[str, float]:
         name: float(np.nanmax(np.abs(run.history[name][1:]))) if len(run.history[name]) > 1 else math.nan
         for name in _in_group(run, "imbalance")
     }
-    count = run.history["particle_count"]
-    return ledger | {"particles_lost": float(count[0] - count[-1])}
+    count, nothing = run.history["particle_count"], np.zeros(1)
+    moved = run.history.get("fed_count", nothing)[-1] - run.history.get("removed_count", nothing)[-1]
+    return ledger | {"particles_lost": float(count[0] + moved - count[-1])}
 
 
 def _energy(run: Run) -> dict[str, float]:

@@ -47,7 +47,7 @@ def _defluidised(run: Run, case: Case) -> Iterator[str]:
     largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
     found = defluidisation(
         time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
-        speed > estimate_bed(case).onset,
+        speed - estimate_bed(case).onset,
     )  # fmt: skip
     if found is not None:
         yield str(found)

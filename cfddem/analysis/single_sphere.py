@@ -58,7 +58,7 @@ def slip_velocity(run: Run, case: Case) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and velocities [m/s] of the sphere relative to the mean fluid velocity, up to its first contact."""
     history = run.history
     contacts = history["time"][history["contact_count"] > 0.0]
-    end, open_fraction = contacts.min(initial=math.inf), float(grid_of(case.column).open.mean())
+    end, open_fraction = contacts.min(initial=math.inf), float(grid_of(case).open.mean())
     before = np.flatnonzero(run.times < end)
     chosen = before[np.unique(np.linspace(0, len(before) - 1, min(len(before), MOST_SNAPSHOTS)).astype(int))]
     times, slip = [], []

@@ -5,6 +5,7 @@
     either         a loop over `prange` for one thread, or for all where `law_set.specialise` compiles it so; kept
     part           a loop over `prange` that is part of a larger one, and is kept with that; for threads as `either`
     threaded_part  the same, on all threads
+    vector_part    as `part`, over arrays that do not overlap: on several rows at once where the processor can
     inline         a helper, compiled into the loops that call it
 
 None of them lets the compiler reorder arithmetic: results are the same bits on any number of threads, and a NaN stays a
@@ -20,6 +21,8 @@ from typing import Any
 
 from numba import get_num_threads, njit, prange, set_num_threads
 from numba.core import event
+from numba.core.cpu import CPUTargetOptions
+from numba.core.options import TargetOptions
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.backend.errors import InputError
@@ -36,6 +39,7 @@ __all__ = [
     "threaded",
     "threaded_part",
     "use_threads",
+    "vector_part",
 ]
 
 if "OMP_WAIT_POLICY" not in os.environ:
@@ -57,6 +61,10 @@ _INLINE: dict[str, Any] = {
 """Helpers are never called from outside, always inlined, and count no references: they own no arrays."""
 
 
+# the compiler has this flag, but no word for it among the options of `njit`
+CPUTargetOptions.noalias = TargetOptions.Mapping("noalias")  # type: ignore[attr-defined]
+
+
 def serial(function: Callable[..., Any]) -> Any:
     """Compile a serial loop; kept on disk."""
     return _marked(kept_on_disk(njit(error_model="numpy")(function)), serial)
@@ -75,6 +83,15 @@ def either(function: Callable[..., Any]) -> Any:
 def part(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` that is part of a larger one, with which it is kept; as `either` for threads."""
     return _marked(njit(error_model="numpy")(function), part)
+
+
+def vector_part(function: Callable[..., Any]) -> Any:
+    """Compile a loop over `prange` as `part` does, where no two array arguments share memory and rows do not meet.
+
+    The compiler may then work on several rows at once, as it does by itself in loops for all threads.
+    """
+    compiled = njit(error_model="numpy", noalias=True)(function)  # type: ignore[call-overload]
+    return _marked(compiled, vector_part)
 
 
 def threaded_part(function: Callable[..., Any]) -> Any:

@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 from numba import float64
 
-from cfddem.backend.compile import either, inline, part, threaded, threaded_part
+from cfddem.backend.compile import either, inline, part, threaded, threaded_part, vector_part
 from cfddem.backend.errors import InputError
 from closures.compiled import is_exposed
 
@@ -64,7 +64,7 @@ def specialise(template: Any, choices: Mapping[str, Any], threads: bool = False)
 
 
 _COPIES: dict[tuple[Any, str], Any] = {}
-_ON_ALL_THREADS = {either: threaded, part: threaded_part}
+_ON_ALL_THREADS = {either: threaded, part: threaded_part, vector_part: threaded_part}
 
 
 class _Specialiser:

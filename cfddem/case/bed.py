@@ -11,6 +11,7 @@ from cfddem.backend.errors import InputError, shown
 from cfddem.case.materials import Checked
 
 Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
 Point = tuple[float, float, float]
 Sizes = tuple[tuple[Positive, Annotated[float, Field(ge=0)]], ...]
 Name = Annotated[str, Field(pattern=r"^\w[\w-]*$", max_length=24)]
@@ -126,6 +127,10 @@ class Bed(Species):
         description="initial state: poured to rest, spread evenly over the column, random packing, or at `positions`",
     )
     positions: tuple[Point, ...] = Field((), description='particle centres, for start = "placed" [m]')
+    start_corner: Point | None = Field(
+        None, description="lower corner of the box in which the particles start; default: the column [m]"
+    )
+    start_size: tuple[Positive, Positive, Positive] | None = Field(None, description="edges of that box [m]")
     initial_velocity: Point = Field((0.0, 0.0, 0.0), description="velocity of all particles at the start [m/s]")
     fixed: bool = Field(False, description="particles do not move: a packed bed")
     seed: int = Field(1, ge=0, description="random seed; the same seed gives the same bed")
@@ -145,6 +150,12 @@ class Bed(Species):
                 raise InputError(
                     "count", self.count, "given, or height, or positions, and only one of them", f"found {found}"
                 )
+        if (self.start_corner is None) != (self.start_size is None):
+            name = "start_corner" if self.start_corner is None else "start_size"
+            raise InputError(name, None, "given, because the other one is", "start_corner and start_size give a box")
+        for name in ("height", "positions"):
+            if self.start_size is not None and getattr(self, name):
+                raise InputError(name, None, "left out where start_corner and start_size are given", "give a count")
         if self.positions and self.start == "poured":
             object.__setattr__(self, "start", "placed")
         if not isinstance(self.inlet_velocity, float):

@@ -6,19 +6,17 @@ import math
 from collections.abc import Callable
 from functools import wraps
 from inspect import signature
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import BUILT_IN, chosen
-from cfddem.case.bed import Point
+from cfddem.case.bed import NonNegative, Point
 from cfddem.case.materials import Checked
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from closures.agitation import INERTIA_SHARE
 from closures.registry import Law
-
-NonNegative = Annotated[float, Field(ge=0)]
 
 
 class AgitationFactors(NamedTuple):
@@ -40,7 +38,9 @@ class CaseLaws(Checked):
         "A", description="model A: pressure gradient on both phases; model B: on the fluid alone"
     )
     lubrication: str | Callable[..., float] = Field(
-        "nijssen", description="lubrication film between close spheres: nijssen, none, a law's name, or a function"
+        "nijssen",
+        description="lubrication film between close spheres: nijssen (along the line of centres), nijssen_full (also "
+        "against sliding and rolling), nijssen_full_twist (and twisting), none, a law's name, or a function",
     )
     minimum_gap: str | Callable[..., float] = Field(
         "elastohydrodynamic",
@@ -67,6 +67,11 @@ class CaseLaws(Checked):
     history: Literal["none", "mei_adrian", "basset"] = Field(
         "none",
         description="history force: of a single sphere at finite Re by Mei and Adrian, or in creeping flow by Basset",
+    )
+    wall_drag: Literal["none", "nearest", "all"] = Field(
+        "none",
+        description="extra drag of a single sphere beside the nearest wall or all walls, by Brenner and by Goldman, "
+        "Cox and Brenner, less what the films apply",
     )
     lift: bool = Field(False, description="Saffman-Mei shear lift and Magnus spin lift")
     torque: bool = Field(False, description="hydrodynamic torque against spin relative to the fluid")

@@ -1,18 +1,59 @@
-"""The grid of a column."""
+"""The grid of a column: cells outside a cylinder, and those that walls of the case close, are solid."""
 
 from __future__ import annotations
 
-from cfddem.case.schema import Column
-from cfddem.fluid.grid import Grid, Region, outside_cylinder
+from collections.abc import Iterator
+from functools import lru_cache, reduce
+
+import numpy as np
+
+from cfddem.case.schema import Case, Column
+from cfddem.case.wall_geometry import solid_part, stamp
+from cfddem.case.walls import CaseWall
+from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
 
 
-def grid_of(column: Column) -> Grid:
-    """Cells of the column; those outside a cylinder are solid."""
-    return Grid.of_size(column.size, column.cell, solid=outside_column(column))
+def grid_of(case: Case) -> Grid:
+    """Cells of the column; those outside a cylinder, and those whose centres walls close to the fluid, are solid."""
+    walls = () if case.fluid is None else case.wall
+    return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
 
 
-def outside_column(column: Column) -> Region | None:
-    """Region of the box of cells that is outside the column; None if the column is the box."""
-    if column.shape == "box":
+@lru_cache(maxsize=8)
+def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int], ...]) -> Grid:
+    closing = [_closed_by(wall) for wall in walls if wall.solid != "none"]
+    if column.shape == "cylinder":
+        closing.append(outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width))
+    if not closing:
+        return Grid.of_size(column.size, column.cell)
+    return Grid.of_size(column.size, column.cell, solid=lambda x, y, z: _any(each(x, y, z) for each in closing))
+
+
+def open_floor(case: Case) -> Region | None:
+    """Part of the floor below open cells; None if all of them are open."""
+    grid = grid_of(case)
+    if grid.solid is None:
         return None
-    return outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width)
+    width, depth, _ = grid.spacing
+    is_open = grid.open[0]
+
+    def inside(x: Array, y: Array, z: Array) -> np.ndarray:
+        column, row = np.floor(x / width).astype(int), np.floor(y / depth).astype(int)
+        return np.asarray(is_open[row, column])
+
+    return inside
+
+
+def _closed_by(wall: CaseWall) -> Region:
+    """Region that a wall closes to the fluid."""
+
+    def inside(x: Array, y: Array, z: Array) -> np.ndarray:
+        points = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+        return solid_part(wall, points.reshape(-1, 3)).reshape(points.shape[:-1])
+
+    return inside
+
+
+def _any(parts: Iterator[np.ndarray]) -> np.ndarray:
+    """Whether any of several masks, which broadcast, is true."""
+    return np.asarray(reduce(np.logical_or, parts))

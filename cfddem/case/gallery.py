@@ -94,7 +94,8 @@ def full_key(key: str) -> str:
     tables = {
         name: sections[0].model_fields for name, field in Case.model_fields.items() if (sections := sections_of(field))
     }
-    tables.pop("material")  # its keys need the name of the solid: material.NAME.density
+    for several in ("material", "pair", "wall", "feed", "outlet"):  # their keys need a name or number
+        tables.pop(several)
     found = [f"{name}.{key}" for name, words in tables.items() if key in words]
     if len(found) > 1:
         found = [each for each in found if not each.startswith(("liquid.", "spray."))] or found

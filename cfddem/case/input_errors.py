@@ -67,7 +67,8 @@ def input_error(
     errors = []
     for key, error in [*found, *(((), error) for error in more)]:
         beyond = error.field.removeprefix(dotted(key)).strip(".")  # a section names a key of its own
-        whole = (*key, *beyond.split(".")) if beyond else key
+        rest = [int(part) if part.isdecimal() else part for part in beyond.split(".")] if beyond else []
+        whole = (*key, *rest)
         errors.append(InputError(place(whole) + error.field, error.value, error.limit, error.remedy))
     omitted = max(0, len(reported) - MOST)
     return errors[0] if len(errors) == 1 and not omitted else InputErrors(errors, omitted)
@@ -201,6 +202,7 @@ def key_lines(text: str) -> dict[Key, int]:
     """Line number of every key and table of a TOML text that begins a line."""
     lines: dict[Key, int] = {}
     table: Key = ()
+    count: dict[Key, int] = {}
     for number, line in enumerate(text.split("\n"), 1):
         found = _LINE.match(line[:1000])
         if found is None:
@@ -208,6 +210,10 @@ def key_lines(text: str) -> dict[Key, int]:
         parts = tuple(each.strip("\"'") for each in re.findall(_PART, found["table"] or found["key"]))
         if found["table"]:
             table = parts
+            if line.lstrip().startswith("[["):  # one table of several
+                lines.setdefault(parts, number)
+                parts = table = (*parts, count.setdefault(table, 0))
+                count[table[:-1]] += 1
         else:
             parts = (*table, *parts)
         lines.setdefault(parts, number)
@@ -216,8 +222,7 @@ def key_lines(text: str) -> dict[Key, int]:
 
 def line_of(key: Key, lines: Mapping[Key, int]) -> int | None:
     """Line number of a key, or of the table that should hold it; None if neither is in the file."""
-    words = tuple(part for part in key if isinstance(part, str))
-    for length in range(len(words), 0, -1):
-        if words[:length] in lines:
-            return lines[words[:length]]
+    for length in range(len(key), 0, -1):
+        if key[:length] in lines:
+            return lines[key[:length]]
     return None

@@ -9,13 +9,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError
-from cfddem.case.bed import Point, Positive
+from cfddem.case.bed import NonNegative, Point, Positive
 from cfddem.case.materials import Checked
+from closures.liquid_film import film_volume
 
 if TYPE_CHECKING:
     from cfddem.case.schema import Case
 
-NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 AMOUNTS = ("thickness", "volume_per_particle", "liquid_fraction")
@@ -23,9 +23,6 @@ AMOUNTS = ("thickness", "volume_per_particle", "liquid_fraction")
 
 SAME_VISCOSITY = 0.01
 """A liquid fluid whose viscosity is that of the liquid within this is the same liquid [-]."""
-
-LIQUID = 100.0
-"""A fluid at least this dense counts as a liquid [kg/m3]."""
 
 
 class Liquid(Checked):
@@ -59,8 +56,13 @@ class Liquid(Checked):
         description="gap at which a bridge breaks: by volume and speed of separation, by volume (Lian, Willett), or "
         "where the films part",
     )
-    redistribution: Literal["half", "radius"] = Field(
-        "half", description="how the liquid of a broken bridge is shared: equally, or by the radii"
+    redistribution: Literal["half", "radius", "contact_angle"] = Field(
+        "half",
+        description="how the liquid of a broken bridge is shared: equally, by the radii, or by the contact angles of "
+        "particle and wall (equally between particles)",
+    )
+    wall_contact_angle: float | None = Field(
+        None, ge=0, le=180, description="contact angle on the walls, for redistribution by contact_angle [degrees]"
     )
     minimum_gap: Positive | None = Field(
         None, description="smallest gap of the film; default: from the roughness of the materials [m]"
@@ -80,6 +82,15 @@ class Liquid(Checked):
             raise InputError(given[1], getattr(self, given[1]), f"left out where {given[0]} is given")
         if self.wall_thickness > 0.0 and self.wall_share == 0.0:
             raise InputError("wall_share", 0.0, "above 0 where wall_thickness is given")
+        by_angle = self.redistribution == "contact_angle"
+        if by_angle and self.wall_share == 0.0:
+            raise InputError(
+                "redistribution", "contact_angle", "used with wall_share above 0",
+                "it acts at walls that take liquid; between particles it is the same as half",
+            )  # fmt: skip
+        if self.wall_contact_angle is not None and not by_angle:
+            without = 'left out without redistribution = "contact_angle"'
+            raise InputError("wall_contact_angle", self.wall_contact_angle, without)
         if self.volume_per_particle is not None and self.volume_per_particle >= 1e-3:
             raise InputError("volume_per_particle", self.volume_per_particle, "below 1e-3 m3", "volumes are in m3")
         return self
@@ -94,8 +105,7 @@ class Liquid(Checked):
         sphere = 4.0 / 3.0 * np.pi * np.asarray(radius) ** 3
         if self.liquid_fraction is not None:
             return np.asarray(self.liquid_fraction * sphere)
-        film = self.thickness or 0.0
-        return np.asarray(4.0 / 3.0 * np.pi * film * (film * film + 3.0 * radius * (film + radius)))
+        return np.asarray(film_volume(radius, self.thickness or 0.0))  # type: ignore[arg-type]  # of every sphere
 
 
 class Spray(Checked):
@@ -153,7 +163,7 @@ def check_wet(case: Case) -> None:
     if spray is None and all(getattr(liquid, name) is None for name in AMOUNTS):
         limit = f"given, or {' or '.join(AMOUNTS[1:])}"
         raise InputError("liquid.thickness", None, limit, "only a case with [spray] may begin dry")
-    if fluid is not None and fluid.density >= LIQUID and _alike(fluid.viscosity, liquid.viscosity):
+    if fluid is not None and fluid.is_liquid and _alike(fluid.viscosity, liquid.viscosity):
         raise InputError(
             "liquid.viscosity", liquid.viscosity, f"other than that of the fluid, {fluid.viscosity:g} Pa s",
             "particles in a liquid have no bridges of the same liquid; leave out [liquid]",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from cfddem.backend.errors import InputError
-from cfddem.case.input_errors import input_error
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.input_errors import dotted, input_error
 
 
 class Checked(BaseModel):
@@ -67,6 +68,72 @@ class Material(Checked):
         return self
 
 
+class MaterialPair(Checked):
+    """Contact of two unlike materials; what is left out follows from the two."""
+
+    restitution: float | None = Field(
+        None, gt=0, le=1, description="dry normal restitution; default: the lower one [-]"
+    )
+    friction: float | None = Field(None, ge=0, description="dry friction coefficient; default: the lower one [-]")
+    rolling_friction: float | None = Field(None, ge=0, description="rolling friction; default: the lower one [-]")
+    friction_lubricated: float | None = Field(
+        None,
+        ge=0,
+        description="friction while a film separates the solids; default: as of the materials, or friction [-]",
+    )
+    work_of_adhesion: float | None = Field(
+        None, ge=0, description="work of adhesion; default: twice the geometric mean of the surface energies [J/m2]"
+    )
+    roughness: float | None = Field(None, ge=0, description="height of asperities; default: the mean of the two [m]")
+
+    def values(self, first: Material, second: Material) -> dict[str, float]:
+        """Entries of the pair table that replace those of the two materials."""
+        given = {name: value for name, value in self if value is not None}
+        if "roughness" in given:
+            given["roughness_gap"] = given.pop("roughness")
+        if self.friction is not None and first.friction_lubricated is None and second.friction_lubricated is None:
+            given.setdefault("friction_lubricated", self.friction)
+        return given
+
+
+Pairs = dict[str, dict[str, MaterialPair]]
+
+
+def pair_overrides(
+    materials: Mapping[str, Material], pairs: Mapping[str, Mapping[str, MaterialPair]]
+) -> dict[tuple[int, int], dict[str, float]]:
+    """Values of pairs by the numbers of their materials, as `pair_table` takes them."""
+    names = list(materials)
+    return {
+        (names.index(first), names.index(second)): pair.values(materials[first], materials[second])
+        for first, row in pairs.items()
+        for second, pair in row.items()
+    }
+
+
+def check_pairs(materials: Mapping[str, Material], pairs: Mapping[str, Mapping[str, MaterialPair]]) -> None:
+    """Refuse pairs of unknown or like materials, and pairs that are given twice."""
+    for first, row in pairs.items():
+        for second in row:
+            key = dotted(("pair", first, second))
+            for name in (first, second):
+                if name not in materials:
+                    raise InputError(
+                        key,
+                        None,
+                        f"a pair of materials: {nearest(name, materials)}",
+                        f"no [{dotted(('material', name))}] is given",
+                    )
+            if first == second:
+                raise InputError(key, None, "two unlike materials", f"give the values in [material.{first}]")
+            if first in pairs.get(second, {}) and first < second:
+                raise InputError(key, None, f"given once; [pair.{second}.{first}] is the same pair")
+
+
+LIQUID_DENSITY = 100.0
+"""A fluid at least this dense counts as a liquid, whose beds expand homogeneously [kg/m3]."""
+
+
 class Fluid(Checked):
     """A Newtonian fluid with constant viscosity or a viscosity that varies with height.
 
@@ -79,6 +146,11 @@ class Fluid(Checked):
         (),
         description="[height, eta] pairs, interpolated linearly; the pre-run check uses `viscosity` [m, Pa s]",
     )
+
+    @property
+    def is_liquid(self) -> bool:
+        """Whether it is a liquid, and not a gas."""
+        return self.density >= LIQUID_DENSITY
 
     @model_validator(mode="after")
     def _profile_ordered_and_positive(self) -> Fluid:

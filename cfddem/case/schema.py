@@ -17,10 +17,12 @@ from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.backend.law_choice import BUILT_IN, chosen
 from cfddem.case.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
 from cfddem.case.case_laws import AgitationFactors, CaseLaws
+from cfddem.case.feeds import CaseFeed, CaseOutlet, refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
 from cfddem.case.liquid import Liquid, Spray, check_wet
-from cfddem.case.materials import Checked, Fluid, Material
+from cfddem.case.materials import Checked, Fluid, Material, Pairs, check_pairs
 from cfddem.case.toml_text import parse, read_text, set_value
+from cfddem.case.walls import CaseWall, with_surfaces_of
 from closures.agitation import SHARES, TIMES, free_spheres
 from closures.registry import Law, law_of
 
@@ -94,7 +96,7 @@ class CaseRun(Checked):
 
 
 HEAVY = 2.0
-"""Density ratio from which agitation is a default: lighter beads expand too far with it (voidage 0.03 too high)."""
+"""Density ratio from which agitation is a default: lighter beads are at the edge of what was measured."""
 
 
 class Case(Checked):
@@ -114,8 +116,12 @@ class Case(Checked):
     title: str = Field("", description="title, one line")
     fluid: Fluid | None = Field(None, description="the fluid; without this table, dry particles only")
     material: dict[str, Material] = Field(min_length=1, description="solids by name")
+    pair: Pairs = Field({}, description="contact of two unlike materials, by their names")
     column: Column
     bed: Bed
+    wall: tuple[CaseWall, ...] = Field((), description="walls beside those of the column")
+    feed: tuple[CaseFeed, ...] = Field((), description="boxes in which particles enter during the run")
+    outlet: tuple[CaseOutlet, ...] = Field((), description="boxes in which particles are removed during the run")
     liquid: Liquid | None = Field(None, description="liquid on the particles, which forms bridges between them")
     spray: Spray | None = Field(None, description="zone where drops of the liquid land on the particles")
     laws: CaseLaws = CaseLaws.model_validate({})
@@ -133,6 +139,8 @@ class Case(Checked):
         named = {f"bed.species.{name}": each.material for name, each in self.bed.species.items()}
         for error in _unknown_materials(list(self.material), named or {"bed": self.bed.material}, self.column.material):
             raise error
+        check_pairs(self.material, self.pair)
+        refuse_wrong_equipment(self)
         return self
 
     @model_validator(mode="after")
@@ -252,12 +260,14 @@ class Case(Checked):
         """Highest collision speed to expect [m/s].
 
         As given in `run.reference_speed`, or the largest of twice the inlet velocity, the speed after a fall of one
-        diameter, and the initial speed.
+        diameter, the initial speed, and the speeds of walls and feeds.
         """
         if self.run.reference_speed is not None:
             return self.run.reference_speed
         fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.largest_diameter)
-        return max(2.0 * self.bed.fastest_inflow, fall, math.hypot(*self.bed.initial_velocity))
+        speeds = [math.hypot(*self.bed.initial_velocity), *(math.hypot(*each.velocity) for each in self.feed)]
+        speeds += [each.fastest for each in self.wall if math.isfinite(each.fastest)]
+        return max(2.0 * self.bed.fastest_inflow, fall, *speeds)
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:
@@ -267,11 +277,11 @@ class Case(Checked):
 
         Raises InputError that lists every input error with file, line, key, value and limit.
         """
-        return cls.from_text(read_text(Path(path)), str(path), overrides)
+        return with_surfaces_of(cls.from_text(read_text(Path(path)), str(path), overrides), Path(path).parent)
 
     @classmethod
     def from_text(cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None) -> Case:
-        """Read a case from the text of a TOML file; errors call it `name`."""
+        """Read a case from the text of a TOML file; errors call it `name`, and surface files stay as they are given."""
         values = parse(text, name)
         for key, value in (overrides or {}).items():
             set_value(values, key.split("."), value, key)
@@ -281,7 +291,7 @@ class Case(Checked):
             lines, given = key_lines(text), {tuple(key.split(".")) for key in overrides or {}}
 
             def place(key: Key) -> str:
-                if key in given:
+                if tuple(map(str, key)) in given:
                     return "--set "
                 line = line_of(key, lines)
                 return f"{name}: " if line is None else f"{name}:{line}: "

@@ -66,8 +66,18 @@ def set_value(values: dict[str, Any], keys: list[str], value: Any, whole: str) -
     keys   of the tables and of the value
     whole  the dotted key, for errors
     """
-    for key in keys[:-1]:
-        values = values.setdefault(key, {})
+    *tables, last = keys
+    while tables:
+        key = tables.pop(0)
+        inner = values.setdefault(key, {})
+        if isinstance(inner, list | tuple) and inner and isinstance(inner[0], dict):  # tables [[wall]], by number
+            values[key] = inner = list(inner)
+            number = tables.pop(0) if tables else ""
+            if not number.isdecimal() or int(number) >= len(inner):
+                limit = f"written as {key}.NUMBER.KEY with a number from 0 to {len(inner) - 1}"
+                raise InputError(f"--set {whole}", shown(value), limit)
+            inner = inner[int(number)]
+        values = inner
         if not isinstance(values, dict):
             raise InputError(f"--set {whole}", shown(value), f"inside a table; {key} is a value")
-    values[keys[-1]] = value
+    values[last] = value

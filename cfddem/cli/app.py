@@ -36,7 +36,7 @@ Exit codes: 0 success; 1 a limit is exceeded (validate), warnings with --strict 
 COMMANDS = {
     "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, cases.sweep),
     "Results": (results.report, results.view, results.export),
-    "Collisions of a few spheres": ("collide", "wet-wall", "three-spheres", "wet-pair"),
+    "Collisions of a few spheres": ("collide", "wet-wall", "film-impact", "three-spheres", "wet-pair"),
     "Validation": (validation.validate, validation.bench),
     "Information": (information.explain, information.doctor),
 }
@@ -47,6 +47,8 @@ COLLISIONS = {
                 "--material delrin --stokes 30 --velocity 0.1"),
     "wet-wall": ("impact", "Let a sphere strike a wall under a thin liquid layer.",
                  "--particle glass_1.74 --film 2e-4 --velocity 0.6"),
+    "film-impact": ("strike_film", "Let a bead fall through a liquid film onto a plate; the liquid's flow is computed.",
+                    "--diameter 5.5e-3 --liquid m5 --film 0.45e-3 --velocity 0.5"),
     "three-spheres": ("simulate_three_spheres", "Let a wet sphere strike a resting pair of wet spheres.",
                       "--stokes 12 --theta12 30"),
     "wet-pair": ("collide_wet", "Let a wet sphere strike an equal one at rest; by default, steel in silicone oil.",

@@ -8,7 +8,7 @@ from typing import Any
 from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.printing import show
 from cfddem.cli.scenario_commands import command
-from scenarios.collisions import immersed_pair, three_spheres, wet_pair, wet_wall
+from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_pair, wet_wall
 from scenarios.collisions.three_spheres.figures import draw_map
 
 
@@ -100,3 +100,21 @@ collide_wet = command(
     wet_pair.collide_wet,
     units={"spin": "rad/s", "separation_time": "s", "minimum_gap": "m", "velocity": "m/s", "turned": "deg"},
 )
+
+
+def _show_film_impact(result: film_impact.FilmImpact, json: bool) -> None:
+    values = result.summary()
+    if json:
+        show(values, {}, json)
+        return
+    units = dict.fromkeys(("minimum_gap", "wetted_radius"), "m") | dict.fromkeys(("turned_speed", "fastest"), "m/s")
+    units |= dict.fromkeys(("lowest_pressure", "highest_pressure"), "Pa") | {"mass_carried": "kg", "seconds": "s"}
+    for name in ("p1", "p2", "p3", "p4"):
+        time, velocity = values.pop(name).values()
+        values |= {f"{name}_time": time, f"{name}_velocity": velocity}
+        units |= {f"{name}_time": "s", f"{name}_velocity": "m/s"}
+    values |= {f"{name}_energy": share for name, share in values.pop("energies").items()}
+    show(values, units, json)
+
+
+strike_film = command(film_impact.impact, show_result=_show_film_impact)

@@ -49,7 +49,10 @@ def view(
     show: Annotated[
         list[str] | None, Parameter(help="spheres, voidage, bubbles or streamlines; may be repeated", negative="")
     ] = None,
-    colour: Annotated[str, Parameter(help="quantity that colours the spheres: speed, or a recorded field")] = "speed",
+    colour: Annotated[
+        str,
+        Parameter(help="quantity that colours the spheres: speed, or a recorded field (liquid, agglomerate)"),
+    ] = "speed",
     movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .mp4 or .gif")] = None,
     history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
     collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,

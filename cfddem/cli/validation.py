@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as _json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -46,6 +46,7 @@ def bench(
     particles: Annotated[int, Parameter(help="1000, 10000, 100000 or 1000000")] = 10_000,
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
+    films: Annotated[Literal["full"] | None, Parameter(help="with films that resist sliding and rolling, too")] = None,
     bridges: Annotated[bool, Parameter(help="with a liquid bridge on every contact", negative="")] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
@@ -59,7 +60,10 @@ def bench(
 
     if target not in ("dem", "bed"):
         raise InputError("target", target, nearest(target, ["dem", "bed"]))
-    result = dense_bed.bench(particles, threads, film, bridges) if target == "dem" else gas_bed.bench(threads)
+    if target == "dem":
+        result = dense_bed.bench(particles, threads, film, bridges, full=films == "full")
+    else:
+        result = gas_bed.bench(threads)
     if json:
         print(_json.dumps(result))
     else:

@@ -12,7 +12,7 @@ forces are explicit.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,10 +32,12 @@ from cfddem.coupling.forces.lift import lift_force
 from cfddem.coupling.forces.pressure import PressureForce
 from cfddem.coupling.forces.torque import turn_with_fluid
 from cfddem.coupling.forces.viscous_stress import viscous_force
+from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler, SampledFlow
 from cfddem.coupling.self_disturbance import SelfDisturbance
-from cfddem.coupling.transfer import ImplicitCoefficients, Transfer
+from cfddem.coupling.terms import CouplingTerms, FluidForces
+from cfddem.coupling.transfer import Transfer
 from cfddem.coupling.velocity_gradient import change_along, vorticity_at
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
@@ -47,48 +49,6 @@ SAME_STEP = 1e-6
 
 STEP_RELAXATION = 0.01
 """Weight of the present step in the running mean of the fluid step."""
-
-
-class CouplingTerms(NamedTuple):
-    """What particles send into a fluid step, and what the coupling needs after it."""
-
-    cell_map: ParticleCellMap
-    flow: SampledFlow
-    drag: Array  # conductance of the drag (N,) [kg/s]
-    implicit: ImplicitCoefficients  # of drag and history force
-    explicit: Array  # forces known before the fluid's step: lift, viscous stress, added mass (N, 3) [N]
-    added: Array  # change of the added mass of every particle at the start of the step (N,) [kg]
-    voidage: Array  # of the cells (nz, ny, nx)
-    source: Array | None  # force on the fluid (nz, ny, nx, 3) [N/m3]
-    agitation: AgitationTerms | None = None
-    history: HistoryTerms | None = None
-
-    @property
-    def step(self) -> float:
-        """Length of the fluid step [s]."""
-        return self.implicit.step
-
-    @property
-    def fluctuating_force(self) -> Array:
-        """Explicit force of agitation on every particle (N, 3) [N]."""
-        force = None if self.agitation is None else self.agitation.force
-        return np.zeros_like(self.explicit) if force is None else force
-
-    @property
-    def fields(self) -> tuple[Array, Array, Array, Array | None]:
-        """Arguments of `FluidSolver.step` after the length of the step."""
-        return self.voidage, self.implicit.cell_conductance, self.implicit.cell_product, self.source
-
-
-class FluidForces(NamedTuple):
-    """Forces of the fluid on every particle, constant over a fluid step (N, 3) [N]."""
-
-    drag: Array
-    pressure: Array  # of model A, without buoyancy
-    weight: Array  # less buoyancy
-    explicit: Array  # lift, viscous stress, added mass
-    agitation: Array  # by the acceleration of the fluctuation, or the fluctuating force; without that in the drag
-    history: Array
 
 
 class Exchange:
@@ -105,6 +65,7 @@ class Exchange:
     self_disturbance correct the sampled velocity and voidage for what each particle causes itself
     agitation        fluctuating force from the flow around the neighbours; None for none
     history          history force; None for none
+    wall_drag        extra drag beside walls; None for none
     """
 
     def __init__(
@@ -121,10 +82,12 @@ class Exchange:
         viscous_stress: bool = False,
         agitation: PseudoTurbulence | FluctuatingForce | None = None,
         history: History | None = None,
+        wall_drag: WallDrag | None = None,
     ) -> None:
         self.fluid, self.kernel = fluid, kernel
         self.lift, self.torque, self.viscous_stress = lift, torque, viscous_stress and fluid.model == "A"
         self.drag, self.agitation, self.history = Drag(drag, fluid.model), agitation, history
+        self.wall_drag = wall_drag
         self.self_disturbance = SelfDisturbance(kernel) if self_disturbance else None
         self.flow = FlowSampler(fluid, kernel, self.self_disturbance, self.drag.needs_sizes)
         self.pressure, self.added_mass = PressureForce(fluid, kernel), added_mass or AddedMass(0.0, fluid.density)
@@ -173,6 +136,9 @@ class Exchange:
             around = self._neighbourhood(particles, cell_map, flow, solid)
             flow, agitation = around.flow, self.agitation.terms(particles, around, step)
         drag = self.drag.conductance(particles, flow) if around is None else around.conductance
+        if self.wall_drag is not None:
+            beside = self.wall_drag.terms(particles, flow.slip)
+            drag, transverse = drag + beside.conductance, transverse + beside.force
         if self.history is not None:
             history = self.history.terms(particles, flow, drag, inertia(particles), step, last_step)
         not_seen = _not_seen(flow, drag, agitation, history)
@@ -185,7 +151,7 @@ class Exchange:
         for each in (agitation, history):
             if each is not None and each.force is not None:
                 lost = lost - each.force
-        explicit = self.added_mass or self.lift or self.viscous_stress or history is not None
+        explicit = self.added_mass or self.lift or self.viscous_stress or history is not None or self.wall_drag
         source = None
         if explicit or (agitation is not None and agitation.force is not None):
             source = self._source(cell_map, lost)
@@ -224,6 +190,11 @@ class Exchange:
                 particles, cell_map, terms.flow.slip, drag + history, screening, fluid.density, step
             )
         return forces
+
+    def solid_fraction(self, particles: Particles) -> Array:
+        """Solid fraction of the cells by the places from which the last voidage was computed (nz, ny, nx) [-]."""
+        place = particles.mapped_position if self.pressure.fields else particles.position
+        return self.kernel.solid_fraction(self.kernel.map_particles(place, particles.radius))
 
     @property
     def outside(self) -> int:

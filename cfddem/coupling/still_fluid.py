@@ -1,8 +1,8 @@
 r"""A fluid at rest around a few particles, without a fluid solver: drag, added mass, history force and buoyancy.
 
-For collisions and falls in a large vessel. A particle moves as if it were alone in an unbounded fluid; a plane wall
-raises its added mass. The fluid that a particle sets in motion acts on this particle, by the history force, and on no
-other. Lubrication films are computed by the particle solver.
+For collisions and falls in a large vessel. A particle moves as if it were alone in an unbounded fluid, but a plane wall
+can raise its added mass, and walls its drag. The fluid that a particle sets in motion acts on this particle, by the
+history force, and on no other. Lubrication films are computed by the particle solver.
 
 Drag and the newest part of the history force are implicit, as in a coupled run (:mod:`cfddem.coupling.transfer`).
 """
@@ -18,6 +18,7 @@ from cfddem.backend.errors import InputError
 from cfddem.coupling.exchange import inertia
 from cfddem.coupling.forces.drag import Drag
 from cfddem.coupling.forces.history import History
+from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -45,6 +46,7 @@ class StillFluid:
     history     "mei_adrian", "basset" or "none"
     wall        plane at rest that raises the added mass, for motion towards it and away from it alone: motion along
                 the wall, whose added mass grows less, gets the same; None for none
+    wall_drag   extra drag beside walls; None for none
     gravity     (3,) [m/s2]
     """
 
@@ -58,6 +60,7 @@ class StillFluid:
         added_mass: bool = True,
         history: Literal["none", "mei_adrian", "basset"] = "mei_adrian",
         wall: Plane | None = None,
+        wall_drag: WallDrag | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         if any(solver.gravity):
@@ -70,6 +73,7 @@ class StillFluid:
         self.solver, self.density, self.viscosity, self.drag = solver, density, viscosity, Drag(drag, "A")
         self.added_mass, self.wall, self.gravity = added_mass, wall, np.array(gravity)
         self.history = None if history == "none" else History(history, density)
+        self.wall_drag = wall_drag
         for field in (DURATION, *(() if self.history is None else self.history.fields)):
             solver.particles.declare(field)
         self.forces: dict[str, Array] = {}
@@ -120,12 +124,15 @@ class StillFluid:
         reynolds = 2.0 * self.density * particles.radius * speed / np.maximum(particles.viscosity, 1e-300)
         none, one = np.zeros(particles.count), np.ones(particles.count)
         flow = SampledFlow(slip, np.zeros_like(slip), one, reynolds, none, one)
-        drag = self.drag.conductance(particles, flow)
-        conductance, explicit, terms = drag, np.zeros_like(slip), None
+        drag, aside = self.drag.conductance(particles, flow), np.zeros_like(slip)
+        if self.wall_drag is not None:
+            beside = self.wall_drag.terms(particles, slip)
+            drag, aside = drag + beside.conductance, beside.force
+        conductance, explicit, terms = drag, aside, None
         if self.history is not None:
             last = float(particles[DURATION.name].max())  # local: one process; inserted particles have no slip yet
             terms = self.history.terms(particles, flow, drag, capacity, span, last)
-            conductance, explicit = drag + terms.conductance, terms.force
+            conductance, explicit = drag + terms.conductance, aside + terms.force
         stiffness = span * conductance / capacity
         theta = (1.0 + stiffness) / (2.0 + stiffness)
         foreseen = slip - (theta * span / capacity)[:, None] * (other + explicit)
@@ -133,5 +140,5 @@ class StillFluid:
         share = (drag / np.maximum(conductance, 1e-300))[:, None]
         if self.history is not None and terms is not None:
             self.history.store(particles, received * (1.0 - share), terms, span)
-        self.forces |= {"drag": received * share, "history": received * (1.0 - share) + explicit}
+        self.forces |= {"drag": received * share + aside, "history": received * (1.0 - share) + explicit - aside}
         return received, explicit

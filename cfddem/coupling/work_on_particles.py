@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.coupling.exchange import CouplingTerms, Exchange, FluidForces
+from cfddem.coupling.exchange import Exchange
+from cfddem.coupling.terms import CouplingTerms, FluidForces
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
@@ -43,7 +44,7 @@ class ParticleWork(NamedTuple):
     history: float
     history_on_fluid: float  # of the implicit part of the same force at the velocity with which the fluid acts
     explicit_history_on_fluid: float  # of its other part
-    explicit: float  # lift, viscous stress and added mass
+    explicit: float  # lift, viscous stress, added mass and wall drag across the slip
     agitation: float  # other forces of agitation
     added: float  # kinetic energy that a change of the added mass has given to the particles
     weight: float  # less buoyancy

@@ -303,6 +303,14 @@ class FluidSolver(FluidBudgets):
         self._set_cells(self.fields.mean_voidage, mean)
         self._set_cells(self.fields.voidage_rate, rate)
 
+    def add_voidage(self, change: Array) -> None:
+        """Change the voidage now, without a flow: particles that enter take the place of fluid, which leaves with them.
+
+        change  (nz, ny, nx) [-]
+        """
+        voidage = np.minimum(self.voidage + change, 1.0)  # where all particles leave a cell, up to rounding
+        self._set_cells(self.fields.voidage, checked_voidage(self.grid, voidage, self.communicator))
+
     def set_velocity(self, velocity: Sequence[Any]) -> None:
         """Start from a velocity, corrected by the smallest potential flow that makes it satisfy continuity.
 

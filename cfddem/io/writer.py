@@ -3,6 +3,7 @@
     run/
       run.json               format, status, grid, quantities with units, versions, seed
       case.toml              the case as it was run
+      surfaces/wall_0.stl    copies of the surface files of its walls
       data/00000012.h5       one snapshot: /fluid/<name> (1, nz, ny, nx[, 3]), /particles/Points (n, 3) and <name>,
                              /collisions/<name> (c,)
       run.vtkhdf             all snapshots as one series for ParaView, pyvista and h5py

@@ -13,76 +13,33 @@ and runs that count no energy pay nothing.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
 from cfddem.particles.energy_of_bridges import BridgeEnergies
-from cfddem.particles.integrate import may_touch
-from cfddem.particles.interactions.contact import friction_coefficient
-from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
-from cfddem.particles.interactions.slots import (
-    FILM,
-    RECORD,
-    RESCALED,
-    ROLLING,
-    ContactState,
-    contact_overlap,
-    derive,
-    elastic_force,
-    lost_energy,
-    read_memory,
-    stored_energy,
-    tangential_stiffness,
-)
-from cfddem.particles.pair_graph import geometry
+from cfddem.particles.energy_of_contacts import CHANNELS, WALLS, count_motion, count_work, room_for_count
+from cfddem.particles.energy_of_shear import CHANNELS as OF_SHEAR
+from cfddem.particles.energy_of_shear import ShearEnergies
 from cfddem.particles.state import added_mass_energy, kinetic_energy
-from cfddem.particles.vectors import NOTHING, across, at, cross, dot, flat, minus, plus, put, times
-from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
-from closures.blend import contact_share
-from closures.friction import coulomb_limit
+from cfddem.particles.vectors import flat
 
 if TYPE_CHECKING:
     from cfddem.particles.solver import ParticleSolver
-
-FILMS, DAMPING, SLIDING, TURNING, WALLS, STIFFENING, FALL, HYSTERESIS = range(8)
-CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffening", "fall", "hysteresis")
-"""Energy lost to films, dashpots, sliding and rolling; energy gained from moving walls, from tangential springs whose
-stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
 DISPLACEMENT = Field("displacement", "m", 3, "scratch", meaning="displacement in the last advance")
 WORK_DISPLACEMENT = Field(
     "work_displacement", "m", 3, "scratch", meaning="displacement whose product with a force is its work"
 )
 
-ALMOST = 1.0 - 1e-9
-"""A contact slides if its tangential force is this share of Coulomb's limit or more."""
-
-
-class Count(NamedTuple):
-    """State of the count between two steps, as compiled loops take it."""
-
-    ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
-    moved: np.ndarray  # (N, 3) distance moved during the half kicks around this instant [m]
-    turned: np.ndarray  # (N, 3) angle turned meanwhile [rad]
-    drifted: np.ndarray  # (N, 3) displacement of the particle in the step [m]
-    spring: np.ndarray  # (n,) square of the tangential spring [m2]
-    stiffness: np.ndarray  # (n,) tangential, times the share of the solids in the load [N/m]
-    power: np.ndarray  # (n,) going into the tangential spring [W]
-    held: np.ndarray  # (n,) energy of the normal spring [J]
-    yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
-    totals: np.ndarray  # (2, CHUNKS, channels); the second half is of pairs that another rank adds [J]
-
 
 class Energies:
     """The energy account of a particle solver.
 
-    channels  names of the channels: `CHANNELS`, and those of bridges where there are any
+    channels  names of the channels: `CHANNELS`, and those of bridges and of films that resist sliding, if any
     totals    energy of each channel since the count began [J]
 
     Fields of the particles, set in every `advance`: `displacement` (N, 3) [m], and `work_displacement`, whose product
@@ -96,9 +53,11 @@ class Energies:
             raise InputError("energies", None, "a contact law that gives its energy", f"the law {name!r} does not")
         if laws.film and laws.integrator != "drift":
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
-        self._work = specialise(_work, solver.choices)
+        self._work = specialise(count_work, solver.choices)
         self._bridges = None if laws.bridge is None else BridgeEnergies(solver)
+        self._shear = ShearEnergies(solver) if laws.shears else None
         self.channels = CHANNELS if self._bridges is None else (*CHANNELS, *self._bridges.channels)
+        self.channels = (*self.channels, *OF_SHEAR) if laws.shears else self.channels
         self.totals = np.zeros(len(self.channels))
         self.fed = 0.0  # energy of inserted particles less that of removed ones [J]
         for field in (DISPLACEMENT, WORK_DISPLACEMENT):
@@ -114,10 +73,14 @@ class Energies:
             if self._edges is not solver.edges:
                 self._make_room(solver)
             self._pass(solver, 0.0, 0.0, 0.5 * step if first else 0.0)
+            if self._bridges is not None and not first:
+                self._bridges.count(solver, 0.0, 0.0, 0.5 * step)  # a new list forgets the half kick that follows
         particles = solver.particles
         self._count.ahead[:] = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
         if self._bridges is not None:
             self._bridges.before(solver, step, self._count.ahead)
+        if self._shear is not None:
+            self._shear.before(solver, step, self._count.ahead)
 
     def after(self, solver: ParticleSolver, step: float, last: bool) -> None:
         """Count after a step [s]; `last` of an advance."""
@@ -162,9 +125,11 @@ class Energies:
 
     def _make_room(self, solver: ParticleSolver) -> None:
         """Begin with another neighbour list."""
-        self._edges, self._count = solver.edges, _room(solver)
+        self._edges, self._count = solver.edges, room_for_count(solver)
         if self._bridges is not None:
             self._bridges.make_room(solver)
+        if self._shear is not None:
+            self._shear.make_room(solver)
 
     def _pass(self, solver: ParticleSolver, step: float, before: float, after: float) -> None:
         solver.lists.ghosts.refresh("work")
@@ -172,189 +137,19 @@ class Energies:
         count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
         count.totals[:] = 0.0
         gravity = np.array(solver.gravity, float)
-        _motion(particles, count, gravity, np.array(solver.free, float), step, before, after)
+        count_motion(particles, count, gravity, np.array(solver.free, float), step, before, after)
         p = solver.laws.parameters
         self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
         self.totals[: len(CHANNELS)] += solver.communicator.sum(count.totals[0], axis=0)
         if self._bridges is not None:
             done, by_walls = self._bridges.count(solver, step, before, after)
-            self.totals[len(CHANNELS) :] += done
+            self.totals[len(CHANNELS) :][: len(done)] += done
+            self.totals[WALLS] += by_walls
+        if self._shear is not None:
+            lost, by_walls = self._shear.count(solver, step)
+            self.totals[-1] += lost
             self.totals[WALLS] += by_walls
         if before + after > 0.0:
             solver.particles.work_displacement += self._count.moved
         if step > 0.0:
             solver.particles.displacement += self._count.drifted
-
-
-def _room(solver: ParticleSolver) -> Count:
-    number, count = len(solver.edges.first), solver.particles.count
-    ahead, moved, turned, drifted = np.zeros((4, count, 3))
-    spring, stiffness, power, held, yielded = np.zeros((5, number))
-    totals = np.zeros((2, CHUNKS, len(CHANNELS)))
-    return Count(ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, totals)
-
-
-@threaded
-def _motion(particles, count, gravity, free, step, before, after):
-    """Motion during the half kicks around this instant, in which forces act, and the work of gravity in the step."""
-    number = len(particles.radius)
-    for chunk in prange(CHUNKS):
-        totals = count.totals[0, chunk]
-        for i in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
-            gain = 0.5 * (after * after - before * before)
-            force, torque = at(particles.force, i), at(particles.torque, i)
-            moved = plus(
-                times(before + after, at(particles.velocity, i)), times(gain * particles.inverse_mass[i], force)
-            )
-            put(count.moved, i, moved)
-            turned = plus(
-                times(before + after, at(particles.spin, i)), times(gain * particles.inverse_inertia[i], torque)
-            )
-            put(count.turned, i, turned)
-            if step > 0.0 and particles.inverse_mass[i] > 0.0:
-                drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], force))
-                drifted = (free[0] * drifted[0], free[1] * drifted[1], free[2] * drifted[2])
-                put(count.drifted, i, times(step, drifted))
-                if i < particles.owned:
-                    totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, drifted)
-            elif step > 0.0:
-                put(count.ahead, i, at(particles.velocity, i))
-
-
-@inline
-def _note(k, memory, channel, lost):
-    """Add what edge k has lost to its collision, where one is recorded; the columns are the first three channels."""
-    if RECORD and not np.isnan(memory.begin[k]):
-        if np.isnan(memory.lost[3 * k]):
-            put(memory.lost, k, NOTHING)
-        memory.lost[3 * k + channel] += lost
-
-
-@inline
-def _film_works(k, particles, edges, memory, count, step):
-    """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
-    i, j = edges.first[k], edges.second[k]
-    impulse = at(memory.impulse, k)
-    drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
-    speed = times(0.5, plus(at(count.ahead, i), drifted))
-    if k < edges.between_particles:
-        drifted = minus(
-            at(particles.velocity, j), times(0.5 * step * particles.inverse_mass[j], at(particles.force, j))
-        )
-        other, by_wall = times(0.5, plus(at(count.ahead, j), drifted)), 0.0
-    else:
-        other = touched(edges, k, SURFACE)
-        by_wall = dot(impulse, other)
-    return -dot(impulse, minus(speed, other)), by_wall
-
-
-@inline
-def _forget(k, count, totals, step):
-    """Clear the count of a contact that has ended; the energy of its tangential spring is lost."""
-    totals[STIFFENING] -= 0.5 * count.stiffness[k] * count.spring[k] if step > 0.0 else 0.0
-    count.spring[k] = 0.0
-    count.stiffness[k] = 0.0
-    count.power[k] = 0.0
-    count.held[k] = 0.0
-    count.yielded[k] = 0.0
-
-
-@inline
-def _moved(k, particles, edges, walls, count, duration):
-    """Relative motion of two bodies over the half kicks around this instant.
-
-    returns  displacement, rotation times radius and rotation of the first body relative to the second; the rates of
-             the first two; the sum of the radii; the displacement of a wall
-    """
-    i, j = edges.first[k], edges.second[k]
-    about = at(count.turned, i)
-    moved, turned = at(count.moved, i), times(particles.radius[i], about)
-    velocity, surface_spin = at(particles.velocity, i), times(particles.radius[i], at(particles.spin, i))
-    if k < edges.between_particles:
-        radius = particles.radius[j]
-        other = at(count.turned, j)
-        moved, turned = minus(moved, at(count.moved, j)), plus(turned, times(radius, other))
-        velocity = minus(velocity, at(particles.velocity, j))
-        surface_spin = plus(surface_spin, times(radius, at(particles.spin, j)))
-        return moved, turned, minus(about, other), velocity, surface_spin, particles.radius[i] + radius, NOTHING
-    surface = touched(edges, k, SURFACE)
-    by_wall = times(duration, surface)
-    about = minus(about, times(duration, at(walls.spin, walls.wall[j])))
-    return minus(moved, by_wall), turned, about, minus(velocity, surface), surface_spin, particles.radius[i], by_wall
-
-
-@inline
-def _slides(row, minimum_gap, pressed, tangent):
-    """Whether a contact is at Coulomb's limit."""
-    limit = coulomb_limit(friction_coefficient(row, minimum_gap), pressed)
-    return math.sqrt(dot(tangent, tangent)) >= ALMOST * limit
-
-
-@inline
-def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, duration, totals):
-    """Count what the contact of edge k has done, and keep what its springs hold; nothing if the solids do not touch."""
-    separation, distance, gap = geometry(k, particles, edges, shift)
-    minimum_gap = memory.minimum_gap[k]
-    if not gap < minimum_gap:
-        _forget(k, count, totals, step)
-        return
-    normal = times(1.0 / distance, separation)
-    row = pair_row(k, particles, edges, walls, table)
-    reduced_radius, inverse_mass = pair_mass_and_radius(k, particles, edges)
-    state = ContactState(minimum_gap - gap, gap, 0.0, step, minimum_gap, reduced_radius, 1.0 / inverse_mass)
-    m = read_memory(memory, k)
-    d = derive(state, row, p, m)
-    share = portion(edges, k) * (contact_share(gap, minimum_gap) if FILM else 1.0)
-    overlap = contact_overlap(state, row, p, m, d)
-    equivalent = ContactState(overlap, gap, 0.0, step, minimum_gap, reduced_radius, 1.0 / inverse_mass)
-    tangential = share * tangential_stiffness(equivalent, row, p, m, d)
-    elastic = share * elastic_force(state, row, p, m, d)
-    force, spring = at(memory.force, k), at(memory.spring, k)
-    moved, turned, about, velocity, surface_spin, radii, by_wall = _moved(k, particles, edges, walls, count, duration)
-    stretch = distance / radii
-    pressed, approach = dot(force, normal), dot(moved, normal)
-    slip = minus(across(velocity, normal), times(stretch, cross(surface_spin, normal)))
-    slid = minus(across(moved, normal), times(stretch, cross(turned, normal)))
-    pulled = dot(force, moved) + dot(at(memory.couple, k), turned) - pressed * approach
-
-    totals[WALLS] += dot(force, by_wall)
-    damped = (elastic - pressed) * approach - pulled - tangential * dot(spring, slid)
-    totals[DAMPING] += damped
-    _note(k, memory, DAMPING, damped)
-    if ROLLING:
-        totals[TURNING] -= dot(at(memory.moment, k), about)
-    square, rate = dot(spring, spring), tangential * dot(spring, slip)
-    yielded = portion(edges, k) * lost_energy(state, row, p, m, d)
-    if step > 0.0:
-        totals[HYSTERESIS] += yielded - count.yielded[k]
-        _note(k, memory, DAMPING, yielded - count.yielded[k])
-        softer, was = count.stiffness[k], count.spring[k]
-        kept = was * softer / tangential if RESCALED and tangential > softer else was
-        taken = 0.25 * (softer + tangential) * (square - kept)
-        totals[STIFFENING] += 0.5 * (tangential * square - softer * was) - taken
-        if _slides(row, minimum_gap, pressed, minus(force, times(pressed, normal))):
-            rubbed = 0.5 * step * (count.power[k] + rate) - taken
-            totals[SLIDING] += rubbed
-            _note(k, memory, SLIDING, rubbed)
-    count.spring[k] = square
-    count.stiffness[k] = tangential
-    count.power[k] = rate
-    count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
-    count.yielded[k] = yielded
-
-
-@threaded
-def _work(particles, edges, memory, walls, count, shift, table, p, step, before, after):
-    """Count what films have done in the step, contacts in the half kicks around this instant, and what springs hold."""
-    number, pairs = len(edges.first), edges.between_particles
-    near = may_touch(edges)
-    for chunk in prange(CHUNKS):
-        for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
-            totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
-            if FILM and step > 0.0:
-                lost, by_wall = _film_works(k, particles, edges, memory, count, step)
-                totals[FILMS] += lost
-                _note(k, memory, FILMS, lost)
-                totals[WALLS] += by_wall
-            if not near <= k < pairs:
-                _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, before + after, totals)

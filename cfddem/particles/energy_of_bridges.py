@@ -132,7 +132,7 @@ def _pulled(k, particles, edges, memory, kick, sign):
 
 
 @inline
-def _mean_motion(i, particles, count, step):
+def mean_motion(i, particles, count, step):
     """Mean velocity and spin of particle i while impulses act: between the two half kicks of the step."""
     velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
     spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
@@ -144,10 +144,10 @@ def _resisted(k, particles, edges, memory, count, step):
     """Energy that the resistance of edge k has taken in the step, and that a moving wall has put in through it."""
     i, j = edges.first[k], edges.second[k]
     impulse, couple = at(memory.bridge_impulse, k), at(memory.bridge_couple, k)
-    velocity, spin = _mean_motion(i, particles, count, step)
+    velocity, spin = mean_motion(i, particles, count, step)
     turned = particles.radius[i] * dot(couple, spin)
     if k < edges.between_particles:
-        other, spin = _mean_motion(j, particles, count, step)
+        other, spin = mean_motion(j, particles, count, step)
         turned += particles.radius[j] * dot(couple, spin)
         return -dot(impulse, minus(velocity, other)) - turned, 0.0
     surface = touched(edges, k, SURFACE)

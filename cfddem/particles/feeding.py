@@ -10,9 +10,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cfddem.backend.errors import InputError
+from cfddem.particles.initial.packing import Seed
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import make_particles
+from cfddem.particles.state import Particles, make_particles
 from cfddem.particles.vectors import Vector
+from cfddem.particles.walls.arrays import near_walls
+from cfddem.particles.walls.nearest_point import Walls
 
 _TRIES = 20
 """Positions that are tried for a particle before it waits for the next call."""
@@ -24,9 +27,9 @@ _NOWHERE_BELOW, _NOWHERE_ABOVE = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, n
 class Feed:
     """Inserts particles in a box at a constant rate.
 
-    Call it with the run from time to time; it inserts the particles due since its first call. A particle that finds no
-    free position in the box waits for the next call. A run that is resumed with the `checkpoint()` of its feeds and
-    outlets continues with the same bits.
+    Call it with the run from time to time; it inserts the particles due since its first call, or since `begin`. A
+    particle that finds no position in the box free of particles and walls waits for the next call. A run that is
+    resumed with the `checkpoint()` of its feeds and outlets continues with the same bits.
 
     rate          [1/s]
     corner, size  of the box in which centres appear; a size may be 0 [m]
@@ -37,6 +40,8 @@ class Feed:
     material      row of the pair table
     viscosity     of the fluid around them [Pa s]
     seed          of the random positions and diameters
+    begin, end    times between which particles become due; from the first call on if not given [s]
+    finish        called with new particles before they are inserted, for instance to declare fields
     """
 
     def __init__(
@@ -50,7 +55,10 @@ class Feed:
         velocity: Vector = (0.0, 0.0, 0.0),
         material: int = 0,
         viscosity: float = 0.0,
-        seed: int,
+        seed: Seed,
+        begin: float = math.nan,
+        end: float = math.inf,
+        finish: Callable[[Particles], None] | None = None,
     ) -> None:
         if not 0.0 <= rate < np.inf:
             raise InputError("rate", rate, "at least 0")
@@ -59,30 +67,36 @@ class Feed:
         self.velocity, self.material, self.viscosity = velocity, material, viscosity
         self.entered = 0
         self.waiting = np.zeros(0)  # diameters of particles that are due [m]
-        self._begin = math.nan  # time of the first call [s]
+        self.end, self.finish = end, finish
+        self._begin = begin  # or time of the first call [s]
         self._generator = np.random.default_rng(seed)
 
     def __call__(self, run: ParticleSolver) -> int:
         """Insert the particles that are due; returns their number."""
         if math.isnan(self._begin):
             self._begin = run.time
-        due = int(self.rate * (run.time - self._begin) * (1.0 + 1e-12)) - self.entered - len(self.waiting)
+        active = max(min(run.time, self.end) - self._begin, 0.0)
+        due = int(self.rate * active * (1.0 + 1e-12)) - self.entered - len(self.waiting)
         if due > 0:
             self.waiting = np.append(self.waiting, self.diameters(due, self._generator))
+        if not len(self.waiting):
+            return 0
         radius = 0.5 * self.waiting
         place, free = self._places(run, radius)
+        free &= apart_from_walls(place, radius, run.walls)
         entered = len(radius[free])
         if entered:
-            run.insert(
-                make_particles(
-                    place[free],
-                    radius[free],
-                    self.density,
-                    velocity=np.array(self.velocity),
-                    material=self.material,
-                    viscosity=self.viscosity,
-                )
+            fresh = make_particles(
+                place[free],
+                radius[free],
+                self.density,
+                velocity=np.array(self.velocity),
+                material=self.material,
+                viscosity=self.viscosity,
             )
+            if self.finish is not None:
+                self.finish(fresh)
+            run.insert(fresh)
         self.waiting = self.waiting[~free]
         self.entered += entered
         return entered
@@ -123,18 +137,23 @@ class Feed:
 
 
 class ParticleOutlet:
-    """Removes and counts particles outside a region.
+    """Removes and counts particles outside a region, or inside it.
 
     low, high  opposite corners of the region; infinite in directions without an outlet [m]
+    inside     remove the particles inside
     """
 
-    def __init__(self, low: Vector = _NOWHERE_BELOW, high: Vector = _NOWHERE_ABOVE) -> None:
-        self.low, self.high = np.array(low, float), np.array(high, float)
+    def __init__(self, low: Vector = _NOWHERE_BELOW, high: Vector = _NOWHERE_ABOVE, *, inside: bool = False) -> None:
+        self.low, self.high, self.inside = np.array(low, float), np.array(high, float), inside
         self.left, self.mass = 0, 0.0
+
+    def takes(self, position: np.ndarray) -> np.ndarray:
+        """Which positions (N, 3) [m] are removed (N,) bool."""
+        return _inside(position, self.low, self.high) == self.inside
 
     def __call__(self, run: ParticleSolver) -> int:
         """Remove the particles that have left; returns their number."""
-        gone = run.remove(~_inside(run.particles.position, self.low, self.high))
+        gone = run.remove(self.takes(run.particles.position))
         left = run.communicator.sum(gone.count)
         self.left += left
         self.mass += run.communicator.sum(gone.mass)
@@ -147,6 +166,15 @@ class ParticleOutlet:
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()` of the same outlet."""
         self.left, self.mass = int(state["left"]), float(state["mass"])
+
+
+def apart_from_walls(place: np.ndarray, radius: np.ndarray, walls: Walls) -> np.ndarray:
+    """Which spheres at positions (N, 3) [m] with radii (N,) [m] touch no wall and are behind none (N,) bool."""
+    apart = np.ones(len(radius), bool)
+    if len(radius) and len(walls.kind):
+        touching, _ = near_walls(make_particles(place, radius, 1.0), walls, 0.0, 0.0)
+        apart[touching] = False
+    return apart
 
 
 def _inside(position: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Phase
 from cfddem.particles.integrate import film_kick, find_bridge_changes, finish_step, move, start_step, start_steps
+from cfddem.particles.interactions.shear_film import shear_kick
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 
@@ -252,11 +253,11 @@ class StepsWithGhosts:
     """
 
     def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Whole, communicator: Communicator) -> None:
-        loops = (start_steps, start_step, film_kick, move, find_bridge_changes, finish_step)
+        loops = (start_steps, start_step, film_kick, move, find_bridge_changes, finish_step, shear_kick)
         made = [specialise(loop, choices, threads) for loop in loops]
-        self.begin, self.start, self.film_kick, self.move, self.find_bridge_changes, self.finish = made
+        self.begin, self.start, self.film_kick, self.move, self.find_bridge_changes, self.finish, self.shear_kick = made
         self.films, self.bridges, self.recording = choices["DRIFTING"], choices["BRIDGE"], choices["RECORD"]
-        self.ghosts, self.communicator = ghosts, communicator
+        self.shear, self.ghosts, self.communicator = choices["SHEAR"], ghosts, communicator
 
     def __call__(self, *arguments: Any) -> tuple[int, float, int]:
         """Arguments and results of `integrate`."""
@@ -282,6 +283,9 @@ class StepsWithGhosts:
 
     def _impulses(self, pairs: list[Any], step: float) -> None:
         """Give ghosts what film and bridge impulses need; with both, films act here, else as particles move."""
+        if self.shear:
+            self.ghosts.refresh("shear")
+            self.shear_kick(*pairs[:5], step)
         if self.films:
             self.ghosts.refresh("film")
         if self.bridges and self.films:

@@ -3,6 +3,8 @@
 A step consists of these phases:
 
     kick                 half a step by the forces of the last step
+    [halo: velocity, spin, load of films]
+    shear impulses       of films that resist sliding: of every pair, then of every particle
     [halo: velocity, film rate]
     film impulses        of every pair, then of every particle
     [halo: velocity, spin, load of bridges]
@@ -26,13 +28,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
+from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
-from cfddem.particles.interactions.bridge import apply_bridge_impulses, find_bridge_impulses, renew_bridges
+from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
+from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
 from cfddem.particles.interactions.film import film_force, film_impulse, update_edge_film
 from cfddem.particles.interactions.kinematics import wall_kinematics
 from cfddem.particles.interactions.pair_loops import edge_contact
+from cfddem.particles.interactions.shear_film import shear_kick
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
@@ -40,89 +44,26 @@ from cfddem.particles.interactions.slots import (
     FILM,
     RECORD,
     ROLLING,
+    SHEAR,
     WALLS,
     clear_contact,
     film_impulses,
     pair_forces,
     update_films,
 )
-from cfddem.particles.pair_graph import edge_role
-from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
+from cfddem.particles.motion import (
+    apply_all_film_impulses,
+    drift_particles,
+    gather_forces,
+    kick,
+    kick_particles,
+    larger,
+)
+from cfddem.particles.vectors import NOTHING, at, plus, put
 from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
 from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
 
-
-@inline
-def gather_forces(i, particles, edges, memory, gravity, near):
-    """Sum what the edges of particle i do to it, with weight and outside force; pairs from `near` on do not touch."""
-    force, couple, moment, resistance = at(particles.applied, i), NOTHING, NOTHING, 0.0
-    load = 0.0
-    for place in range(edges.start[i], edges.start[i + 1]):
-        k, sign = edge_role(edges.incident[place])
-        if BRIDGE and memory.bridge_film[k] > 0.0:
-            load += memory.bridge_resistance[k]
-            force = plus(force, times(sign, at(memory.bridge_force, k)))
-        if FILM:
-            resistance += memory.resistance[k]
-        if (FILM or BRIDGE) and near <= k < edges.between_particles:
-            continue
-        force = plus(force, times(sign, at(memory.force, k)))
-        couple = plus(couple, at(memory.couple, k))
-        if ROLLING:
-            moment = plus(moment, times(sign, at(memory.moment, k)))
-    if particles.inverse_mass[i] > 0.0:
-        force = plus(force, times(1.0 / particles.inverse_mass[i], gravity))
-    put(particles.force, i, force)
-    put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
-    if FILM:
-        particles.film_rate[i] = particles.inverse_mass[i] * resistance
-    if BRIDGE:
-        particles.bridge_load[i] = load
-
-
-@inline
-def kick(i, particles, step):
-    """Half a kick by the forces of the last step."""
-    gain = times(0.5 * step * particles.inverse_mass[i], at(particles.force, i))
-    put(particles.velocity, i, plus(at(particles.velocity, i), gain))
-    gain = times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i))
-    put(particles.spin, i, plus(at(particles.spin, i), gain))
-
-
-@inline
-def apply_film_impulses(i, particles, edges, memory):
-    """Give particle i the impulses of its films."""
-    impulse = (0.0, 0.0, 0.0)
-    for place in range(edges.start[i], edges.start[i + 1]):
-        k, sign = edge_role(edges.incident[place])
-        impulse = plus(impulse, times(sign, at(memory.impulse, k)))
-    put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
-
-
-@inline
-def larger(a, b):
-    """The larger of two numbers; NaN if one of them is NaN."""
-    return b if b > a or b != b else a
-
-
-@inline
-def drift(i, particles, free, step, origin):
-    """Move particle i along the free directions; returns its squared distance from its origin."""
-    velocity = at(particles.velocity, i)
-    change = (step * free[0] * velocity[0], step * free[1] * velocity[1], step * free[2] * velocity[2])
-    put(particles.position, i, plus(at(particles.position, i), change))
-    moved = minus(at(particles.position, i), at(origin, i))
-    return dot(moved, moved)
-
-
 # ---------------------------------------------------------------- phases
-
-
-@part
-def kick_particles(particles, step):
-    """Half a kick of all particles."""
-    for i in prange(particles.owned):
-        kick(i, particles, step)
 
 
 @inline
@@ -139,30 +80,6 @@ def find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_rat
     for k in prange(len(edges.first)):
         if k >= pairs or memory.hard[k]:
             film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-
-
-@part
-def apply_all_film_impulses(particles, edges, memory):
-    """Give every particle the impulses of its films, before bridges act on what these leave."""
-    for i in prange(particles.owned):
-        apply_film_impulses(i, particles, edges, memory)
-
-
-@part
-def drift_particles(particles, edges, memory, free, step, origin):
-    """Apply the impulses of films and move the particles; returns the largest squared distance from the origin."""
-    farthest, count = np.zeros(CHUNKS), particles.owned
-    for chunk in prange(CHUNKS):
-        far = 0.0
-        for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            if DRIFTING and not BRIDGE:
-                apply_film_impulses(i, particles, edges, memory)
-            far = larger(far, drift(i, particles, free, step, origin))
-        farthest[chunk] = far
-    largest = 0.0
-    for chunk in range(CHUNKS):
-        largest = larger(largest, farthest[chunk])
-    return largest
 
 
 @inline
@@ -266,10 +183,11 @@ def find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_
 
 @serial
 def act_bridges(changes, particles, edges, memory, walls, shift, p):
-    """Form and break bridges, of which `find_bridge_changes` has found the number, and find the pull of all."""
+    """Form and break bridges, of which `find_bridge_changes` has found the number, and find the pull at walls."""
     if changes > 0:
         exchange_liquid(particles, edges, memory, walls, shift, p)
-    renew_bridges(particles, edges, memory, shift, p)
+    if WALLS:
+        renew_wall_bridges(particles, edges, memory, shift, p)
 
 
 @inline
@@ -308,6 +226,8 @@ def integrate(
     while True:
         if steps > 0:
             kick_particles(particles, step)
+            if SHEAR:
+                shear_kick(particles, edges, memory, walls, shift, step)
             if DRIFTING and BRIDGE:
                 film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
             moved = move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step, origin)

@@ -267,21 +267,25 @@ def _place(incident, key, begin, end, edge, other):
     incident[place], key[place] = edge, other
 
 
+@inline
+def _edge_of(edges, i, j, wall):
+    """Edge of particle i and of particle j, or piece j of the walls; -1 without one. The lower id is particle i."""
+    if i < 0 or j < 0:
+        return -1
+    for place in range(edges.start[i], edges.start[i + 1]):
+        edge = edges.incident[place]
+        if edge >= 0 and edges.second[edge] == j and (edge >= edges.between_particles) == wall:
+            return edge
+    return -1
+
+
 @serial
 def _find(old, new, old_row, source):
     """Find the old edge of each new one; -1 for new pairs."""
     for k in range(len(new.first)):
         wall = k >= new.between_particles
         i, j = old_row[new.first[k]], new.second[k] if wall else old_row[new.second[k]]
-        source[k] = -1
-        if i < 0 or j < 0:
-            continue
-        for place in range(old.start[i], old.start[i + 1]):
-            edge = old.incident[place]
-            # the lower id is first in both lists
-            if edge >= 0 and old.second[edge] == j and (edge >= old.between_particles) == wall:
-                source[k] = edge
-                break
+        source[k] = _edge_of(old, i, j, wall)
 
 
 @serial
@@ -290,14 +294,7 @@ def _find_named(edges, rows, bodies, found):
     for n in range(len(found)):
         wall, i = bodies[n, 1] < 0, rows[n, 0]
         j = -1 - bodies[n, 1] if wall else rows[n, 1]
-        found[n] = -1
-        if i < 0 or j < 0:
-            continue
-        for place in range(edges.start[i], edges.start[i + 1]):
-            edge = edges.incident[place]
-            if edge >= 0 and edges.second[edge] == j and (edge >= edges.between_particles) == wall:
-                found[n] = edge
-                break
+        found[n] = _edge_of(edges, i, j, wall)
 
 
 def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> np.ndarray:

@@ -21,8 +21,22 @@ from cfddem.data.fields import Field, Phase, Table
 
 PARTICLE_FIELDS = (
     Field("position", "m", 3, halo=("start", "motion"), snapshot=True, meaning="position of the centre"),
-    Field("velocity", "m/s", 3, halo=("start", "film", "bridge", "motion", "work"), snapshot=True, meaning="velocity"),
-    Field("spin", "rad/s", 3, halo=("start", "bridge", "motion", "work"), snapshot=True, meaning="angular velocity"),
+    Field(
+        "velocity",
+        "m/s",
+        3,
+        halo=("start", "shear", "film", "bridge", "motion", "work"),
+        snapshot=True,
+        meaning="velocity",
+    ),
+    Field(
+        "spin",
+        "rad/s",
+        3,
+        halo=("start", "shear", "bridge", "motion", "work"),
+        snapshot=True,
+        meaning="angular velocity",
+    ),
     Field("radius", "m", halo=("start",), snapshot=True, meaning="radius"),
     Field("density", "kg/m3", meaning="density"),
     Field("inverse_mass", "1/kg", halo=("start",), meaning="1/(m + added mass), 0 for a particle that nothing moves"),

@@ -31,6 +31,12 @@ HEADROOM = 1.4
 SHARP = 200
 """Pixels of a rendered image per inch of paper."""
 
+AGGLOMERATE = "agglomerate"
+"""The field whose values are names: every agglomerate gets a colour of its own."""
+
+SINGLE = 0.04
+"""Part of the colours that is for single particles."""
+
 PANELS = ("spheres", "voidage", "bubbles", "streamlines")
 
 _WIDTH, _HEIGHT, _NARROWEST = 8.0, 6.0, 0.9  # of the page, of a panel, of a panel [inch]
@@ -77,7 +83,7 @@ class Stage:
             values = np.concatenate([_values(each, colour) for each in shown])
             high = float(np.quantile(values, 0.998)) if values.size else 1.0
             low = 0.0 if values.size == 0 or values.min() >= 0.0 else float(values.min())
-            limits["spheres"] = (low, high if high > low else low + 1.0)
+            limits["spheres"] = (0.0, 1.0) if colour == AGGLOMERATE else (low, high if high > low else low + 1.0)
             largest = max((float(each["radius"].max()) for each in shown if len(each["radius"])), default=0.0)
             deep = size[depth] > 12.0 * largest
         if "voidage" in panels:
@@ -118,8 +124,15 @@ class Stage:
     @property
     def label(self) -> str:
         """Label of the colour bar of the spheres."""
+        if self.colour == AGGLOMERATE:
+            return "agglomerate; grey: single spheres"
         name = "velocity" if self.colour == "speed" else self.colour
         return f"{self.colour.replace('_', ' ')}  [{shown_unit(self.run.quantities['particles'][name].unit)}]"
+
+    @property
+    def colours(self) -> Any:
+        """Colour map of the spheres."""
+        return _many_colours() if self.colour == AGGLOMERATE else _part_of("viridis", 0.12, 1.0)
 
     def coloured(self, snapshot: int) -> tuple[np.ndarray, np.ndarray]:
         """Radius of the spheres, and the values of their colours."""
@@ -136,11 +149,14 @@ class Stage:
             middle = float(self.bounds[self.depth].mean())
             behind = position[:, self.depth] >= middle if self.depth == 1 else position[:, self.depth] <= middle
             title = f"spheres\nbehind {'xy'[self.depth]} = {middle:.3g} m"
-        colours, limits = _part_of("viridis", 0.12, 1.0), self.limits["spheres"]
+        colours, limits = self.colours, self.limits["spheres"]
         view = rendering.View(self.bounds, self.depth, pixels)
         image = rendering.spheres(view, position[behind], particles["radius"][behind], values[behind], limits, colours)
         axes.imshow(image, extent=self._extent, interpolation="antialiased")
-        _colour_bar(axes, colours, limits, self.label)
+        if self.colour == AGGLOMERATE:
+            title = title.replace("spheres", "agglomerates, grey: single")
+        else:
+            _colour_bar(axes, colours, limits, self.label)
         axes.set_title(title, loc="left")
 
     def _voidage(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
@@ -230,7 +246,26 @@ def _values(particles: dict[str, np.ndarray], colour: str) -> np.ndarray:
     if name not in particles:
         raise InputError("colour", colour, nearest(colour, ["speed", *sorted(particles)]))
     values = particles[name]
+    if name == AGGLOMERATE:
+        return _scattered(values)
     return _magnitude(values) if values.ndim == 2 else values.astype(float)
+
+
+def _scattered(names: np.ndarray) -> np.ndarray:
+    """A number for each agglomerate, alike for the same name in all snapshots; 0 for those of a single particle."""
+    _, place, size = np.unique(names, return_inverse=True, return_counts=True)
+    mixed = (0.6180339887498949 * names.astype(float)) % 1.0  # neighbouring names get distant colours
+    return np.where(size[place] > 1, SINGLE + (1.0 - SINGLE) * mixed, 0.0)
+
+
+def _many_colours() -> Any:
+    """Grey for single particles, and all hues for agglomerates."""
+    import matplotlib as mpl
+    from matplotlib.colors import ListedColormap
+
+    hues = mpl.colormaps["turbo"](np.linspace(0.05, 0.95, 256))
+    hues[: int(256 * SINGLE)] = (0.78, 0.78, 0.78, 1.0)
+    return ListedColormap(hues)
 
 
 def _magnitude(vectors: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ def scene(run: Run, colour: str = "speed", off_screen: bool = False) -> Any:
         if "spheres" in stage.panels:
             rendering.add_spheres(
                 plotter, run.particles(place)["position"], *stage.coloured(place), stage.limits["spheres"],
-                name="spheres", scalar_bar_args=_bar(stage.label, 0.05),
+                stage.colours, name="spheres", scalar_bar_args=_bar(stage.label, 0.05),
             )  # fmt: skip
         if "voidage" in stage.panels:
             layer: Any = run.mesh(place)["fluid"]

@@ -10,9 +10,6 @@ from cfddem.case.schema import Case
 from cfddem.preflight.mixture import bed_drag
 from closures import balance, bed, drag_single, numbers
 
-LIQUID = 100.0
-"""A fluid at least this dense counts as a liquid, whose beds expand homogeneously [kg/m3]."""
-
 
 @dataclass(frozen=True)
 class BedEstimate:
@@ -72,13 +69,13 @@ def estimate_bed(case: Case) -> BedEstimate:
         voidage = 1.0 - solids / (floor * case.column.height)
     elif case.bed.fixed:
         voidage = packed
-    elif inlet > 0.0 and number > 0.0 and fluid.density >= LIQUID:
+    elif inlet > 0.0 and number > 0.0 and fluid.is_liquid:
         voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
     height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
     drop = weight
     if case.bed.fixed or inlet < onset:
         drop = bed.ergun_gradient(inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)) * height
-    factor = drag(reynolds, voidage)
+    factor = drag(reynolds, voidage) if 0.0 < voidage <= 1.0 else nan  # negative where the particles do not fit
     return BedEstimate(
         count, solids, weight, number, inlet, reynolds, onset, terminal, voidage, height, drop, factor
     )  # fmt: skip
@@ -86,7 +83,7 @@ def estimate_bed(case: Case) -> BedEstimate:
 
 def bubbles(case: Case, bed: BedEstimate) -> bool:
     """Whether the bed bubbles: a gas bed above minimum fluidisation. Correlations for homogeneous beds then fail."""
-    return case.fluid is not None and case.fluid.density < LIQUID and bed.inlet > bed.onset
+    return case.fluid is not None and not case.fluid.is_liquid and bed.inlet > bed.onset
 
 
 def mean_inlet_velocity(case: Case) -> float:

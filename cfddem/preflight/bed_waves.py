@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from cfddem.case.schema import Case
-from cfddem.preflight.bed_estimate import LIQUID, BedEstimate
+from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.mixture import bed_drag
 from closures.agitation import agitated_temperature
@@ -144,7 +144,7 @@ def grid_damping(speed: float, wavelength: float, cell: float) -> float:
 
 def is_liquid_bed(case: Case) -> bool:
     """Whether a case is a bed of free particles in a liquid."""
-    liquid = case.fluid is not None and case.fluid.density >= LIQUID
+    liquid = case.fluid is not None and case.fluid.is_liquid
     return liquid and case.particle_count > 1 and not case.bed.fixed
 
 
@@ -154,7 +154,7 @@ def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:
     In a periodic column the bed fills the column evenly.
     """
     fluid, column = case.fluid, case.column
-    if fluid is None or fluid.density < LIQUID or fluid.viscosity == 0.0:
+    if fluid is None or not fluid.is_liquid or fluid.viscosity == 0.0:
         return None
     if case.bed.fixed or case.laws.drag_law is None:
         return None

@@ -6,14 +6,15 @@ import math
 from collections.abc import Iterator
 
 from cfddem.case.schema import Case
-from cfddem.preflight.bed_estimate import LIQUID, BedEstimate
+from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.bed_waves import check_waves
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.cost_estimate import CostEstimate, available_memory
-from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel
+from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel, check_wall_drag
 from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.wall_checks import check_walls_and_feeds
 from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 
 SOFT_OVERLAP, LARGEST_OVERLAP = 0.02, 0.1
@@ -48,7 +49,9 @@ def find_issues(
         *check_positions(case),
         *check_overlap(case, collision),
         *check_surface_laws(case),
+        *check_wall_drag(case),
         *check_wet(case, wet),
+        *check_walls_and_feeds(case),
         *check_steps(case, steps),
         *check_cost(case, cost),
     ]
@@ -67,7 +70,7 @@ def check_units(case: Case) -> Iterator[Issue]:
             f"{fluid.density:.3g} kg/m3 is that of a gas, but {fluid.viscosity:.3g} Pa s is not",
             "water has 1000 kg/m3 and 1e-3 Pa s, air 1.2 kg/m3 and 1.8e-5 Pa s",
         )  # fmt: skip
-    if fluid is not None and fluid.density >= LIQUID and 0.0 < fluid.viscosity < THIN_LIQUID:
+    if fluid is not None and fluid.is_liquid and 0.0 < fluid.viscosity < THIN_LIQUID:
         yield Issue(
             "warning", "fluid.viscosity", f"{fluid.viscosity:.3g} Pa s is below that of any common liquid",
             "give the dynamic viscosity, the kinematic one times the density; water has 1e-3 Pa s",
@@ -105,7 +108,8 @@ def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
     if law.takes("contact_modulus"):
         key = f"material.{case.material_name_of(species)}.contact_modulus"
         softer = solid.contact_modulus or solid.youngs_modulus
-        remedy = f"use {softer * (part / (0.5 * SOFT_OVERLAP)) ** power:.1g} Pa"
+        needed = softer * (part / (0.5 * SOFT_OVERLAP)) ** power if math.isfinite(part) else math.inf
+        remedy = f"use {needed:.1g} Pa" if math.isfinite(needed) else "give all values in SI units: m, kg, s, Pa"
     limit = f"overlap of {100.0 * part:.2g} % of a diameter under {cause}; the limit is {100.0 * SOFT_OVERLAP:g} %"
     if math.isinf(part):
         limit = "the contacts are too soft: particles pass through each other"
@@ -131,16 +135,17 @@ def check_surface_laws(case: Case) -> Iterator[Issue]:
         ("rolling_resistance", laws.rolling_resistance, laws.rolling_resistance != "none", "rolling_friction"),
         ("contact", laws.contact, contact.takes("work_of_adhesion"), "surface_energy"),
     ):
-        given = [name for name, each in case.material.items() if getattr(each, needed) > 0.0]
+        given = [f"material.{name}.{needed}" for name, each in case.material.items() if getattr(each, needed) > 0.0]
+        of_pair = "work_of_adhesion" if needed == "surface_energy" else needed
+        pairs = {f"pair.{a}.{b}.{of_pair}": each for a, row in case.pair.items() for b, each in row.items()}
+        given += [key for key, each in pairs.items() if getattr(each, of_pair)]
         if used and not given:
             yield Issue(
                 "warning", f"laws.{key}", f"the {needed} that {law} uses is 0 in every material",
                 f"set material.NAME.{needed}",
             )  # fmt: skip
         if given and not used:
-            yield Issue(
-                "warning", f"material.{given[0]}.{needed}", f'unused, because laws.{key} is "{law}"', f"set laws.{key}"
-            )
+            yield Issue("warning", given[0], f'unused, because laws.{key} is "{law}"', f"set laws.{key}")
 
 
 def check_steps(case: Case, steps: StepEstimate) -> Iterator[Issue]:

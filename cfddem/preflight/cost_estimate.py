@@ -6,6 +6,7 @@ import math
 import os
 from dataclasses import dataclass
 
+from cfddem.case.feeds import fed_count
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.step_estimate import StepEstimate
@@ -33,18 +34,18 @@ class CostEstimate:
 
 def estimate_cost(case: Case, bed: BedEstimate, steps: StepEstimate) -> CostEstimate:
     """Estimate the cost of a run to within a factor of two or three."""
-    cells = math.prod(steps.cells or (0, 0, 0))
+    cells, count = math.prod(steps.cells or (0, 0, 0)), bed.count + fed_count(case)
     particle_steps = case.run.until / min(steps.particle, steps.fluid)
     fluid_steps = case.run.until / steps.fluid
-    seconds = particle_steps * bed.count / PARTICLE_STEPS_PER_SECOND
-    seconds += fluid_steps * (cells / CELL_STEPS_PER_SECOND + bed.count / EXCHANGES_PER_SECOND * bool(cells))
+    seconds = particle_steps * count / PARTICLE_STEPS_PER_SECOND
+    seconds += fluid_steps * (cells / CELL_STEPS_PER_SECOND + count / EXCHANGES_PER_SECOND * bool(cells))
     snapshots = 1.0 + case.run.until / (case.run.every or case.run.until / 50.0)
     return CostEstimate(
         seconds,
-        BYTES_AT_LEAST + BYTES_PER_PARTICLE * bed.count + BYTES_PER_CELL * cells,
-        snapshots * (120.0 * bed.count + 40.0 * cells),
+        BYTES_AT_LEAST + BYTES_PER_PARTICLE * count + BYTES_PER_CELL * cells,
+        snapshots * (120.0 * count + 40.0 * cells),
         snapshots,
-        BYTES_PER_CELL * cells > BYTES_PER_PARTICLE * bed.count,
+        BYTES_PER_CELL * cells > BYTES_PER_PARTICLE * count,
     )
 
 

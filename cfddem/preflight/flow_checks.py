@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from inspect import signature
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.step_estimate import StepEstimate
-from closures.registry import Law
+from closures.registry import REGISTRY, Law, load_built_in_laws
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
@@ -73,6 +74,18 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
     if not (case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or downward == 0.0):
         yield from _check_inlet(case, bed)
+
+
+def check_wall_drag(case: Case) -> Iterator[Issue]:
+    """Check that drag beside walls has a fluid, and walls at rest of a known shape."""
+    if case.laws.wall_drag == "none":
+        return
+    if case.fluid is None:
+        yield Issue("warning", "laws.wall_drag", "unused, because the case has no fluid", "leave it out")
+    for number, wall in enumerate(case.wall):
+        if wall.shape == "surface" or wall.moves:
+            what = "is a surface file" if wall.shape == "surface" else "moves"
+            yield Issue("error", "laws.wall_drag", f"wall.{number} {what}", 'set laws.wall_drag = "none"')
 
 
 def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:
@@ -138,7 +151,8 @@ def check_drag(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             if not low <= value <= high:
                 yield Issue(
                     "warning", key,
-                    f"{each.name} was fitted to {name} {low:g} to {high:g}, but the bed has {value:.3g}",
+                    f"{each.name} was fitted to {name} {low:g} to {high:g}, but the bed has {value:.3g}"
+                    + (_difference(each, bed.reynolds, voidage) if key == "laws.drag" else ""),
                     "choose another law; cfddem explain lists all with their ranges",
                 )  # fmt: skip
     if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
@@ -148,3 +162,20 @@ def check_drag(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             f"{max(ratios) / min(ratios):.3g}",
             'use "beetstra_polydisperse": the drag on each size decides which species sinks',
         )  # fmt: skip
+
+
+def _difference(law: Law, reynolds: float, voidage: float) -> str:
+    """How far the drag factor of a law lies from those of the laws that were fitted here, in words."""
+    load_built_in_laws()
+    others = []
+    for other in REGISTRY["drag"].values():
+        given = {"reynolds": reynolds, "voidage": voidage}
+        ranges = (other.ranges.get(name, (-math.inf, math.inf)) for name in given)
+        plain = len(signature(other.function).parameters) == len(given)
+        if other is not law and plain and all(low <= each <= high for (low, high), each in zip(ranges, given.values())):
+            others.append(other.function(reynolds, voidage))
+    if not others or len(signature(law.function).parameters) != 2:
+        return ""
+    apart = [100.0 * (law.function(reynolds, voidage) / each - 1.0) for each in others]
+    count = f"{len(others)} laws" if len(others) > 1 else "1 law"
+    return f"; its drag differs by {min(apart):+.0f} to {max(apart):+.0f} % from that of the {count} fitted here"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate, bubbles
 from cfddem.preflight.collision_estimate import CollisionEstimate
@@ -13,6 +14,7 @@ from cfddem.preflight.cost_estimate import CostEstimate
 from cfddem.preflight.issue import WIDTH
 from cfddem.preflight.mixture import bed_drag, net_downward_forces
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.wall_checks import closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
 
@@ -47,6 +49,7 @@ def overview(
         *_species(case, bed),
         *_collisions_and_film(case, collision),
         *_bridges(wet),
+        *_equipment(case),
         *_time_scales(case, bed, steps),
         *_expected(case, bed),
         *_cost(cost),
@@ -132,6 +135,23 @@ def _bridges(wet: WetEstimate | None) -> Iterator[Row]:
     yield Row(group, "viscous time", wet.relaxation_time, "s", "of a pair at the minimum gap")
 
 
+def _equipment(case: Case) -> Iterator[Row]:
+    group = "walls and feeds"
+    for number, wall in enumerate(case.wall):
+        if wall.moves and math.isfinite(wall.fastest):
+            yield Row(group, f"wall {number}: largest speed", wall.fastest, "m/s", wall.shape)
+    for number, feed in enumerate(case.feed):
+        note = f"about {largest_rate(case, feed):.2g} fit through its box"
+        yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
+    if case.fluid is not None and case.wall:
+        for number, mask in closed_cells(case).items():
+            yield Row(
+                group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid"
+            )
+    if case.feed:
+        yield Row(group, "particles at the end, at most", case.particle_count + fed_count(case))
+
+
 def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Row]:
     group, scales = "time scales", steps.time_scales
     if not case.bed.fixed:
@@ -168,7 +188,7 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
         if bed.inlet:
             note = "Ergun" if case.bed.fixed or bed.inlet < bed.onset else "buoyant weight over the floor area"
             yield Row(group, "pressure drop", bed.pressure_drop, "Pa", note)
-    elif case.bed.start == "poured":
+    elif case.bed.start == "poured" and not case.wall:
         yield Row(group, "bed height", bed.height, "m", "poured")
 
 

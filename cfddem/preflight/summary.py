@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import math
 import textwrap
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
+
+import numpy as np
 
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
@@ -85,6 +88,11 @@ def preflight(case: Case) -> Preflight:
     ('ok', [1.867, 0.185])
     """
     title = case.title or "case without a title"
+    with np.errstate(all="ignore"):  # values that overflow are reported below
+        return _preflight(case, title)
+
+
+def _preflight(case: Case, title: str) -> Preflight:
     try:
         bed = estimate_bed(case)
         collision = estimate_collision(case, bed)
@@ -98,8 +106,34 @@ def preflight(case: Case) -> Preflight:
         key = failure.field.replace("grid.", "column.")
         return Preflight(title, (), (Issue("error", key, reason, failure.remedy or "change it"),))
     except (ArithmeticError, ValueError):
-        reason = "some values are too large or too small for the correlations"
-        return Preflight(title, (), (Issue("error", "case", reason, "give all values in SI units: m, kg, s, Pa"),))
+        key, value = most_extreme(case)
+        reason = f"{value:g} is too large or too small for the correlations"
+        return Preflight(title, (), (Issue("error", key, reason, "give all values in SI units: m, kg, s, Pa"),))
+
+
+def most_extreme(case: Case) -> tuple[str, float]:
+    """Key and value of the number of a case whose decimal logarithm is the largest in magnitude.
+
+    >>> most_extreme(Case(
+    ...     material=dict(glass=dict(density=1e300, youngs_modulus=60e9, poisson=0.23)),
+    ...     column=dict(width=0.02, height=0.12, cell=0.005), bed=dict(diameter=2e-3, count=2), run=dict(until=2.0),
+    ... ))
+    ('material.glass.density', 1e+300)
+    """
+    numbers = [each for each in _numbers(case.model_dump(), ()) if each[1] != 0.0]
+    return max(numbers, key=lambda each: abs(math.log10(abs(each[1]))))
+
+
+def _numbers(values: Any, key: tuple[str, ...]) -> Iterator[tuple[str, float]]:
+    """Every number of nested values, with its key."""
+    if isinstance(values, Mapping):
+        for name, each in values.items():
+            yield from _numbers(each, (*key, str(name)))
+    elif isinstance(values, list | tuple):
+        for number, each in enumerate(values):
+            yield from _numbers(each, (*key, str(number)) if isinstance(each, Mapping) else key)
+    elif isinstance(values, int | float) and not isinstance(values, bool):
+        yield ".".join(key), float(values) if abs(values) < 10**308 else math.inf
 
 
 def refuse_errors(case: Case) -> Preflight:

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfddem.case.liquid import LIQUID, Liquid
+from cfddem.case.liquid import Liquid
 from cfddem.case.schema import Case
 from cfddem.preflight.collision_estimate import CollisionEstimate, pair_row, reduced
 from cfddem.preflight.issue import Issue
 from closures import bridge, capillary, capillary_pull, numbers
+from closures.liquid_film import film_thickness
 
 SLOW = 0.1
 """Speed of a common collision over the reference speed, which is that of the fastest ones [-]."""
@@ -65,7 +66,7 @@ def estimate_wet(case: Case, collision: CollisionEstimate) -> WetEstimate | None
     mass, radius = reduced(case, species, species.diameter)
     solid, speed = case.material_of(species), collision.speed
     own = float(liquid.volume_on(np.array([0.5 * species.diameter]))[0])
-    film = 0.5 * species.diameter * math.expm1(math.log1p(6.0 * own / (math.pi * species.diameter**3)) / 3.0)
+    film = film_thickness(0.5 * species.diameter, own)
     volume = 2.0 * own * capillary.liquid_share(1.0, 1.0)
     least = liquid.minimum_gap or float(pair_row(case, species)["roughness_gap"])
     angle, wet = math.radians(liquid.contact_angle), volume > 0.0
@@ -111,7 +112,7 @@ def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
             "warning", "liquid.contact_angle", f"{liquid.contact_angle:g} degrees: bridges push instead of pulling",
             "angles are in degrees; below 90 the liquid wets the solids",
         )  # fmt: skip
-    if case.fluid is not None and case.fluid.density >= LIQUID:
+    if case.fluid is not None and case.fluid.is_liquid:
         yield Issue(
             "warning", "liquid", f"bridges in a fluid of {case.fluid.density:g} kg/m3, a liquid",
             "give the interfacial tension of the two liquids, which do not mix, or use a gas",

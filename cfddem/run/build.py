@@ -12,12 +12,14 @@ import numpy as np
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Jet
-from cfddem.case.column_grid import grid_of, outside_column
+from cfddem.case.column_grid import grid_of, open_floor
+from cfddem.case.materials import pair_overrides
 from cfddem.case.schema import Case, Column
 from cfddem.coupling.exchange import Exchange
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
 from cfddem.coupling.forces.history import History
+from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
@@ -31,6 +33,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.spray import Spray, box, cone
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
+from cfddem.run.equipment import case_walls
 from cfddem.run.initial_particles import SPECIES, particles_of, periodic_box, periodic_directions
 from closures.registry import Law
 
@@ -66,7 +69,7 @@ def parts_of(
         spheres.declare(SPECIES)
     cells = None
     if case.fluid is not None and communicator.size > 1:
-        cells = divide(grid_of(case.column), communicator.size, spheres.position)
+        cells = divide(grid_of(case), communicator.size, spheres.position)
     solver = ParticleSolver(
         spheres,
         table,
@@ -95,7 +98,7 @@ def require_parallel(case: Case, ranks: int) -> None:
         limit = "0 in a run of several processes"
         raise InputError("liquid.wall_share", case.liquid.wall_share, limit, "liquid on walls is for one process")
     if ranks > 1 and case.fluid is not None:
-        divide(grid_of(case.column), ranks)
+        divide(grid_of(case), ranks)
 
 
 def division_of(case: Case, spheres: Particles, ranks: int, cells: Division | None) -> Slabs | None:
@@ -103,7 +106,7 @@ def division_of(case: Case, spheres: Particles, ranks: int, cells: Division | No
     if ranks == 1:
         return None
     if cells is not None:
-        return Slabs(cells.axis, cells.planes(grid_of(case.column)))
+        return Slabs(cells.axis, cells.planes(grid_of(case)))
     width, depth, _ = case.column.size
     return Slabs.balanced(0 if width >= depth else 1, spheres.position, ranks)
 
@@ -117,7 +120,7 @@ def flow_of(
     cells    division of the cells among the ranks; None in one process
     """
     assert case.fluid is not None
-    grid = grid_of(case.column)
+    grid = grid_of(case)
     if cells is not None:
         grid = Block(grid, cells, communicator)
     fluid = FluidSolver(
@@ -152,8 +155,18 @@ def flow_of(
         viscous_stress=case.laws.viscous_stress,
         agitation=agitation_of(case, fluid, kernel, added_mass),
         history=None if case.laws.history == "none" else History(case.laws.history, fluid.density, fluid.model),
+        wall_drag=wall_drag_of(case),
     )
     return fluid, exchange
+
+
+def wall_drag_of(case: Case) -> WallDrag | None:
+    """Extra drag beside the walls of the column and of the case."""
+    which = case.laws.wall_drag
+    if which == "none":
+        return None
+    laws = laws_of(case)
+    return WallDrag(walls_of(case), which, film=laws.film, shear=laws.shears)
 
 
 def agitation_of(
@@ -174,11 +187,11 @@ def agitation_of(
 
 def materials_of(case: Case) -> np.ndarray:
     """Pair table of the case's materials, in the order of the case."""
-    return pair_table(list(case.material.values()))
+    return pair_table(list(case.material.values()), pair_overrides(case.material, case.pair))
 
 
 def walls_of(case: Case) -> list[Wall]:
-    """Walls of the column: floor and lid unless the ends are periodic, sides unless they are periodic."""
+    """Floor and lid unless the ends are periodic, sides unless they are periodic, then the walls of the case."""
     width, depth, height = case.column.size
     names, first = list(case.material), next(iter(case.species.values()))
     solid = names.index(case.column.material or first.material or names[0])
@@ -188,13 +201,17 @@ def walls_of(case: Case) -> list[Wall]:
         walls.append(Plane(point=(0.0, 0.0, height), normal=(0.0, 0.0, -1.0), material=solid))
     if case.column.shape == "cylinder":
         walls.append(Cylinder(point=(0.5 * width, 0.5 * width, 0.0), radius=0.5 * width, material=solid))
-        return walls
+        return [*walls, *case_walls(case, solid)]
     for axis, length, repeats in zip((0, 1), (width, depth), periodic_directions(case)):
         if not repeats:
             inward = np.eye(3)[axis]
             walls.append(Plane(normal=tuple(inward), material=solid))
             walls.append(Plane(point=tuple(length * inward), normal=tuple(-inward), material=solid))
-    return walls
+    return [*walls, *case_walls(case, solid)]
+
+
+FILM_MOTIONS: dict[Any, str] = {"nijssen_full": "full", "nijssen_full_twist": "full_twist"}
+"""Choice of a case -> motions that films resist."""
 
 
 def laws_of(case: Case) -> Laws:
@@ -208,6 +225,7 @@ def laws_of(case: Case) -> Laws:
         rolling=laws.rolling_resistance,
         rolling_damping=laws.rolling_damping,
         bridge=bridge_laws_of(case),
+        film_motions=FILM_MOTIONS.get(laws.lubrication, "normal") if case.has_films else "normal",
         **own,
     )
 
@@ -228,6 +246,7 @@ def bridge_laws_of(case: Case) -> BridgeLaws | None:
         rupture=liquid.rupture,
         redistribution=liquid.redistribution,
         minimum_gap=liquid.minimum_gap or max(materials_of(case)["roughness_gap"].ravel().tolist()),
+        wall_contact_angle=None if liquid.wall_contact_angle is None else math.radians(liquid.wall_contact_angle),
         wall_share=liquid.wall_share,
         wall_film=liquid.wall_thickness,
         wall_patch=case.bed.diameter if liquid.wall_share > 0.0 else 0.0,
@@ -278,13 +297,13 @@ def boundaries_of(case: Case) -> dict[str, Condition | list[Condition]]:
 
 def _inlet(case: Case) -> list[Condition]:
     """Inlets in the floor: all of its open cells, and a jet in its middle."""
-    velocity, outside = case.bed.inlet_velocity, outside_column(case.column)
+    velocity, is_open = case.bed.inlet_velocity, open_floor(case)
 
     def within(region: Region | None = None) -> Region | None:
-        """The part of a region inside a cylinder, or inside the box, where `outside` is None."""
-        if outside is None:
-            return region
-        return lambda *at: ~outside(*at) if region is None else region(*at) & ~outside(*at)
+        """The part of a region below open cells; all of it where every cell is open."""
+        if is_open is None or region is None:
+            return is_open or region
+        return lambda *at: is_open(*at) & region(*at)
 
     if isinstance(velocity, float):
         inlets: list[Condition] = [Inlet(velocity, where=within())]

@@ -28,9 +28,9 @@ from cfddem.case.schema import Case
 from cfddem.io.quantities import TIME, Quantity
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
-from cfddem.run import liquid_bed_measures, wet_measures
+from cfddem.run import equipment_measures, liquid_bed_measures, wet_measures
 from cfddem.run.budgets import conservation, energy
-from cfddem.run.liquid_bed_measures import BED, cells_of, open_area
+from cfddem.run.liquid_bed_measures import BED, cells_of, open_area, open_volume
 from cfddem.run.simulation import Simulation
 
 Function = Callable[[Simulation], float]
@@ -155,6 +155,14 @@ def _is_sprayed(case: Case) -> bool:
     return case.spray is not None
 
 
+def _is_fed(case: Case) -> bool:
+    return bool(case.feed)
+
+
+def _has_outlets(case: Case) -> bool:
+    return bool(case.outlet)
+
+
 # ---------------------------------------------------------------- the bed
 
 
@@ -174,13 +182,13 @@ def bed_height(simulation: Simulation) -> float:
 def bed_voidage(simulation: Simulation) -> float:
     """Mean voidage of the bed, from its height."""
     solids = 0.99 * simulation.communicator.sum(simulation.owned.volume)
-    return 1.0 - solids / (open_area(simulation.case) * bed_height(simulation))
+    return 1.0 - solids / open_volume(simulation.case, 0.0, bed_height(simulation))
 
 
 @measure("1", when=_is_fluid_bed)
 def bed_voidage_from_pressure(simulation: Simulation) -> float:
     """Mean voidage of the bed, from the pressure gradient within it."""
-    particles, fluid, grid = simulation.owned, simulation.fluid, grid_of(simulation.case.column)
+    particles, fluid, grid = simulation.owned, simulation.fluid, grid_of(simulation.case)
     assert fluid is not None
     carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
     total, volume = simulation.communicator.sum, particles.volume
@@ -195,7 +203,7 @@ def pressure_drop(simulation: Simulation) -> float:
     """Pressure drop from below the floor to the top, without the hydrostatic part."""
     fluid, column = simulation.fluid, simulation.case.column
     assert fluid is not None
-    grid = grid_of(column)
+    grid = grid_of(simulation.case)
     drop = measures.pressure_drop(fluid.whole("pressure"), grid.spacing, 0.0, column.height, open_cells=grid.open)
     inflow, voidage = fluid.grid.joined(fluid.volume_flux(2)[:-1])[0], fluid.whole("mean_voidage")[0]
     return drop + measures.entrance_pressure_drop(inflow, voidage, fluid.density, grid.open[0])
@@ -293,10 +301,13 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
 _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
 
 
-# ---------------------------------------------------------------- liquid
+# ---------------------------------------------------------------- liquid, feeds and outlets
 
 
-for _kind, _found in ((_is_wet, wet_measures.MEASURES), (_is_sprayed, wet_measures.OF_SPRAY)):
+for _kind, _found in (
+    (_is_wet, wet_measures.MEASURES), (_is_sprayed, wet_measures.OF_SPRAY),
+    (_is_fed, equipment_measures.OF_FEEDS), (_has_outlets, equipment_measures.OF_OUTLETS),
+):  # fmt: skip
     for _unit, _group, _function in _found:
         measure(_unit, group=_group, when=_kind)(_function)
 

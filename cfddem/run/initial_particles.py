@@ -3,27 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.case.liquid import Liquid
 from cfddem.case.particle_properties import ParticleProperties, particle_properties
-from cfddem.case.schema import Case, Column
+from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
-from cfddem.particles.initial.filling import loose_places
+from cfddem.particles.initial.filling import clear_of_walls, loose_places
 from cfddem.particles.initial.packing import lattice, random_packing
 from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, poured_bed
 from cfddem.particles.interactions.bridge import LIQUID
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.state import Particles
 from cfddem.particles.state import make_particles as make_bodies
+from cfddem.particles.walls.arrays import near_walls, wall_arrays
 from cfddem.particles.walls.shapes import Wall
 
 SPECIES = Field("species", dtype=np.int32, snapshot=True, meaning="number of the species, in the order of the case")
 """Declared on the particles of a mixture."""
+
+LARGEST_OVERLAP = 0.02
+"""Largest overlap of a particle with a wall of the case at the start, over the radius [-]."""
 
 _WET = 1
 """Random numbers that choose the wet particles; others use the seed alone."""
@@ -34,12 +39,13 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     bed, properties = case.bed, particle_properties(case)
     diameters = properties.diameter
     if bed.start == "poured":
-        spheres = poured_bed(
-            table, diameters, properties.density, walls, *_filling_box(case),
-            box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
-            gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
-            at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
-        ).particles  # fmt: skip
+        with _box_named_as_in(case):
+            spheres = poured_bed(
+                table, diameters, properties.density, walls, *_filling_box(case),
+                box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
+                gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
+                at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
+            ).particles  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start == "packed":
         share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(case.column.size)
@@ -51,7 +57,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     elif bed.species:
         places = _spread_evenly(case, properties, walls)
     else:
-        places = _suspended(len(diameters), float(diameters.max()), case.column, bed.seed)
+        places = _suspended(len(diameters), float(diameters.max()), case, walls)
     made = make_bodies(
         places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
         material=properties.material,
@@ -62,7 +68,21 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     if case.liquid is not None:
         made.declare(LIQUID, liquid_of(case.liquid, made.radius, bed.seed))
     _must_be_inside(made.position, case.column.size)
+    if case.wall:
+        _must_be_apart(made, walls, len(walls) - len(case.wall))
     return made
+
+
+@contextmanager
+def _box_named_as_in(case: Case) -> Iterator[None]:
+    """Name the box into which particles are poured by the keys of the case, where it is too small."""
+    try:
+        yield
+    except InputError as failure:
+        if not failure.field.startswith("size"):
+            raise
+        key = "column.height" if case.bed.start_size is None else "bed.start_size"
+        raise InputError(key, failure.value, failure.limit, "use fewer particles, or a larger box") from None
 
 
 def liquid_of(liquid: Liquid, radius: Array, seed: int) -> Array:
@@ -76,23 +96,45 @@ def liquid_of(liquid: Liquid, radius: Array, seed: int) -> Array:
     return volume
 
 
-def _suspended(count: int, largest: float, column: Column, seed: int) -> Array:
+def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) -> Array:
     """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m]."""
-    volume = column.floor_area * column.height
-    pitch = min((volume / count) ** (1.0 / 3.0), *column.size)
+    column, seed = case.column, case.bed.seed
+    corner, size = case.bed.start_corner or (0.0, 0.0, 0.0), case.bed.start_size or column.size
+    volume = math.prod(case.bed.start_size) if case.bed.start_size else column.floor_area * column.height
+    pitch = min((volume / count) ** (1.0 / 3.0), *size)
     for _ in range(200):
         if pitch < 1.02 * largest:
             break
-        places = lattice(largest, ((0.0, 0.0, 0.0), column.size), spacing=pitch / largest, seed=seed)
+        places = lattice(largest, (corner, tuple(np.add(corner, size))), spacing=pitch / largest, seed=seed)
         if column.shape == "cylinder":
             from_axis = np.hypot(*(places[:, :2] - 0.5 * column.width).T)
             places = places[from_axis <= 0.5 * (column.width - largest)]
+        if case.wall:
+            places = places[clear_of_walls(places, 0.5 * largest, walls)]
         if len(places) >= count:
             chosen = np.random.default_rng(seed).permutation(len(places))[:count]
             return np.ascontiguousarray(places[np.sort(chosen)])
         pitch *= 0.99
     fraction = count * math.pi / 6.0 * largest**3 / volume
     raise InputError("bed.count", count, f"below what a lattice holds; the solid fraction would be {fraction:.2f}")
+
+
+def _must_be_apart(made: Particles, walls: Sequence[Wall], of_column: int) -> None:
+    """Refuse particles that overlap walls.
+
+    of_column  number of walls of the column, which come first
+    """
+    arrays = wall_arrays(walls)
+    movable = make_bodies(made.position, made.radius, made.density)  # the fixed ones as well
+    rows, pieces = near_walls(movable, arrays, -LARGEST_OVERLAP, 0.0)
+    if len(rows):
+        place = ", ".join(f"{each:.4g}" for each in made.position[rows[0]])
+        number = int(arrays.wall[pieces[0]]) - of_column
+        name = f"wall.{number}" if number >= 0 else "a wall of the column"
+        raise InputError(
+            f"position of particle {rows[0]}", None, "away from walls",
+            f"at ({place}) m it is in {name}; set bed.start_corner and bed.start_size",
+        )  # fmt: skip
 
 
 def _spread_evenly(case: Case, properties: ParticleProperties, walls: Sequence[Wall]) -> Array:
@@ -122,6 +164,8 @@ def _must_be_inside(position: Array, size: tuple[float, float, float]) -> None:
 
 def _filling_box(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
     """Corner and size of the box that particles are poured into [m]."""
+    if case.bed.start_corner is not None and case.bed.start_size is not None:
+        return case.bed.start_corner, case.bed.start_size
     width, depth, height = case.column.size
     if case.column.shape == "box":
         return (0.0, 0.0, 0.0), (width, depth, height)

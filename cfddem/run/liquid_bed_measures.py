@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -35,9 +36,8 @@ def layer_deviation(simulation: Simulation) -> float:
     if count < FEWEST_LAYERS:
         return math.nan
     edges = np.linspace(low, high, count + 1)
-    layers = measures.layer_solid_fraction(
-        simulation.whole("position"), simulation.whole("radius"), edges, open_area(case)
-    )
+    area = np.array([open_volume(case, a, b) / (b - a) for a, b in pairwise(edges)])
+    layers = measures.layer_solid_fraction(simulation.whole("position"), simulation.whole("radius"), edges, area)
     return float(layers.std())  # local: a layer of the whole column
 
 
@@ -50,7 +50,7 @@ def collisional_pressure(simulation: Simulation) -> float:
     apart = positions[edges.first[touching]] - positions[edges.second[touching]]
     box = np.where(np.isfinite(solver.box), solver.box, 0.0)
     apart -= box * np.rint(apart / np.maximum(box, np.finfo(float).tiny))
-    volume = open_area(simulation.case) * bed_height(simulation)
+    volume = open_volume(simulation.case, 0.0, bed_height(simulation))
     return float(simulation.communicator.sum(edges.force[touching] * apart)) / (3.0 * volume)
 
 
@@ -74,14 +74,26 @@ MEASURES = (
 
 def open_area(case: Case) -> float:
     """Floor area of the open cells [m2]."""
+    return float(_open_areas(case)[0])
+
+
+def open_volume(case: Case, low: float, high: float) -> float:
+    """Volume of the open cells between two heights [m3]."""
+    areas, edges = _open_areas(case), grid_of(case).spacing[2] * np.arange(grid_of(case).open.shape[0] + 1.0)
+    edges[-1] = max(edges[-1], high)  # the top of the column, up to rounding
+    return float((areas * np.diff(edges.clip(low, high))).sum())  # local: of the whole grid
+
+
+def _open_areas(case: Case) -> np.ndarray:
+    """Cross-section of the open cells in each layer of cells (nz,) [m2]."""
     column = case.column
-    open_part = float(grid_of(column).open.mean())  # local: every rank knows the whole grid
-    return open_part * column.size[0] * column.size[1]
+    open_part = grid_of(case).open.mean(axis=(1, 2))  # local: every rank knows the whole grid
+    return np.asarray(open_part * column.size[0] * column.size[1])
 
 
 def cells_of(simulation: Simulation) -> measures.Cells:
     """The cell of every particle of all ranks."""
-    grid = grid_of(simulation.case.column)
+    grid = grid_of(simulation.case)
     return measures.cells_of(simulation.whole("position"), grid.shape, grid.spacing)
 
 

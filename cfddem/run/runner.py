@@ -21,6 +21,7 @@ from cfddem.io.folder import make_folder, read_about, require_free
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, of_fields
 from cfddem.io.rank_folders import folder_of_ranks
+from cfddem.io.surfaces import keep_surfaces, with_kept_surfaces
 from cfddem.io.writer import RunFolder
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
 from cfddem.particles.guard import guard
@@ -99,7 +100,8 @@ class Run:
         """
         folder, text = Path(folder), case.to_toml() if text is None else text
         history.require_shared(case, communicator.size)
-        communicator.by_first(lambda: _prepare_folder(folder, text))
+        communicator.by_first(lambda: _prepare_folder(folder, text, case))
+        case = with_kept_surfaces(case, folder)
         begun = clock.monotonic()
         simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
         simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # initial packing, compilation for it
@@ -289,10 +291,11 @@ class Run:
         self._checkpoint_cost = self._checkpoint_at - begin
 
 
-def _prepare_folder(folder: Path, text: str) -> None:
+def _prepare_folder(folder: Path, text: str, case: Case) -> None:
     """Make the folder of a new run, before its preparation, which may take long."""
     require_free(folder, text)
     make_folder(folder)
+    keep_surfaces(case, folder)
 
 
 def quantities_of(simulation: Simulation) -> Quantities:

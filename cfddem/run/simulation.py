@@ -12,13 +12,22 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.particles.state import Particles, particles_in
+from cfddem.particles.zone_times import FIELDS as ZONE_FIELDS
+from cfddem.particles.zone_times import note_visits
 from cfddem.run.budgets.energy import EnergyLedger
 from cfddem.run.budgets.liquid import LiquidBudget
 from cfddem.run.build import parts_of, spray_of
+from cfddem.run.equipment import Equipment
 from cfddem.run.time_steps import TimeSteps
+from cfddem.run.wet_state import SNAPSHOT_FIELDS, fill_snapshot_fields
 
 Callback = Callable[["Simulation"], None]
 """Function that is called after every fluid step, with the simulation."""
+
+
+def _fields_of(case: Case) -> list[Field]:
+    """Fields of the particles that measures and snapshots of a case need."""
+    return [*(SNAPSHOT_FIELDS if case.liquid is not None else ()), *(ZONE_FIELDS if case.spray is not None else ())]
 
 
 class Simulation:
@@ -44,19 +53,22 @@ class Simulation:
         communicator: Communicator = SERIAL,
     ) -> None:
         self.case, self.gravity, self.communicator = case, np.array(case.laws.gravity), communicator
-        self.callbacks, fields = list(callbacks), list(fields)
+        self.callbacks, fields = list(callbacks), [*fields, *_fields_of(case)]
         particles = None if state is None else particles_in(state["particles"]["particles"])
         parts = parts_of(case, progress, particles, communicator)
         self.particle_solver, self.fluid, self.exchange = parts.particle_solver, parts.fluid, parts.exchange
         self.wall = self.particle_solver.wall
         self.spray = spray_of(case, communicator)
+        self.equipment = Equipment(case, self.particle_solver)
         self.liquid = None if case.liquid is None else LiquidBudget(self.particle_solver, self.spray)
         self.steps, self.last_step = 0, 0.0
         particle_step = None if state is None else self._restore(state, fields)
         for field in fields:
             self.particles.declare(field)
         self.energy = self._ledger(state)
-        self.time_steps = TimeSteps(case, self.particle_solver, self.fluid, particle_step, communicator)
+        self.time_steps = TimeSteps(
+            case, self.particle_solver, self.fluid, particle_step, communicator, self.equipment.motions.largest_step
+        )
 
     @property
     def particles(self) -> Particles:
@@ -84,6 +96,8 @@ class Simulation:
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The fields of the particles that a snapshot contains; those of all ranks on rank 0, no rows on the others."""
+        if self.liquid is not None:
+            fill_snapshot_fields(self.particle_solver)
         return {name: self.communicator.gathered(array) for name, array in self.owned.snapshot().items()}
 
     def step(self, until: float = math.inf) -> None:
@@ -102,17 +116,30 @@ class Simulation:
             if self.energy is not None:
                 with part("energies"):
                     self.energy.after_fluid_step(terms, forces)
+        self.equipment.move_walls(self.particle_solver, step)
         self.particle_solver.advance(step / substeps, substeps)
         if self.spray is not None:
             with part("spray"):
-                self.spray(self.owned, self.time)
+                owned = self.owned
+                self.spray(owned, self.time)
+                note_visits(owned, self.spray.zone(owned.position), self.time)
         if self.energy is not None:
             with part("energies"):
                 self.energy.after_particle_steps()
+        if self.equipment.exchanges:
+            with part("feeds and outlets"):
+                self._exchange_particles()
         self.steps, self.last_step = self.steps + 1, step
         for callback in self.callbacks:
             with part(f"callback {getattr(callback, '__name__', 'without a name')}"):
                 callback(self)
+
+    def _exchange_particles(self) -> None:
+        """Let particles enter and leave; each replaces fluid of its own volume, or leaves room for it."""
+        before = self.owned
+        moved = self.equipment.exchange_particles(self.particle_solver)
+        if moved and self.fluid is not None and self.exchange is not None:
+            self.fluid.add_voidage(self.exchange.solid_fraction(before) - self.exchange.solid_fraction(self.owned))
 
     def until(self, time: float) -> None:
         """Continue until a time [s]."""
@@ -134,6 +161,8 @@ class Simulation:
             parts |= {"energy": self.energy.checkpoint()}
         if self.liquid is not None:
             parts |= {"liquid": self.liquid.checkpoint()}
+        if self.equipment.exchanges:
+            parts |= {"equipment": self.equipment.checkpoint()}
         return parts
 
     @classmethod
@@ -160,6 +189,8 @@ class Simulation:
             self.exchange.restore(state["exchange"])
         if self.liquid is not None:
             self.liquid.restore(state["liquid"])
+        if self.equipment.exchanges:
+            self.equipment.restore(state["equipment"])
         self.steps = int(state["steps"])
         return float(state["particle_step"])
 

@@ -28,6 +28,7 @@ class TimeSteps:
     fluid            limits the fluid step; None without a fluid
     particle_step    of an earlier part of the run; evaluated if None [s]
     communicator     path to sums, extremes and decisions over all ranks
+    oscillation      longest step for the oscillation of walls; infinite without one [s]
 
     limiting  criterion of the last fluid step
     """
@@ -39,7 +40,9 @@ class TimeSteps:
         fluid: FluidSolver | None,
         particle_step: float | None = None,
         communicator: Communicator = SERIAL,
+        oscillation: float = math.inf,
     ) -> None:
+        self.oscillation = oscillation
         self.case, self.particle_solver, self.fluid = case, particle_solver, fluid
         self.communicator = communicator
         self.particle_step = self._largest_particle_step() if particle_step is None else particle_step
@@ -76,11 +79,12 @@ class TimeSteps:
 
     def _flow_limits(self) -> dict[str, float]:
         """Limits of the fluid step by fluid, inlet and moving particles [s]."""
+        walls = {"wall oscillation": self.oscillation} if math.isfinite(self.oscillation) else {}
         if self.fluid is None:
-            return {}
+            return walls
         spacing, flow = self.fluid.grid.spacing, self.fluid.largest_step(COURANT)
         crossing = crossing_rate(self.particle_solver.particles.velocity, spacing, self.communicator)
-        return {
+        return walls | {
             flow.criterion: flow.step,
             "inlet Courant": courant_step(self.case.bed.fastest_inflow, spacing),
             "particle Courant": COURANT / max(crossing, 1e-300),

@@ -9,6 +9,8 @@ import numpy as np
 from cfddem.analysis import agglomerates
 from cfddem.analysis.agglomerates import AgglomerateSizes
 from cfddem.backend.communicator import SERIAL
+from cfddem.particles import zone_times
+from cfddem.run import wet_state
 from cfddem.run.budgets.liquid import LiquidBudget
 from cfddem.run.simulation import Simulation
 
@@ -70,7 +72,7 @@ def bridge_count(simulation: Simulation) -> float:
 
 def bridges_per_particle(simulation: Simulation) -> float:
     """Mean number of bridges of a particle to other particles."""
-    first, _, _ = _joined(simulation)
+    first, _, _ = wet_state.joined(simulation.particle_solver)
     return 2.0 * len(first) / max(len(simulation.whole("id")), 1)
 
 
@@ -89,6 +91,22 @@ def agglomerated_share(simulation: Simulation) -> float:
     return _sizes(simulation).joined
 
 
+def spray_zone_share(simulation: Simulation) -> float:
+    """Share of the particles in the spray zone."""
+    owned, total = simulation.owned, simulation.communicator.sum
+    return float(total(owned.zone_inside) / max(total([owned.count]), 1))
+
+
+def spray_residence_time(simulation: Simulation) -> float:
+    """Mean time so far of a visit to the spray zone."""
+    return zone_times.mean_visit(simulation.owned, simulation.communicator)
+
+
+def spray_circulation_time(simulation: Simulation) -> float:
+    """Mean time so far from one entry of a particle into the spray zone to its next."""
+    return zone_times.mean_round(simulation.owned, simulation.communicator)
+
+
 MEASURES = (
     ("1", "measure", bridge_liquid_share),
     ("1", "measure", wet_share),
@@ -105,7 +123,13 @@ MEASURES = (
 )
 """Unit, group and function of the measures of cases with a liquid."""
 
-OF_SPRAY = (("m3", "recorded", liquid_sprayed), ("m3", "recorded", liquid_missed))
+OF_SPRAY = (
+    ("m3", "recorded", liquid_sprayed),
+    ("m3", "recorded", liquid_missed),
+    ("1", "measure", spray_zone_share),
+    ("s", "recorded", spray_residence_time),
+    ("s", "recorded", spray_circulation_time),
+)
 """Those of cases with a spray."""
 
 
@@ -114,32 +138,10 @@ def _budget(simulation: Simulation) -> LiquidBudget:
     return simulation.liquid
 
 
-def _joined(simulation: Simulation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places of the particles that each bridge between particles joins, among the ids of all ranks, and its liquid."""
-    bridges = simulation.particle_solver.bridges
-    assert bridges is not None
-    bodies, volume = bridges.bodies.reshape(-1, 2), bridges.volume
-    pairs = bodies[:, 1] >= 0
-    joined = simulation.communicator.joined
-    bodies, volume = joined(bodies[pairs]), joined(volume[pairs])
-    ids = np.sort(simulation.whole("id"))
-    first, second = np.searchsorted(ids, bodies[:, 0]), np.searchsorted(ids, bodies[:, 1])
-    return first, second, volume
-
-
 def _sizes(simulation: Simulation) -> AgglomerateSizes:
-    first, second, _ = _joined(simulation)
-    return agglomerates.summary(first, second, len(simulation.whole("id")))
+    first, second, _ = wet_state.joined(simulation.particle_solver)
+    return agglomerates.summary(first, second, len(wet_state.ids(simulation.particle_solver)))
 
 
 def _carried(simulation: Simulation) -> np.ndarray:
-    """Liquid of every particle of all ranks by id, with half of its bridges to others and all at walls (N,) [m3]."""
-    ids = simulation.whole("id")
-    order, bridges, joined = np.argsort(ids), simulation.particle_solver.bridges, simulation.communicator.joined
-    carried = agglomerates.carried_liquid(simulation.whole("liquid")[order], *_joined(simulation))
-    assert bridges is not None
-    bodies = bridges.bodies.reshape(-1, 2)
-    at_wall = bodies[:, 1] < 0
-    places = np.searchsorted(ids[order], joined(bodies[at_wall, 0]))
-    np.add.at(carried, places, joined(bridges.volume[at_wall]))
-    return carried
+    return wet_state.carried(simulation.particle_solver)

@@ -38,6 +38,11 @@ ROOMS = {
 }
 """Folder of modules -> title and sentence."""
 
+TABLES = {"material": "[material.NAME]", "pair": "[pair.NAME.NAME]"} | {
+    name: f"[[{name}]]" for name in ("wall", "feed", "outlet")
+}
+"""Headings of tables of a case file that have names of their own."""
+
 HIDDEN = {
     "scenarios/validation",
     "scenarios/benchmarks",
@@ -101,7 +106,7 @@ def case_keys() -> str:
         if not parts:
             lines += [f"`{name}`: {_plain(field.description or '')}.", ""]
             continue
-        table = f"[{name}.NAME]" if name == "material" else f"[{name}]"
+        table = TABLES.get(name, f"[{name}]")
         about = field.description or (parts[0].__doc__ or "").split("\n")[0]
         lines += [*_table_of_keys(table, about, parts[0])]
         for key, each in parts[0].model_fields.items():

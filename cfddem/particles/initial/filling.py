@@ -84,7 +84,7 @@ def _fill(
             begin += len(more)
             fresh = (sites[more][:, None, :] + block[None]).reshape(-1, 3)
             if k > 1:  # a site is half a pitch away from walls, its corners perhaps not
-                fresh = fresh[_clear(fresh, 0.5 * pitch / k, walls)]
+                fresh = fresh[clear_of_walls(fresh, 0.5 * pitch / k, walls)]
             taken = np.concatenate([taken, fresh])
         missing += max(0, len(members) - len(taken)) // len(block) + (len(taken) < len(members))
         if len(taken) >= len(members):
@@ -120,7 +120,7 @@ def _sites(
         return np.stack(np.meshgrid(*lines, heights, indexing="ij"), axis=-1)
 
     inside = layers(0, along[2])
-    joined, number = ndimage.label(_clear(inside.reshape(-1, 3), 0.5 * pitch, walls).reshape(inside.shape[:3]))
+    joined, number = ndimage.label(clear_of_walls(inside.reshape(-1, 3), 0.5 * pitch, walls).reshape(inside.shape[:3]))
     if number == 0:
         raise InputError(
             "size", tuple(size), f"a box with room for a sphere of {pitch / SPACING:.3g} m between the walls"
@@ -131,7 +131,7 @@ def _sites(
     while (found := sum(len(part) for part in sites)) < wanted and open_above.any():
         end = begin + max(1, math.ceil((wanted - found) / int(open_above.sum())))
         above = layers(begin, end)
-        clear = _clear(above.reshape(-1, 3), 0.5 * pitch, walls).reshape(above.shape[:3])
+        clear = clear_of_walls(above.reshape(-1, 3), 0.5 * pitch, walls).reshape(above.shape[:3])
         room = np.logical_and.accumulate(clear & open_above[:, :, None], axis=2)
         sites.append(above[room])
         open_above, begin = room[:, :, -1], end
@@ -143,7 +143,7 @@ def _sites(
     return every[np.argsort(every[:, 2], kind="stable")[:wanted]]
 
 
-def _clear(places: np.ndarray, distance: float, walls: Sequence[Wall]) -> np.ndarray:
+def clear_of_walls(places: np.ndarray, distance: float, walls: Sequence[Wall]) -> np.ndarray:
     """Whether each position is in front of all walls and at least this far away from them (n,)."""
     clear = np.ones(len(places), bool)
     if len(walls) and len(places):

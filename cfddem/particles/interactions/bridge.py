@@ -11,17 +11,14 @@ first gap and the last. Across it the solution is exact for a fixed gap. The pul
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from cfddem.backend.compile import inline, part, prange
+from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bridge_law import BridgeNumbers
-from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, speed_after_bridge
-from cfddem.particles.interactions.film import clamp_speed
-from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
+from cfddem.particles.interactions.bridge_solution import at_gap, held_gap
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius
 from cfddem.particles.interactions.slots import (
     BRIDGE_FILM,
     BRIDGE_PULL,
@@ -32,9 +29,10 @@ from cfddem.particles.interactions.slots import (
     bridge_resistance,
     sliding_resistance,
 )
-from cfddem.particles.pair_graph import edge_role, geometry
+from cfddem.particles.pair_graph import geometry
 from cfddem.particles.state import Particles
-from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
+from cfddem.particles.vectors import put, times
+from closures.liquid_film import film_thickness, film_volume
 
 LIQUID = Field(
     "liquid", "m3", halo=("start",), snapshot=True, meaning="volume of the liquid film on the particle, without bridges"
@@ -45,6 +43,7 @@ PARTICLE_FIELDS = (
     Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
     Field("bridge_load", "kg/s", halo=("bridge",), meaning="resistance of all bridges of the particle"),
     Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),
+    Field("bridges_change", role="scratch", dtype=bool, meaning="bridges of the particle form or break in this step"),
     Field("bridges_formed", dtype=np.int64, meaning="bridges that have formed, counted by the lower id"),
     Field("bridges_broken", dtype=np.int64, meaning="bridges that have broken, counted by the lower id"),
 )
@@ -56,11 +55,16 @@ FIELDS = (
     Field("bridge_gap", "m", role="memory", meaning="minimum gap of the bridge"),
     Field("bridge_accounted", "m", role="memory", meaning="gap up to which the impulse of the bridge has been given"),
     Field("bridge_resistance", "kg/s", role="memory", meaning="resistance of the bridge; 0 where it has none"),
+    Field("closed_along", "kg/s", role="memory", meaning="resistance along the line of centres below h_min"),
+    Field("closed_across", "kg/s", role="memory", meaning="resistance of the bridge to sliding below h_min"),
     Field("bridge_force", "N", 3, "memory", meaning="pull of the bridge on the first body"),
     Field("bridge_impulse", "N s", 3, "scratch", meaning="impulse of the bridge in this step, on the first body"),
     Field("bridge_couple", "N s", 3, "scratch", meaning="angular impulse per radius, the same on both bodies"),
     Field(
         "bridge_change", role="scratch", dtype=np.int8, meaning="1 where a bridge forms, -1 where one breaks, else 0"
+    ),
+    Field(
+        "bridge_open", role="scratch", dtype=bool, meaning="the gap of the bridge exceeds h_min, now or in this step"
     ),
 )
 """What pairs remember of their bridges."""
@@ -68,21 +72,25 @@ FIELDS = (
 FLAT = 1e100
 """Radius of a wall, in the laws that share liquid [m]."""
 
+BELOW = -1.0
+"""A gap below any h_min [m]."""
 
-def film_volume(radius: np.ndarray, thickness: np.ndarray | float) -> np.ndarray:
-    """Volume of a layer of liquid all over a sphere (N,) [m3].
 
-    radius     of the spheres (N,) [m]
-    thickness  of the layer (N,), or one for all [m]
+def thickness_of_films(radius: np.ndarray, volume: np.ndarray) -> np.ndarray:
+    """Thickness of a layer of liquid all over each sphere (N,) [m].
+
+    radius  of the spheres (N,) [m]
+    volume  of the liquid on each (N,) [m3]
     """
-    volume: np.ndarray = 4.0 / 3.0 * np.pi * thickness * (thickness**2 + 3.0 * radius * (thickness + radius))
-    return volume
-
-
-def film_thickness(radius: np.ndarray, volume: np.ndarray) -> np.ndarray:
-    """Thickness of a layer of liquid all over a sphere (N,) [m]; see `film_volume`."""
-    thickness: np.ndarray = radius * np.expm1(np.log1p(3.0 * volume / (4.0 * np.pi * radius**3)) / 3.0)
+    thickness = np.empty(len(radius))
+    _thickness_of_films(radius, volume, thickness)
     return thickness
+
+
+@serial
+def _thickness_of_films(radius, volume, thickness):
+    for i in range(len(thickness)):
+        thickness[i] = film_thickness(radius[i], volume[i])
 
 
 def coat(particles: Particles, thickness: np.ndarray | float) -> None:
@@ -96,13 +104,17 @@ def coat(particles: Particles, thickness: np.ndarray | float) -> None:
         row = int(refused[0])
         raise InputError(f"film of particle {particles.id[row]}", float(films[row]), "at least 0 and finite")
     particles.declare(LIQUID)
-    particles.liquid = film_volume(particles.radius, films)
+    particles.liquid = np.asarray(film_volume(particles.radius, films))  # type: ignore[arg-type]  # of every sphere
+
+
+_FIRST_NUMBER = -1 - len(BridgeNumbers._fields)
+"""Place of the first number of bridges among those that loops take; the damping of rolling is the last of all."""
 
 
 @inline
 def numbers_of(p):
     """The numbers of the bridge laws, among those that loops take."""
-    return BridgeNumbers(p[-9], p[-8], p[-7], p[-6], p[-5], p[-4], p[-3], p[-2])
+    return BridgeNumbers(*p[_FIRST_NUMBER:-1])
 
 
 @inline
@@ -139,101 +151,30 @@ def renew_bridge(k, particles, edges, memory, shift, p):
     separation, distance, gap = geometry(k, particles, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
     state = bridge_state(k, gap, reduced_radius, memory, p)
-    memory.bridge_resistance[k] = resistance_along(state) + resistance_across(state)
+    renew_resistance(k, particles, edges, memory, shift, p)
     if BRIDGE_PULL:
         put(memory.bridge_force, k, times(-bridge_pull(state) / distance, separation))
 
 
-@part
-def renew_bridges(particles, edges, memory, shift, p):
-    """Resistance and pull of all bridges."""
-    for k in prange(len(edges.first)):
-        if memory.bridge_film[k] > 0.0:
-            renew_bridge(k, particles, edges, memory, shift, p)
-
-
 @inline
-def no_impulse(k, memory):
-    """The bridge of edge k gives no impulse in this step."""
-    put(memory.bridge_impulse, k, NOTHING)
-    put(memory.bridge_couple, k, NOTHING)
-
-
-@part
-def find_bridge_impulses(particles, edges, memory, shift, p, step):
-    """Impulses of all bridges over the coming step."""
-    for k in prange(len(edges.first)):
-        if memory.bridge_resistance[k] > 0.0:
-            bridge_impulse(k, particles, edges, memory, shift, p, step)
-        elif memory.bridge_film[k] > 0.0:
-            no_impulse(k, memory)
-
-
-@inline
-def _rates(k, particles, edges, memory, lever):
-    """Inverse masses that both bodies give the bridge of edge k, along and across the line of centres [1/kg].
-
-    lever  arm of the impulse over the radius [-]
-    """
-    i, j = edges.first[k], edges.second[k]
-    load = particles.bridge_load[i] / memory.bridge_resistance[k]
-    arm = lever * particles.radius[i]
-    along = load * particles.inverse_mass[i]
-    across_it = along + load * arm * arm * particles.inverse_inertia[i]
-    if k < edges.between_particles:
-        load = particles.bridge_load[j] / memory.bridge_resistance[k]
-        arm = lever * particles.radius[j]
-        along += load * particles.inverse_mass[j]
-        across_it += load * (particles.inverse_mass[j] + arm * arm * particles.inverse_inertia[j])
-    return along, across_it
-
-
-@inline
-def bridge_impulse(k, particles, edges, memory, shift, p, step):
-    """Impulse and couple of the bridge of edge k over the coming step.
-
-    Lever arms add up to the distance of the centres, so that angular momentum is kept.
-    """
-    i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, particles, edges, shift)
-    normal = times(1.0 / distance, separation)
+def renew_resistance(k, particles, edges, memory, shift, p):
+    """Resistance of the bridge of edge k at the present positions."""
+    _, _, gap = geometry(k, particles, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
     state = bridge_state(k, gap, reduced_radius, memory, p)
-    velocity = relative_velocity(k, particles, edges)
-    turning, radii = times(particles.radius[i], at(particles.spin, i)), particles.radius[i]
-    if k < edges.between_particles:
-        turning, radii = plus(turning, times(particles.radius[j], at(particles.spin, j))), radii + particles.radius[j]
-    lever = distance / radii
-    along, sideways = _rates(k, particles, edges, memory, lever)
+    memory.bridge_resistance[k] = resistance_along(state) + resistance_across(state)
 
-    speed = new_speed = dot(velocity, normal)
-    if BRIDGE_FILM:
-        new_speed = speed_after_bridge(speed, state, memory.bridge_accounted[k], step, along)
-        new_speed = clamp_speed(new_speed, speed)
-    memory.bridge_accounted[k] = gap + step * new_speed
-    impulse = times((new_speed - speed) / along, normal)
-    couple = NOTHING
-    if BRIDGE_SLIDING:
-        resistance = resistance_across(at_gap(state, gap + 0.5 * step * new_speed))
-        slip = minus(across(velocity, normal), times(lever, cross(turning, normal)))
-        drag = times(math.expm1(-step * resistance * sideways) / sideways, slip)
-        impulse = plus(impulse, drag)
-        couple = times(-lever, cross(normal, drag))
-    put(memory.bridge_impulse, k, impulse)
-    put(memory.bridge_couple, k, couple)
+
+@inline
+def find_closed(k, reduced_radius, memory, p):
+    """Resistances of the bridge of edge k below h_min, where they do not depend on the gap."""
+    state = bridge_state(k, BELOW, reduced_radius, memory, p)
+    memory.closed_along[k], memory.closed_across[k] = resistance_along(state), resistance_across(state)
 
 
 @part
-def apply_bridge_impulses(particles, edges, memory):
-    """Give every particle the impulses of its bridges."""
-    for i in prange(particles.owned):
-        impulse, couple = NOTHING, NOTHING
-        for place in range(edges.start[i], edges.start[i + 1]):
-            k, sign = edge_role(edges.incident[place])
-            if memory.bridge_resistance[k] > 0.0:
-                impulse = plus(impulse, times(sign, at(memory.bridge_impulse, k)))
-                couple = plus(couple, at(memory.bridge_couple, k))
-        gain = times(particles.inverse_mass[i], impulse)
-        put(particles.velocity, i, plus(at(particles.velocity, i), gain))
-        gain = times(particles.inverse_inertia[i] * particles.radius[i], couple)
-        put(particles.spin, i, plus(at(particles.spin, i), gain))
+def renew_wall_bridges(particles, edges, memory, shift, p):
+    """Resistance and pull of the bridges at walls; those of pairs are renewed as changes are found."""
+    for k in prange(edges.between_particles, len(edges.first)):
+        if memory.bridge_film[k] > 0.0:
+            renew_bridge(k, particles, edges, memory, shift, p)

@@ -9,19 +9,39 @@ Loops over `prange` write through functions: the compiler for threads loses what
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
 from cfddem.particles.collision_events import move_event
-from cfddem.particles.interactions.bridge import FLAT, bridge_state, numbers_of
+from cfddem.particles.interactions.bridge import (
+    FLAT,
+    bridge_state,
+    find_closed,
+    numbers_of,
+    renew_bridge,
+    renew_resistance,
+)
+from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
-from cfddem.particles.interactions.slots import RECORD, WALL_LIQUID, WALLS, bridge_rupture, drawn_share, returned_share
-from cfddem.particles.interactions.wall_liquid import thickest_wall, transfer_wall_liquid, wall_thickness
+from cfddem.particles.interactions.slots import (
+    RECORD,
+    WALL_LIQUID,
+    WALLS,
+    bridge_rupture,
+    drawn_share,
+    pair_bridges,
+    returned_share,
+)
+from cfddem.particles.interactions.wall_liquid import (
+    share_left_by_wall,
+    thickest_wall,
+    transfer_wall_liquid,
+    wall_thickness,
+)
 from cfddem.particles.pair_graph import edge_role, geometry
 from cfddem.particles.vectors import NOTHING, at, dot, put
 from cfddem.particles.walls.nearest_point import touched_distance
+from closures.liquid_film import film_thickness
 from closures.minimum_gap import glass_transition
 from closures.numbers import capillary
 
@@ -36,9 +56,7 @@ def renew_thickness(particles):
 @inline
 def find_thickness(i, particles):
     """Thickness of the layer of liquid all over particle i."""
-    radius = particles.radius[i]
-    swell = 3.0 * particles.liquid[i] / (4.0 * math.pi * radius * radius * radius)
-    particles.film_thickness[i] = radius * math.expm1(math.log1p(swell) / 3.0)
+    particles.film_thickness[i] = film_thickness(particles.radius[i], particles.liquid[i])
 
 
 @inline
@@ -55,13 +73,29 @@ def longest_gap(k, particles, edges, memory, shift, p):
 
 @serial
 def find_changes(particles, edges, memory, walls, shift, p):
-    """Mark where bridges form or break, and what each body has for new ones; returns the number of changes."""
-    changes = _pair_changes(particles, edges, memory, shift, p)
+    """Mark where bridges form or break, and what each body has for new ones; returns the number of changes.
+
+    Bridges between particles that neither form nor break are renewed on the way.
+    """
+    pair_bridges(0, edges.between_particles, particles, edges, memory, shift, p)
+    changes = _open_changes(particles, edges, memory, shift, p)
     if WALLS:
         changes += wall_changes(particles, edges, memory, walls, shift, p)
     if changes > 0:
+        mark_bodies(particles, edges, memory)
         limit_shares(particles, edges, memory)
     return changes
+
+
+@serial
+def mark_bodies(particles, edges, memory):
+    """Mark the particles whose bridges form or break."""
+    particles.bridges_change[:] = False
+    for k in range(len(edges.first)):
+        if memory.bridge_change[k] != 0:
+            particles.bridges_change[edges.first[k]] = True
+            if k < edges.between_particles:
+                particles.bridges_change[edges.second[k]] = True
 
 
 @serial
@@ -70,7 +104,7 @@ def exchange_liquid(particles, edges, memory, walls, shift, p):
     fill_bridges(particles, edges, memory, walls, shift, p)
     if WALLS and WALL_LIQUID:
         transfer_wall_liquid(particles, edges, memory, walls, p)
-    transfer_liquid(particles, edges, memory)
+    transfer_liquid(particles, edges, memory, p)
     clear_bridges(edges, memory)
 
 
@@ -83,29 +117,29 @@ def _change(k, gap, film, particles, edges, memory, shift, p):
     if memory.bridge_film[k] > 0.0:
         parted = gap > memory.bridge_film[k] and gap > longest_gap(k, particles, edges, memory, shift, p)
         return -1 if parted else 0
-    return 1 if film > 0.0 and gap < film else 0  # dry solids overlap without a bridge
-
-
-@inline
-def _mark_pair(k, particles, edges, memory, shift, p):
-    """Mark whether the bridge of a pair of particles forms or breaks; returns 1 if so."""
-    _, _, gap = geometry(k, particles, edges, shift)
-    film = particles.film_thickness[edges.first[k]] + particles.film_thickness[edges.second[k]]
-    change = _change(k, gap, film, particles, edges, memory, shift, p)
-    memory.bridge_change[k] = change
-    return change * change
+    return 1 if film > SMALLEST_GAP and gap < film else 0  # dry solids overlap without a bridge
 
 
 @part
-def _pair_changes(particles, edges, memory, shift, p):
-    """Mark the pairs of particles whose bridges form or break; returns their number."""
+def _open_changes(particles, edges, memory, shift, p):
+    """Resistance of open bridges between particles, and those that break; returns how many pairs change."""
     counts, number = np.zeros(CHUNKS, np.int64), edges.between_particles
     for chunk in prange(CHUNKS):
         count = 0
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
-            count += _mark_pair(k, particles, edges, memory, shift, p)
+            if memory.bridge_open[k]:
+                _open_change(k, particles, edges, memory, shift, p)
+            count += memory.bridge_change[k] * memory.bridge_change[k]
         counts[chunk] = count
     return counts.sum()  # local: pairs of this rank
+
+
+@inline
+def _open_change(k, particles, edges, memory, shift, p):
+    """See `_open_changes`, for edge k."""
+    renew_resistance(k, particles, edges, memory, shift, p)
+    _, _, gap = geometry(k, particles, edges, shift)
+    memory.bridge_change[k] = _change(k, gap, 0.0, particles, edges, memory, shift, p)
 
 
 @serial
@@ -186,7 +220,8 @@ def _limit_share(i, particles, edges, memory):
 def limit_shares(particles, edges, memory):
     """Liquid of which each new bridge takes its share: less than there is where the shares add up to more than 1."""
     for i in prange(particles.owned):
-        _limit_share(i, particles, edges, memory)
+        if particles.bridges_change[i]:
+            _limit_share(i, particles, edges, memory)
 
 
 @part
@@ -215,17 +250,21 @@ def _fill(k, particles, edges, memory, walls, shift, p):
     memory.bridge_volume[k], memory.bridge_film[k] = volume, film
     memory.bridge_gap[k] = max(glass, n.minimum_gap)
     memory.bridge_accounted[k] = gap
+    if k < edges.between_particles:
+        find_closed(k, reduced_radius, memory, p)
+        renew_bridge(k, particles, edges, memory, shift, p)
 
 
 @part
-def transfer_liquid(particles, edges, memory):
+def transfer_liquid(particles, edges, memory, p):
     """Take what new bridges have drawn from the liquid of every particle, and add what broken ones return."""
     for i in prange(particles.owned):
-        _transfer(i, particles, edges, memory)
+        if particles.bridges_change[i]:
+            _transfer(i, particles, edges, memory, p)
 
 
 @inline
-def _transfer(i, particles, edges, memory):
+def _transfer(i, particles, edges, memory, p):
     """See `transfer_liquid`, for particle i."""
     drawn, returned, formed, broken = 0.0, 0.0, 0, 0
     for place in range(edges.start[i], edges.start[i + 1]):
@@ -235,7 +274,7 @@ def _transfer(i, particles, edges, memory):
             drawn += drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
             formed += 1 if sign > 0.0 else 0
         elif change < 0:
-            returned += _part_returned(k, sign, particles, edges, memory)
+            returned += _part_returned(k, sign, particles, edges, memory, p)
             broken += 1 if sign > 0.0 else 0
     if drawn > 0.0 or returned > 0.0:
         particles.liquid[i] = max(particles.liquid[i] - particles.liquid_supply[i] * drawn, 0.0) + returned
@@ -245,13 +284,14 @@ def _transfer(i, particles, edges, memory):
 
 
 @inline
-def _part_returned(k, sign, particles, edges, memory):
+def _part_returned(k, sign, particles, edges, memory, p):
     """Liquid of the broken bridge of edge k that its first (sign 1) or second body gets [m3]."""
     i, j = edges.first[k], edges.second[k]
     volume = memory.bridge_volume[k]
     if k >= edges.between_particles:
-        return returned_share(particles.radius[i], FLAT) * volume if WALL_LIQUID else volume
-    to_first = returned_share(particles.radius[i], particles.radius[j]) * volume
+        return share_left_by_wall(particles.radius[i], p) * volume if WALL_LIQUID else volume
+    angle = numbers_of(p).contact_angle
+    to_first = returned_share(particles.radius[i], particles.radius[j], angle, angle) * volume
     return to_first if sign > 0.0 else volume - to_first
 
 

@@ -119,7 +119,11 @@ RUPTURES: dict[str, Function] = {
     "film": _separation_of_films,
 }
 SHARES: dict[str, Function] = {"shi_mccarthy": capillary.liquid_share, "none": _nothing}
-REDISTRIBUTIONS: dict[str, Function] = {"half": _half, "radius": rupture.share_by_radius}
+REDISTRIBUTIONS: dict[str, Function] = {
+    "half": _half,
+    "radius": rupture.share_by_radius,
+    "contact_angle": rupture.share_by_contact_angle,
+}
 
 _WORDS: dict[str, Mapping[str, Any]] = {
     "film": FILMS,
@@ -137,6 +141,7 @@ class BridgeNumbers(NamedTuple):
     viscosity: float  # [Pa s]
     surface_tension: float  # [N/m]
     contact_angle: float  # [rad]
+    wall_contact_angle: float  # [rad]
     minimum_gap: float  # [m]
     transition_pressure: float  # [Pa]
     wall_share: float  # [-]
@@ -160,7 +165,9 @@ class BridgeLaws:
                          and speed, "lian" or "willett" by its volume, "film" where the films separate, or a function
     share                part of a body's liquid that flows into a new bridge: "shi_mccarthy", "none", or a function of
                          radius and other_radius
-    redistribution       part of a broken bridge that a body gets: "half", "radius" by the radii, or a function
+    wall_contact_angle   on walls, for the redistribution "contact_angle"; as on particles if not given [rad]
+    redistribution       part of a broken bridge that a body gets: "half", "radius" by the radii, "contact_angle" by
+                         the cosines of the contact angles, or a function
                          of radius and other_radius
     minimum_gap          h_min, at least [m]
     transition_pressure  at which the liquid turns to glass, which sets h_min [Pa]
@@ -186,6 +193,7 @@ class BridgeLaws:
     wall_share: float = 0.0
     wall_film: float = 0.0
     wall_patch: float = 0.0
+    wall_contact_angle: float | None = None
     parameters: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def check(self) -> None:
@@ -193,8 +201,9 @@ class BridgeLaws:
         for name in ("viscosity", "surface_tension", "minimum_gap", "wall_film", "wall_patch"):
             if not 0.0 <= (value := getattr(self, name)) < math.inf:
                 raise InputError(name, value, "at least 0 and finite")
-        if not 0.0 <= self.contact_angle <= math.pi:
-            raise InputError("contact_angle", self.contact_angle, "0 to pi")
+        for name in ("contact_angle", "wall_contact_angle"):
+            if (angle := getattr(self, name)) is not None and not 0.0 <= angle <= math.pi:
+                raise InputError(name, angle, "0 to pi")
         if not self.transition_pressure > 0.0:
             raise InputError("transition_pressure", self.transition_pressure, "above 0")
         if not 0.0 <= self.wall_share <= 1.0:
@@ -229,7 +238,9 @@ class BridgeLaws:
     @property
     def built_in(self) -> BridgeNumbers:
         """The numbers of all laws."""
-        return BridgeNumbers(*(float(getattr(self, name)) for name in BridgeNumbers._fields))
+        on_walls = self.contact_angle if self.wall_contact_angle is None else self.wall_contact_angle
+        given = {name: getattr(self, name) for name in BridgeNumbers._fields} | {"wall_contact_angle": on_walls}
+        return BridgeNumbers(**{name: float(value) for name, value in given.items()})
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
@@ -237,15 +248,18 @@ class BridgeLaws:
         # the damping of rolling and the built-in numbers follow in p
         first = -(len(self.parameters) + len(BridgeNumbers._fields) + 1)
         of_bridge |= {name: f"bridge.p[{first + n}]" for n, name in enumerate(self.parameters)}
-        of_radii = {"radius": "radius", "other_radius": "other_radius"}
+        of_radii = {name: name for name in ("radius", "other_radius")}
+        of_angles = {name: name for name in ("contact_angle", "other_contact_angle")}
         made: dict[str, Any] = {
             "BRIDGE": True,
             "CUT_CONSTANT": self.cut == "constant",
             "WALL_LIQUID": self.wall_share > 0.0,
         }
         for slot, function in self._functions().items():
-            if slot in ("drawn_share", "returned_share"):
+            if slot == "drawn_share":
                 made[slot] = adapted(function, "radius, other_radius", of_radii)
+            elif slot == "returned_share":
+                made[slot] = adapted(function, ", ".join(of_radii | of_angles), of_radii | of_angles)
             else:
                 made[slot] = adapted(function, "bridge", of_bridge)
         return made | {

@@ -10,8 +10,8 @@ import numpy as np
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
-from cfddem.particles.interactions.bridge import film_thickness
-from cfddem.particles.interactions.bridge_changes import clear_bridges, transfer_liquid
+from cfddem.particles.interactions.bridge import thickness_of_films
+from cfddem.particles.interactions.bridge_changes import clear_bridges, mark_bodies, transfer_liquid
 from cfddem.particles.interactions.slots import WALL_LIQUID, WALLS
 from cfddem.particles.interactions.wall_liquid import transfer_wall_liquid
 from cfddem.particles.pair_graph import Edges
@@ -47,9 +47,9 @@ def bridge_reach_ratio(solver: ParticleSolver, after: Particles | None = None) -
         np.add.at(most, second[~at_wall], edges.bridge_volume[rows[~at_wall]])
         other = np.where(at_wall, np.inf, radius[np.where(at_wall, 0, second)])
         longest = solver.gap[rows] * (1.0 / radius[first] + 1.0 / other)
-    films, radii = film_thickness(radius, most), radius
+    films, radii = thickness_of_films(radius, most), radius
     if after is not None:
-        films, radii = np.append(films, film_thickness(after.radius, after.liquid)), np.append(radius, after.radius)
+        films, radii = np.append(films, thickness_of_films(after.radius, after.liquid)), np.append(radius, after.radius)
     laws = solver.laws.bridge
     on_walls = max(laws.wall_film, float(solver.walls.patch_thickest[0])) if laws is not None else 0.0
     reach = (4.0 * GROWTH * largest(films, default=0.0) + on_walls) / solver.communicator.smallest(
@@ -87,7 +87,8 @@ def release_bridges(solver: ParticleSolver, gone: np.ndarray) -> None:
 
 @serial
 def _break(particles, edges, memory, walls, p):
+    mark_bodies(particles, edges, memory)
     if WALLS and WALL_LIQUID:
         transfer_wall_liquid(particles, edges, memory, walls, p)
-    transfer_liquid(particles, edges, memory)
+    transfer_liquid(particles, edges, memory, p)
     clear_bridges(edges, memory)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from cfddem.backend.compile import inline
+from cfddem.particles.interactions.newton import next_guess
 from cfddem.particles.interactions.slots import (
     BRIDGE_ENERGY,
     BRIDGE_POTENTIAL,
@@ -19,7 +20,7 @@ from cfddem.particles.interactions.slots import (
 )
 
 SMALLEST_GAP = 1e-9
-"""Gap below which the resistance of a bridge is cut if nothing else limits it [m]."""
+"""Gap below which the resistance of a bridge is cut if nothing else limits it; thinner films form no bridge [m]."""
 
 SHORT = 0.05
 """Change of the gap up to which Gauss' rule of three points is used, over the gap: it integrates A/h to 1e-11."""
@@ -112,15 +113,9 @@ def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
         excess = guess + inverse_mass * resistance_integral(state, gap, step * guess, floor) - total
         if abs(excess) <= 1e-13 * (abs(total) + abs(guess)):
             return guess
-        if excess > 0.0:
-            high = guess
-        else:
-            low = guess
         end = gap + step * guess
         slope = _resistance(state, max(end, floor)) if CUT_CONSTANT or end > floor else 0.0
-        following = guess - excess / (1.0 + step * inverse_mass * slope)
-        if not low < following < high:
-            following = 0.5 * (low + high)
+        following, low, high = next_guess(guess, excess, 1.0 + step * inverse_mass * slope, low, high)
         if following == guess:
             return guess
         guess = following

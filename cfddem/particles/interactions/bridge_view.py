@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from cfddem.backend.compile import serial
 from cfddem.backend.law_set import specialise
-from cfddem.particles.interactions.bridge import film_thickness
+from cfddem.particles.agglomerates import agglomerates
+from cfddem.particles.interactions.bridge import thickness_of_films
 from cfddem.particles.interactions.bridge_changes import longest_gap
 from cfddem.particles.interactions.wall_liquid import gained_by_walls
 
@@ -84,16 +83,14 @@ class Bridges:
     @property
     def thickness(self) -> np.ndarray:
         """Thickness of the film of each particle, without the liquid in bridges (N,) [m]."""
-        return film_thickness(self._solver.particles.radius, self._solver.particles.liquid)
+        return thickness_of_films(self._solver.particles.radius, self._solver.particles.liquid)
 
     @property
     def agglomerates(self) -> np.ndarray:
         """Number of the agglomerate of each particle: particles joined by bridges (N,), by row."""
         edges, count = self._solver.edges, self._solver.particles.count
         joined = self.edges[self.edges < edges.between_particles]
-        ends = edges.first[joined].astype(np.int64), edges.second[joined].astype(np.int64)
-        links = coo_matrix((np.ones(len(joined)), ends), shape=(count, count))
-        return connected_components(links, directed=False)[1]  # type: ignore[no-any-return]
+        return agglomerates(edges.first[joined].astype(np.int64), edges.second[joined].astype(np.int64), count)
 
     def gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Gap of every bridge, and how far it can still be stretched (n,), (n,) [m]."""

@@ -10,14 +10,17 @@ from typing import Any
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import adapted, check_compiles, written
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
-from cfddem.particles.interactions import bridge, contact, film, rolling
+from cfddem.particles.interactions import bridge, contact, film, rolling, shear_film
 from cfddem.particles.interactions.contact_law import COLUMNS, ContactLaw, Function
 from cfddem.particles.interactions.slots import ContactState
 from cfddem.particles.pair_graph import Graph
 
 ARGUMENTS = "contact, row, p, m, d"
 
-TAKEN = {each.name for each in (*contact.FIELDS, *film.FIELDS, film.OUTSIDE, *rolling.FIELDS, *RECORD_FIELDS)}
+TAKEN = {
+    each.name
+    for each in (*contact.FIELDS, *film.FIELDS, film.OUTSIDE, *shear_film.FIELDS, *rolling.FIELDS, *RECORD_FIELDS)
+}
 TAKEN |= {each.name for each in bridge.FIELDS} | set(Graph._fields)
 """Names of the built-in fields of pairs."""
 

@@ -17,9 +17,11 @@ from cfddem.particles.interactions.kinematics import (
     pair_viscosity,
     relative_velocity,
 )
+from cfddem.particles.interactions.shear_film import edge_asymmetry, renew_shear
 from cfddem.particles.interactions.slots import (
     COUNT_FILM,
     COUNT_GAP,
+    SHEAR,
     USER_GAP,
     FilmState,
     GapState,
@@ -97,6 +99,9 @@ def update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ra
     viscosity = pair_viscosity(k, particles, edges)
     row = pair_row(k, particles, edges, walls, table)
     renew_film(k, gap, viscosity, reduced_radius, portion(edges, k), memory, row, cutoff_ratio)
+    if SHEAR:
+        asymmetry = edge_asymmetry(k, particles, edges)
+        renew_shear(k, gap, viscosity, reduced_radius, asymmetry, portion(edges, k), memory)
 
 
 @inline

@@ -16,6 +16,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.backend.law_set import adapted, check_compiles, written
+from cfddem.particles.interactions.newton import next_guess
 from cfddem.particles.interactions.slots import (
     POTENTIAL,
     SHORT_POTENTIAL,
@@ -246,14 +247,8 @@ def speed_after_step(speed, film, accounted_gap, step, strength_per_mass, invers
         excess = guess + inverse_mass * _integral(gap, gap + step * guess, film) - total
         if abs(excess) <= 1e-14 * (abs(total) + abs(guess)):
             return guess
-        if excess > 0.0:
-            high = guess
-        else:
-            low = guess
         slope = resistance_with_lever(_at(film, gap + step * guess))
-        following = guess - excess / (1.0 + step * inverse_mass * slope)
-        if not low < following < high:
-            following = 0.5 * (low + high)
+        following, low, high = next_guess(guess, excess, 1.0 + step * inverse_mass * slope, low, high)
         if following == guess:
             return guess
         guess = following

@@ -10,7 +10,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
-from cfddem.particles.interactions import bridge, contact, film, rolling
+from cfddem.particles.interactions import bridge, contact, film, rolling, shear_film
 from cfddem.particles.interactions.bridge_law import NO_BRIDGE, BridgeLaws
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
@@ -21,6 +21,7 @@ CHOICES = {
     "integrator": ("drift", "verlet"),
     "friction_onset": ("film", "overlap"),
     "spring": ("total", "rescaled"),
+    "film_motions": ("normal", "full", "full_twist"),
     "rolling": ("none", "constant_torque", "spring_dashpot"),
 }
 """Words that each choice may take."""
@@ -40,6 +41,8 @@ class Laws(NamedTuple):
     minimum_gap           a user's law of the minimum gap; the built-in elastohydrodynamic one if not given
     lubrication           a user's film: its resistance, or a
                           :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
+    film_motions          motions that films resist: along the line of centres ("normal"), and sliding and rolling
+                          ("full"), and twisting ("full_twist")
     bridge                laws of liquid bridges, where particles carry liquid
     """
 
@@ -54,10 +57,11 @@ class Laws(NamedTuple):
     minimum_gap: Callable[..., float] | None = None
     lubrication: Callable[..., float] | FilmLaw | None = None
     bridge: BridgeLaws | None = None
+    film_motions: str = "normal"
 
     def dry(self) -> Laws:
         """The same laws without films and bridges."""
-        return self._replace(film=False, minimum_gap=None, lubrication=None, bridge=None)
+        return self._replace(film=False, minimum_gap=None, lubrication=None, bridge=None, film_motions="normal")
 
     def check(self) -> None:
         """Refuse unknown words, laws that cannot be compiled, and choices that exclude each other."""
@@ -68,6 +72,10 @@ class Laws(NamedTuple):
         check_contact_law(self.contact_law)
         if self.contact_law.adhesive and self.film:
             raise InputError("contact", self.contact_law.name, "a law without adhesion where there are films")
+        if self.shears and not (self.film and self.integrator == "drift"):
+            raise InputError(
+                "film_motions", self.film_motions, '"normal" without films, and with the integrator "verlet"'
+            )
         if self.bridge is not None:
             self.bridge.check()
         for kind in OF_THE_PAIR_LOOP:
@@ -87,6 +95,11 @@ class Laws(NamedTuple):
         return self.contact if isinstance(self.contact, ContactLaw) else contact_named(str(self.contact))
 
     @property
+    def shears(self) -> bool:
+        """Whether films resist sliding and rolling."""
+        return self.film_motions != "normal"
+
+    @property
     def film_law(self) -> FilmLaw | None:
         """The user's film law; None where the built-in one holds or there is no film."""
         if self.lubrication is None or isinstance(self.lubrication, FilmLaw):
@@ -104,6 +117,8 @@ class Laws(NamedTuple):
         fields = [*contact.FIELDS, *self.contact_law.memory]
         if self.film:
             fields += film.FIELDS
+        if self.shears:
+            fields += shear_film.FIELDS
         if self.rolling != "none":
             fields += rolling.FIELDS
         if self.bridge is not None:
@@ -114,7 +129,8 @@ class Laws(NamedTuple):
 
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
-        return () if self.bridge is None else bridge.PARTICLE_FIELDS
+        of_bridges = () if self.bridge is None else bridge.PARTICLE_FIELDS
+        return (*of_bridges, *shear_film.PARTICLE_FIELDS) if self.shears else of_bridges
 
     @property
     def kept_apart(self) -> set[str]:
@@ -138,6 +154,8 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "rolling_torque": rolling.ROLLINGS[laws.rolling],
         **(built_in() if laws.film else {}),
         "POTENTIAL": False,
+        "SHEAR": laws.shears,
+        "TWIST": laws.film_motions == "full_twist",
         "USER_GAP": laws.minimum_gap is not None,
         "COUNT_GAP": False,
         "COUNT_FILM": False,

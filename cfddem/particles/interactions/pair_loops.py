@@ -9,23 +9,26 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 from collections.abc import Callable, Collection, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.compile import inline, part, prange
+from cfddem.backend.compile import inline, prange, vector_part
 from cfddem.backend.law_set import specialise, written
 from cfddem.data.fields import Field
+from cfddem.particles.interactions.bridge_loops import WetParticles, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
 from cfddem.particles.interactions.film import film_impulse_short, renew_film
 from cfddem.particles.interactions.film_law import at_least
 from cfddem.particles.interactions.kinematics import sphere_kinematics
 from cfddem.particles.interactions.rolling import resist_rolling
+from cfddem.particles.interactions.shear_film import pair_shear, renew_shear
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     COUNT_FILM,
     FILM,
     ROLLING,
+    SHEAR,
     FilmState,
     adhesive_reach,
     film_outside,
@@ -37,6 +40,9 @@ from cfddem.particles.vectors import NOTHING, at, dot, minus, put, times
 
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
 """Arrays of the particles that loops over pairs read."""
+
+ShearParticles = namedtuple("ShearParticles", "position velocity spin radius viscosity slip_rate turn_rate")
+"""The same of the loop over films that resist sliding."""
 
 PairEnds = namedtuple("PairEnds", "first second image")
 """Arrays of the graph that loops over pairs read."""
@@ -75,6 +81,9 @@ def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p,
     if FILM:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
         renew_film(k, kinematics.gap, viscosity, kinematics.reduced_radius, 1.0, memory, row, cutoff_ratio)
+        if SHEAR:
+            asymmetry = (particles.radius[i] - particles.radius[j]) * kinematics.inverse_sum
+            renew_shear(k, kinematics.gap, viscosity, kinematics.reduced_radius, asymmetry, 1.0, memory)
     edge_contact(k, kinematics, row, 1.0, memory, p, step)
 
 
@@ -90,6 +99,9 @@ def pair_film(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio):
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     renew_film(k, gap, viscosity, reduced_radius, 1.0, memory, row, cutoff_ratio)
+    if SHEAR:
+        asymmetry = (particles.radius[i] - particles.radius[j]) / radii
+        renew_shear(k, gap, viscosity, reduced_radius, asymmetry, 1.0, memory)
 
 
 @inline
@@ -116,12 +128,24 @@ def pair_impulse(n, particles, edges, memory, shift, cutoff_ratio, step):
     put(memory.impulse, k, times(size, normal))
 
 
-LOOPS: dict[str, tuple[Callable[..., Any], str]] = {
-    "pair_forces": (pair_force, "shift, rows, kinds, cutoff_ratio, p, free, step"),
-    "update_films": (pair_film, "shift, rows, kinds, cutoff_ratio"),
-    "film_impulses": (pair_impulse, "shift, cutoff_ratio, step"),
+class PairLoop(NamedTuple):
+    """A loop over pairs."""
+
+    body: Callable[..., Any]  # function of one pair
+    rest: str  # what it takes beside the arrays
+    particles: Any = PairParticles  # arrays of the particles that it reads
+    needed_by: str = ""  # choice without which a run has no such loop
+
+
+LOOPS: dict[str, PairLoop] = {
+    "pair_forces": PairLoop(pair_force, "shift, rows, kinds, cutoff_ratio, p, free, step"),
+    "update_films": PairLoop(pair_film, "shift, rows, kinds, cutoff_ratio", needed_by="FILM"),
+    "film_impulses": PairLoop(pair_impulse, "shift, cutoff_ratio, step", needed_by="FILM"),
+    "shear_impulses": PairLoop(pair_shear, "shift, step", ShearParticles, "SHEAR"),
+    "pair_bridges": PairLoop(pair_bridge, "shift, p", WetParticles, "BRIDGE"),
+    "bridge_impulses": PairLoop(pair_bridge_impulse, "shift, step", WetParticles, "BRIDGE"),
 }
-"""Slot -> function of one pair, and what it takes beside the arrays."""
+"""Slot -> loop over pairs."""
 
 
 def loop_choices(fields: Iterable[Field], choices: dict[str, Any], kept_apart: Collection[str]) -> dict[str, Any]:
@@ -131,8 +155,8 @@ def loop_choices(fields: Iterable[Field], choices: dict[str, Any], kept_apart: C
     """
     fields = list(fields)
     names = tuple(each.name for each in fields)
-    loops = {slot: over_pairs(specialise(body, choices), names, rest) for slot, (body, rest) in LOOPS.items()
-             if choices["FILM"] or slot == "pair_forces"}  # fmt: skip
+    loops = {slot: over_pairs(specialise(loop.body, choices), names, loop.rest, loop.particles)
+             for slot, loop in LOOPS.items() if choices.get(loop.needed_by, True)}  # fmt: skip
     lines = ["put(memory.{0}, to, at(memory.{0}, k))" if each.components else "memory.{0}[to] = memory.{0}[k]"
              for each in fields]  # fmt: skip
     copied = [line.format(each.name) for line, each in zip(lines, fields)
@@ -155,14 +179,15 @@ def _clear_contact(memory, k):
     write_memory(memory, k, read_memory(memory, k), False)
 
 
-def over_pairs(body: Any, names: tuple[str, ...], rest: str) -> Any:
+def over_pairs(body: Any, names: tuple[str, ...], rest: str, particles: Any = PairParticles) -> Any:
     """A loop `(begin, end, particles, edges, memory, rest)` over pairs, with each array an argument of its own.
 
-    body   (n, particles, edges, memory, rest), compiled by `inline`
-    names  of the fields of a pair
-    rest   further arguments
+    body       (n, particles, edges, memory, rest), compiled by `inline`
+    names      of the fields of a pair
+    rest       further arguments
+    particles  arrays of the particles that the body reads
     """
-    structures = {"particles": PairParticles, "edges": PairEnds, "memory": memory_class(names)}
+    structures = {"particles": particles, "edges": PairEnds, "memory": memory_class(names)}
     arrays = {name: [f"{name}_{each}" for each in made._fields] for name, made in structures.items()}
     every = ", ".join(each for some in arrays.values() for each in some)
     rebuilt = ", ".join(f"{name}_of({', '.join(some)})" for name, some in arrays.items())
@@ -174,4 +199,4 @@ def over_pairs(body: Any, names: tuple[str, ...], rest: str) -> Any:
         f"        body(n, {rebuilt}, {rest})\n"
     )
     call = f"def call(begin, end, particles, edges, memory, {rest}):\n    over_pairs(begin, end, {given}, {rest})\n"
-    return written(call, over_pairs=written(loop, part, body=body, prange=prange, **classes))
+    return written(call, over_pairs=written(loop, vector_part, body=body, prange=prange, **classes))

@@ -88,6 +88,8 @@ rolling_torque = Slot("rolling_torque")
 # ---------------------------------------------------------------- film; argument FilmState or GapState
 
 FILM = Slot("FILM")
+SHEAR = Slot("SHEAR")  # films resist sliding and rolling
+TWIST = Slot("TWIST")  # and twisting
 DRIFTING = Slot("DRIFTING")  # films act by impulses; else as an explicit force
 film_resistance = Slot("film_resistance")  # at this gap or h_min, without lever [kg/s]
 explicit_resistance = Slot("explicit_resistance")  # with lever; 0 for overlaps and out of reach [kg/s]
@@ -122,7 +124,7 @@ bridge_pull = Slot("bridge_pull")  # [N]
 bridge_energy = Slot("bridge_energy")  # integral of the pull over the gap, from contact [J]
 bridge_rupture = Slot("bridge_rupture")  # largest gap of the bridge [m]
 drawn_share = Slot("drawn_share")  # (radius, other radius): part of a body's liquid that flows into a new bridge
-returned_share = Slot("returned_share")  # (radius, other radius): part of a broken bridge that the body gets
+returned_share = Slot("returned_share")  # (both radii, both contact angles): part of a broken bridge that a body gets
 
 # ---------------------------------------------------------------- loops
 
@@ -131,5 +133,8 @@ RECORD = Slot("RECORD")  # collisions are recorded
 pair_forces = Slot("pair_forces")
 update_films = Slot("update_films")
 film_impulses = Slot("film_impulses")
+pair_bridges = Slot("pair_bridges")
+bridge_impulses = Slot("bridge_impulses")
+shear_impulses = Slot("shear_impulses")
 copy_memory = Slot("copy_memory")  # (memory arrays, from, to)
 clear_contact = Slot("clear_contact")  # (memory arrays, k)

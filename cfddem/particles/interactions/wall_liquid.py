@@ -90,6 +90,13 @@ def wall_thickness(k, edges, walls, p):
 
 
 @inline
+def share_left_by_wall(radius, p):
+    """Part of a broken bridge at a wall that its particle gets."""
+    n = numbers_of(p)
+    return returned_share(radius, FLAT, n.contact_angle, n.wall_contact_angle)
+
+
+@inline
 def thickest_wall(walls, p):
     """Upper bound of the thickness of the liquid on walls [m]."""
     return max(numbers_of(p).wall_film, walls.patch_thickest[0]) if WALL_LIQUID else 0.0
@@ -129,5 +136,5 @@ def transfer_wall_liquid(particles, edges, memory, walls, p):
             walls.patch_liquid[row] = there - drawn
         else:
             volume = memory.bridge_volume[k]
-            walls.patch_liquid[row] = there + (volume - returned_share(radius, FLAT) * volume)
+            walls.patch_liquid[row] = there + (volume - share_left_by_wall(radius, p) * volume)
         walls.patch_thickest[0] = max(walls.patch_thickest[0], walls.patch_liquid[row] / area)

@@ -18,6 +18,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.particles.vectors import Vector
 from cfddem.particles.walls.nearest_point import PLANE, REVOLVED, SOLID_CYLINDER, TRIANGLE
+from cfddem.particles.walls.stl import read_stl
 
 ROUNDING = 1e-9
 """Relative difference below which directions and positions are equal."""
@@ -258,13 +259,17 @@ class Mesh(Wall):
         super().__post_init__()
 
     @classmethod
-    def from_stl(cls, path: str | Path, *, scale: float = 1.0, **options: Any) -> Mesh:
+    def from_stl(cls, path: str | Path, *, scale: float = 1.0, place: Vector = (0.0, 0.0, 0.0), **options: Any) -> Mesh:
         """Read a surface from a file.
 
         path     STL, or another surface format that pyvista reads
         scale    length of the file's unit [m]
+        place    of the file's origin [m]
         options  as of :class:`Wall`
         """
+        if Path(path).suffix.lower() == ".stl":
+            corners = (np.array(place) + scale * read_stl(path)).reshape(-1, 3)
+            return cls(vertices=corners, triangles=np.arange(len(corners)).reshape(-1, 3), **options)
         import pyvista  # takes a second to import, and few runs need it
 
         if not Path(path).is_file():
@@ -274,7 +279,8 @@ class Mesh(Wall):
             raise InputError("mesh", str(path), "a file of one surface")
         surface = surface.triangulate()
         corners = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
-        return cls(vertices=scale * np.asarray(surface.points, float), triangles=corners, **options)
+        vertices = np.array(place) + scale * np.asarray(surface.points, float)
+        return cls(vertices=vertices, triangles=corners, **options)
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         corners = self.vertices[self.triangles]

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from cfddem.coupling.exchange import CouplingTerms, Exchange, FluidForces
+from cfddem.coupling.exchange import Exchange
+from cfddem.coupling.terms import CouplingTerms, FluidForces
 from cfddem.coupling.work_on_particles import CouplingWork
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
-from cfddem.particles.energy_count import CHANNELS
+from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 
@@ -41,16 +42,17 @@ GAINED = {
 """Energy gained; a negative line is a loss."""
 
 LOST = {
-    "drag": "by drag, at the slip of the particles",
+    "drag": "by drag, at the slip of the particles, with wall drag along it",
     "history": "to the fluid by the history force",
     "drag_in_cells": "by drag, in velocity differences within the kernel and the cell",
     "pressure_in_cells": "where the pressure gradient at the particles differs from that of the cells",
     "implicit_drag": "by the implicit drag step",
     "viscous": "by viscous stress",
     "convection": "by the convection scheme",
-    "lift_and_added_mass": "between fluid and particles by lift, viscous stress and added mass",
+    "lift_and_added_mass": "by lift, viscous stress, added mass and wall drag across the slip, between the phases",
     "torque": "by the torque of the fluid on spin",
     "film": "by films",
+    "film_shear": "by films to sliding and rolling",
     "bridge": "by the resistance of liquid bridges",
     "bridges_broken": "where liquid bridges break",
     "contact_damping": "by the dashpots of contacts",
@@ -146,6 +148,8 @@ class EnergyLedger:
         absent = set() if self.fluid is not None else set(_OF_FLUID)
         if self.particle_solver.laws.contact_law.lost is None:
             absent.add("hysteresis")
+        if not self.particle_solver.laws.shears:
+            absent.add("film_shear")
         if self.exchange is None or self.exchange.history is None:
             absent.add("history")
         if self.particle_solver.laws.bridge is None:

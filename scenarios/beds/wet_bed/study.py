@@ -45,6 +45,13 @@ def bed(state: str = "oil 0.1 %") -> Case:
     return case.with_(title=f"{case.title}, {state}", **{f"liquid.{name}": value for name, value in changes.items()})
 
 
+def wide_bed(state: str = "oil 0.1 %") -> Case:
+    """The same beads in a column 120 mm wide and 7.5 mm deep, periodic in depth, at 1.4 times minimum fluidisation."""
+    changes = {"column.width": 0.120, "column.depth": 0.0075, "column.front": "periodic"}
+    changes |= {"bed.inlet_velocity": [[0.0, 0.0], [0.1, 2.0]], "run.until": 0.6, "run.particle_step": 1.2e-5}
+    return bed(state).with_(**changes)
+
+
 def effects(run: Run, begin: float) -> Effects:
     """Means of a run from a time on [s]."""
     history = run.history

@@ -198,15 +198,24 @@ def readings(curves: Curves) -> Any:
     return figure
 
 
+GONDRET = {
+    "film_alone": "film, contact, weight less buoyancy",
+    "and_drag_and_added_mass": "and drag and added mass",
+    "and_history_force": "and history force",
+    "and_drag_beside_the_wall": "and drag beside the wall",
+}
+"""Curves of the bounce, each with one force more."""
+
+
 def gondret(curves: Curves) -> Any:
     """Measured and computed bounce of a steel sphere."""
     figure, axes = panels(height=4.2)
-    model, measured = _of(curves, "gondret_2002/model"), _of(curves, "gondret_2002/measured")
-    axes.plot(model["time"] * 1e3, model["gap"] * 1e3, color=BLUE, label="film, contact, weight less buoyancy")
-    around = _of(curves, "gondret_2002/surroundings")
-    axes.plot(around["time"] * 1e3, around["gap"] * 1e3, color=GREY, label="with drag, added mass and history force")
+    measured = _of(curves, "gondret_2002/measured")
+    for (group, text), colour in zip(GONDRET.items(), (BLUE, SKY, GREY, ORANGE)):
+        path = _of(curves, f"gondret_2002/{group}")
+        axes.plot(path["time"] * 1e3, path["gap"] * 1e3, color=colour, label=text)
     axes.plot(measured["time"] * 1e3, measured["gap"] * 1e3, "o", color=RED, ms=5, label="Gondret et al. (2002)")
-    axes.set(xlim=(-6, 46), ylim=(0, 3.1))
+    axes.set(xlim=(-6, 46), ylim=(0, 4.2))
     label(axes, "time after contact", "ms", "gap", "mm", "A 6 mm steel sphere bounces in silicone oil, St = 27")
     legend(axes, loc="upper right")
     return figure

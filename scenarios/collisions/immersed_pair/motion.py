@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,11 +11,12 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.case.materials import Material
+from cfddem.coupling.still_fluid import StillFluid
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from cfddem.particles.walls.shapes import Plane
 from closures import contact, lubrication
+from scenarios.collisions.immersed_pair.surroundings import WALL
 
 COAST = 1e-5
 """A pair has stopped when its remaining kinetic and spring energy would change ln h by less than this."""
@@ -74,7 +75,7 @@ def stage(
     return ParticleSolver(
         pair,
         table,
-        walls=[Plane(normal=(-1.0, 0.0, 0.0), material=1)] if wall else [],
+        walls=[WALL] if wall else [],
         laws=laws,
         free=(1.0, 1.0, 1.0) if full else (1.0, 0.0, 0.0),
         skin=8.0 * setting.reduced_radius,
@@ -115,41 +116,67 @@ def _look(simulation: ParticleSolver) -> _Moment:
     return _Moment(distance - float(simulation.particles.radius.sum()), approach, math.hypot(*u))
 
 
-def follow(simulation: ParticleSolver, setting: Setting, full: bool) -> dict[str, np.ndarray]:
+FLUID_STEP = 0.01
+"""Longest step with a fluid around the pair, over the time in which the pair crosses its film at the impact speed."""
+
+
+AT_REST = 1e-4
+"""A pair in contact is at rest when it is slower in three steps, over the impact speed; a rebound is never."""
+
+
+def follow(
+    simulation: ParticleSolver,
+    setting: Setting,
+    full: bool,
+    fluid: StillFluid | None = None,
+    until: float | None = None,
+) -> dict[str, np.ndarray]:
     """Integrate until the pair has left the film or stopped; returns the history as columns.
+
+    until  follow it for this time instead, or until it rests in contact [s]
 
     Where only the film acts its impulse depends on the gap alone, so a step may take up to half of the gap, less
     where the film changes the speed so much that times would be coarse. The first step into the film is short,
     because a film acts from the step after the one that enters it.
     """
-    rows = [_row(simulation, _look(simulation))]
+    advance: Callable[..., object] = simulation.advance if fluid is None else fluid.advance
+    rows = [_row(simulation, _look(simulation), None)]
     laws, cutoff = simulation.laws, setting.cutoff_gap if simulation.laws.film else 0.0
+    longest = math.inf if fluid is None else FLUID_STEP * setting.cutoff_gap / setting.speed
     if not full:
-        simulation.advance(min(1e-6 * setting.cutoff_gap / setting.speed, setting.impact_step))
+        advance(min(1e-6 * setting.cutoff_gap / setting.speed, setting.impact_step))
     turn = 0.004 * setting.reduced_radius / math.hypot(setting.speed, setting.tangential_speed) if full else math.inf
     touched = False
-    for moment, minimum_gap in _moments(simulation, rows):
+    for moment, minimum_gap in _moments(simulation, rows, fluid):
         touched = touched or moment.gap <= minimum_gap
-        if moment.gap > cutoff and moment.normal_speed > 0.0:
+        if until is not None:
+            slow = AT_REST * setting.speed
+            at_rest = all(row["gap"] < minimum_gap and abs(row["normal_speed"]) < slow for row in rows[-3:])
+            if simulation.time >= until or at_rest:
+                break
+        elif moment.gap > cutoff and moment.normal_speed > 0.0:  # noqa: SIM114
             break
-        if laws.film and _halted(moment, minimum_gap, setting, full):
+        elif laws.film and _halted(moment, minimum_gap, setting, full):
             break
         if laws.film and laws.integrator == "verlet":
             near = moment.gap < 4.0 * minimum_gap + 2.0 * setting.speed * setting.impact_step
-            simulation.advance(setting.impact_step, 1 if near else 25)
+            advance(setting.impact_step, 1 if near else 25)
         else:
-            simulation.advance(_step(moment, minimum_gap, setting, cutoff, turn))
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+            advance(min(_step(moment, minimum_gap, setting, cutoff, turn), longest))
+    none = np.zeros(3)  # forces of the fluid are known from the first step on
+    columns = {name: np.array([row.get(name, none) for row in rows]) for name in rows[-1]}
     return columns | {"touched": np.array(touched)}
 
 
-def _moments(simulation: ParticleSolver, rows: list[dict[str, Any]]) -> Iterator[tuple[_Moment, float]]:
+def _moments(
+    simulation: ParticleSolver, rows: list[dict[str, Any]], fluid: StillFluid | None
+) -> Iterator[tuple[_Moment, float]]:
     while simulation.steps < MOST_STEPS:
         moment = _look(simulation)
         last = rows[-1]
         if simulation.time > last["time"]:
             moment = replace(moment, rate=(moment.gap - last["gap"]) / (simulation.time - last["time"]))
-        rows.append(_row(simulation, moment))
+        rows.append(_row(simulation, moment, fluid))
         yield moment, float(simulation.edges.minimum_gap[0])
     raise RunFailed(
         f"the pair neither separates nor halts within {MOST_STEPS} steps: gap {moment.gap:.3g} m, "
@@ -157,8 +184,9 @@ def _moments(simulation: ParticleSolver, rows: list[dict[str, Any]]) -> Iterator
     )
 
 
-def _row(simulation: ParticleSolver, moment: _Moment) -> dict[str, Any]:
-    return {
+def _row(simulation: ParticleSolver, moment: _Moment, fluid: StillFluid | None) -> dict[str, Any]:
+    around = {} if fluid is None else {f"force_{name}": force[0].copy() for name, force in fluid.forces.items()}
+    return around | {
         "time": simulation.time,
         "gap": moment.gap,
         "normal_speed": moment.normal_speed,

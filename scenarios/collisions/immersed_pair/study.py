@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
@@ -24,11 +24,11 @@ from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.state import Particles
 from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
 from closures.minimum_gap import elastohydrodynamic
 from scenarios.collisions.immersed_pair.motion import Setting, follow, stage
+from scenarios.collisions.immersed_pair.surroundings import chosen_forces, fluid_around
 from scenarios.collisions.results import plain
 
 MATERIALS = {
@@ -93,8 +93,13 @@ def collide(
     friction_onset: str = "film",
     spring: str = "total",
     step_fraction: float | None = None,
+    surroundings: str | Sequence[str] = "none",
+    fluid_density: float = 1000.0,
+    gravity: float = 0.0,
+    until: float | None = None,
     minimum_gap: Callable[..., float] | None = None,
     lubrication: Callable[..., float] | None = None,
+    film_motions: str = "normal",
 ) -> Collision:
     r"""Let one body strike another at rest in a fluid, in the particle engine.
 
@@ -113,8 +118,13 @@ def collide(
     friction_onset  "film": at h_min, weighted by 1 - h/h_min; "overlap": at h = 0, as in the published figures
     spring          "total" tangential displacement, or "rescaled" while loading
     step_fraction   of the Hertz time; 0.02, or 0.005 for an oblique impact with the sudden onset "overlap" [-]
+    surroundings    beyond the film: "none", "all", or some of drag, added_mass, history, wall_drag, joined by commas
+    fluid_density   [kg/m3]
+    gravity         from striker to target; the weight is less buoyancy [m/s2]
+    until           follow the pair for this time, also after it has left the film, or until it rests [s]
     minimum_gap     a user-defined law for h_min, instead of the elastohydrodynamic one
     lubrication     a user-defined law for the resistance of the film
+    film_motions    that films resist: "normal"; "full" with sliding and rolling; "full_twist"
     returns         :class:`Collision`
 
     >>> wall = collide(MATERIALS["glass"], against="wall", velocity=0.2, stokes=50)
@@ -128,8 +138,7 @@ def collide(
     if step_fraction is None:
         step_fraction = 0.005 if oblique and friction_onset == "overlap" else 0.02
     _check("step_fraction", step_fraction, 0.0 < step_fraction <= 0.2, "above 0 and at most 0.2")
-    for given in spin:
-        _check("spin", given, math.isfinite(given), "finite")
+    _check_motion(spin, fluid_density, gravity, until)
     laws = Laws(
         film=viscosity > 0.0,
         integrator=integrator,
@@ -137,6 +146,7 @@ def collide(
         spring=spring,
         minimum_gap=minimum_gap,
         lubrication=lubrication,
+        film_motions=film_motions if viscosity > 0.0 else "normal",
     )
     laws.check()
     full = _choice("trajectory", trajectory, {"frozen": False, "full": True})
@@ -144,7 +154,8 @@ def collide(
     setting = _setting(table[0, 1], bodies, velocity, viscosity, angle, step_fraction, laws)
     caveats = _check_film_step(setting, laws, step_fraction)
     simulation = stage(setting, table, bodies.materials, laws, full, spin)
-    history = follow(simulation, setting, full)
+    fluid = fluid_around(simulation, chosen_forces(surroundings), fluid_density, viscosity, gravity, against == "wall")
+    history = follow(simulation, setting, full, fluid, until)
     return _result(simulation, setting, table, history, laws, full, caveats)
 
 
@@ -164,6 +175,15 @@ def _choice(name: str, value: str, choices: dict[str, Chosen]) -> Chosen:
 def _check(name: str, value: float, holds: bool, limit: str) -> None:
     if not holds:
         raise InputError(name, value, limit)
+
+
+def _check_motion(spin: Sequence[float], fluid_density: float, gravity: float, until: float | None) -> None:
+    for each in spin:
+        _check("spin", each, math.isfinite(each), "finite")
+    _check("fluid_density", fluid_density, 0.0 <= fluid_density < math.inf, "at least 0 and finite")
+    _check("gravity", gravity, math.isfinite(gravity), "finite")
+    if until is not None:
+        _check("until", until, until > 0.0, "above 0")
 
 
 class Bodies(NamedTuple):
@@ -273,12 +293,14 @@ def _result(
     full: bool,
     caveats: tuple[str, ...],
 ) -> Collision:
-    """The result from the end of the history."""
-    body: Particles = simulation.particles
-    target = body.velocity[1] if body.count == 2 else np.zeros(3)
-    parting = target - body.velocity[0]
+    """The result from where the pair leaves the film, or from the end of the history."""
     cutoff = setting.cutoff_gap if laws.film else 0.0
-    separated = history["gap"][-1] > cutoff
+    left = np.flatnonzero((history["gap"] > cutoff) & (history["normal_speed"] > 0.0))
+    end = int(left[0]) if len(left) else -1
+    velocity, spin = history["velocity"][end], history["spin"][end]
+    target = velocity[1] if len(velocity) == 2 else np.zeros(3)
+    parting = target - velocity[0]
+    separated = history["gap"][end] > cutoff
     touched = bool(history.pop("touched"))
     outcome = "rebound" if separated and touched else "touch_no_rebound" if touched else "no_touch"
     restitution = float(parting[0]) / setting.speed if separated or full else 0.0
@@ -295,13 +317,13 @@ def _result(
         outcome=outcome,
         restitution=restitution,
         restitution_tangential=sideways / setting.tangential_speed if setting.tangential_speed > 0.0 else math.nan,
-        rebound_angle_striker=_degrees(float(body.velocity[0, 1]), float(body.velocity[0, 0])),
+        rebound_angle_striker=_degrees(float(velocity[0, 1]), float(velocity[0, 0])),
         rebound_angle_relative=_degrees(sideways, restitution * setting.speed),
         minimum_gap=minimum_gap,
         mechanism=mechanism if laws.film else "dry",
         friction_used=friction if laws.film else float(row["friction"]),
-        stop_gap=None if separated else float(history["gap"][-1]),
-        spin=(float(body.spin[0, 2]), float(body.spin[1, 2]) if body.count == 2 else 0.0),
+        stop_gap=None if separated else float(history["gap"][end]),
+        spin=(float(spin[0]), float(spin[1]) if len(spin) == 2 else 0.0),
         time=history.pop("time"),
         gap=history.pop("gap"),
         history=history,

@@ -19,7 +19,7 @@ from cfddem.particles.material_pairs import pair_table
 from closures.contact import hertz_largest_overlap, hertz_stiffness
 from closures.restitution import critical_stokes, immersed, legendre, stop_gap
 from scenarios.collisions.bouncing_sphere.study import SPEED as FALL_SPEED
-from scenarios.collisions.bouncing_sphere.study import bounce, speed_after_contact
+from scenarios.collisions.bouncing_sphere.study import bounce, collision, shares_of_loss, speed_after_contact
 from scenarios.collisions.immersed_pair import checks, figures
 from scenarios.collisions.immersed_pair.checks import CUTOFF, DRY, SPEED, WATER
 from scenarios.collisions.immersed_pair.study import MATERIALS, collide
@@ -170,39 +170,63 @@ def oblique(curves: Curves) -> list[Row]:
             onsets["overlap"].restitution_tangential,
             onsets["film"].restitution_tangential,
         ),
+        *_with_sliding_films(),
     ]
+
+
+def _with_sliding_films() -> list[Row]:
+    """What films that resist sliding and rolling change in the classes of figure 5, against normal films."""
+    rows = []
+    for name, (material, viscosity, span) in CLASSES.items():
+        for angle in (20.0, 60.0):
+            given: dict[str, Any] = {"viscosity": viscosity, "stokes": span[1], "angle": angle}
+            full, normal = (collide(MATERIALS[material], film_motions=each, **given) for each in ("full", "normal"))
+            rows.append(
+                Row(
+                    f"{name} St, {angle:.0f} deg: e_t with sliding films; ref. normal films",
+                    full.restitution_tangential,
+                    normal.restitution_tangential,
+                )
+            )
+    return rows
 
 
 def gondret(curves: Curves) -> list[Row]:
     """Gondret's steel sphere at St = 27: with film, contact and weight alone, and with drag, added mass and history."""
     measured = numbers("gondret2002_st27_trajectory")
-    time, gap = bounce(surroundings=())
     curves["gondret_2002/measured"] = {"time": (measured["t"], "s"), "gap": (measured["gap"], "m")}
-    curves["gondret_2002/model"] = {"time": (time, "s"), "gap": (gap, "m")}
-    slowed, height = bounce()
-    curves["gondret_2002/surroundings"] = {"time": (slowed, "s"), "gap": (height, "m")}
-    rebound = np.where(time > 0.0, gap, 0.0)
-    early = measured["t"][0], measured["t"][1]
+    highest, rows = 1e3 * measured["gap"].max(), []
+    for name, forces in SURROUNDINGS.items():
+        time, gap = bounce(surroundings=forces)
+        curves[f"gondret_2002/{name}"] = {"time": (time, "s"), "gap": (gap, "m")}
+        apex = 1e3 * gap[time > 0.0].max()
+        rows.append(Row(f"Gondret, St 27: apex, {name.replace('_', ' ')}", apex, highest, unit="mm"))
+    for name, share in shares_of_loss(collision()).items():
+        rows.append(Row(f"Gondret, St 27: share of the loss until the apex, {name}", share))
+    time, gap = (curves["gondret_2002/film_alone"][name][0] for name in ("time", "gap"))
+    rebound, early = np.where(time > 0.0, gap, 0.0), (measured["t"][0], measured["t"][1])
     model_speed = speed_after_contact(time, gap, *early)
     measured_speed = speed_after_contact(measured["t"], measured["gap"], *early)
     return [
-        Row("Gondret, St 27: apex", 1e3 * rebound.max(), 1e3 * measured["gap"].max(), unit="mm"),
+        *rows,
         Row(
             "Gondret, St 27: time of the apex",
             1e3 * time[rebound.argmax()],
             1e3 * measured["t"][measured["gap"].argmax()],
             unit="ms",
         ),
-        Row(
-            "Gondret, St 27: apex with drag, added mass, history",
-            1e3 * height[slowed > 0.0].max(),
-            1e3 * measured["gap"].max(),
-            unit="mm",
-        ),
         Row("Gondret, St 27: speed after 1.7 ms / U", model_speed / FALL_SPEED, measured_speed / FALL_SPEED),
         Row("Gondret, St 27: e at h_co; 0.43 to 0.49", immersed(27.0, DRY, 3e-3, 3e-7), 0.46),
     ]
 
+
+SURROUNDINGS: dict[str, tuple[str, ...]] = {
+    "film_alone": (),
+    "and_drag_and_added_mass": ("drag", "added_mass"),
+    "and_history_force": ("drag", "added_mass", "history"),
+    "and_drag_beside_the_wall": ("drag", "added_mass", "history", "wall_drag"),
+}
+"""Forces of the fluid around Gondret's sphere; weight, film and contact always act."""
 
 PARTS: tuple[Callable[[Curves], list[Row]], ...] = (
     gap_histories,

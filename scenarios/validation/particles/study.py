@@ -8,6 +8,7 @@ poured beds have rolling friction, because without it particles would roll indef
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation.particles import granular_beds, single_sphere, suspensions
+from scenarios.validation.particles import granular_beds, sheared_films, single_sphere, suspensions, two_spheres
 from scenarios.validation.table import Curves, Progress, Row, in_parts, reference, worst
 
 ANGLE = 9.0
@@ -157,6 +158,35 @@ def films(curves: Curves) -> list[Row]:
     ]
 
 
+def sliding_films(curves: Curves) -> list[Row]:
+    """Films that resist sliding and rolling: slopes and remainder of the law, and a sheared suspension."""
+    gaps, ratios = (1e-4, 1e-3), (1.0, 0.5, 2.0)
+    slopes = []
+    for ratio in ratios:
+        near, far = (np.array(two_spheres.resistance(gap, ratio)) for gap in gaps)
+        lead = np.array(two_spheres.leading(ratio))
+        slopes += [(ratio, slope, 1.0) for slope in (near - far) / math.log(10.0) / lead]
+    exact, lead = np.array(two_spheres.resistance(0.05)), np.array(two_spheres.leading(1.0))
+    left = exact - [1.0, 0.0, 0.0, 0.0, 1.0, 0.0] - lead * math.log(20.0)
+    names = ("Y^A_11", "-Y^A_12", "-Y^B_11", "Y^B_12", "Y^C_11", "Y^C_12")
+    rows = [worst("slope of the exact resistance against ln(1/xi) over that of the law, 1e-4 to 1e-3 R", slopes, 0.01)]
+    rows += [Row(f"{name} at 0.05 R less Stokes' and the film's", value) for name, value in zip(names, left)]
+    cases = {"at 0.4": (0.4, 0.0), "at 0.5": (0.5, 0.0), "under a lid": (0.5, 20.0)}
+    for name, (fraction, press) in cases.items():
+        full = sheared_films.sheared(fraction, "full", press)
+        curve = (1.0 - full.solid_fraction / 0.64) ** -1.6
+        note = f"Krieger & Dougherty at {full.solid_fraction:.2f}, with the fluid itself; films alone here"
+        rows += [
+            Row(f"sheared {name}, sliding films: dissipated over work", full.dissipated, 1.0, 0.01),
+            Row(f"sheared {name}: part of sliding and rolling in the work", full.sliding),
+            Row(f"sheared {name}: relative viscosity of all films", full.viscosity, curve, note=note),
+        ]
+        if press == 0.0:
+            normal = sheared_films.sheared(fraction, "normal").viscosity
+            rows.append(Row(f"sheared {name}: relative viscosity of normal films", normal))
+    return rows
+
+
 def _draw(folder: Path, curves: Curves) -> None:
     """Spin and rebound of Kharaz' spheres; slopes that begin to flow."""
     figure, axes = panels(3, width=13.0)
@@ -175,4 +205,13 @@ def _draw(folder: Path, curves: Curves) -> None:
     save(figure, folder / "particles.png")
 
 
-PARTS: tuple[Callable[[Curves], list[Row]], ...] = (falling, rolling, oblique, resting, slopes, hopper, films)
+PARTS: tuple[Callable[[Curves], list[Row]], ...] = (
+    falling,
+    rolling,
+    oblique,
+    resting,
+    slopes,
+    hopper,
+    films,
+    sliding_films,
+)

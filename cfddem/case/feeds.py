@@ -1,0 +1,123 @@
+"""Particles that enter and leave during a run: feeds and outlets of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from pydantic import Field, model_validator
+
+from cfddem.backend.errors import InputError, nearest, shown
+from cfddem.case.bed import NonNegative, Point, Positive, Species
+from cfddem.case.materials import Checked
+
+if TYPE_CHECKING:
+    from cfddem.case.schema import Case
+
+Size = tuple[NonNegative, NonNegative, NonNegative]
+
+
+class CaseFeed(Checked):
+    """A box in which particles appear at a constant rate."""
+
+    corner: Point = Field(description="lower corner of the box in which centres appear [m]")
+    size: Size = Field(description="edges of the box; an edge may be 0 [m]")
+    rate: Positive | None = Field(None, description="particles per second [1/s]")
+    mass_rate: Positive | None = Field(None, description="mass per second, instead of a rate [kg/s]")
+    species: str | None = Field(None, description="species of the bed that is fed; needed for a mixture")
+    velocity: Point = Field((0.0, 0.0, 0.0), description="velocity of particles that enter [m/s]")
+    begin: NonNegative = Field(0.0, description="time at which the feed begins [s]")
+    end: Positive | None = Field(None, description="time at which it ends; default: the end of the run [s]")
+
+    @model_validator(mode="after")
+    def _one_rate_and_a_span(self) -> CaseFeed:
+        if (self.rate is None) == (self.mass_rate is None):
+            found = "found none" if self.rate is None else "found both"
+            raise InputError("rate", self.rate, "given, or mass_rate, and only one of them", found)
+        if self.end is not None and self.end <= self.begin:
+            raise InputError("end", self.end, f"after the beginning, {self.begin:g} s")
+        return self
+
+
+class CaseOutlet(Checked):
+    """A box in which particles are removed and counted."""
+
+    corner: Point = Field(description="lower corner of the box; a particle leaves when its centre is inside [m]")
+    size: tuple[Positive, Positive, Positive] = Field(description="edges of the box [m]")
+
+
+def refuse_wrong_equipment(case: Case) -> None:
+    """Refuse walls, feeds and outlets that do not go with the rest of the case."""
+    for error in (*_wrong_walls(case), *_wrong_feeds(case)):
+        raise error
+
+
+def feed_rate(case: Case, feed: CaseFeed) -> float:
+    """Particles per second that a feed brings [1/s]."""
+    species = fed_species(case, feed)
+    if feed.rate is not None:
+        return feed.rate
+    return (feed.mass_rate or 0.0) / (species.mean_volume * case.material_of(species).density)
+
+
+def fed_count(case: Case) -> float:
+    """Particles that all feeds bring until the end of the run."""
+    ends = (case.run.until if each.end is None else min(each.end, case.run.until) for each in case.feed)
+    return sum(feed_rate(case, each) * max(end - each.begin, 0.0) for each, end in zip(case.feed, ends))
+
+
+def fed_species(case: Case, feed: CaseFeed) -> Species:
+    """The species that a feed brings."""
+    return case.species[feed.species or next(iter(case.species))]
+
+
+def _wrong_walls(case: Case) -> Iterator[InputError]:
+    for number, wall in enumerate(case.wall):
+        key = f"wall.{number}"
+        if wall.material is not None and wall.material not in case.material:
+            limit = nearest(wall.material, case.material)
+            yield InputError(
+                f"{key}.material", shown(wall.material), limit, "every material is a table [material.NAME]"
+            )
+        if case.fluid is None:
+            if wall.solid is not None:
+                yield InputError(f"{key}.solid", wall.solid, "left out in a case without a fluid")
+            continue
+        if wall.is_open and wall.solid is None:
+            remedy = "fluid on both sides of an open wall: give the side whose cells are solid"
+            yield InputError(f"{key}.solid", None, "given in a case with a fluid: inside, outside or none", remedy)
+        if wall.leaves_its_place and wall.solid != "none":
+            remedy = "the cells of the fluid do not move; a wall may move along itself"
+            yield InputError(f"{key}.solid", wall.solid, "none for a wall that leaves its place in a fluid", remedy)
+    if case.wall and case.bed.start == "packed":
+        yield InputError("bed.start", "packed", '"poured", "suspended" or "placed" where walls are given')
+
+
+def _wrong_feeds(case: Case) -> Iterator[InputError]:
+    boxes = [(f"feed.{n}", each.corner, each.size) for n, each in enumerate(case.feed)]
+    boxes += [(f"outlet.{n}", each.corner, each.size) for n, each in enumerate(case.outlet)]
+    if case.bed.start_size is not None and case.bed.start_corner is not None:
+        boxes.append(("bed.start", case.bed.start_corner, case.bed.start_size))
+    whole = case.column.size
+    for key, corner, size in boxes:
+        for low, edge, length in zip(corner, size, whole):
+            if low < 0.0 or low + edge > length * (1.0 + 1e-9):
+                divider = "_" if key == "bed.start" else "."
+                limit = f"inside the column, 0 to {', '.join(f'{each:g}' for each in whole)} m"
+                remedy = f"the box ends at {', '.join(f'{a + b:.4g}' for a, b in zip(corner, size))} m"
+                yield InputError(f"{key}{divider}corner", corner, limit, remedy)
+                break
+    if case.feed and case.fluid is not None:
+        for key, law, none in (("added_mass", case.laws.added_mass, 0.0), ("history", case.laws.history, "none")):
+            if law != none:
+                remedy = "the law needs the past of a particle, and particles of a feed have none"
+                yield InputError(f"laws.{key}", shown(law), f"{none!r} where there is a feed in a fluid", remedy)
+    for number, feed in enumerate(case.feed):
+        known = list(case.bed.species)
+        if feed.species is None and known:
+            yield InputError(f"feed.{number}.species", None, f"given, {nearest('', known)}")
+        elif feed.species is not None and feed.species not in known:
+            limit = nearest(feed.species, known) if known else "left out for a bed of one species"
+            yield InputError(f"feed.{number}.species", shown(feed.species), limit)
+        if case.bed.fixed:
+            yield InputError("bed.fixed", True, "false where there is a feed")

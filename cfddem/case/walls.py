@@ -1,0 +1,226 @@
+"""Walls of a case beside those of the column: planes, cylinders, cones and surfaces from files, at rest or moving."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cfddem.backend.errors import InputError, shown
+from cfddem.case.bed import NonNegative, Point, Positive
+from cfddem.case.materials import Checked
+
+if TYPE_CHECKING:
+    from cfddem.case.schema import Case
+
+
+OWN_KEYS: Mapping[str, tuple[str, ...]] = {
+    "plane": ("normal",),
+    "cylinder": ("axis", "radius", "length", "caps", "outside"),
+    "cone": ("axis", "radius", "top_radius", "length"),
+    "surface": ("file", "scale"),
+}
+"""Keys of each shape beside those of all walls."""
+
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "plane": (),
+    "cylinder": ("radius",),
+    "cone": ("top_radius", "length"),
+    "surface": ("file",),
+}
+
+COPIES = "surfaces"
+"""Folder inside a run folder with copies of the surface files of the case."""
+
+IN_PLACE = 1e-9
+"""Relative difference below which directions are equal."""
+
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+class CaseWall(Checked):
+    """A wall inside the column: a plane, a cylinder, a cone, or a surface from a file; at rest or moving."""
+
+    shape: Literal["plane", "cylinder", "cone", "surface"] = Field(description="shape of the wall")
+    material: str | None = Field(None, description="material of the wall; default: that of the column")
+    point: Point = Field(
+        ORIGIN,
+        description="a point of a plane, centre of the lower end of a cylinder or cone, or where the origin of a "
+        "surface file lies [m]",
+    )
+    normal: Point = Field((0.0, 0.0, 1.0), description="normal of a plane, to the side of the particles")
+    axis: Point = Field((0.0, 0.0, 1.0), description="axis of a cylinder or cone, from its lower end")
+    radius: NonNegative | None = Field(
+        None, description="radius of a cylinder, or of the lower end of a cone, default 0 [m]"
+    )
+    top_radius: Positive | None = Field(None, description="radius of the upper end of a cone [m]")
+    length: Positive | None = Field(
+        None, description="length of a cylinder or cone along its axis; a cylinder without it has no end [m]"
+    )
+    caps: bool = Field(False, description="a cylinder has flat ends; without them particles touch it from both sides")
+    outside: bool = Field(False, description="particles are outside of a cylinder that is closed or has no end")
+    file: str | None = Field(None, description="STL file of a surface; its place is relative to the case file")
+    scale: Positive = Field(1.0, description="unit of length of the file [m]")
+    velocity: Point = Field(ORIGIN, description="velocity of the wall [m/s]")
+    spin: Point = Field(ORIGIN, description="angular velocity of the wall [rad/s]")
+    centre: Point | None = Field(
+        None, description="centre of the spin, moves with the wall; default: on the axis, or in the middle [m]"
+    )
+    amplitude: Point = Field(
+        ORIGIN, description="amplitude of an oscillation: displacement amplitude x sin(2 pi frequency t) [m]"
+    )
+    frequency: NonNegative = Field(0.0, description="frequency of the oscillation [Hz]")
+    begin: NonNegative = Field(0.0, description="time at which the motion begins [s]")
+    end: Positive | None = Field(None, description="time at which the motion ends; default: the end of the run [s]")
+    solid: Literal["inside", "outside", "none"] | None = Field(
+        None,
+        description="in a fluid: side of the wall whose cells are solid; none: the fluid passes through. Default: the "
+        "side without particles, or the inside of a surface",
+    )
+
+    @model_validator(mode="after")
+    def _keys_suit_the_shape(self) -> CaseWall:
+        for name in sorted({name for names in OWN_KEYS.values() for name in names} - {*OWN_KEYS[self.shape]}):
+            if getattr(self, name) != type(self).model_fields[name].default:
+                owners = " or ".join(shape for shape, names in OWN_KEYS.items() if name in names)
+                raise InputError(
+                    name,
+                    shown(getattr(self, name)),
+                    f'left out for shape = "{self.shape}"',
+                    f"it belongs to a {owners}",
+                )
+        for name in NEEDED[self.shape]:
+            if getattr(self, name) is None:
+                raise InputError(name, None, f'given for shape = "{self.shape}"')
+        for name in ("normal", "axis"):
+            if not math.hypot(*getattr(self, name)) > 0.0:
+                raise InputError(name, getattr(self, name), "a direction other than zero")
+        self._check_shape()
+        self._check_motion()
+        return self
+
+    def _check_shape(self) -> None:
+        if self.shape == "cylinder":
+            if not self.radius:
+                raise InputError("radius", self.radius, "above 0")
+            if self.caps and self.length is None:
+                raise InputError("caps", True, "false where no length is given")
+            if self.outside and self.is_open:
+                raise InputError("outside", True, "false for an open cylinder", "particles touch it from both sides")
+        if self.file is not None and Path(self.file).suffix.lower() != ".stl":
+            raise InputError("file", self.file, "an STL file, *.stl")
+        if self.solid in ("inside", "outside") and self.shape != "surface" and not self.is_open:
+            raise InputError("solid", self.solid, "none, or left out", "the side without particles is solid")
+
+    def _check_motion(self) -> None:
+        oscillates, spins = any(self.amplitude), any(self.spin)
+        if oscillates != (self.frequency > 0.0):
+            name, other = ("frequency", "amplitude") if oscillates else ("amplitude", "frequency")
+            raise InputError(name, getattr(self, name), f"other than 0 where {other} is given")
+        if oscillates and any(self.velocity):
+            raise InputError("amplitude", self.amplitude, "left out where velocity is given")
+        if self.end is not None and self.end <= self.begin:
+            raise InputError("end", self.end, f"after the beginning of the motion, {self.begin:g} s")
+        if (self.begin or self.end) and not self.moves:
+            raise InputError("begin", self.begin, "left out for a wall at rest", "give velocity, spin or amplitude")
+        if self.centre is not None and not spins:
+            raise InputError("centre", self.centre, "left out where there is no spin")
+        if self.shape == "plane" and not _parallel(self.spin, self.normal):
+            raise InputError("spin", self.spin, "along the normal of a plane", "use a surface for a plate that tilts")
+        if self.shape == "cylinder" and self.length is None and not self._spins_in_place:
+            raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give a length")
+
+    @property
+    def is_open(self) -> bool:
+        """Whether particles touch the wall from both sides, and it has no inside."""
+        return self.shape == "cone" or (self.shape == "cylinder" and self.length is not None and not self.caps)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the surface has a velocity at some time."""
+        return any(self.velocity) or any(self.spin) or any(self.amplitude)
+
+    @property
+    def has_schedule(self) -> bool:
+        """Whether the velocity changes in time."""
+        return self.begin > 0.0 or self.end is not None or any(self.amplitude)
+
+    @property
+    def swing(self) -> np.ndarray:
+        """Largest velocity of the oscillation (3,) [m/s]."""
+        return 2.0 * math.pi * self.frequency * np.array(self.amplitude)
+
+    @property
+    def leaves_its_place(self) -> bool:
+        """Whether the wall sweeps through space; one that moves along itself does not."""
+        drift = np.array(self.velocity) + self.swing
+        if self.shape == "plane":
+            return not abs(float(drift @ np.array(self.normal))) <= IN_PLACE * _norm(drift) * _norm(self.normal)
+        if self.shape == "cylinder" and self.length is None:
+            return not _parallel(drift, self.axis)
+        if self.shape == "surface":
+            return self.moves
+        return bool(drift.any()) or not self._spins_in_place
+
+    @property
+    def _spins_in_place(self) -> bool:
+        """Whether a spin leaves a surface of revolution unchanged."""
+        arm = np.subtract(self.point if self.centre is None else self.centre, self.point)
+        return not any(self.spin) or (_parallel(self.spin, self.axis) and _parallel(arm, self.axis))
+
+    @property
+    def fastest(self) -> float:
+        """Bound of the speed of the surface; NaN for the spin of a surface from a file, which is not read [m/s]."""
+        turning = 0.0
+        if any(self.spin):
+            arm = np.subtract(self.point if self.centre is None else self.centre, self.point)
+            reach = max(self.radius or 0.0, self.top_radius or 0.0) + (self.length or 0.0) * (not self._spins_in_place)
+            across = _norm(arm) * (not self._spins_in_place)
+            turning = _norm(self.spin) * (reach + across) if self.shape in ("cylinder", "cone") else math.nan
+            turning = 0.0 if self.shape == "plane" else turning
+        return _norm(self.velocity) + _norm(self.swing) + turning
+
+
+def _norm(vector: Sequence[float] | np.ndarray) -> float:
+    return math.hypot(*vector)
+
+
+def _parallel(one: Sequence[float] | np.ndarray, other: Sequence[float] | np.ndarray) -> bool:
+    """Whether two vectors have the same axis; a vector of length 0 has any."""
+    across = _norm(np.cross(np.array(one, float), np.array(other, float)))
+    return across <= IN_PLACE * _norm(one) * _norm(other)
+
+
+# ---------------------------------------------------------------- surface files
+
+
+def copy_of(folder: Path, number: int) -> Path:
+    """Copy of the surface of a wall in a run folder."""
+    return folder / COPIES / f"wall_{number}.stl"
+
+
+def with_surfaces_of(case: Case, folder: Path) -> Case:
+    """The case with the places of its surface files; a run folder has copies, other paths are relative to it.
+
+    folder  of the case file
+    """
+    is_run = (folder / "run.json").is_file()
+
+    def place(number: int, file: str) -> str:
+        copy = copy_of(folder, number)
+        return os.path.abspath(copy if is_run and copy.is_file() else folder / file)
+
+    return with_surfaces(case, {n: place(n, wall.file) for n, wall in enumerate(case.wall) if wall.file is not None})
+
+
+def with_surfaces(case: Case, files: Mapping[int, str]) -> Case:
+    """The case with other surface files, by the number of the wall."""
+    if not files:
+        return case
+    walls = [wall.model_copy(update={"file": files[n]}) if n in files else wall for n, wall in enumerate(case.wall)]
+    return case.model_copy(update={"wall": tuple(walls)})

@@ -1,0 +1,98 @@
+"""Energy lost to films that resist sliding, rolling and twisting.
+
+The work of an impulse is its product with the mean of the motion before and after all impulses of the step: so the work
+of all impulses adds up to the change of the kinetic energy to round-off.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, prange, threaded
+from cfddem.backend.law_set import specialise
+from cfddem.particles.energy_of_bridges import mean_motion
+from cfddem.particles.energy_of_contacts import FILMS, note_loss
+from cfddem.particles.interactions.shear_film import impulses_of
+from cfddem.particles.vectors import at, dot, flat, minus, plus, times
+from cfddem.particles.walls.nearest_point import SURFACE, touched
+
+if TYPE_CHECKING:
+    from cfddem.particles.solver import ParticleSolver
+
+CHANNELS = ("film_shear",)
+"""Energy lost to films that resist sliding, rolling and twisting."""
+
+
+class ShearCount(NamedTuple):
+    """State of the count between two steps, as compiled loops take it."""
+
+    ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
+    spin_ahead: np.ndarray  # (N, 3) likewise [rad/s]
+    totals: np.ndarray  # (2, CHUNKS, 2) lost, and put in by moving walls; second half: another rank adds it [J]
+
+
+class ShearEnergies:
+    """The energy account of films that resist sliding."""
+
+    def __init__(self, solver: ParticleSolver) -> None:
+        self._loop = specialise(_count_shear, solver.choices)
+        self.make_room(solver)
+
+    def make_room(self, solver: ParticleSolver) -> None:
+        """Begin with another neighbour list."""
+        ahead, spin_ahead = np.zeros((2, solver.particles.count, 3))
+        self._state = ShearCount(ahead, spin_ahead, np.zeros((2, CHUNKS, 2)))
+
+    def before(self, solver: ParticleSolver, step: float, ahead: np.ndarray) -> None:
+        """Keep what impulses of a step act on.
+
+        step   [s]
+        ahead  velocity after the first half kick (N, 3) [m/s]
+        """
+        particles = solver.particles
+        self._state.ahead[:] = ahead
+        gain = (0.5 * step * particles.inverse_inertia)[:, None] * particles.torque
+        self._state.spin_ahead[:] = particles.spin + gain
+
+    def count(self, solver: ParticleSolver, step: float) -> np.ndarray:
+        """Energy lost in the step, and put in by moving walls (2,) [J].
+
+        step  0 where no time has passed since the last count [s]
+        """
+        if step == 0.0:
+            return np.zeros(2)
+        particles, edges, memory, walls, _ = solver.views
+        state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
+        state.totals[:] = 0.0
+        self._loop(particles, edges, memory, walls, state, step)
+        return solver.communicator.sum(state.totals[0], axis=0)
+
+
+@inline
+def _shear_works(k, particles, edges, memory, walls, count, step):
+    """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
+    i, j = edges.first[k], edges.second[k]
+    impulse, couple, moment = impulses_of(k, memory)
+    velocity, spin = mean_motion(i, particles, count, step)
+    gained = dot(impulse, velocity) + dot(plus(times(particles.radius[i], couple), moment), spin)
+    if k < edges.between_particles:
+        velocity, spin = mean_motion(j, particles, count, step)
+        gained += dot(minus(times(particles.radius[j], couple), moment), spin) - dot(impulse, velocity)
+        return -gained, 0.0
+    by_wall = dot(impulse, touched(edges, k, SURFACE)) + dot(moment, at(walls.spin, walls.wall[j]))
+    return by_wall - gained, by_wall
+
+
+@threaded
+def _count_shear(particles, edges, memory, walls, count, step):
+    """See `ShearEnergies.count`."""
+    number = len(edges.first)
+    for chunk in prange(CHUNKS):
+        for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
+            lost, by_wall = _shear_works(k, particles, edges, memory, walls, count, step)
+            totals[0] += lost
+            totals[1] += by_wall
+            note_loss(k, memory, FILMS, lost)

@@ -1,0 +1,118 @@
+"""Impulses of liquid bridges over a step: of one edge for any change of the gap, and of all edges in turn."""
+
+from __future__ import annotations
+
+import math
+
+from cfddem.backend.compile import inline, part, prange, serial
+from cfddem.particles.interactions.bridge import bridge_state, resistance_across
+from cfddem.particles.interactions.bridge_solution import at_gap, speed_after_bridge
+from cfddem.particles.interactions.film import clamp_speed
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
+from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_SLIDING, WALLS, bridge_impulses
+from cfddem.particles.pair_graph import edge_role, geometry
+from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
+
+
+@serial
+def find_bridge_impulses(particles, edges, memory, shift, p, step):
+    """Impulses of all bridges over the coming step."""
+    bridge_impulses(0, edges.between_particles, particles, edges, memory, shift, step)
+    open_impulses(particles, edges, memory, shift, p, step)
+    if WALLS:
+        wall_impulses(particles, edges, memory, shift, p, step)
+
+
+@part
+def open_impulses(particles, edges, memory, shift, p, step):
+    """Impulses of the bridges between particles that the short solution leaves."""
+    for k in prange(edges.between_particles):
+        if memory.bridge_open[k]:
+            bridge_impulse(k, particles, edges, memory, shift, p, step)
+
+
+@part
+def wall_impulses(particles, edges, memory, shift, p, step):
+    """Impulses of the bridges at walls."""
+    for k in prange(edges.between_particles, len(edges.first)):
+        if memory.bridge_resistance[k] > 0.0:
+            bridge_impulse(k, particles, edges, memory, shift, p, step)
+        elif memory.bridge_film[k] > 0.0:
+            no_impulse(k, memory)
+
+
+@inline
+def no_impulse(k, memory):
+    """The bridge of edge k gives no impulse in this step."""
+    put(memory.bridge_impulse, k, NOTHING)
+    put(memory.bridge_couple, k, NOTHING)
+
+
+@inline
+def _rates(k, particles, edges, memory, lever):
+    """Inverse masses that both bodies give the bridge of edge k, along and across the line of centres [1/kg].
+
+    lever  arm of the impulse over the radius [-]
+    """
+    i, j = edges.first[k], edges.second[k]
+    load = particles.bridge_load[i] / memory.bridge_resistance[k]
+    arm = lever * particles.radius[i]
+    along = load * particles.inverse_mass[i]
+    across_it = along + load * arm * arm * particles.inverse_inertia[i]
+    if k < edges.between_particles:
+        load = particles.bridge_load[j] / memory.bridge_resistance[k]
+        arm = lever * particles.radius[j]
+        along += load * particles.inverse_mass[j]
+        across_it += load * (particles.inverse_mass[j] + arm * arm * particles.inverse_inertia[j])
+    return along, across_it
+
+
+@inline
+def bridge_impulse(k, particles, edges, memory, shift, p, step):
+    """Impulse and couple of the bridge of edge k over the coming step.
+
+    Lever arms add up to the distance of the centres, so that angular momentum is kept.
+    """
+    i, j = edges.first[k], edges.second[k]
+    separation, distance, gap = geometry(k, particles, edges, shift)
+    normal = times(1.0 / distance, separation)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    state = bridge_state(k, gap, reduced_radius, memory, p)
+    velocity = relative_velocity(k, particles, edges)
+    turning, radii = times(particles.radius[i], at(particles.spin, i)), particles.radius[i]
+    if k < edges.between_particles:
+        turning, radii = plus(turning, times(particles.radius[j], at(particles.spin, j))), radii + particles.radius[j]
+    lever = distance / radii
+    along, sideways = _rates(k, particles, edges, memory, lever)
+
+    speed = new_speed = dot(velocity, normal)
+    if BRIDGE_FILM:
+        new_speed = speed_after_bridge(speed, state, memory.bridge_accounted[k], step, along)
+        new_speed = clamp_speed(new_speed, speed)
+    memory.bridge_accounted[k] = gap + step * new_speed
+    impulse = times((new_speed - speed) / along, normal)
+    couple = NOTHING
+    if BRIDGE_SLIDING:
+        resistance = resistance_across(at_gap(state, gap + 0.5 * step * new_speed))
+        slip = minus(across(velocity, normal), times(lever, cross(turning, normal)))
+        drag = times(math.expm1(-step * resistance * sideways) / sideways, slip)
+        impulse = plus(impulse, drag)
+        couple = times(-lever, cross(normal, drag))
+    put(memory.bridge_impulse, k, impulse)
+    put(memory.bridge_couple, k, couple)
+
+
+@part
+def apply_bridge_impulses(particles, edges, memory):
+    """Give every particle the impulses of its bridges."""
+    for i in prange(particles.owned):
+        impulse, couple = NOTHING, NOTHING
+        for place in range(edges.start[i], edges.start[i + 1]):
+            k, sign = edge_role(edges.incident[place])
+            if memory.bridge_resistance[k] > 0.0:
+                impulse = plus(impulse, times(sign, at(memory.bridge_impulse, k)))
+                couple = plus(couple, at(memory.bridge_couple, k))
+        gain = times(particles.inverse_mass[i], impulse)
+        put(particles.velocity, i, plus(at(particles.velocity, i), gain))
+        gain = times(particles.inverse_inertia[i] * particles.radius[i], couple)
+        put(particles.spin, i, plus(at(particles.spin, i), gain))

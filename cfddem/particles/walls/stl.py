@@ -1,0 +1,73 @@
+"""Triangles of STL files, text or binary."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+
+from cfddem.backend.errors import InputError
+
+HEADER, RECORD = 80, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+"""Bytes before the number of triangles of a binary file, and one triangle after it."""
+
+_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
+
+
+def read_stl(path: str | Path) -> np.ndarray:
+    """Corners of the triangles of a surface (T, 3, 3), in the unit of the file.
+
+    errors  InputError if the file is missing, or is not a whole STL file
+    """
+    content = _content(Path(path))
+    count = triangles_in(path, content)
+    if _is_binary(content):
+        corners = np.frombuffer(content, RECORD, count, HEADER + 4)["corners"].astype(float)
+    else:
+        try:
+            corners = np.array(_VERTEX.findall(content)).astype(float).reshape(-1, 3, 3)
+        except ValueError:
+            raise _not_stl(path, "a corner is not three numbers") from None
+    if not np.isfinite(corners).all():
+        raise _not_stl(path, "a corner is not finite")
+    return corners
+
+
+def triangles_in(path: str | Path, content: bytes | None = None) -> int:
+    """Number of triangles of an STL file.
+
+    errors  InputError if the file is missing, or is not a whole STL file
+    """
+    content = _content(Path(path)) if content is None else content
+    if _is_binary(content):
+        return int.from_bytes(content[HEADER : HEADER + 4], "little")
+    if not content.lstrip()[:5].lower() == b"solid":
+        raise _not_stl(
+            path, "its length does not fit its number of triangles, and it is not a text that begins with solid"
+        )
+    corners = len(_VERTEX.findall(content))
+    if corners == 0 or corners % 3:
+        raise _not_stl(path, f"it has {corners} corners")
+    return corners // 3
+
+
+def _is_binary(content: bytes) -> bool:
+    """Whether a file has the length that a binary one states."""
+    if len(content) < HEADER + 4:
+        return False
+    count = int.from_bytes(content[HEADER : HEADER + 4], "little")
+    return count > 0 and len(content) == HEADER + 4 + count * RECORD.itemsize
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as failure:
+        reason = getattr(failure, "strerror", None) or str(failure)
+        raise InputError("file", os.fspath(path), "a readable STL file", reason) from None
+
+
+def _not_stl(path: str | Path, why: str) -> InputError:
+    return InputError("file", os.fspath(path), "an STL file of triangles", why)

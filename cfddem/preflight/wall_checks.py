@@ -1,0 +1,255 @@
+"""Checks of walls, feeds and outlets: whether they lie in the column, can be read, and can work."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+from cfddem.backend.errors import InputError
+from cfddem.case.bed import Point
+from cfddem.case.feeds import CaseFeed, fed_species, feed_rate
+from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import corners_of, distance, extent, is_closed, solid_part, triangles
+from cfddem.case.walls import CaseWall
+from cfddem.fluid.cell_counts import cell_counts
+from cfddem.preflight.issue import Issue, Severity
+
+MANY_TRIANGLES, MOST_TRIANGLES, LARGEST_FILE = 200_000, 2_000_000, 1_000_000_000
+"""Triangles of a surface above which preparation is slow, and above which it is refused; largest file [byte]."""
+
+FINE = 0.05
+"""Mean edge of the triangles over the smallest diameter below which a surface is needlessly fine [-]."""
+
+LOOSE = 0.3
+"""Solid fraction that random insertion reaches in a box [-]."""
+
+MOST_CELLS = 5_000_000
+"""Cells above which the pre-run check does not look for those that walls close."""
+
+SAMPLES, MOSTLY = 400, 0.5
+"""Places tried in the box of a feed, and share of them that must be free of walls [-]."""
+
+
+def check_walls_and_feeds(case: Case) -> Iterator[Issue]:
+    """Check the walls, feeds and outlets of a case."""
+    for number, wall in enumerate(case.wall):
+        yield from _check_wall(case, wall, f"wall.{number}")
+    for number, feed in enumerate(case.feed):
+        yield from _check_feed(case, feed, f"feed.{number}")
+    yield from _check_outlets(case)
+    yield from _check_cells(case)
+
+
+# ---------------------------------------------------------------- walls
+
+
+def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
+    if wall.shape == "surface":
+        found = list(_check_surface(case, wall, key))
+        yield from found
+        if any(each.severity == "error" for each in found):
+            return
+    yield from _check_place(case, wall, key)
+    if wall.moves and wall.has_schedule and wall.begin >= case.run.until:
+        yield Issue("warning", f"{key}.begin", f"{wall.begin:g} s is not before the end of the run", "begin earlier")
+    if math.isnan(wall.fastest) and case.run.reference_speed is None:
+        yield Issue(
+            "warning", "run.reference_speed", f"the speed of {key}, a surface file that spins, is not part of it",
+            "set it to the speed of the tip, if that is the fastest",
+        )  # fmt: skip
+    if wall.moves and case.fluid is not None and wall.solid != "none":
+        yield Issue(
+            "warning", f"{key}.velocity" if any(wall.velocity) else f"{key}.spin",
+            "the fluid does not feel the motion of a wall: at its cells the velocity is 0",
+            "the motion acts on particles that touch the wall",
+        )  # fmt: skip
+    if _is_periodic(case) and not _repeats(case, wall):
+        yield Issue(
+            "error", key, f"a {wall.shape} is not the same all along the periodic sides of the column",
+            'set column.sides or column.front to "no_slip"; only planes and endless cylinders along them repeat',
+        )  # fmt: skip
+
+
+def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
+    """Check that a surface can be read, and is not needlessly fine."""
+    try:
+        size = Path(wall.file or "").stat().st_size
+        if size > LARGEST_FILE:
+            raise InputError("file", wall.file, f"at most {LARGEST_FILE / 1e9:g} GB")
+        corners = triangles(wall)
+    except (InputError, OSError, ValueError) as failure:
+        why = failure.strerror if isinstance(failure, OSError) else str(failure).partition(": ")[2] or str(failure)
+        yield Issue("error", f"{key}.file", f"{wall.file}: {why}", "paths are relative to the case file")
+        return
+    edge = float(np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1).mean())
+    smallest = min(each.smallest_diameter for each in case.species.values())
+    if len(corners) > MANY_TRIANGLES:
+        yield Issue(
+            "error" if len(corners) > MOST_TRIANGLES else "warning", f"{key}.file",
+            f"{len(corners)} triangles take long to prepare; the limit is {MOST_TRIANGLES}",
+            "simplify the surface; edges of half a diameter are enough",
+        )  # fmt: skip
+    elif edge < FINE * smallest:
+        yield Issue(
+            "warning", f"{key}.file", f"its edges of {edge:.2g} m are below {FINE:g} diameters, which costs time",
+            "simplify the surface, or check scale: the unit of the file in m",
+        )  # fmt: skip
+    if case.fluid is not None and wall.solid != "none" and not is_closed(corners):
+        yield Issue(
+            "error", f"{key}.solid", "the surface is not closed, so that no cells lie inside",
+            'close the surface, or set solid = "none"',
+        )  # fmt: skip
+
+
+def _check_place(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
+    """Check that a wall lies in the column."""
+    size = np.array(case.column.size)
+    box = extent(wall)
+    if box is not None:
+        if (box[0] > size).any() or (box[1] < 0.0).any():
+            low, high = (", ".join(f"{each:.4g}" for each in corner) for corner in box)
+            yield Issue(
+                "error", f"{key}.point", f"the wall, from ({low}) to ({high}) m, lies outside the column",
+                f"the column extends from 0 to {case.column.size} m",
+            )  # fmt: skip
+        return
+    if wall.shape == "plane":
+        away = distance(wall, corners_of(np.zeros(3), size))
+        if away.max() <= 0.0:
+            yield Issue("error", f"{key}.normal", "the whole column lies behind the plane", "reverse the normal")
+        elif away.min() >= 0.0 and not wall.leaves_its_place:
+            yield Issue("warning", f"{key}.point", "the plane does not cut the column", "move it into the column")
+
+
+def _check_cells(case: Case) -> Iterator[Issue]:
+    """Check which cells the walls close to the fluid."""
+    if case.fluid is None or not case.wall:
+        return
+    closed = closed_cells(case)
+    for number, mask in closed.items():
+        if not mask.any():
+            yield Issue(
+                "warning", f"wall.{number}.solid", "the wall closes no cell: the fluid passes through it",
+                'use cells smaller than the wall is thick, or set solid = "none"',
+            )  # fmt: skip
+    together = reduce(np.logical_or, closed.values(), np.zeros((1, 1, 1), bool))
+    if together.all():
+        yield Issue("error", "wall", "the walls close all cells to the fluid", 'check solid: "inside" or "outside"')
+    elif case.column.ends == "flow" and together.shape[0] > 1 and together[0].all():
+        yield Issue("error", "wall", "the walls close the whole floor, where the fluid enters", "raise the walls")
+
+
+def closed_cells(case: Case) -> dict[int, np.ndarray]:
+    """Cells that each wall closes to the fluid (nz, ny, nx) bool, by its number."""
+    counts = cell_counts(case.column.size, case.column.cell)
+    if math.prod(counts) > MOST_CELLS:
+        return {}
+    lines = [(np.arange(n) + 0.5) * length / n for n, length in zip(counts, case.column.size)]
+    z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
+    centres = np.stack([x, y, z], axis=-1)
+    closed = {}
+    for number, wall in enumerate(case.wall):
+        if wall.solid != "none":
+            with suppress(InputError, OSError):  # a surface that cannot be read, or is open, is reported elsewhere
+                closed[number] = solid_part(wall, centres.reshape(-1, 3)).reshape(x.shape)
+    return closed
+
+
+def _is_periodic(case: Case) -> bool:
+    return "periodic" in (case.column.sides, case.column.front, case.column.ends)
+
+
+def _repeats(case: Case, wall: CaseWall) -> bool:
+    """Whether a wall is the same in every periodic image of the column."""
+    column = case.column
+    periodic = [each == "periodic" for each in (column.sides, column.front or column.sides, column.ends)]
+    if wall.shape == "plane":
+        return not any(part for part, repeats in zip(wall.normal, periodic) if repeats)
+    if wall.shape == "cylinder" and wall.length is None:
+        return sum(periodic) == 1 and not any(part for part, repeats in zip(wall.axis, periodic) if not repeats)
+    return False
+
+
+# ---------------------------------------------------------------- feeds and outlets
+
+
+def _check_feed(case: Case, feed: CaseFeed, key: str) -> Iterator[Issue]:
+    diameter = fed_species(case, feed).diameter
+    free = free_share(case, feed.corner, feed.size, 0.5 * diameter)
+    if free < MOSTLY:
+        severity: Severity = "error" if free == 0.0 else "warning"
+        yield Issue(
+            severity, f"{key}.corner", f"only {100.0 * free:.0f} % of the box is half a diameter away from walls",
+            "move the box, or make it smaller",
+        )  # fmt: skip
+    rate, most = feed_rate(case, feed), largest_rate(case, feed)
+    if rate > most:
+        yield Issue(
+            "error" if rate > 10.0 * most else "warning", f"{key}.{'rate' if feed.rate else 'mass_rate'}",
+            f"{rate:.3g} particles per second; about {most:.2g} fall out of the box in time to make room",
+            "use a larger box, a higher velocity or a lower rate; particles that find no place wait",
+        )  # fmt: skip
+    if feed.begin >= case.run.until:
+        yield Issue("warning", f"{key}.begin", f"{feed.begin:g} s is not before the end of the run", "begin earlier")
+
+
+def free_share(case: Case, corner: Point, size: Point, radius: float) -> float:
+    """Share of the places in a box that are a radius away from planes, cylinders and cones [-]."""
+    places = np.array(corner) + np.random.default_rng(1).uniform(size=(SAMPLES, 3)) * np.array(size)
+    free = np.ones(SAMPLES, bool)
+    for wall in case.wall:
+        away = distance(wall, places)
+        free &= ~(away < radius)
+    if case.column.shape == "cylinder":
+        free &= np.hypot(*(places[:, :2] - 0.5 * case.column.width).T) < 0.5 * case.column.width - radius
+    return float(np.count_nonzero(free)) / SAMPLES
+
+
+def largest_rate(case: Case, feed: CaseFeed) -> float:
+    """Particles per second that leave the box of a feed in time to make room for others, about [1/s]."""
+    species = fed_species(case, feed)
+    room = [edge + species.diameter for edge in feed.size]
+    held = max(1.0, LOOSE * math.prod(room) / species.mean_volume)
+    times = []
+    for length, speed, pull in zip(room, feed.velocity, case.laws.gravity):
+        along = abs(speed) if speed * pull >= 0.0 else 0.0
+        if pull:
+            times.append((math.sqrt(along**2 + 2.0 * abs(pull) * length) - along) / abs(pull))
+        elif along:
+            times.append(length / along)
+    return held / max(min(times, default=math.inf), 1e-300)
+
+
+def _check_outlets(case: Case) -> Iterator[Issue]:
+    for number, outlet in enumerate(case.outlet):
+        low, high = np.array(outlet.corner), np.array(outlet.corner) + np.array(outlet.size)
+        for n, feed in enumerate(case.feed):
+            begin, end = np.array(feed.corner), np.array(feed.corner) + np.array(feed.size)
+            if (np.maximum(low, begin) <= np.minimum(high, end)).all():
+                yield Issue(
+                    "warning",
+                    f"outlet.{number}",
+                    f"it removes particles where feed.{n} inserts them",
+                    "move one of them",
+                )
+        if _unreachable(case, outlet.corner, outlet.size):
+            yield Issue(
+                "error", f"outlet.{number}.corner", "all of the box lies behind walls, where no particle comes",
+                "move the box to where particles leave",
+            )  # fmt: skip
+
+
+def _unreachable(case: Case, corner: Point, size: Point) -> bool:
+    """Whether a box lies behind a wall with one side, or outside of a round column."""
+    low = np.array(corner)
+    places = np.concatenate([corners_of(low, low + np.array(size)), [low + 0.5 * np.array(size)]])
+    for wall in case.wall:
+        if not wall.leaves_its_place and (distance(wall, places) < 0.0).all() and not wall.is_open:
+            return True
+    width = case.column.width
+    return case.column.shape == "cylinder" and bool((np.hypot(*(places[:, :2] - 0.5 * width).T) > 0.5 * width).all())

@@ -1,0 +1,80 @@
+"""Cavitation: where the pressure would fall below that of the vapour, a void opens, and closes before it carries load.
+
+Each liquid cell either has no void and a pressure above the floor, or the pressure of the floor and a void whose volume
+grows or shrinks. The set of cells with voids is found by exchanging cells until every one satisfies its inequality.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+EXCHANGES = 50
+"""Largest number of exchanges between the two sets; then the last set is taken."""
+
+
+def coupled(
+    matrix: np.ndarray, outflow: np.ndarray, shadow: np.ndarray, velocity: float, share: float
+) -> tuple[np.ndarray, float]:
+    """Pressure and bead speed for which the outflow of every cell and the bead's displacement add to zero.
+
+    matrix    lower bands of the pressure equation
+    outflow   of each cell before the pressure [m3/s]
+    shadow    projected area of the bead in each cell [m2]
+    velocity  of the bead before the pressure [m/s]
+    share     time step over its mass [s/kg]
+    """
+    both = np.stack([-outflow, shadow], axis=1)
+    at_rest, moving = solveh_banded(matrix, both, overwrite_b=True, lower=True, check_finite=False).T
+    speed = float((velocity + share * (shadow @ at_rest)) / (1.0 + share * (shadow @ moving)))
+    return at_rest - speed * moving, speed
+
+
+def with_voids(
+    matrix: np.ndarray, outflow: np.ndarray, shadow: np.ndarray, velocity: float, share: float, floor: float,
+    closing: np.ndarray,
+) -> tuple[np.ndarray, float, np.ndarray]:  # fmt: skip
+    """The same with a lowest pressure; returns also the rate at which the void of each cell grows [m3/s].
+
+    floor    lowest pressure [Pa]
+    closing  void of each cell over the time step [m3/s]
+    """
+    void = closing > 0.0
+    for _ in range(EXCHANGES):
+        pressure, speed = _with_fixed(
+            matrix, outflow + np.where(void, 0.0, closing), shadow, velocity, share, floor * void
+        )
+        growth = np.where(void, _times(matrix, pressure) + outflow + shadow * speed, -closing)
+        opens, shuts = ~void & (pressure < floor), void & (growth < -closing)
+        if not (opens.any() or shuts.any()):
+            break
+        void = (void | opens) & ~shuts
+    return pressure, speed, growth
+
+
+def _with_fixed(
+    matrix: np.ndarray, outflow: np.ndarray, shadow: np.ndarray, velocity: float, share: float, fixed: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Pressure and bead speed with the pressure given in some cells, where `fixed` is not 0."""
+    known = fixed != 0.0
+    if not known.any():
+        return coupled(matrix, outflow, shadow, velocity, share)
+    free = matrix.copy()
+    free[:, known] = 0.0
+    for band in range(1, len(matrix)):
+        free[band, :-band][known[band:]] = 0.0
+    free[0, known] = 1.0
+    both = np.stack([-outflow - _times(matrix, fixed), shadow], axis=1)
+    both[known] = np.stack([fixed[known], np.zeros(known.sum())], axis=1)
+    at_rest, moving = solveh_banded(free, both, overwrite_b=True, lower=True, check_finite=False).T
+    speed = float((velocity + share * (shadow @ at_rest)) / (1.0 + share * (shadow @ moving)))
+    return at_rest - speed * moving, speed
+
+
+def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Product of a symmetric matrix, given by its lower bands, with a vector."""
+    product = matrix[0] * values
+    for band in range(1, len(matrix)):
+        product[band:] += matrix[band, :-band] * values[:-band]
+        product[:-band] += matrix[band, :-band] * values[band:]
+    return product

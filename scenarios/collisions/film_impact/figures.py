@@ -1,0 +1,119 @@
+"""Figures of the film impact: the flow at P1 to P4, motion and energy, and restitution beside fit and film laws."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, blank, label, legend, panels, save, shades
+from closures.restitution import singh
+from scenarios.collisions.film_impact.film_laws import laws_of
+from scenarios.collisions.film_impact.materials import LIQUIDS
+from scenarios.collisions.film_impact.result import FilmImpact, Frame
+
+TITLES = {
+    "P1": "P1: meets the film", "P2": "P2: strikes the plate", "P3": "P3: has turned", "P4": "P4: leaves the film",
+}  # fmt: skip
+STYLES = {
+    "fit": (GREY, ":"),
+    "static bridge": (RED, "--"),
+    "deforming bridge": (ORANGE, "-."),
+    "immersed film": (GREEN, "--"),
+    "deforming bridge and added mass": (BLUE, "--"),
+    "reduced model": (BLUE, "-"),
+}
+"""Colour and line of each law."""
+
+Case = tuple[float, str, float]
+"""Diameter, liquid, depth of the film [m]."""
+
+
+def draw_moments(path: Path, result: FilmImpact, diameter: float) -> None:
+    """The bead in the film at P1 to P4, with the pressure of the liquid."""
+    figure, axes = blank(4, 1, width=9.0, height=9.5, sharex=True, sharey=True)
+    for axis, (name, frame) in zip(axes, sorted(result.frames.items())):
+        _draw_frame(figure, axis, frame, 0.5 * diameter)
+        axis.set_title(f"{TITLES[name]}, {frame.time * 1e3:.3f} ms", loc="left", fontweight="bold", fontsize=11)
+        axis.set_ylabel("height  [mm]")
+    axes[-1].set_xlabel("radius  [mm]")
+    save(figure, path, 130)
+
+
+def _draw_frame(figure: Any, axis: Any, frame: Frame, radius: float) -> None:
+    """One frame, mirrored at the axis: pressure in kPa on the liquid cells, liquid particles, and the bead."""
+    shown = np.where(frame.liquid, frame.pressure / 1e3, np.nan)
+    most = max(float(np.nanpercentile(np.abs(shown[frame.liquid]), 95.0)), 1e-3)
+    shown = np.concatenate([shown[::-1], shown])
+    wide, high = len(shown) * frame.dx * 500.0, shown.shape[1] * frame.dx * 1e3
+    image = axis.imshow(
+        shown.T, origin="lower", extent=(-wide, wide, 0.0, high), cmap="RdBu_r", vmin=-most, vmax=most, aspect="equal"
+    )
+    figure.colorbar(image, ax=axis, label="pressure  [kPa]", extend="both", shrink=0.85)
+    r, z = frame.particles[::4].T * 1e3
+    axis.plot(np.concatenate([-r, r]), np.concatenate([z, z]), ",", color="#333333", alpha=0.5)
+    across = np.linspace(-radius, radius, 400)
+    under = frame.gap + radius - np.sqrt(radius**2 - across**2)
+    axis.fill_between(across * 1e3, under * 1e3, 10.0 * radius * 1e3, color="#d9d9d9", zorder=3)
+    axis.plot(across * 1e3, under * 1e3, color="#555555", lw=1.0, zorder=4)
+    axis.set(xlim=(-wide, wide), ylim=(0.0, high * 0.5))
+    axis.grid(False)
+
+
+def draw_motion(path: Path, slow: FilmImpact, fast: FilmImpact) -> None:
+    """Speed of the bead against its height, and the energy of the liquid, of a slow and a fast impact."""
+    figure, (left, middle, right) = panels(3, width=15.0, height=4.4)
+    for result, colour in ((slow, BLUE), (fast, ORANGE)):
+        history, speed = result.history, -result.p1.velocity
+        name = f"{speed:g} m/s"
+        left.plot(history["gap"] * 1e6, np.abs(history["velocity"]) / speed, color=colour, label=name)
+        end = result.p4.time if np.isfinite(result.p4.time) else history["time"][-1]
+        energy = history["liquid_kinetic"] / history["liquid_kinetic"].max()
+        middle.plot(history["time"] / end, energy, color=colour, label=name)
+    for name, colour in (("contact", GREY), ("viscous", BLUE), ("impulsive", ORANGE), ("liquid_kinetic", GREEN)):
+        share = fast.energies[name] / max(fast.history[name][-1], 1e-30)
+        right.plot(fast.history["time"] * 1e3, fast.history[name] * share, color=colour, label=name.replace("_", " "))
+    label(left, "height of the lowest point", "um", "speed over that at P1", "-", "Motion: P1, P2, P3, P4")
+    label(
+        middle, "time over that of P4", "-", "kinetic energy of the liquid, over its peak", "-", "Energy of the liquid"
+    )
+    label(right, "time", "ms", "energy over that of the bead", "-", f"Where it goes, {-fast.p1.velocity:g} m/s")
+    for axis in (left, middle, right):
+        legend(axis)
+    save(figure, path)
+
+
+def draw_restitution(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
+    """Restitution against the Stokes number at each film ratio, beside the fit and the bracket of the added mass."""
+    figure, axis = panels(width=8.6, height=5.2)
+    for (case, results), colour in zip(cases.items(), shades(len(cases))):
+        diameter, liquid, _ = case
+        stokes = np.array([each.stokes for each in results])
+        name = f"{diameter * 1e3:g} mm, {liquid}, $\\gamma$ = {results[0].film_ratio:.3f}"
+        axis.plot(stokes, [each.restitution for each in results], "o", color=colour, label=name)
+        line = np.geomspace(stokes[0], stokes[-1], 60)
+        axis.plot(line, [singh(each, results[0].film_ratio) for each in line], color=colour, lw=1.2)
+    axis.set_xscale("log")
+    label(axis, "Stokes number", "-", "restitution", "-", "Resolved (points) and the fit of Singh et al. (lines)")
+    legend(axis, loc="lower right")
+    save(figure, path)
+
+
+def draw_laws(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
+    """The same impacts by laws of thin films."""
+    chosen = [case for case in cases if case[0] in (8e-3, 2.8e-3) or case[1] == "m5"]
+    figure, axes = panels(len(chosen), width=15.0, height=4.6, sharey=True)
+    for axis, case in zip(axes, chosen):
+        diameter, liquid, film = case
+        speeds = np.array([-each.p1.velocity for each in cases[case]])
+        laws = [laws_of(diameter, LIQUIDS[liquid], film, float(speed)) for speed in speeds]
+        for name, (colour, line) in STYLES.items():
+            axis.plot(speeds, [each[name] for each in laws], line, color=colour, label=name)
+        axis.plot(speeds, [each.restitution for each in cases[case]], "o", color="#222222", label="resolved")
+        label(axis, "velocity", "m/s", "restitution", "-", f"{diameter * 1e3:g} mm, {liquid}")
+        axis.set_ylim(0.4, 1.0)
+    for axis in axes[1:]:
+        axis.set_ylabel("")
+    legend(axes[-1], loc="lower right")
+    save(figure, path)

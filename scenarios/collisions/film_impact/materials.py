@@ -1,0 +1,73 @@
+"""Bead, plate and liquids of Singh, Windows-Yule & Nair (2026), and the gap at which the solids touch."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.materials import Fluid, Material
+from cfddem.particles.material_pairs import pair_table
+from closures.minimum_gap import asperities, elastohydrodynamic
+
+
+class Liquid(Fluid):
+    """A liquid with a surface."""
+
+    surface_tension: float = Field(default=0.0, ge=0, description="sigma [N/m]")
+
+
+LIQUIDS = {
+    "water": Liquid(density=998, viscosity=1.0e-3, surface_tension=0.0728),
+    "m5": Liquid(density=925, viscosity=4.6e-3, surface_tension=0.0192),
+}
+"""Liquids of the paper, table 2; m5 is a silicone oil."""
+
+GLASS = Material(density=2580, youngs_modulus=63e9, poisson=0.23, restitution=0.98)
+"""Glass of the paper, table 2, with its dry restitution; elastic constants of Buck et al. (2018), table 1."""
+
+GAP_RULES = ("fixed", "roughness", "elastohydrodynamic")
+"""How the gap is found at which the solids touch."""
+
+
+def liquid_named(liquid: str | Liquid, viscosity: float | None) -> Liquid:
+    """The liquid of a name, with another viscosity if one is given."""
+    if isinstance(liquid, str):
+        if liquid not in LIQUIDS:
+            raise InputError("liquid", liquid, nearest(liquid, LIQUIDS))
+        liquid = LIQUIDS[liquid]
+    if viscosity is None:
+        return liquid
+    if not (math.isfinite(viscosity) and viscosity >= 0.0):
+        raise InputError("viscosity", viscosity, "at least 0 and finite")
+    return liquid.model_copy(update={"viscosity": float(viscosity)})
+
+
+def touching_gap(
+    rule: str, fixed: float, viscosity: float, velocity: float, diameter: float, solids: tuple[Material, Material]
+) -> float:
+    """Gap at which the solids touch [m].
+
+    rule       "fixed", "roughness" of the solids, or "elastohydrodynamic"; never less than the roughness
+    fixed      the gap of the rule "fixed" [m]
+    viscosity  dynamic [Pa s]
+    velocity   of the impact [m/s]
+    diameter   of the bead [m]
+    solids     of bead and plate
+    """
+    if rule not in GAP_RULES:
+        raise InputError("gap_rule", rule, nearest(rule, dict.fromkeys(GAP_RULES)))
+    if rule == "fixed":
+        if not (math.isfinite(fixed) and fixed > 0.0):
+            raise InputError("minimum_gap", fixed, "above 0 and finite")
+        return float(fixed)
+    rough = asperities(solids[0].roughness, solids[1].roughness)
+    if rule == "roughness":
+        if rough == 0.0:
+            raise InputError("gap_rule", rule, "fixed or elastohydrodynamic for smooth solids", "or give a roughness")
+        return rough
+    if viscosity == 0.0:
+        raise InputError("viscosity", 0.0, "above 0 with gap_rule = elastohydrodynamic", "gap_rule = fixed needs none")
+    modulus = float(pair_table(list(solids))[0, 1]["contact_modulus"])
+    return max(rough, elastohydrodynamic(viscosity, velocity, modulus, 0.5 * diameter))

@@ -1,0 +1,188 @@
+r"""Pressure of the liquid and speed of the bead, solved as one.
+
+For each liquid cell, what leaves through its open faces and what the bead displaces add to zero:
+
+.. math:: \sum_f A_f\,b_f\Big[u_f^* - \frac{\Delta t}{\rho\,\theta_f\Delta x}(p_{nb} - p_c)\Big] + J_c V = 0,
+          \qquad V = V^* + \frac{\Delta t}{m}\sum_c J_c p_c
+
+with the open area A, the resistance of a thin gap b, the distance theta to the surface, and the horizontal projection J
+of the bead's surface within the cell. The matrix without V is symmetric and banded; V follows from two right-hand
+sides.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cfddem.backend.compile import inline, serial
+from scenarios.collisions.film_impact.cavitation import coupled, with_voids
+from scenarios.collisions.film_impact.grid import Grid
+
+SHORTEST = 0.1
+"""Least distance from the centre of a liquid cell to the surface, in cells."""
+
+
+@dataclass
+class Bead:
+    """The moving bead: lowest point and speed, both positive upwards."""
+
+    radius: float  # [m]
+    mass: float  # [kg]; infinite for a prescribed speed
+    gap: float  # height of the lowest point [m]
+    velocity: float  # [m/s]
+    force: float = 0.0  # of the liquid's pressure in the last step [N]
+
+
+@dataclass
+class Voids:
+    """Voids of a liquid that cavitates."""
+
+    floor: float  # lowest pressure, below 0 [Pa]
+    volume: np.ndarray  # void in each cell [m3]
+    work: float = 0.0  # that opened them, less what they gave back when they closed [J]
+
+
+@inline
+def distance(filled, liquid, i, j, k, m):
+    """Distance from the centre of a liquid cell to the next pressure, in cells: 1, or to the surface.
+
+    A plane surface at a distance s fills 1/2 + s - s^2/2 of the tent around this cell, and s^2/2 around the next.
+    """
+    if not (0 <= k < liquid.shape[0] and 0 <= m < liquid.shape[1]):
+        return 0.5
+    if liquid[k, m]:
+        return 1.0
+    below = 1.0 - math.sqrt(2.0 - 2.0 * min(max(filled[i, j], 0.5), 1.0))
+    above = math.sqrt(2.0 * min(max(filled[k, m], 0.0), 0.5))
+    return min(max(0.5 * (below + above), SHORTEST), 1.0)
+
+
+@serial
+def number_cells(liquid, number):
+    """Number the liquid cells column by column; returns their count and the largest step between neighbours."""
+    count, band = 0, 1
+    for i in range(liquid.shape[0]):
+        for j in range(liquid.shape[1]):
+            number[i, j] = -1
+            if liquid[i, j]:
+                number[i, j] = count
+                if i > 0 and number[i - 1, j] >= 0:
+                    band = max(band, count - number[i - 1, j])
+                count += 1
+    return count, band
+
+
+@serial
+def assemble(number, filled, liquid, open_u, open_w, ease_u, u, w, dx, rate, outer_open, matrix, outflow, shadow):
+    """Rows of the pressure equation: lower bands of the matrix, outflow of each cell, projected area of the bead.
+
+    ease_u  factor of velocity and pressure gradient by the resistance of thin gaps
+    rate    time step over density
+    """
+    radial, vertical = liquid.shape
+    for i in range(radial):
+        ring = math.pi * dx * dx * (2.0 * i + 1.0)
+        for j in range(vertical):
+            c = number[i, j]
+            if c < 0:
+                continue
+            shadow[c] = ring * (open_w[i, j] - open_w[i, j + 1])
+            for side in range(4):
+                k, m = i + (side == 1) - (side == 0), j + (side == 3) - (side == 2)
+                if k < 0 or m < 0 or (k == radial and not outer_open):
+                    continue
+                if side < 2:
+                    face = max(i, k)
+                    area = 2.0 * math.pi * face * dx * dx * open_u[face, j] * ease_u[face, j]
+                    flow = u[face, j] if side == 1 else -u[face, j]
+                else:
+                    face = max(j, m)
+                    area = ring * open_w[i, face]
+                    flow = w[i, face] if side == 3 else -w[i, face]
+                outflow[c] += area * flow
+                link = area * rate / (dx * distance(filled, liquid, i, j, k, m))
+                matrix[0, c] += link
+                if k < radial and m < vertical and number[k, m] >= 0 and number[k, m] < c:
+                    matrix[c - number[k, m], number[k, m]] = -link
+
+
+@serial
+def correct(number, filled, liquid, open_u, open_w, ease_u, u, w, p, dx, rate, outer_open):
+    """Subtract the pressure gradient on every open face of a liquid cell; closed faces have no flow."""
+    radial, vertical = liquid.shape
+    for i in range(radial + 1):
+        for j in range(vertical):
+            left = i > 0 and liquid[i - 1, j]
+            right = i < radial and liquid[i, j]
+            if not (left or right):
+                continue
+            if i == 0 or (i == radial and not outer_open) or open_u[i, j] == 0.0:
+                u[i, j] = 0.0
+                continue
+            low = p[number[i - 1, j]] if left else 0.0
+            high = p[number[i, j]] if right else 0.0
+            length = distance(filled, liquid, i - 1, j, i, j) if left else distance(filled, liquid, i, j, i - 1, j)
+            u[i, j] = ease_u[i, j] * (u[i, j] - rate * (high - low) / (dx * length))
+    for i in range(radial):
+        for j in range(vertical + 1):
+            below = j > 0 and liquid[i, j - 1]
+            above = j < vertical and liquid[i, j]
+            if not (below or above):
+                continue
+            if j == 0 or open_w[i, j] == 0.0:
+                w[i, j] = 0.0
+                continue
+            low = p[number[i, j - 1]] if below else 0.0
+            high = p[number[i, j]] if above else 0.0
+            length = distance(filled, liquid, i, j - 1, i, j) if below else distance(filled, liquid, i, j, i, j - 1)
+            w[i, j] -= rate * (high - low) / (dx * length)
+
+
+@dataclass
+class Solved:
+    """Pressure of one step."""
+
+    pressure: np.ndarray  # in the liquid cells (radial, vertical); 0 elsewhere [Pa]
+    force: float  # on the bead [N]
+    plate: float  # on the plate [N]
+
+
+def solve(
+    grid: Grid, bead: Bead, flow: tuple[np.ndarray, np.ndarray], cells: tuple[np.ndarray, np.ndarray],
+    ease: np.ndarray, density: float, dt: float, voids: Voids | None = None,
+) -> Solved:  # fmt: skip
+    """Make velocities and bead satisfy continuity; changes both.
+
+    flow   radial and vertical velocity on the faces, before the pressure [m/s]
+    cells  which cells are liquid, and their filled share
+    ease   factor of the radial faces by the resistance of thin gaps [-]
+    voids  of a liquid that cavitates; their volume is updated
+    """
+    (u, w), (liquid, filled) = flow, cells
+    number = np.empty(liquid.shape, dtype=np.int64)
+    count, band = number_cells(liquid, number)
+    pressure = np.zeros(liquid.shape)
+    if count == 0:
+        bead.force = 0.0
+        return Solved(pressure, 0.0, 0.0)
+    matrix, outflow, shadow = np.zeros((band + 1, count)), np.zeros(count), np.zeros(count)
+    open_faces = (grid.open_u, grid.open_w, ease)
+    rate = dt / density
+    assemble(number, filled, liquid, *open_faces, u, w, grid.dx, rate, grid.outer_open, matrix, outflow, shadow)
+    matrix[0, matrix[0] == 0.0] = 1.0
+    share = dt / bead.mass
+    if voids is None:
+        p, bead.velocity = coupled(matrix, outflow, shadow, bead.velocity, share)
+    else:
+        closing = voids.volume[liquid] / dt
+        p, bead.velocity, growth = with_voids(matrix, outflow, shadow, bead.velocity, share, voids.floor, closing)
+        voids.volume[liquid] = np.maximum(voids.volume[liquid] + growth * dt, 0.0)
+        voids.volume[~liquid] = 0.0
+        voids.work -= float(p @ growth) * dt
+    bead.force = float(shadow @ p)
+    correct(number, filled, liquid, *open_faces, u, w, p, grid.dx, rate, grid.outer_open)
+    pressure[liquid] = p
+    return Solved(pressure, bead.force, float(grid.ring @ pressure[:, 0]))

@@ -1,0 +1,202 @@
+"""The film impact against the fit of Singh, Windows-Yule & Nair (2026), its convergence, and its sensitivity.
+
+The comparison with the fit has no limit: no parameter is adjusted to it. Limits apply to convergence, conservation, and
+the statements of the paper without numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from closures.restitution import singh, singh_crossover
+from scenarios.collisions.film_impact.figures import Case, draw_laws, draw_moments, draw_motion, draw_restitution
+from scenarios.collisions.film_impact.film_laws import laws_of
+from scenarios.collisions.film_impact.materials import LIQUIDS
+from scenarios.collisions.film_impact.result import COLUMNS, FilmImpact
+from scenarios.collisions.film_impact.study import impact, sweep
+from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
+
+VELOCITIES = (0.2, 0.35, 0.5, 0.75, 1.0, 1.5)
+CASES: tuple[Case, ...] = (
+    (8e-3, "water", 0.4e-3),
+    (5.5e-3, "water", 0.4e-3),
+    (4e-3, "water", 0.4e-3),
+    (2.8e-3, "water", 0.4e-3),
+    (5.5e-3, "m5", 0.45e-3),
+)
+"""Beads and films of the paper; 20 cells in the film."""
+
+SENSITIVITIES: dict[str, dict[str, Any]] = {
+    "minimum gap of 0.3 um": {"minimum_gap": 0.3e-6},
+    "minimum gap of 3 um": {"minimum_gap": 3e-6},
+    "elastohydrodynamic minimum gap": {"gap_rule": "elastohydrodynamic"},
+    "wetted column may lack 0.25": {"wetted_missing": 0.25},
+    "wetted column may lack 1": {"wetted_missing": 1.0},
+    "wetted radius guessed, share 0": {"wetted_share": 0.0},
+    "wetted radius guessed, share 0.6": {"wetted_share": 0.6},
+    "wetted radius guessed, share 0.9": {"wetted_share": 0.9},
+    "cavitation at -1e5 Pa": {"cavitation": -1e5},
+    "FLIP share of 0.9": {"flip": 0.9},
+    "FLIP share of 1": {"flip": 1.0},
+    "4 particles in a cell": {"particles_per_side": 2},
+    "16 particles in a cell": {"particles_per_side": 4},
+    "half the Courant number": {"courant": 0.25},
+}
+"""Changes of the oil impact at 10 cells, one at a time."""
+
+PEAK = 0.02
+"""Least height of a peak of the liquid's energy above what surrounds it, over the highest."""
+
+oil = partial(impact, 5.5e-3, "m5", 0.45e-3, 0.5)
+"""The case of the paper's study of resolution."""
+
+
+def study(folder: Path, progress: Progress) -> list[Row]:
+    """Run convergence, sensitivities and the sweep; write histories and figures; return the table."""
+    rows = convergence(progress) + sensitivities(progress)
+    cases = {case: sweep(VELOCITIES, progress, diameter=case[0], liquid=case[1], film=case[2]) for case in CASES}
+    rows += fit(cases) + conservation(cases) + words(cases) + film_laws(cases)
+    fastest = {case: results[-1] for case, results in cases.items()}
+    histories = {f"{d * 1e3:g}mm_{liquid}_{v:g}": each
+                 for (d, liquid, _), results in cases.items() for v, each in zip(VELOCITIES, results)}  # fmt: skip
+    write_histories(folder / "histories.h5", {name: _columns(each) for name, each in histories.items()})
+    shown = cases[CASES[0]]
+    draw_moments(folder / "film_impact.png", shown[2], CASES[0][0])
+    draw_motion(folder / "film_impact_motion.png", shown[0], fastest[CASES[0]])
+    draw_restitution(folder / "film_impact_restitution.png", cases)
+    draw_laws(folder / "film_impact_laws.png", cases)
+    return rows
+
+
+def convergence(progress: Progress) -> list[Row]:
+    """Oil, 5.5 mm, 0.5 m/s: restitution against the cells in the film and the width of the domain."""
+    results = {}
+    for cells in (5, 10, 20, 40):
+        progress(f"{cells} cells in the film")
+        results[cells] = oil(cells=cells)
+    e = {cells: each.restitution for cells, each in results.items()}
+    wide = oil(cells=10, domain=1.5).restitution
+    return [
+        Row("oil, 0.5 m/s: restitution at 5 cells", e[5], e[40]),
+        Row("oil, 0.5 m/s: restitution at 10 cells", e[10], e[40], 0.01),
+        Row("oil, 0.5 m/s: restitution at 20 cells", e[20], e[40], 0.01),
+        Row("oil, 0.5 m/s: domain wider by half, 10 cells", wide, e[10], 0.005),
+        Row("oil, 0.5 m/s: time of a run at 20 cells", results[20].seconds, unit="s"),
+        Row("oil, 0.5 m/s: time of a run at 40 cells", results[40].seconds, unit="s"),
+    ]
+
+
+def sensitivities(progress: Progress) -> list[Row]:
+    """Restitution of the oil impact at 10 cells with one number of the method changed."""
+    rows, base, changed = [], oil(cells=10).restitution, {}
+    for name, change in SENSITIVITIES.items():
+        progress(name)
+        changed[name] = oil(cells=10, **change).restitution
+        rows.append(Row(f"oil, 0.5 m/s: {name}", changed[name], base))
+    tracked = [base] + [e for name, e in changed.items() if "may lack" in name]
+    guessed = [e for name, e in changed.items() if "guessed" in name]
+    return [
+        *rows,
+        Row("oil, 0.5 m/s: spread of e over the tracked wetted radii", np.ptp(tracked), 0.0, 0.03),
+        Row("oil, 0.5 m/s: spread of e over the guessed wetted radii", np.ptp(guessed)),
+    ]
+
+
+def fit(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
+    """Restitution of every impact beside the fit."""
+    rows, differences = [], []
+    for (diameter, liquid, _), results in cases.items():
+        points = [(-r.p1.velocity, r.restitution, singh(r.stokes, r.film_ratio)) for r in results]
+        rows += [Row(f"{diameter * 1e3:g} mm, {liquid}, {v:g} m/s: restitution", e, fitted) for v, e, fitted in points]
+        differences += [e - fitted for _, e, fitted in points if liquid == "water"]
+    return [
+        *rows,
+        Row("water: root mean square of the deviation from the fit", float(np.sqrt(np.mean(np.square(differences))))),
+    ]
+
+
+def conservation(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
+    """Energy, exchange between particles and grid, momentum and volume, over all impacts."""
+    every = [(-r.p1.velocity, r) for results in cases.values() for r in results]
+    seconds = sum(r.seconds for _, r in every)
+    return [
+        worst("energy left unexplained", [(v, r.ledger_error, 0.0) for v, r in every], 0.02),
+        worst("energy lost between particles and grid", [(v, r.energies["exchange"], 0.0) for v, r in every], 0.02),
+        worst("momentum of the particles against the impulses", [(v, r.momentum_error, 0.0) for v, r in every]),
+        worst("liquid where there is no room for it", [(v, r.volume_error, 0.0) for v, r in every], 0.005),
+        Row(f"time of the sweep of {len(every)}", seconds, unit="s"),
+        worst("time of one impact at 20 cells", [(v, r.seconds, 0.0) for v, r in every], unit="s"),
+    ]
+
+
+def words(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
+    """Statements of the paper: order of the moments, suction, two regimes, peaks, and a straight line in 1/St."""
+    every = [r for results in cases.values() for r in results]
+    ordered = [r.p1.time < r.p2.time <= r.p3.time < r.p4.time and r.p2.velocity < 0.0 < r.p4.velocity for r in every]
+    suction = [r.highest_pressure > 0.0 > r.lowest_pressure for r in every]
+    rows = [
+        Row("impacts with P1 to P4 out of order", float(ordered.count(False)), 0.0, 0.0),
+        Row("impacts without suction after the contact", float(suction.count(False)), 0.0, 0.0),
+    ]
+    for (diameter, liquid, _), results in cases.items():
+        name = f"{diameter * 1e3:g} mm, {liquid}"
+        stokes, e = np.array([r.stokes for r in results]), np.array([r.restitution for r in results])
+        ratio = change_of_slope(stokes, e) / singh_crossover(results[0].film_ratio)
+        if liquid == "water":
+            rows.append(Row(f"{name}: ln of St where the slope changes, over St*", math.log(ratio), 0.0, math.log(1.5)))
+        else:
+            rows.append(Row(f"{name}: ln of St where the slope changes, over St*", math.log(ratio)))
+        rows.append(Row(f"{name}: R2 of e against 1/St", straight(1.0 / stokes, e), 1.0, 0.02))
+    slow, fast = cases[CASES[3]][0], cases[CASES[0]][-1]
+    return [
+        *rows,
+        Row("peaks of the liquid's energy, regime 1 (2.8 mm, 0.2 m/s)", float(peaks(slow)), 1.0, 0.0),
+        Row("peaks of the liquid's energy, regime 2 (8 mm, 1.5 m/s)", float(peaks(fast)), 2.0, 0.0),
+    ]
+
+
+def film_laws(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
+    """Laws of thin films beside the resolved impacts: the largest deviation of each."""
+    points: dict[str, list[tuple[float, float, float]]] = {}
+    for (diameter, liquid, film), results in cases.items():
+        for each in results:
+            speed = -each.p1.velocity
+            for name, e in laws_of(diameter, LIQUIDS[liquid], film, speed).items():
+                points.setdefault(name, []).append((speed, e, each.restitution))
+    return [worst(f"restitution by the {name} against the resolved", each) for name, each in points.items()]
+
+
+def change_of_slope(stokes: np.ndarray, restitution: np.ndarray) -> float:
+    """Stokes number of the corner of the two joined lines that fit ln e against ln St best."""
+    errors = []
+    corners = np.geomspace(1.1 * stokes[0], stokes[-1] / 1.1, 200)
+    for corner in corners:
+        x = np.log(stokes / corner)
+        terms = np.stack([np.ones_like(x), np.minimum(x, 0.0), np.maximum(x, 0.0)], axis=1)
+        found = np.linalg.lstsq(terms, np.log(restitution), rcond=None)[0]
+        errors.append(float(((terms @ found - np.log(restitution)) ** 2).sum()))
+    return float(corners[int(np.argmin(errors))])
+
+
+def straight(x: np.ndarray, y: np.ndarray) -> float:
+    """Coefficient of determination R2 of a straight line."""
+    rest = y - np.polyval(np.polyfit(x, y, 1), x)
+    return float(1.0 - (rest**2).sum() / ((y - y.mean()) ** 2).sum())
+
+
+def peaks(result: FilmImpact) -> int:
+    """Peaks of the kinetic energy of the liquid."""
+    from scipy.signal import find_peaks
+
+    energy = result.history["liquid_kinetic"]
+    even = np.interp(np.linspace(0.0, result.p4.time, 400), result.history["time"], energy) / energy.max()
+    return len(find_peaks(even, prominence=PEAK)[0])
+
+
+def _columns(result: FilmImpact) -> Columns:
+    return {name: (result.history[name], unit) for name, unit in COLUMNS.items()}

@@ -1,0 +1,42 @@
+"""The coating scenario: its case, and its numbers from a made-up run."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cfddem.preflight.summary import refuse_errors
+from scenarios.beds.coating import bed, coating, distribution
+
+RUN = SimpleNamespace(
+    times=np.array([0.0, 0.5]),
+    history={
+        "time": np.array([0.0, 0.25, 0.5]),
+        "agglomerated_share": np.array([0.0, 0.1, 0.2]),
+        "spray_residence_time": np.array([np.nan, 0.01, 0.02]),
+        "spray_circulation_time": np.array([np.nan, 0.1, 0.2]),
+    },
+    particles=lambda snapshot: {"liquid_carried": [np.zeros(4), np.array([0.0, 1e-13, 1e-13, 2e-13])][snapshot]},
+)
+
+
+def test_the_case_begins_dry_and_sprays_into_the_column() -> None:
+    case = bed()
+    refuse_errors(case)
+    assert case.liquid is not None and case.spray is not None
+    assert case.liquid.thickness is case.liquid.liquid_fraction is None
+    sprayed = case.spray.rate * (case.run.until - case.spray.begin)
+    solid = case.bed.count * np.pi / 6.0 * case.bed.diameter**3
+    assert sprayed / solid == pytest.approx(1e-3, rel=0.02)
+
+
+def test_coating_of_a_snapshot() -> None:
+    last = coating(RUN)  # type: ignore[arg-type]
+    assert (last.time, last.liquid, last.wet_share) == (0.5, 1e-13, 0.75)
+    assert last.variation == pytest.approx(np.sqrt(0.5))
+    assert (last.joined_share, last.residence_time, last.circulation_time) == (0.2, 0.02, 0.2)
+    assert np.isnan(coating(RUN, 0).variation)  # type: ignore[arg-type]
+    shares = distribution(RUN, np.array([0.0, 0.5, 1.5, 2.5]))  # type: ignore[arg-type]
+    assert shares.tolist() == [0.25, 0.5, 0.25]
