@@ -35,6 +35,27 @@ def film_added_mass(density_ratio: float, film_ratio: float) -> float:
     return 3.0 * density_ratio * film_ratio
 
 
+@law("film_impact", "kinetic energy of the thin film between two spheres; see Range")
+def pair_added_mass(density: float, film: float, reduced_radius: float) -> float:
+    r"""Added mass of the film between two bodies at the moment of contact.
+
+    .. math:: M_a = \frac{\pi\rho_l}{2}\int_0^{r_w}\frac{r^3}{h}\,dr = 2\pi\rho_l R^{*2}\delta,\qquad
+              h = \frac{r^2}{2R^*},\quad r_w^2 = 4R^*\delta
+
+    density         rho_l, of the liquid [kg/m3]
+    film            delta, thickness of the liquid on both bodies together [m]
+    reduced_radius  R*; at a wall the radius of the sphere [m]
+    returns         M_a [kg]
+
+    Range: delta << R*. At a wall it is :func:`film_added_mass` times the mass of the sphere.
+
+    >>> sphere = 2580 * math.pi / 6 * 8e-3**3
+    >>> round(pair_added_mass(998, 0.4e-3, 4e-3) / sphere, 3), round(film_added_mass(998 / 2580, 0.4 / 8), 3)
+    (0.058, 0.058)
+    """
+    return 2.0 * math.pi * density * reduced_radius * reduced_radius * film
+
+
 @law("film_impact", "momentum of bead and film at contact")
 def reversal_restitution(restitution: float, added_mass: float) -> float:
     r"""Speed of the bead once the film has turned with it, over its speed before contact.

@@ -7,13 +7,14 @@ function by its name; :mod:`closures.compiled` makes that possible.
 from __future__ import annotations
 
 import pkgutil
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from inspect import signature
+from inspect import getdoc, signature
 from pathlib import Path
 from typing import TypeVar
 
@@ -38,6 +39,16 @@ class Law:
     def outside(self, **arguments: float) -> list[str]:
         """Names of the arguments outside their fitted range."""
         return [name for name, (low, high) in self.ranges.items() if not low <= arguments[name] <= high]
+
+    def _repr_markdown_(self) -> str:
+        """The law in a notebook: sentence, equation, arguments, range, source."""
+        text = getdoc(self.function) or ""
+        equation = re.search(r"\.\. math:: (.*?)\n\n", text + "\n\n", re.DOTALL)
+        parts = [f"**{self.name}** ({self.kind.replace('_', ' ')}): {' '.join(text.split(chr(10) * 2)[0].split())}"]
+        parts += [f"$${' '.join(equation[1].split())}$$"] if equation else []
+        parts += [f"Arguments: {', '.join(f'`{name}`' for name in self.arguments)}"]
+        parts += [f"Range: {self.fitted_for}"] if self.ranges else []
+        return "\n\n".join([*parts, f"Source: {self.reference}"])
 
     @property
     def fitted_for(self) -> str:

@@ -56,6 +56,20 @@ def test_the_account_of_many_bridges_closes(laws: BridgeLaws, speed: float) -> N
     assert abs(remainder) < 1e-3 * put_in
 
 
+@pytest.mark.slow
+def test_the_account_with_inertia_of_the_films_closes() -> None:
+    """The loss where films turn with their bodies counts as that of bridges; momentum is kept."""
+    run, _ = swarm(150, replace(THIN, film_density=1000.0), speed=0.5, energies=True)
+    start = (run.particles.mass[:, None] * run.particles.velocity).sum(axis=0)
+    remainder, done, put_in = ledger(run, 0.5 * run.time_scales(1.0).recommended, 1000)
+    assert (run.edges.bridge_impact_speed >= 0.0).all()
+    assert done["bridge"] > 0.1 * put_in
+    assert abs(remainder) < 1e-3 * put_in
+    end = (run.particles.mass[:, None] * run.particles.velocity).sum(axis=0)
+    size = float((run.particles.mass * np.linalg.norm(run.particles.velocity, axis=1)).sum())
+    assert np.abs(end - start).max() < 1e-12 * size
+
+
 def test_the_account_does_not_depend_on_neighbour_lists() -> None:
     """The work of the pull in the half kick before a new list counts, too."""
     counted = []

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import copy
-import datetime
-import tempfile
-import time
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
-import tomli_w
-from example_case import MIXTURE, TEXT
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from test_case_walls import HOPPER
+from example_case import TEXT
 
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery, overrides
-from cfddem.case.input_errors import MOST, InputErrors, sections_of
+from cfddem.case.input_errors import InputErrors, sections_of
 from cfddem.case.renamed import KEYS
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import DEEPEST_KEY, LONGEST_FILE
-from cfddem.preflight.summary import preflight
 
 GALLERY = gallery()
 LONGEST_LINE = 600
-SECONDS = 2.0
 
 
 def refused(text: str, given: dict[str, Any] | None = None) -> InputError:
@@ -222,107 +212,3 @@ def test_the_json_schema_holds_every_key() -> None:
     for name, section in (("Bed", "bed"), ("Column", "column"), ("CaseLaws", "laws"), ("CaseRun", "run")):
         assert set(tomllib.loads(TEXT)[section]) <= set(schema["$defs"][name]["properties"])
         assert schema["$defs"][name]["additionalProperties"] is False
-
-
-# ---------------------------------------------------------------- random files
-
-odd_values = st.one_of(
-    st.floats(),
-    st.sampled_from([0.0, -0.0, 1e-300, 1e300, -1e300, 5e-324, 1.7e308, float("nan"), float("inf")]),
-    st.integers(-(10**40), 10**40),
-    st.integers(2**62, 2**64),
-    st.booleans(),
-    st.text(max_size=30),
-    st.lists(st.one_of(st.floats(), st.text(max_size=3), st.lists(st.floats(), max_size=4)), max_size=5),
-    st.dictionaries(st.text(max_size=5), st.floats(), max_size=3),
-    st.just(datetime.date(2020, 1, 1)),
-    st.just("x" * 5000),
-    st.just([[0.02, 0.02, 0.1]] * 300),
-    st.sampled_from(
-        ["poured", "suspended", "placed", "packed", "cylinder", "periodic", "closed", "flow", "linear", "none"]
-    ),
-)
-
-
-ENDINGS = [
-    *[""] * 6,
-    "x = " + "[" * 5000,
-    "x.y = {" * 500,
-    "a." * 3000 + "a = 1",
-    "#" * 300_000,
-    "x = 0x" + "f" * 9000,
-    "\n".join(f"k{k} = {k}" for k in range(20_000)),
-    "x = [" + "1.5, " * 80_000 + "]",
-    "x = '" + "ä" * 400_000,
-]
-
-
-@st.composite
-def mutated_files(draw: st.DrawFn) -> bytes:
-    """A case file with a few random changes of values, keys, text and bytes."""
-    values = copy.deepcopy(tomllib.loads(draw(st.sampled_from([TEXT, MIXTURE, HOPPER]))))
-    tables = [values, *(each for each in values.values() if isinstance(each, dict)), *values["material"].values()]
-    tables += values["bed"].get("species", {}).values()
-    tables += [each for several in values.values() if isinstance(several, list) for each in several]
-    known = [name for part in Case.model_json_schema()["$defs"].values() for name in part["properties"]]
-    for _ in range(draw(st.integers(0, 4))):
-        table = draw(st.sampled_from(tables))
-        change = draw(st.sampled_from(["set", "set", "set", "delete", "add", "nest"]))
-        if change == "delete" and table:
-            table.pop(draw(st.sampled_from(sorted(table))))
-        elif change == "set" and table:
-            table[draw(st.sampled_from(sorted(table)))] = draw(odd_values)
-        elif change == "add":
-            table[draw(st.one_of(st.sampled_from(known), st.text(max_size=10)))] = draw(odd_values)
-        else:
-            for _ in range(draw(st.integers(1, 30))):
-                table = table.setdefault(draw(st.sampled_from(["bed", "fluid", "a"])), {})
-                if not isinstance(table, dict):
-                    break
-    text = tomli_w.dumps(values)
-    for _ in range(draw(st.integers(0, 2))):
-        where = draw(st.integers(0, len(text)))
-        text = text[:where] + draw(st.text(max_size=5)) + text[where + draw(st.integers(0, 5)) :]
-    text += draw(st.sampled_from(ENDINGS))
-    content = text.encode(draw(st.sampled_from(["utf-8", "utf-8", "utf-8", "utf-8-sig", "utf-16", "utf-7"])), "replace")
-    if draw(st.booleans()):
-        where = draw(st.integers(0, len(content)))
-        content = content[:where] + draw(st.binary(max_size=4)) + content[where:]
-    return content
-
-
-def examine(content: bytes) -> None:
-    """A file is a valid case, or is refused in lines of the documented form; quickly, and nothing is written."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bed.toml"
-        path.write_bytes(content)
-        begun = time.process_time()
-        try:
-            made = preflight(Case.from_toml(path))
-        except InputError as refusal:
-            lines = str(refusal).splitlines()
-            assert 1 <= len(lines) <= MOST + 3
-            for line in lines:
-                assert len(line) <= LONGEST_LINE
-                assert ": must be " in line or line.endswith("more input errors")
-        else:
-            assert made.status in ("ok", "warning", "error")
-            assert max(map(len, made.lines())) <= 100
-        assert time.process_time() - begun < SECONDS
-        assert [each.name for each in Path(folder).iterdir()] == ["bed.toml"]
-
-
-UNHURRIED: dict[str, Any] = {"deadline": None, "suppress_health_check": list(HealthCheck), "derandomize": True}
-
-
-@settings(max_examples=200, **UNHURRIED)
-@given(mutated_files())
-def test_a_mutated_file_is_a_case_or_a_few_lines_of_errors(content: bytes) -> None:
-    examine(content)
-
-
-@pytest.mark.slow
-@settings(max_examples=5000, **UNHURRIED)
-@given(mutated_files())
-def test_five_thousand_mutated_files(content: bytes) -> None:
-    examine(content)

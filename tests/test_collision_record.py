@@ -136,5 +136,5 @@ def test_a_report_shows_the_map_where_collisions_were_recorded(tmp_path: Path) -
     met = found["collisions"]
     assert met["number"] >= 1.0 and met["median_stokes"] > 0.0 and 0.0 <= met["contact_fraction"] <= 1.0
     assert any("collisions with films: median St" in line for line in lines(found))
-    assert "regime map of collisions" in page(folder, tmp_path / "page.html", found).read_text()
+    assert "collisions in the averaging window" in page(folder, tmp_path / "page.html", found).read_text()
     assert collisions(folder, tmp_path / "map.png").stat().st_size > 10_000

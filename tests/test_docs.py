@@ -21,9 +21,9 @@ PAGES = sorted([*DOCS.rglob("*.md"), *(ROOT / "scenarios").rglob("README.md")])
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>[^\n]*?) -->\n)?```(?P<kind>python|sh)\n(?P<text>.*?)^```$", re.M | re.S)
-"""A block that can be run. The comment before it is `not run`, `slow`, `exits N`, or `needs LIBRARY`."""
+"""A block to run. The comment before it: `not run`, `slow`, `exits N`, `needs LIBRARY`, `needs LIBRARY, slow`."""
 
-QUICK = ("immersed_pair", "wet_pair", "wet_wall")
+QUICK = ("wet_pair", "wet_wall")
 """Scenarios whose pages take seconds; the others run whole beds, or maps."""
 
 
@@ -49,7 +49,7 @@ def run_page(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Pa
     monkeypatch.chdir(folder)
     names: dict[str, Any] = {"__name__": "page"}
     for block in blocks(page):
-        if (block.mark == "slow" and not slow) or lacks(block):
+        if ("slow" in block.mark and not slow) or lacks(block):
             continue
         if block.kind == "python":
             exec(compile("\n" * block.line + block.text, page, "exec"), names)
@@ -63,7 +63,10 @@ def run_page(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Pa
 
 def lacks(block: Block) -> bool:
     """Whether a block needs an optional library that is not installed."""
-    return block.mark.startswith("needs") and importlib.util.find_spec(block.mark.removeprefix("needs ")) is None
+    return (
+        block.mark.startswith("needs")
+        and importlib.util.find_spec(block.mark.removeprefix("needs ").split(",")[0]) is None
+    )
 
 
 def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
@@ -78,7 +81,7 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
-LONG = {"user-law", "contact-law", "wet-particles", "cluster"}
+LONG = {"user-law", "contact-law", "wet-particles", "cluster", "walls"}
 """Pages with many laws, each of which is compiled."""
 
 
@@ -125,7 +128,8 @@ def generated_pages() -> set[str]:
     """Addresses of the pages that are generated when the site is built."""
     pages = tool("pages")
     reference = {pages.page_of(module) for room in pages.ROOMS for module in pages.modules(room)}
-    others = {f"reference/{name}.md" for name in ("index", "case", "commands", "laws")}
+    notebooks = {address for address, _ in pages.notebooks() if address.endswith(".md")}
+    others = notebooks | {f"reference/{name}.md" for name in ("index", "case", "commands", "laws")}
     return reference | others | {address for address, _ in pages.gallery()} | {"changes.md"}
 
 

@@ -129,6 +129,17 @@ def test_a_liquid_that_cavitates_lets_the_bead_go_sooner() -> None:
     assert abs(free.ledger_error) < 0.02
 
 
+def test_cells_that_cavitate_and_are_not_found_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one trial a step instead of 50, the last set is taken, and the result says in how many steps."""
+    from scenarios.collisions.film_impact import cavitation
+
+    given: dict[str, Any] = {"diameter": 8e-3, "film": 0.4e-3, "velocity": 1.0, "cells": 5, "cavitation": -1e5}
+    assert impact(**given).warnings == ()
+    monkeypatch.setattr(cavitation, "EXCHANGES", 1)
+    (warning,) = impact(**given).warnings
+    assert "cells that cavitate were not found" in warning
+
+
 def test_tracked_wetted_radii_agree_and_guessed_ones_do_not() -> None:
     """Spread of e: 0.03 at most by the tracked volume, more by guesses between 0 and 0.9 of the ideal radius."""
     tracked = [impact(5.5e-3, "m5", 0.45e-3, 0.5, cells=10, wetted_missing=share).restitution for share in (0.25, 1.0)]

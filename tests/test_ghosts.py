@@ -122,7 +122,7 @@ def finished(spheres: Particles, given: dict[str, Any], steps: int, **others: An
     return run
 
 
-@pytest.mark.parametrize(("film", "walls"), [(False, False), (True, False), (False, True), (True, True)])
+@pytest.mark.parametrize(("film", "walls"), [slow(False, False), slow(True, False), (False, True), (True, True)])
 def test_bits_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> None:
     """The same spheres with the same ids in other rows, over several neighbour lists."""
     spheres, given = settings(film, walls)
@@ -163,7 +163,7 @@ def divided(size: int, axis: int, length: float) -> Slabs:
 @pytest.mark.parametrize("ranks", [2, 3])
 @pytest.mark.parametrize(
     ("film", "walls", "liquid"),
-    [(False, False, False), (True, False, False), (False, True, False), (True, True, False),
+    [slow(False, False, False), slow(True, False, False), (False, True, False), slow(True, True, False),
      slow(False, False, True), (True, True, True)],
 )  # fmt: skip
 def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, liquid: bool, ranks: int) -> None:
@@ -270,7 +270,7 @@ def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
 
 
 @pytest.mark.parametrize(("before", "after"), [(1, 2), (3, 2), (3, 1)])
-@pytest.mark.parametrize(("film", "liquid"), [(False, False), (True, False), slow(False, True)])
+@pytest.mark.parametrize(("film", "liquid"), [(False, False), slow(True, False), slow(False, True)])
 def test_a_checkpoint_goes_on_with_another_number_of_ranks(film: bool, liquid: bool, before: int, after: int) -> None:
     """With moving triangles, between two lists; the bits are those of a run without a stop."""
     spheres, given = settings(film, True, liquid)

@@ -11,8 +11,12 @@ WITHIN = 1e-9
 """Largest difference, over the largest value of the array."""
 
 
-LONG = {"bridges_static", "bridges_deforming", "bridges_pendular"}
-"""Runs with laws that take long to compile."""
+LONG = {
+    "bridges_static", "bridges_deforming", "bridges_pendular", "liquid_bed_counted", "collision_record_film",
+    "periodic_fluid", "energies_dry_rolling", "own_minimum_gap_and_film", "mesh_film", "rolling_constant_torque",
+    "collision_film_verlet", "collision_film_overlap_onset", "linear_contact_film",
+}  # fmt: skip
+"""Runs with laws of their own, which take long to compile."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in RUNS])

@@ -6,12 +6,15 @@ of Nijssen, Ottens & Padding, Powder Technol. 413 (2023) 118017.
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from command_line import call
 from impacts import Pair
 
 from cfddem.backend.errors import InputError, UnstableStep
@@ -300,3 +303,33 @@ def test_the_record_of_the_engine_agrees_with_the_scenario(stokes: float) -> Non
 def test_bad_input_is_refused_by_name_value_and_limit(wrong: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=said):
         collide(DELRIN, **wrong)
+
+
+def test_measured_rebounds_are_computed_drawn_and_scored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point at the computed restitution, and one three errors above it."""
+    monkeypatch.chdir(tmp_path)
+    once = json.loads(call("collide", "--velocity", "0.1", "--stokes", "100", "--json").out)["restitution"]
+    (tmp_path / "points.csv").write_text(f"St [-], e [-], error [%]\n100, {once}, 2\n100, {once + 0.06}, 2\n")
+    done = call("collide", "--velocity", "0.1", "--data", "points.csv", "--json")
+    score = json.loads(done.out)
+    assert score["points"] == 2 and score["chi2"] == pytest.approx(4.5) and score["holds"] is False
+    assert (tmp_path / "collide.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("speed [m/s], e [-]\n1, 0.5\n", "one of stokes and angle"),
+        ("St [-], e [mm]\n1, 0.5\n", "units of 1"),
+        ("St [-], e [-]\n0, 0.5\n", "above 0"),
+        ("angle [deg], rebound angle [deg]\n90, 30\n", "below 90 degrees"),
+        ("St [-], e [-], error [-]\n1, 0.5, 0\n", "above 0"),
+    ],
+)
+def test_a_wrong_file_of_rebounds_is_one_line(
+    text: str, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "points.csv").write_text(text)
+    done = call("collide", "--velocity", "0.1", "--data", "points.csv")
+    assert (done.code, done.err.count("\n")) == (2, 1) and said in done.err, done.err

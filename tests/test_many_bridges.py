@@ -14,6 +14,7 @@ from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, 
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.spray import Spray, box
 from cfddem.particles.state import kinetic_energy, make_particles, particles_in
 
 
@@ -108,15 +109,20 @@ def test_the_order_of_particles_does_not_matter(monkeypatch: pytest.MonkeyPatch)
 
 
 def formed_and_broken(steps: int) -> None:
-    """Liquid over many steps in which bridges form and break."""
+    """Liquid over many steps in which bridges form and break, and a spray adds a tenth of it."""
     run, bridges = swarm(150, THIN, speed=1.0)
     liquid, step = bridges.liquid, 1e-6
+    drop = 1e-4 * liquid
+    spray = Spray(0.1 * liquid / (steps * step), drop, box(np.zeros(3), np.array(run.box)), seed=3)
     speed, draw = run.particles.velocity.std(), np.random.default_rng(5)
-    for _ in range(steps // 500):
-        run.advance(step, 500)
-        run.particles.velocity[:] = draw.normal(0.0, speed, run.particles.velocity.shape)  # stirred
+    for _ in range(steps // 100):
+        run.advance(step, 100)
+        spray(run.particles, run.time)
+        if run.steps % 500 == 0:
+            run.particles.velocity[:] = draw.normal(0.0, speed, run.particles.velocity.shape)  # stirred
     assert bridges.broken > steps // 50
-    assert bridges.liquid == pytest.approx(liquid, rel=1e-12)
+    assert spray.landed == pytest.approx(1000, abs=2)
+    assert bridges.liquid == pytest.approx(liquid + spray.volume, rel=1e-12)
 
 
 def test_liquid_is_kept_where_bridges_form_and_break() -> None:

@@ -20,8 +20,9 @@ from cfddem.io.reading import newest_run, open_run
 from cfddem.io.writer import RunFolder
 from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import rendering
+from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
-from cfddem.plotting.panels import BUBBLE, SINGLE, Stage, _bubbles, _scattered
+from cfddem.plotting.panels import BUBBLE, Stage, _bubbles
 from cfddem.plotting.pictures import movie, picture
 from cfddem.plotting.window import scene, window
 from scenarios.beds.liquid_bed.movie import side_by_side
@@ -99,11 +100,11 @@ def test_the_colour_shows_the_value_and_an_empty_image_is_white(renders):
 
 
 def test_agglomerates_have_a_colour_each_and_single_spheres_none():
-    values = _scattered(np.array([7, 7, 3, 12, 12, 12, 40]))
+    values = scattered(np.array([7, 7, 3, 12, 12, 12, 40]))
     assert values[2] == values[6] == 0.0
     assert values[0] == values[1] and values[3] == values[4] == values[5]
     assert min(values[0], values[3]) > SINGLE and abs(values[0] - values[3]) > 0.05
-    assert _scattered(np.array([1, 12, 12]))[1] == values[3], "the same colour in all snapshots"
+    assert scattered(np.array([1, 12, 12]))[1] == values[3], "the same colour in all snapshots"
 
 
 # ---------------------------------------------------------------- pictures of a run
@@ -155,7 +156,7 @@ def test_axes_colour_bars_and_title_are_labelled(renders, bed):
 
 
 def test_a_long_title_fits_a_narrow_picture(bed, monkeypatch):
-    monkeypatch.setattr("cfddem.plotting.panels._title", lambda run: "Liquid-fluidised bed of alumina beads")
+    monkeypatch.setattr("cfddem.plotting.panels.title_of", lambda run: "Liquid-fluidised bed of alumina beads")
     figure = Stage.of(open_run(bed), [2], ("voidage",), "speed", None).figure(2)
     left, right = figure._suptitle.get_window_extent().intervalx
     assert 0.0 < left < right < figure.bbox.width

@@ -14,6 +14,7 @@ from cfddem.case.gallery import full_key
 from cfddem.case.liquid import Liquid
 from cfddem.case.schema import Case
 from cfddem.preflight.summary import Preflight, preflight
+from cfddem.run.build import bridge_laws_of
 from closures import capillary, numbers, restitution
 from scenarios.beds.wet_bed import study
 
@@ -85,6 +86,10 @@ def refused(text: str = WET, given: dict[str, Any] | None = None) -> str:
         ({"liquid.surface_tension": -0.02}, "liquid.surface_tension = -0.02: must be at least 0"),
         ({"liquid.share_of_wet_particles": 1.5}, "liquid.share_of_wet_particles = 1.5: must be at most 1"),
         ({"liquid.wall_thickness": 1e-6}, "liquid.wall_share = 0.0: must be above 0 where wall_thickness is given"),
+        (
+            {"liquid.film_density": 998.0, "liquid.film": "none"},
+            "film_density = 998.0: must be 0 where film is none",
+        ),
         ({"liquid.pull": "wilett"}, "did you mean 'willett'?"),
         ({"fluid.density": 1000.0, "fluid.viscosity": 0.02}, "must be other than that of the fluid, 0.02 Pa s"),
         ({**SPRAY, "spray.length": 0.1}, "spray.length: must be chosen so that the spray zone lies in the column"),
@@ -113,6 +118,12 @@ def test_a_wet_case_survives_its_own_text() -> None:
     assert Case.from_text(case.to_toml()) == case
     assert full_key("viscosity") == "fluid.viscosity"
     assert full_key("surface_tension") == "liquid.surface_tension"
+
+
+def test_the_density_of_a_film_reaches_the_laws() -> None:
+    """0 by default: films have no inertia."""
+    assert [bridge_laws_of(made(liquid__film_density=each)).film_density for each in (0.0, 998.0)] == [0.0, 998.0]  # type: ignore[union-attr]
+    assert bridge_laws_of(made()).film_density == 0.0  # type: ignore[union-attr]
 
 
 def test_the_three_amounts_of_liquid_agree() -> None:

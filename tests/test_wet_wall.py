@@ -43,6 +43,38 @@ def test_an_impact_agrees_with_an_independent_solution(case: tuple[Any, ...]) ->
         assert ours.spin == pytest.approx(omega, rel=1e-5, abs=0.01)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [CASES[0], CASES[5], CASES[7]], ids=lambda case: f"{case[0]}-{case[1]}")
+def test_the_particle_engine_agrees_with_the_equations(case: tuple[Any, ...]) -> None:
+    """A bridge of the engine between a particle and a wall: times 0.5 %, restitutions 0.005, spin 1 %."""
+    sphere, liquid, film, _, speed, angle, spin, friction = case
+    given: dict[str, Any] = {"angle": angle, "spin": spin, "friction": friction, "spring": "cut"}
+    engine = impact(sphere, liquid, film, speed, **given, solver="particles")
+    equations = impact(sphere, liquid, film, speed, **given)
+    assert engine.duration == pytest.approx(equations.duration, rel=5e-3)
+    assert engine.restitution == pytest.approx(equations.restitution, abs=5e-3)
+    assert engine.energy_lost == pytest.approx(equations.energy_lost, abs=0.01 * sum(equations.energy_lost.values()))
+    if angle:
+        assert engine.restitution_tangential == pytest.approx(equations.restitution_tangential, abs=5e-3)
+        assert engine.spin == pytest.approx(equations.spin, rel=0.01)
+
+
+@pytest.mark.slow
+def test_spheres_stick_in_the_particle_engine() -> None:
+    """Buck et al.: 0.345 m/s; within 2 %."""
+    found = sticking_velocity("glass_1.74", "water", 100e-6, precision=4e-3, solver="particles")
+    assert found == pytest.approx(0.345, rel=0.02)
+
+
+def test_the_particle_engine_refuses_readings_that_it_does_not_have() -> None:
+    with pytest.raises(InputError, match="spring"):
+        impact("alumina_1.74", None, angle=30, solver="particles")
+    with pytest.raises(InputError, match="capillary_phases"):
+        impact(capillary_phases="bridge", solver="particles")
+    with pytest.raises(InputError, match="solver"):
+        impact(solver="engine")
+
+
 @pytest.mark.parametrize(
     ("sphere", "liquid", "film", "published"),
     [
@@ -125,7 +157,7 @@ def test_the_printed_signs_of_the_film_hardly_matter() -> None:
 
 @pytest.mark.parametrize(("angle", "engine"), [(10.0, 0.8133), (20.0, 0.7085), (30.0, 0.6633), (40.0, 0.6546)])
 def test_a_spring_that_is_cut_acts_as_in_the_particle_engine(angle: float, engine: float) -> None:
-    """The engine's restitution of the same dry impact, at 0.2 % of the Hertz time; its dashpot slides otherwise."""
+    """The engine's restitution of the same dry impact, at 0.2 % of the Hertz time."""
     cut = impact("alumina_1.74", None, angle=angle, spring="cut", tolerance=1e-8)
     assert cut.restitution_tangential == pytest.approx(engine, abs=0.012)
     assert cut.restitution == pytest.approx(0.76, abs=1e-4)
@@ -138,7 +170,7 @@ def test_cutting_the_spring_matters_only_where_a_contact_slides_for_a_part() -> 
         differences[angle] = abs(kept.restitution_tangential - cut.restitution_tangential)
     assert differences[3.0] < 5e-3
     assert differences[30.0] > 0.2
-    assert differences[60.0] < 1e-6
+    assert differences[60.0] < 5e-3  # a contact that is cut has no friction in the weak pull at its end
 
 
 def test_a_thick_liquid_holds_a_sphere() -> None:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cfddem.analysis.answers import answers
 from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison, expansion_note
 from cfddem.analysis.fluctuations import impacts
+from cfddem.analysis.measured import compared_with_measured, with_files
 from cfddem.analysis.regimes import RegimeMap, regime_map
-from cfddem.analysis.run_warnings import last_value, warnings_of
+from cfddem.analysis.run_warnings import STATE, last_value, warnings_of
 from cfddem.analysis.series import block_average, stationarity
 from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
+from cfddem.case.compare import with_files_of
 from cfddem.case.schema import Case
-from cfddem.case.walls import with_surfaces_of
 from cfddem.io.reading import Run, open_run
 from cfddem.preflight.summary import preflight
 
@@ -24,32 +27,38 @@ ENERGY = "energy_"
 """Prefix of the columns of the energy budget in the history."""
 
 
-def report(folder: Path) -> dict[str, Any]:
+def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
     """Means over the averaging window of a run, and the laws that apply to it.
 
     folder   of the run
-    returns  plain values: `case`, `status`, `window`, `measures` (mean, error, unit, drift, stationary), `laws`
+    data     files of measured points beside those of the case
+    returns  plain values: `case`, `status`, `window`, `answers` (name, value, error, unit, verdict), `measures`
+             (mean, error, unit, drift, stationary), `laws`
              (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
              and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
-             the window, if recorded), `warnings`, `wall_time`, `preflight`, `provenance`
-    errors   InputError if the run has no history
+             the window, if recorded), `warnings`, `advice` (the warnings by what to do), `wall_time`, `preflight`,
+             `provenance`, `measured` (scores against measured data)
+    errors   InputError if the run has no history, or for data that cannot be read
     """
     run = open_run(folder)
     if not len(run.history.get("time", ())):
         raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
-    case = case_of(run)
+    case = with_files(case_of(run), data)
     begin, end = window_of(run, case)
     measures = _measures(run, run.history["time"] >= begin)
     drag_law = (comparison(*row) for row in compared_with_drag_law(run, case))
     laws = [*compared_with_bed_laws(case, measures), *drag_law]
     energy = _energy(run)
+    advice = warnings_of(run, case, begin, measures, laws)
     return {
         "case": case.title or folder.resolve().name,
         "folder": str(folder),
         "status": run.status,
         "message": run.message,
         "window": [begin, end],
+        "answers": answers(run, case, measures, laws, STATE in advice),
         "measures": measures,
+        "measured": [each.score() for each in compared_with_measured(run, case, begin)],
         "laws": laws,
         "laws_note": expansion_note(laws, measures),
         "ledger": _ledger(run),
@@ -57,7 +66,8 @@ def report(folder: Path) -> dict[str, Any]:
         "energy_lines": _energy_lines(run, energy),
         "collisions": _collisions(run, begin),
         "impacts": _impacts(run, begin, end),
-        "warnings": warnings_of(run, case, begin, measures, laws),
+        "warnings": [each for group in advice.values() for each in group],
+        "advice": advice,
         "wall_time": run.about.get("wall_time", {}),
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
         "preflight": preflight(case).summary(),
@@ -67,12 +77,17 @@ def report(folder: Path) -> dict[str, Any]:
 
 def case_of(run: Run) -> Case:
     """The case of a run."""
-    return with_surfaces_of(Case.from_text(run.case_text, str(run.folder / "case.toml")), run.folder)
+    return with_files_of(Case.from_text(run.case_text, str(run.folder / "case.toml")), run.folder)
 
 
 def window_of(run: Run, case: Case) -> tuple[float, float]:
-    """Start and end of the averaging window [s]: from `run.average_from`, or the second half of the run."""
+    """Start and end of the averaging window [s]: from `run.average_from`, or the second half of the run.
+
+    The run has recorded the start if the errors of its means have ended it.
+    """
     end = float(run.history["time"][-1])
+    if run.averages_from is not None:
+        return run.averages_from, end
     return (0.5 * end if case.run.average_from is None else min(case.run.average_from, end)), end
 
 

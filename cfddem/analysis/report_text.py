@@ -1,4 +1,4 @@
-"""The report of a run as text and as JSON."""
+"""The report of a run as text and as JSON: the answer first, then what to do about warnings, then details."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
+from cfddem.analysis.bed_laws import FROM_PRESSURE
 from cfddem.io.quantities import shown_unit
 
 WIDTH = 98
 """Columns of wrapped lines."""
+
+REMARKS = {FROM_PRESSURE: "; middle of the bed"}
+"""What a reader should know about a mean, by its name."""
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
@@ -23,13 +27,16 @@ def lines(result: dict[str, Any]) -> list[str]:
     """
     return [
         *_headline(result),
+        *_answers(result["answers"]),
+        *_measured(result["measured"]),
+        *_advice(result["advice"]),
+        *_measures(result),
         *_laws(result["laws"], result["laws_note"]),
         *_ledger(result["ledger"]),
         *_collisions(result["collisions"]),
         *_impacts(result["impacts"]),
         *_energy(result),
         *_wall_time(result["wall_time"]),
-        *_warnings(result["warnings"]),
     ]
 
 
@@ -61,16 +68,50 @@ def spelled(name: str) -> str:
     return name.replace("_", " ")
 
 
+def number(value: float | str, error: float = math.nan, unit: str = "") -> str:
+    """A value with its error and unit; a text as it is.
+
+    >>> number(0.04321, 0.0002, "m"), number(0.6, unit="1"), number("packed")
+    ('0.04321 +- 0.0002 m', '0.6', 'packed')
+    """
+    if isinstance(value, str):
+        return value
+    shown = "" if math.isnan(error) else f" +- {error:.2g}"
+    return f"{value:.4g}{shown} {'' if unit == '1' else unit}".rstrip()
+
+
 def _headline(result: dict[str, Any]) -> Iterator[str]:
     begin, end = result["window"]
-    yield f"{result['case']}: {result['status']}"
+    reason = f", {result['message']}" if result["status"] == "finished" and result["message"] else ""
+    yield f"{result['case']}: {result['status']}{reason}"
     yield f"means from {begin:g} to {end:g} s"
+
+
+def _answers(found: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
+    for each in found:
+        value = number(each["value"], each["error"], each["unit"])
+        opening = f"  {each['name']:<16} {value:<26} "
+        yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 46) or [opening]
+
+
+def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
+    if found:
+        yield ""
+        yield "  comparison with measured data"
+    for each in found:
+        opening = f"  {each['name']:<16} {each['points']} points of {spelled(each['quantity'])}: "
+        yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 19)
+
+
+def _measures(result: dict[str, Any]) -> Iterator[str]:
+    answered = {each["name"] for each in result["answers"]}
+    yield ""
+    yield "  all other means"
     for name, each in result["measures"].items():
-        error = "" if math.isnan(each["error"]) else f" +- {each['error']:.2g}"
-        unit = "" if each["unit"] == "1" else each["unit"]
-        value = f"{each['mean']:.4g}{error} {unit}".rstrip()
-        yield f"  {spelled(name):<26} {value:<28} {steadiness(each)}"
+        if spelled(name) not in answered:
+            value = number(each["mean"], each["error"], each["unit"])
+            yield f"  {spelled(name):<28} {value:<28} {steadiness(each)}{REMARKS.get(name, '')}"
 
 
 def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
@@ -129,8 +170,9 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
     return ["", *(line.replace(NO_BREAK, " ") for line in lines)]
 
 
-def _warnings(found: list[str]) -> Iterator[str]:
-    if found:
+def _advice(grouped: dict[str, list[str]]) -> Iterator[str]:
+    for action, found in grouped.items():
         yield ""
-    for each in found:
-        yield from textwrap.wrap(f"warning: {each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+        yield f"  {action}"
+        for each in found:
+            yield from textwrap.wrap(f"warning: {each}", WIDTH, initial_indent="  ", subsequent_indent="    ")

@@ -1,4 +1,4 @@
-"""Warnings about a run: an early end, laws outside of their fitted ranges, means that are not stationary."""
+"""Warnings about a run, grouped by what to do: an early end, laws outside of their ranges, means that still drift."""
 
 from __future__ import annotations
 
@@ -16,28 +16,43 @@ from closures.registry import Law
 
 REMEDY = "choose a law with a wider range (cfddem explain)"
 
+FINISH = "finish the run before you use its means"
+LONGER = "run longer, or average over another window"
+LAWS = "check the laws: they were used outside of their fitted ranges"
+COMPARE = "treat these comparisons with care: the published law is outside of its range"
+STATE = "check the state of the bed: it is not what the case intends"
+"""What to do about a group of warnings, in the order in which to do it."""
+
+Grouped = dict[str, list[str]]
+"""Warnings by what to do about them."""
+
+Found = Iterator[tuple[str, str]]
+"""What to do, and the warning."""
 
 LEAST_SHARE, AGITATION_SHARE = 0.01, 0.25
 """Share of the uses of a law outside of its range from which a warning is given; more for agitation, because surface
 and floor of every bed are outside."""
 
 
-def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], laws: list[dict[str, Any]]) -> list[str]:
-    """All warnings, one line each.
+def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Grouped:
+    """All warnings, one line each, by what to do.
 
     begin           start of the averaging window [s]
     measures, laws  of the report
     """
-    return [
+    grouped: Grouped = {}
+    for action, text in (
         *_status_warnings(run),
-        *_range_warnings(run, case, begin),
-        *(f"{row['law']}: {row['outside_range']}" for row in laws if row["outside_range"]),
-        *_series_warnings(measures),
         *_defluidised(run, case),
-    ]
+        *_series_warnings(measures),
+        *_range_warnings(run, case, begin),
+        *((COMPARE, f"{row['law']}: {row['outside_range']}") for row in laws if row["outside_range"]),
+    ):
+        grouped.setdefault(action, []).append(text)
+    return grouped
 
 
-def _defluidised(run: Run, case: Case) -> Iterator[str]:
+def _defluidised(run: Run, case: Case) -> Found:
     """A wet bed that has come to rest, or lets the gas pass, at a velocity that fluidises the dry bed."""
     weight, history = weight_over_floor(case), run.history
     if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:
@@ -50,7 +65,7 @@ def _defluidised(run: Run, case: Case) -> Iterator[str]:
         speed - estimate_bed(case).onset,
     )  # fmt: skip
     if found is not None:
-        yield str(found)
+        yield STATE, str(found)
 
 
 def last_value(run: Run, name: str) -> int:
@@ -59,28 +74,28 @@ def last_value(run: Run, name: str) -> int:
     return int(column[-1]) if len(column) else 0
 
 
-def _status_warnings(run: Run) -> Iterator[str]:
+def _status_warnings(run: Run) -> Found:
     """A run that did not finish, and missing snapshots."""
     if run.status == "stopped":
-        yield f"the run was stopped: {run.message}"
+        yield FINISH, f"the run was stopped: {run.message}"
     elif run.status == "failed":
-        yield f"the run failed: {run.message}"
+        yield FINISH, f"the run failed: {run.message}"
     elif run.status == "running":
-        yield "the run has not finished; if it was killed, continue it with cfddem resume"
+        yield FINISH, "the run has not finished; if it was killed, continue it with cfddem resume"
     if run.missing:
-        yield f"{len(run.missing)} snapshots are missing"
+        yield FINISH, f"{len(run.missing)} snapshots are missing"
 
 
-def _range_warnings(run: Run, case: Case, begin: float) -> Iterator[str]:
+def _range_warnings(run: Run, case: Case, begin: float) -> Found:
     """How often laws were evaluated outside of their fitted ranges after a time [s], if it is more than LEAST_SHARE."""
     steps = _gained(run, "fluid_steps", begin)
-    evaluations = steps * float(run.history["particle_count"].mean())
+    evaluations = steps * float(run.history.get("particle_count", np.zeros(1)).mean())
     drag, agitation, pair_laws = case.laws.drag_law, case.agitation, list(case.laws.pair_laws.values())
     if pair_laws:
         if outside := _gained(run, "out_of_range_count", begin):
             laws = [law for law in (drag, *pair_laws) if law is not None and law.ranges]
             ranges = "; ".join(f"{law.name} {law.fitted_for}" for law in laws)
-            yield f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}; {REMEDY}"
+            yield LAWS, f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}; {REMEDY}"
     elif drag is not None:
         yield from _beyond("drag law", drag, _gained(run, "out_of_range_count", begin), evaluations)
     if isinstance(agitation, Law):
@@ -94,19 +109,18 @@ def _gained(run: Run, name: str, begin: float) -> int:
     return int(column[-1] - column[np.searchsorted(run.history["time"], begin)]) if len(column) else 0
 
 
-def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float = LEAST_SHARE) -> Iterator[str]:
+def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float = LEAST_SHARE) -> Found:
     """Warning that a law was used outside of its range in more than a share of its uses."""
     if evaluations and outside > share * evaluations:
-        yield (
-            f"the {kind} {law.name} was evaluated outside of its fitted range in {100.0 * outside / evaluations:.2g} % "
-            f"of its uses: {law.fitted_for}; {REMEDY}"
-        )
+        share_outside = f"{100.0 * outside / evaluations:.2g} % of its uses: {law.fitted_for}; {REMEDY}"
+        yield LAWS, f"the {kind} {law.name} was evaluated outside of its fitted range in {share_outside}"
 
 
-def _series_warnings(measures: dict[str, Any]) -> Iterator[str]:
+def _series_warnings(measures: dict[str, Any]) -> Found:
     """Series without a stationary mean, or without an error."""
     drifting = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is False]
     if drifting:
-        yield f"not stationary in the averaging window: {', '.join(drifting)}; run longer, or increase run.average_from"
+        remedy = "run longer, or increase run.average_from"
+        yield LONGER, f"not stationary in the averaging window: {', '.join(drifting)}; {remedy}"
     if any(each["stationary"] is None for each in measures.values()):
-        yield "the averaging window has too few rows for errors; run longer, or decrease run.history_every"
+        yield LONGER, "the averaging window has too few rows for errors; run longer, or decrease run.history_every"

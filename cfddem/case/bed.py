@@ -112,6 +112,10 @@ class MixtureSpecies(Species):
     )
 
 
+AT_RANDOM = ("packed", "expanded")
+"""Starts with a random packing, which fills a box."""
+
+
 class Bed(Species):
     """The particles, their initial state, and the inlet flow."""
 
@@ -122,9 +126,10 @@ class Bed(Species):
     arrangement: Literal["mixed", "layers"] = Field(
         "mixed", description="initial arrangement of several species: mixed, or in layers with the first at the bottom"
     )
-    start: Literal["poured", "suspended", "packed", "placed"] = Field(
+    start: Literal["poured", "suspended", "expanded", "packed", "placed"] = Field(
         "poured",
-        description="initial state: poured to rest, spread evenly over the column, random packing, or at `positions`",
+        description="initial state: poured to rest, spread evenly over the column, at random up to the height expected "
+        "in the flow, at random over the column, or at `positions`",
     )
     positions: tuple[Point, ...] = Field((), description='particle centres, for start = "placed" [m]')
     start_corner: Point | None = Field(
@@ -178,8 +183,9 @@ class Bed(Species):
             value = getattr(self, name)
             if value != type(self).model_fields[name].default:
                 raise InputError(name, value, "left out where species are given", f"give bed.species.NAME.{name}")
-        if self.start == "packed" and self.arrangement == "layers":
-            raise InputError("arrangement", "layers", 'mixed where start = "packed"', "a random packing has no layers")
+        if self.start in AT_RANDOM and self.arrangement == "layers":
+            where = f'mixed where start = "{self.start}"'
+            raise InputError("arrangement", "layers", where, "a random packing has no layers")
         wanted, other = ("fraction", "count") if self.height else ("count", "fraction")
         for name, part in self.species.items():
             if getattr(part, wanted) is None:

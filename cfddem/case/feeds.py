@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, nearest, shown
-from cfddem.case.bed import NonNegative, Point, Positive, Species
+from cfddem.case.bed import AT_RANDOM, NonNegative, Point, Positive, Species
 from cfddem.case.materials import Checked
 
 if TYPE_CHECKING:
@@ -89,8 +89,8 @@ def _wrong_walls(case: Case) -> Iterator[InputError]:
         if wall.leaves_its_place and wall.solid != "none":
             remedy = "the cells of the fluid do not move; a wall may move along itself"
             yield InputError(f"{key}.solid", wall.solid, "none for a wall that leaves its place in a fluid", remedy)
-    if case.wall and case.bed.start == "packed":
-        yield InputError("bed.start", "packed", '"poured", "suspended" or "placed" where walls are given')
+    if case.wall and case.bed.start in AT_RANDOM:
+        yield InputError("bed.start", case.bed.start, '"poured", "suspended" or "placed" where walls are given')
 
 
 def _wrong_feeds(case: Case) -> Iterator[InputError]:

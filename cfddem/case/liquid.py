@@ -51,6 +51,11 @@ class Liquid(Checked):
     cut: Literal["constant", "zero"] = Field(
         "constant", description="resistance below the minimum gap: as at the minimum gap, or none"
     )
+    film_density: NonNegative = Field(
+        0.0,
+        description="density of the liquid; if above 0, the added mass of the film is reversed with the bodies at "
+        "contact; 0: films have no inertia [kg/m3]",
+    )
     rupture: Literal["capillary", "lian", "willett", "film"] = Field(
         "capillary",
         description="gap at which a bridge breaks: by volume and speed of separation, by volume (Lian, Willett), or "
@@ -82,6 +87,8 @@ class Liquid(Checked):
             raise InputError(given[1], getattr(self, given[1]), f"left out where {given[0]} is given")
         if self.wall_thickness > 0.0 and self.wall_share == 0.0:
             raise InputError("wall_share", 0.0, "above 0 where wall_thickness is given")
+        if self.film_density > 0.0 and self.film == "none":
+            raise InputError("film_density", self.film_density, "0 where film is none")
         by_angle = self.redistribution == "contact_angle"
         if by_angle and self.wall_share == 0.0:
             raise InputError(

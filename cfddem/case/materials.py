@@ -33,6 +33,12 @@ class Checked(BaseModel):
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # a nested description keeps its own errors
 
+    def _repr_html_(self) -> str:
+        """The keys that differ from their defaults, in a notebook."""
+        from cfddem.case.display import model_html
+
+        return model_html(self)
+
 
 class Material(Checked):
     """A solid.

@@ -15,14 +15,15 @@ from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.backend.law_choice import BUILT_IN, chosen
-from cfddem.case.bed import POURED_SOLID_FRACTION, Bed, Point, Positive, Species
+from cfddem.case.bed import AT_RANDOM, POURED_SOLID_FRACTION, Bed, Name, Point, Positive, Species
 from cfddem.case.case_laws import AgitationFactors, CaseLaws
+from cfddem.case.compare import CaseData, with_files_of
 from cfddem.case.feeds import CaseFeed, CaseOutlet, refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
 from cfddem.case.liquid import Liquid, Spray, check_wet
 from cfddem.case.materials import Checked, Fluid, Material, Pairs, check_pairs
 from cfddem.case.toml_text import parse, read_text, set_value
-from cfddem.case.walls import CaseWall, with_surfaces_of
+from cfddem.case.walls import CaseWall
 from closures.agitation import SHARES, TIMES, free_spheres
 from closures.registry import Law, law_of
 
@@ -80,6 +81,11 @@ class CaseRun(Checked):
     every: Positive | None = Field(None, description="interval between snapshots; default: until / 50 [s]")
     history_every: Positive | None = Field(None, description="interval between history rows; default: every / 10 [s]")
     average_from: float | None = Field(None, ge=0, description="start of time averages; default: until / 2 [s]")
+    until_error: dict[str, Positive] = Field(
+        {},
+        description="end early, once the standard error of the mean of each named measure is below this fraction of "
+        "the mean; averages then begin where the start-up ends [-]",
+    )
     particle_step: Positive | None = Field(None, description="particle time step; default: 2 % of the Hertz time [s]")
     fluid_step: Positive | None = Field(
         None, description="upper limit of the fluid time step; default: set by its stability criteria [s]"
@@ -126,6 +132,7 @@ class Case(Checked):
     spray: Spray | None = Field(None, description="zone where drops of the liquid land on the particles")
     laws: CaseLaws = CaseLaws.model_validate({})
     run: CaseRun
+    compare: dict[Name, CaseData] = Field({}, description="measured data that the report draws beside the run")
 
     @field_validator("title")
     @classmethod
@@ -145,8 +152,10 @@ class Case(Checked):
 
     @model_validator(mode="after")
     def _a_random_packing_fills_a_box(self) -> Case:
-        if self.bed.start == "packed" and self.column.shape == "cylinder":
-            raise InputError("bed.start", "packed", '"poured" or "suspended" in a cylinder', "a packing fills a box")
+        if self.bed.start in AT_RANDOM and self.column.shape == "cylinder":
+            raise InputError(
+                "bed.start", self.bed.start, '"poured" or "suspended" in a cylinder', "a packing fills a box"
+            )
         return self
 
     @model_validator(mode="after")
@@ -277,7 +286,7 @@ class Case(Checked):
 
         Raises InputError that lists every input error with file, line, key, value and limit.
         """
-        return with_surfaces_of(cls.from_text(read_text(Path(path)), str(path), overrides), Path(path).parent)
+        return with_files_of(cls.from_text(read_text(Path(path)), str(path), overrides), Path(path).parent)
 
     @classmethod
     def from_text(cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None) -> Case:

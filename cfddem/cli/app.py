@@ -6,14 +6,15 @@ import os
 import shutil
 import sys
 import textwrap
-from typing import NoReturn
+import warnings
+from typing import Any, NoReturn
 
 from cyclopts import App, CycloptsError, Group
 
 from cfddem import __version__
 from cfddem.backend.errors import CfddemError
 from cfddem.backend.launch import several_ranks
-from cfddem.cli import cases, information, results, validation
+from cfddem.cli import calibration, cases, information, results, validation
 from cfddem.cli.ranks import end_together
 
 WIDTH = 100
@@ -34,8 +35,8 @@ Exit codes: 0 success; 1 a limit is exceeded (validate), warnings with --strict 
 )
 
 COMMANDS = {
-    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, cases.sweep),
-    "Results": (results.report, results.view, results.export),
+    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, cases.sweep, calibration.calibrate),
+    "Results": (results.report, results.compare, results.view, results.export),
     "Collisions of a few spheres": ("collide", "wet-wall", "film-impact", "three-spheres", "wet-pair"),
     "Validation": (validation.validate, validation.bench),
     "Information": (information.explain, information.doctor),
@@ -71,8 +72,13 @@ app.register_install_completion_command(help="Complete commands and options in t
 
 def main() -> None:
     """Run a command. A user's error ends in one line and exit code 2, never in a traceback."""
+    if os.name == "nt":  # a redirected output may have an encoding that lacks a sign
+        for stream in (sys.stdout, sys.stderr):
+            getattr(stream, "reconfigure", lambda **_: None)(errors="replace")
     try:
-        app(sys.argv[1:], exit_on_error=False, print_error=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning  # type: ignore[assignment]
+            app(sys.argv[1:], exit_on_error=False, print_error=False)
     except CycloptsError as failure:
         _fail(" ".join(str(failure).split()), 2)
     except CfddemError as failure:
@@ -96,6 +102,11 @@ def _fail(message: str, code: int) -> NoReturn:
     for line in message.splitlines():
         _print_error(line)
     sys.exit(code)
+
+
+def _show_warning(message: Warning | str, *_: Any) -> None:
+    """Print a warning in one line, without the place in the source."""
+    _print_error(f"warning: {' '.join(str(message).split())}")
 
 
 def _print_error(message: str) -> None:

@@ -89,10 +89,12 @@ def stability(
     from cfddem.io.files import require_folder
     from cfddem.preflight.bed_estimate import estimate_bed
     from cfddem.preflight.bed_waves import lines, summary, waves_of
+    from cfddem.preflight.summary import refused_extremes
 
     require_folder(plot)
     described = Case.from_toml(find_case(case), overrides(set or []))
-    found = waves_of(described, estimate_bed(described))
+    with refused_extremes(described):
+        found = waves_of(described, estimate_bed(described))
     if found is None:
         remedy = "waves are computed for free particles above minimum fluidisation, denser than their liquid"
         raise InputError("case", described.title or None, "a fluidised liquid bed", remedy)
@@ -203,7 +205,14 @@ def resume(
 def sweep(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
-    over: Annotated[list[str], Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")],
+    over: Annotated[
+        list[str] | None, Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")
+    ] = None,
+    vary: Annotated[
+        list[str] | None, Parameter(help="KEY=LOW..HIGH; may be repeated; the ranges are sampled", negative="")
+    ] = None,
+    sample: Annotated[str, Parameter(help="how ranges are sampled: latin (hypercube) or sobol")] = "latin",
+    runs: Annotated[int, Parameter(help="number of samples")] = 16,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
     scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None,
@@ -212,6 +221,8 @@ def sweep(
     json: Annotated[bool, Parameter(help="print the outcomes as JSON", negative="")] = False,
 ) -> None:
     """Run a case for many values, one folder each, and write a table and a figure of the results.
+
+    The values are listed (--over), or fill ranges evenly (--vary, --sample, --runs).
 
     After a stop, the same command continues with the missing runs. With --write-jobs nothing is run: the folder gets
     one command for each run, and a script for Slurm; the same command without it collects the results afterwards.
@@ -222,11 +233,12 @@ def sweep(
     from dataclasses import asdict
 
     from cfddem.case.gallery import find_case, overrides
-    from cfddem.run.sweep import Outcome, failures, ranges
+    from cfddem.run.samples import chosen_values
+    from cfddem.run.sweep import Outcome, failures
     from cfddem.run.sweep import sweep as run_all
 
     path = find_case(case)
-    values = ranges(over)
+    values = chosen_values(over or [], vary or [], sample, runs)
     folder = output or Path(f"{path.stem}-sweep")
     if write_jobs:
         from cfddem.run.job_array import write_jobs as write

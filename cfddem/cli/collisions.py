@@ -9,23 +9,36 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.printing import show
 from cfddem.cli.scenario_commands import command
 from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_pair, wet_wall
+from scenarios.collisions.immersed_pair.measured import MeasuredCollisions, compare_points
 from scenarios.collisions.three_spheres.figures import draw_map
 
 
 def _collide(
-    *, material: str, target: str | None, diameter: float, target_diameter: float | None, spin: float, **given: Any
-) -> immersed_pair.Collision:
-    """Collide two spheres of named materials."""
+    *,
+    material: str,
+    target: str | None,
+    diameter: float,
+    target_diameter: float | None,
+    spin: float,
+    data: Path | None,
+    figure: Path,
+    **given: Any,
+) -> immersed_pair.Collision | MeasuredCollisions:
+    """Collide two spheres of named materials, once or at each measured point."""
     known = immersed_pair.MATERIALS
     for name in (material, target):
         if name is not None and name not in known:
             raise InputError("material", name, nearest(name, known))
-    return immersed_pair.collide(
-        (known[material], known[target or material]),
-        diameter=(diameter, diameter if target_diameter is None else target_diameter),
-        spin=(spin, 0.0),
-        **given,
-    )
+
+    def once(**point: float) -> immersed_pair.Collision:
+        return immersed_pair.collide(
+            (known[material], known[target or material]),
+            diameter=(diameter, diameter if target_diameter is None else target_diameter),
+            spin=(spin, 0.0),
+            **given | point,
+        )
+
+    return once() if data is None else compare_points(data, once, figure)
 
 
 collide = command(
@@ -43,6 +56,8 @@ collide = command(
         "diameter": (float, 12.7e-3, "of the striker [m]"),
         "target_diameter": (float | None, None, "of the target; the same if not given [m]"),
         "spin": (float, 0.0, "of the striker before the collision [rad/s]"),
+        "data": (Path | None, None, "CSV file of measured points, restitution over stokes or rebound angle over angle"),
+        "figure": (Path, Path("collide.png"), "PNG file that shows the measured points"),
     },
     call=_collide,
 )

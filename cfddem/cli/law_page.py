@@ -11,6 +11,7 @@ from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.equation_text import equation_text
+from cfddem.cli.scenario_commands import descriptions
 from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named
 from closures import registry
 from closures.registry import Law
@@ -175,14 +176,20 @@ def plot(law: Law, output: Path) -> Path:
     low, high = axes.dataLim.intervaly
     if high > 100.0 * low > 0.0:
         axes.set_yscale("log")
-    axes.set_xlabel(names[0].replace("_", " "))
-    axes.set_ylabel(law.name.replace("_", " "))
+    units = {name: re.findall(r"\[([^\]]*)\]", text) for name, text in descriptions(law.function).items()}
+    plots.label(axes, names[0].replace("_", " "), _unit(units.get(names[0])), law.name.replace("_", " "),
+                _unit(units.get("returns")))  # fmt: skip
     if len(names) > 1:
         plots.legend(axes)
     rest = [f"{name} = {middle[name]:.3g}" for name in names[2:]]
     axes.set_title("\n".join(textwrap.wrap(", ".join(rest), 70)) or law.kind, loc="left", fontsize=9)
     plots.save(figure, output)
     return output
+
+
+def _unit(found: list[str] | None) -> str:
+    """The unit that a docstring gives; `SI` where it gives none, or several."""
+    return found[0] if found and len(found) == 1 else "SI"
 
 
 def _span(law: Law, name: str) -> list[float]:

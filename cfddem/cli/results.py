@@ -12,33 +12,73 @@ def report(
     folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
     *,
     output: Annotated[
-        Path | None, Parameter(name=["--output", "-o"], help="HTML file; default: NAME-report.html")
+        Path | None, Parameter(name=["--output", "-o"], help="HTML or Markdown (.md) file; default: NAME-report.html")
     ] = None,
     json: Annotated[
         bool, Parameter(help="print the report as JSON; writes no page unless -o is given", negative="")
     ] = False,
+    markdown: Annotated[
+        bool, Parameter(help="print the report as Markdown; writes no page unless -o is given", negative="")
+    ] = False,
+    data: Annotated[
+        list[Path] | None, Parameter(help="CSV file of measured points, beside those of the case; may be repeated")
+    ] = None,
 ) -> None:
-    """Report the results of a run as text and as an HTML page with figures.
+    """Report the results of a run as text and as a page with figures.
 
-    The report holds time averages with errors, comparison with correlations, conservation and warnings.
+    The answer comes first: bed height, voidage, pressure drop and regime, each with its error and a verdict. Then come
+    warnings by what to do about them, all means, comparison with correlations, and conservation.
 
     Example: cfddem report bed
     """
     from cfddem.analysis.report import report as summary
+    from cfddem.analysis.report_markdown import markdown as as_markdown
     from cfddem.analysis.report_text import as_json, lines
     from cfddem.io.files import require_folder
     from cfddem.io.reading import newest_run
 
     folder = folder or newest_run(Path())
     require_folder(output)
-    result = summary(folder)
-    if json and output is None:
-        print(as_json(result))
+    result = summary(folder, data or ())
+    printed = as_json(result) if json else as_markdown(result).rstrip() if markdown else ""
+    if printed and output is None:
+        print(printed)
         return
-    from cfddem.plotting.report_page import page
+    from cfddem.plotting.report_page import markdown_page, page
 
-    written = page(folder, output, result)
-    print(as_json(result) if json else "\n".join([*lines(result), "", f"  page with figures: {written}"]))
+    if output is not None and output.suffix.lower() == ".md":
+        written = markdown_page(folder, output, result, data or ())
+    else:
+        written = page(folder, output, result, data or ())
+    print(printed or "\n".join([*lines(result), "", f"  page with figures: {written}"]))
+
+
+def compare(
+    folders: Annotated[list[Path], Parameter(help="run folders; the first is the reference", negative="")],
+    *,
+    output: Annotated[
+        Path, Parameter(name=["--output", "-o"], help="HTML page, or PNG with the histories alone")
+    ] = Path("compare.html"),
+    json: Annotated[bool, Parameter(help="print the comparison as JSON", negative="")] = False,
+) -> None:
+    """Compare runs: keys of their cases that differ, means with differences over their errors, curves in one figure.
+
+    Example: cfddem compare seeds/seed-1 seeds/seed-2
+    """
+    from cfddem.analysis.comparison import compare as compared
+    from cfddem.analysis.comparison import lines
+    from cfddem.analysis.report_text import as_json
+    from cfddem.backend.errors import InputError
+    from cfddem.io.files import require_folder
+
+    require_folder(output)
+    if output.suffix.lower() not in (".html", ".png"):
+        raise InputError("output", str(output), "a file that ends in .html or .png")
+    result = compared(folders)
+    from cfddem.plotting.comparison_page import comparison_page
+
+    written = comparison_page(folders, output, result)
+    print(as_json(result) if json else "\n".join([*lines(result), "", f"page with figures: {written}"]))
 
 
 def view(
@@ -51,15 +91,23 @@ def view(
     ] = None,
     colour: Annotated[
         str,
-        Parameter(help="quantity that colours the spheres: speed, or a recorded field (liquid, agglomerate)"),
+        Parameter(
+            help="quantity that colours the spheres: speed, collisions, or a recorded field (liquid, agglomerate)"
+        ),
     ] = "speed",
     movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .mp4 or .gif")] = None,
     history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
     collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,
     waves: Annotated[bool, Parameter(help="solid fraction over height and time instead", negative="")] = False,
     window: Annotated[bool, Parameter(help="interactive window instead of a file", negative="")] = False,
+    web: Annotated[
+        bool, Parameter(help="page in the browser instead of a file; stop with Ctrl-C", negative="")
+    ] = False,
+    port: Annotated[int | None, Parameter(help="port of the page; default: 8080, or any free one")] = None,
 ) -> None:
-    """Make a picture or movie of a run, or curves over time.
+    """Make a picture or movie of a run, or curves over time; or look at it in a window or in the browser.
+
+    The page in the browser follows a run that is still going. It can be opened on this computer only.
 
     Example: cfddem view bed --movie bed.gif
     """
@@ -72,7 +120,11 @@ def view(
     folder, panels = folder or newest_run(Path()), show or ()
     require_folder(output)
     require_folder(movie)
-    if window:
+    if web:
+        from cfddem.plotting.browser import browse
+
+        browse(folder, colour, port)
+    elif window:
         on_screen(folder, colour)
     elif movie is not None:
         print(pictures.movie(folder, movie, show=panels, colour=colour))

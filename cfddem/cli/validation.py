@@ -23,6 +23,9 @@ def validate(
     output: Annotated[Path, Parameter(name=["--output", "-o"], help="folder for figures, tables and histories")] = Path(
         "results/validation"
     ),
+    data: Annotated[
+        list[Path] | None, Parameter(help="CSV file of measured points; for binary-collision", negative="")
+    ] = None,
     json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
 ) -> None:
     """Reproduce published results and compare; exits 1 if a limit is exceeded.
@@ -34,38 +37,46 @@ def validate(
 
     if target != "all" and target not in TARGETS:
         raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
+    if data and target != "binary-collision":
+        raise InputError("--data", target, "used with binary-collision", "cfddem report --data takes data of a run")
     names = [name for name in TARGETS if name not in ONLY_IF_NAMED] if target == "all" else [target]
-    held = [run(name, output, json) for name in names]  # every target runs, even after a failure
+    held = [run(name, output, json, data or ()) for name in names]  # every target runs, even after a failure
     if not all(held):
         sys.exit(1)
 
 
 def bench(
-    target: Annotated[str, Parameter(help="dem, or bed")] = "dem",
+    target: Annotated[str, Parameter(help="dem, fluid, bed, or all")] = "dem",
     *,
-    particles: Annotated[int, Parameter(help="1000, 10000, 100000 or 1000000")] = 10_000,
+    particles: Annotated[int, Parameter(help="of dem: 1000, 10000, 100000 or 1000000")] = 10_000,
     threads: Annotated[int, Parameter(help="of each code")] = 1,
-    film: Annotated[bool, Parameter(help="with the film of water", negative="")] = False,
+    film: Annotated[bool, Parameter(help="dem with the film of water", negative="")] = False,
     films: Annotated[Literal["full"] | None, Parameter(help="with films that resist sliding and rolling, too")] = None,
-    bridges: Annotated[bool, Parameter(help="with a liquid bridge on every contact", negative="")] = False,
+    bridges: Annotated[bool, Parameter(help="dem with a liquid bridge on every contact", negative="")] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
-    """Measure the speed of this machine: a dense bed of spheres (dem) or a gas bed of 24 750 spheres (bed).
+    """Measure the speed of this machine: a dense bed of spheres (dem), boxes of fluid, a gas bed (bed).
+
+    Each is compared with the memory speed of the machine, and with other codes where they are installed or published.
 
     Example: cfddem bench dem --particles 10000
     """
     announce_compilation()
     from scenarios.beds.gas_bed import study as gas_bed
-    from scenarios.benchmarks import dense_bed
+    from scenarios.benchmarks import dense_bed, fluid_box, table
 
-    if target not in ("dem", "bed"):
-        raise InputError("target", target, nearest(target, ["dem", "bed"]))
-    if target == "dem":
-        result = dense_bed.bench(particles, threads, film, bridges, full=films == "full")
-    else:
-        result = gas_bed.bench(threads)
+    targets = {
+        "dem": (lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"), dense_bed.rows),
+        "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),
+        "bed": (lambda: gas_bed.bench(threads), gas_bed.rows),
+        "all": (lambda: table.bench(threads), table.rows),
+    }
+    if target not in targets:
+        raise InputError("target", target, nearest(target, list(targets)))
+    measure, rows = targets[target]
+    result = measure()
     if json:
         print(_json.dumps(result))
     else:
-        for name, text in (dense_bed if target == "dem" else gas_bed).rows(result):
+        for name, text in rows(result):
             print(f"{name:<20}  {text}")

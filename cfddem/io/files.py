@@ -95,7 +95,12 @@ def hdf5_in_memory(image: io.BytesIO, **options: Any) -> Any:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Flush the file names of a folder to the disk, so that a power cut does not undo a rename."""
+    """Flush the file names of a folder to the disk, so that a power cut does not undo a rename.
+
+    Windows has no such call; its file system keeps a journal of names.
+    """
+    if os.name == "nt":
+        return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

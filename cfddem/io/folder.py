@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io.damage import damage_named, require_about, require_columns
+from cfddem.io.file_lock import lock_file
 from cfddem.io.files import disk_error, reason, require_format
 from cfddem.io.index import POINTS, Layout, Snapshot
 
@@ -19,6 +20,9 @@ FORMAT = 2
 RUN_FILES = ("run.json", "run.vtkhdf", "history.h5", "checkpoint")
 """A folder that holds one of these files holds a run."""
 
+AVERAGES_FROM = "averages_from"
+"""Entry of `run.json`: start of averages in a run that ended because its means were known [s]."""
+
 
 def read_about(folder: Path) -> dict[str, Any]:
     """The content of `run.json`.
@@ -27,15 +31,17 @@ def read_about(folder: Path) -> dict[str, Any]:
     """
     path = folder / "run.json"
     try:
-        about: dict[str, Any] = json.loads(path.read_text())
+        about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         found = int(about["format"])
     except FileNotFoundError:
         raise InputError("folder", str(folder), "a run folder", "it contains no run.json") from None
     except OSError as failure:
         raise disk_error("read", path, failure) from failure
-    except (ValueError, KeyError, TypeError) as damage:
+    except (ValueError, KeyError, TypeError, OverflowError) as damage:
         raise RunFailed(f"{path}: the file is damaged ({damage}); restore it, the snapshots are in data/") from damage
     require_format(path, found, FORMAT, folder)
+    with damage_named(path, "restore it, the snapshots are in data/"):
+        require_about(about)
     return about
 
 
@@ -56,14 +62,11 @@ def read_snapshot_header(path: Path) -> tuple[Snapshot, Layout]:
     """
     import h5py
 
-    try:
-        with h5py.File(path, "r") as file:
-            particles = file.get("particles", {})
-            count = len(particles[POINTS]) if POINTS in particles else 0
-            snapshot = Snapshot(path.name, float(file.attrs["time"]), int(file.attrs["step"]), count)
-            return snapshot, Layout.of(file.get("fluid", {}), particles)
-    except (OSError, KeyError) as damage:
-        raise RunFailed(f"{path}: the snapshot is damaged ({damage}); move the file elsewhere and retry") from damage
+    with damage_named(path), h5py.File(path, "r") as file:
+        particles = file.get("particles", {})
+        count = len(particles[POINTS]) if POINTS in particles else 0
+        snapshot = Snapshot(path.name, float(file.attrs["time"]), int(file.attrs["step"]), count)
+        return snapshot, Layout.of(file.get("fluid", {}), particles)
 
 
 def read_columns(path: Path) -> dict[str, np.ndarray]:
@@ -75,11 +78,12 @@ def read_columns(path: Path) -> dict[str, np.ndarray]:
 
     if not path.exists():
         return {}
-    try:
-        with h5py.File(path, "r") as file:
-            return {name: each[:] for name, each in file.items()}
-    except OSError as damage:
-        raise RunFailed(f"{path}: the history is damaged ({damage}); move the file elsewhere and retry") from damage
+    with damage_named(path), h5py.File(path, "r") as file:
+        columns = {name: each[:] for name, each in file.items()}
+        require_columns(columns)
+        if columns and "time" not in columns:
+            raise ValueError("it has no column time")
+        return columns
 
 
 def require_free(folder: Path, case_text: str) -> None:
@@ -94,7 +98,7 @@ def require_free(folder: Path, case_text: str) -> None:
     taken = [name for name in RUN_FILES if (folder / name).exists()]
     if any((folder / "data").glob("*.h5")):
         taken.append("data")
-    if (folder / "case.toml").exists() and (folder / "case.toml").read_text() != case_text:
+    if (folder / "case.toml").exists() and (folder / "case.toml").read_bytes() != case_text.encode():
         taken.append("case.toml")
     if taken:
         raise InputError(
@@ -123,14 +127,10 @@ def lock(folder: Path) -> Any:
     """
     path = folder / ".lock"
     try:
-        file = path.open("w")
+        file = path.open("w", encoding="utf-8")
     except OSError as failure:
         raise disk_error("write", path, failure) from failure
-    try:
-        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    if not lock_file(file):
         file.close()
-        raise InputError("folder", str(folder), "unused", "another process is writing this run") from None
-    except OSError:  # the file system does not support locks
-        pass
+        raise InputError("folder", str(folder), "unused", "another process is writing this run")
     return file

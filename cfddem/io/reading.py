@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -16,15 +17,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, RunFailed, nearest
-from cfddem.io.folder import read_about, read_columns, read_snapshot_header
+from cfddem.backend import html
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.toml_text import read_text
+from cfddem.io.damage import damage_named, require_cells, require_columns, require_particles
+from cfddem.io.folder import AVERAGES_FROM, read_about, read_columns, read_snapshot_header
 from cfddem.io.index import GridBox, Snapshot, field_name, listed
-from cfddem.io.quantities import Quantity, from_json
+from cfddem.io.quantities import Quantity, from_json, shown_unit
 
 if TYPE_CHECKING:
     import pyvista
 
 _log = logging.getLogger("cfddem")
+
+_NUMBERED = re.compile(r"\d{8}\.h5")
+
+_SHOWN = ("time", "bed_height", "bed_voidage", "pressure_drop", "largest_speed", "contact_count", "particle_count")
+"""Columns of the history that a notebook shows."""
 
 
 def open_run(folder: str | Path) -> Run:
@@ -45,7 +54,19 @@ def newest_run(place: Path) -> Path:
     found = [path for path in (place / "run.json", *place.glob("*/run.json")) if path.exists()]
     if not found:
         raise InputError("folder", None, "a run folder", f"there is none in {place.resolve()}")
-    return max(found, key=lambda path: max(path.stat().st_mtime, path.with_name("data").stat().st_mtime)).parent
+    return max(found, key=_last_change).parent
+
+
+def _last_change(about: Path) -> float:
+    """When a run folder with this `run.json` was last written [s]."""
+    return max(each.stat().st_mtime for each in (about, about.with_name("data")) if each.exists())
+
+
+class Columns(dict[str, np.ndarray]):
+    """Columns by name; a name that is missing is refused with the nearest one."""
+
+    def __missing__(self, name: str) -> np.ndarray:
+        raise InputError("history column", name, nearest(name, self))
 
 
 class Run:
@@ -66,6 +87,18 @@ class Run:
         ends = f"{self.times[0]:g} to {self.times[-1]:g} s" if len(self.snapshots) else "no time"
         return f"Run({str(self.folder)!r}: {self.status}, {len(self.snapshots)} snapshots, {ends})"
 
+    def _repr_html_(self) -> str:
+        """Status, the last row of the history and the last snapshot, in a notebook."""
+        rows = [("status", self.status), ("snapshots", f"{len(self.snapshots)}")]
+        for name, column in self.history.items():
+            if len(column) and np.isfinite(column[-1]) and name in _SHOWN:
+                rows.append((name.replace("_", " "), f"{column[-1]:.4g} {shown_unit(self.unit(name)).strip('-')}"))
+        drawing = ""
+        if {"position", "radius", "velocity"} <= set(self.particle_fields):
+            last = self.particles(-1)
+            drawing = html.spheres(last["position"], last["radius"], last["velocity"])
+        return html.table(f"Run {self.folder.name}", rows, drawing)
+
     # ------------------------------------------------------------ about
 
     @property
@@ -79,6 +112,12 @@ class Run:
         return str(self.about["message"])
 
     @property
+    def averages_from(self) -> float | None:
+        """Start of averages in a run that ended because its means were known [s]; None for others."""
+        start = self.about.get(AVERAGES_FROM)
+        return start if isinstance(start, float) else None
+
+    @property
     def provenance(self) -> dict[str, Any]:
         """Versions, platform and random seed."""
         return dict(self.about["provenance"])
@@ -86,7 +125,7 @@ class Run:
     @cached_property
     def case_text(self) -> str:
         """The case in TOML as it was run."""
-        return (self.folder / "case.toml").read_text()
+        return read_text(self.folder / "case.toml")
 
     @cached_property
     def times(self) -> np.ndarray:
@@ -129,12 +168,16 @@ class Run:
         """A fluid field (nz, ny, nx) or (nz, ny, nx, 3) of one snapshot."""
         self._require_name(name, self.fluid_fields, "fluid")
         with self._opened(snapshot) as file:
-            return np.asarray(file[f"fluid/{name}"][0])
+            values = np.asarray(file[f"fluid/{name}"][0])
+            require_cells(values, name, self.grid.shape if self.grid is not None else (0, 0, 0))
+            return values
 
     def particles(self, snapshot: int = -1) -> dict[str, np.ndarray]:
         """All particle fields of one snapshot, one row per particle, in the order of ids."""
         with self._opened(snapshot) as file:
-            return {field_name(name): np.asarray(each[:]) for name, each in file.get("particles", {}).items()}
+            fields = {field_name(name): np.asarray(each[:]) for name, each in file.get("particles", {}).items()}
+            require_particles(fields)
+            return fields
 
     def track(self, particle: int) -> dict[str, np.ndarray]:
         """One particle in all snapshots that contain it: `time` and every field, one row per snapshot.
@@ -158,17 +201,23 @@ class Run:
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
         """Measures in time, name -> column; `pandas.DataFrame(run.history)` makes a table."""
-        return read_columns(self.folder / "history.h5")
+        return Columns(read_columns(self.folder / "history.h5"))
 
     @cached_property
     def collisions(self) -> dict[str, np.ndarray]:
         """All completed collisions, name -> column; empty if the run records none."""
         parts: dict[str, list[np.ndarray]] = {}
         for place in range(len(self.snapshots)):
-            with self._opened(place) as file:
-                for name, each in file.get("collisions", {}).items():
-                    parts.setdefault(name, []).append(each[:])
+            for name, each in self.collisions_of(place).items():
+                parts.setdefault(name, []).append(each)
         return {name: np.concatenate(each) for name, each in parts.items()}
+
+    def collisions_of(self, snapshot: int) -> dict[str, np.ndarray]:
+        """The collisions that were completed between the previous snapshot and this one; empty without a record."""
+        with self._opened(snapshot) as file:
+            columns = {name: each[:] for name, each in file.get("collisions", {}).items()}
+            require_columns({name: each for name, each in columns.items() if name != "place"})
+            return columns
 
     def mesh(self, snapshot: int = -1) -> pyvista.MultiBlock:
         """One snapshot as pyvista objects: an ImageData `fluid` with cell fields and a PolyData `particles`."""
@@ -198,8 +247,8 @@ class Run:
 
         Snapshots are numbered without a gap, so a gap is a loss.
         """
-        present = {path.name for path in (self.folder / "data").glob("[0-9]*.h5")}
-        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf")}
+        present = {path.name for path in (self.folder / "data").glob("*.h5") if _NUMBERED.fullmatch(path.name)}
+        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf") if _NUMBERED.fullmatch(each.name)}
         found = [
             known[name] if name in known else read_snapshot_header(self.folder / "data" / name)[0]
             for name in sorted(present)
@@ -224,11 +273,7 @@ class Run:
         if not -len(self.snapshots) <= snapshot < len(self.snapshots):
             raise InputError("snapshot", snapshot, f"from 0 to {len(self.snapshots) - 1}, or -1 for the last")
         path = self.folder / "data" / self.snapshots[snapshot].name
-        try:
-            file = h5py.File(path, "r")
-        except OSError as damage:
-            raise RunFailed(f"{path}: cannot be read ({damage})") from damage
-        with file:
+        with damage_named(path), h5py.File(path, "r") as file:
             yield file
 
     def _require_name(self, name: str, known: list[str], where: str) -> None:
@@ -243,5 +288,5 @@ def _indexed(path: Path) -> list[Snapshot]:
     try:
         with h5py.File(path, "r") as file:
             return listed(file)
-    except (OSError, KeyError):
+    except (OSError, KeyError, IndexError, RuntimeError, TypeError, ValueError, AttributeError):
         return []

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.case.toml_text import read_text
 from cfddem.io import checkpoint
 from cfddem.io.files import hdf5_in_memory, remove_partial, write_whole
 from cfddem.io.folder import FORMAT, lock, make_folder, read_about, read_columns, require_free, scan
@@ -104,7 +105,7 @@ class RunFolder:
         """
         folder = Path(folder)
         about = read_about(folder)
-        run = cls(folder, about, (folder / "case.toml").read_text())
+        run = cls(folder, about, read_text(folder / "case.toml"))
         for place in (folder, folder / "data", folder / "checkpoint"):
             remove_partial(place)
         run.snapshots, run._layout = scan(folder)
@@ -186,6 +187,11 @@ class RunFolder:
     def last_row(self) -> dict[str, float]:
         """The last row of the history; empty before the first."""
         return {name: column[-1] for name, column in self._history.items() if column}
+
+    @property
+    def history(self) -> dict[str, np.ndarray]:
+        """All rows so far, name -> copy of the column."""
+        return {name: np.array(column) for name, column in self._history.items()}
 
     def flush_history(self) -> None:
         """Write all rows so far."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
 from cfddem.backend.law_set import specialise
+from cfddem.particles.impulse_motion import keep_motion, mean_motion
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_changes import of_same_wall
 from cfddem.particles.interactions.bridge_solution import pull_energy
@@ -64,15 +65,8 @@ class BridgeEnergies:
         self._state = BridgeCount(ahead, spin_ahead, held, pulled, np.zeros((2, CHUNKS, 4)))
 
     def before(self, solver: ParticleSolver, step: float, ahead: np.ndarray) -> None:
-        """Keep what impulses of a step act on.
-
-        step   [s]
-        ahead  velocity after the first half kick (N, 3) [m/s]
-        """
-        particles = solver.particles
-        self._state.ahead[:] = ahead
-        gain = (0.5 * step * particles.inverse_inertia)[:, None] * particles.torque
-        self._state.spin_ahead[:] = particles.spin + gain
+        """Before a step [s]; `ahead`, the velocity after the first half kick (N, 3) [m/s]."""
+        keep_motion(self._state, solver.particles, step, ahead)
 
     def count(self, solver: ParticleSolver, step: float, before: float, after: float) -> tuple[np.ndarray, float]:
         """Count at this instant.
@@ -129,14 +123,6 @@ def _pulled(k, particles, edges, memory, kick, sign):
         return dot(force, minus(moved, _half_motion(j, particles, kick, sign))), 0.0
     by_wall = dot(force, times(kick, touched(edges, k, SURFACE)))
     return dot(force, moved) - by_wall, by_wall
-
-
-@inline
-def mean_motion(i, particles, count, step):
-    """Mean velocity and spin of particle i while impulses act: between the two half kicks of the step."""
-    velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
-    spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
-    return times(0.5, plus(at(count.ahead, i), velocity)), times(0.5, plus(at(count.spin_ahead, i), spin))
 
 
 @inline

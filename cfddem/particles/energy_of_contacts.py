@@ -59,6 +59,7 @@ class Count(NamedTuple):
 
 
 def room_for_count(solver: ParticleSolver) -> Count:
+    """A count with all values 0, for the present particles and pairs."""
     number, count = len(solver.edges.first), solver.particles.count
     ahead, moved, turned, drifted = np.zeros((4, count, 3))
     spring, stiffness, power, held, yielded = np.zeros((5, number))

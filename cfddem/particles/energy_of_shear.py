@@ -12,8 +12,8 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.backend.law_set import specialise
-from cfddem.particles.energy_of_bridges import mean_motion
 from cfddem.particles.energy_of_contacts import FILMS, note_loss
+from cfddem.particles.impulse_motion import keep_motion, mean_motion
 from cfddem.particles.interactions.shear_film import impulses_of
 from cfddem.particles.vectors import at, dot, flat, minus, plus, times
 from cfddem.particles.walls.nearest_point import SURFACE, touched
@@ -46,15 +46,8 @@ class ShearEnergies:
         self._state = ShearCount(ahead, spin_ahead, np.zeros((2, CHUNKS, 2)))
 
     def before(self, solver: ParticleSolver, step: float, ahead: np.ndarray) -> None:
-        """Keep what impulses of a step act on.
-
-        step   [s]
-        ahead  velocity after the first half kick (N, 3) [m/s]
-        """
-        particles = solver.particles
-        self._state.ahead[:] = ahead
-        gain = (0.5 * step * particles.inverse_inertia)[:, None] * particles.torque
-        self._state.spin_ahead[:] = particles.spin + gain
+        """Before a step [s]; `ahead`, the velocity after the first half kick (N, 3) [m/s]."""
+        keep_motion(self._state, solver.particles, step, ahead)
 
     def count(self, solver: ParticleSolver, step: float) -> np.ndarray:
         """Energy lost in the step, and put in by moving walls (2,) [J].

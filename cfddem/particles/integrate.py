@@ -45,6 +45,7 @@ from cfddem.particles.interactions.slots import (
     RECORD,
     ROLLING,
     SHEAR,
+    TRIANGLES,
     WALLS,
     clear_contact,
     film_impulses,
@@ -168,7 +169,7 @@ def move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, s
     largest = drift_particles(particles, edges, memory, free, step, origin)
     if WALLS:
         largest = larger(largest, advance_walls(walls, step) ** 2)
-        if len(walls.cell_member) > 0:
+        if TRIANGLES:
             share_memory(edges, memory, walls)
     return largest
 

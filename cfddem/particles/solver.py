@@ -100,6 +100,7 @@ class ParticleSolver:
         self.pair_fields = [*self.laws.fields(), *recorded]
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
         choices = self.laws.choices() | {"WALLS": bool(walls), "RECORD": record}
+        choices["TRIANGLES"] = len(self.walls.cell_member) > 0
         self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart)
         self._parameters, self._loop, self._threads = self.laws.parameters, _NO_LOOP, False
         self.gravity, self.free = gravity, free
@@ -286,7 +287,7 @@ class ParticleSolver:
         self.walls.travel[:] = 0.0
         if len(self.walls.kind):
             particles, graph, memory, walls, _ = self._views
-            wall_contacts(particles, graph, memory.minimum_gap, walls, self.free, self._reach)
+            specialise(wall_contacts, self.choices)(particles, graph, memory.minimum_gap, walls, self.free, self._reach)
 
     def _relist(self) -> None:
         """Make a new neighbour list; memory and present forces of pairs are carried over."""

@@ -36,6 +36,12 @@ def at(array, row):
 
 
 @inline
+def of_row(array, row):
+    """Vector of a row of an array of rows (N, 3)."""
+    return array[row, 0], array[row, 1], array[row, 2]
+
+
+@inline
 def put(array, row, a):
     """Write a vector into a row of a flat array."""
     x = _3 * np.uint64(row)

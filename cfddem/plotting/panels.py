@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run
-from cfddem.plotting import rendering
+from cfddem.plotting import colours, rendering
 from cfddem.plotting.curves import BLUE, ORANGE, SKY, blank
 
 if TYPE_CHECKING:
@@ -30,12 +29,6 @@ HEADROOM = 1.4
 
 SHARP = 200
 """Pixels of a rendered image per inch of paper."""
-
-AGGLOMERATE = "agglomerate"
-"""The field whose values are names: every agglomerate gets a colour of its own."""
-
-SINGLE = 0.04
-"""Part of the colours that is for single particles."""
 
 PANELS = ("spheres", "voidage", "bubbles", "streamlines")
 
@@ -73,24 +66,21 @@ class Stage:
                 raise InputError("show", name, nearest(name, PANELS))
         if "spheres" in panels or "bubbles" in panels:
             rendering.require_rendering()
-        bounds = _bounds(run, snapshots)
+        bounds = bounds_of(run, snapshots)
         size = np.diff(bounds, axis=1).ravel()
         depth = 0 if size[0] < size[1] else 1
         limits: dict[str, tuple[float, float]] = {}
         deep = False
         if "spheres" in panels:
-            shown = [run.particles(each) for each in snapshots]
-            values = np.concatenate([_values(each, colour) for each in shown])
-            high = float(np.quantile(values, 0.998)) if values.size else 1.0
-            low = 0.0 if values.size == 0 or values.min() >= 0.0 else float(values.min())
-            limits["spheres"] = (0.0, 1.0) if colour == AGGLOMERATE else (low, high if high > low else low + 1.0)
-            largest = max((float(each["radius"].max()) for each in shown if len(each["radius"])), default=0.0)
+            shown = [colours.values(run, each, colour) for each in snapshots]
+            limits["spheres"] = colours.limits(np.concatenate([values for _, values in shown]), colour)
+            largest = max((float(each["radius"].max(initial=0.0)) for each, _ in shown), default=0.0)
             deep = size[depth] > 12.0 * largest
         if "voidage" in panels:
             lowest = min(float(run.fluid("voidage", each).min()) for each in snapshots)
             limits["voidage"] = (min(np.floor(20.0 * lowest) / 20.0, 0.95), 1.0)
         if "streamlines" in panels:
-            fastest = max(float(_magnitude(run.fluid("velocity", each)).max()) for each in snapshots)
+            fastest = max(float(colours.magnitude(run.fluid("velocity", each)).max()) for each in snapshots)
             limits["streamlines"] = (0.0, fastest or 1.0)
         return cls(run, panels, bounds, depth, colour, deep if cut is None else cut, limits)
 
@@ -115,48 +105,30 @@ class Stage:
             self._finish(panel, width, tall)
         for unused in axes[len(self.panels) :]:
             unused.remove()
-        title = f"{_title(self.run)},  t = {self.run.times[snapshot]:.4g} s"
+        title = f"{title_of(self.run)},  t = {self.run.times[snapshot]:.4g} s"
         heading = figure.suptitle(title, fontsize=12, fontweight="bold")
         too_wide = heading.get_window_extent().width / (0.96 * figure.bbox.width)
         heading.set_fontsize(12 / max(1.0, too_wide))
         return figure
 
-    @property
-    def label(self) -> str:
-        """Label of the colour bar of the spheres."""
-        if self.colour == AGGLOMERATE:
-            return "agglomerate; grey: single spheres"
-        name = "velocity" if self.colour == "speed" else self.colour
-        return f"{self.colour.replace('_', ' ')}  [{shown_unit(self.run.quantities['particles'][name].unit)}]"
-
-    @property
-    def colours(self) -> Any:
-        """Colour map of the spheres."""
-        return _many_colours() if self.colour == AGGLOMERATE else _part_of("viridis", 0.12, 1.0)
-
-    def coloured(self, snapshot: int) -> tuple[np.ndarray, np.ndarray]:
-        """Radius of the spheres, and the values of their colours."""
-        particles = self.run.particles(snapshot)
-        return particles["radius"], _values(particles, self.colour)
-
     # ------------------------------------------------------------ panels
 
     def _spheres(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
-        particles = self.run.particles(snapshot)
-        position, values = particles["position"], _values(particles, self.colour)
+        particles, values = colours.values(self.run, snapshot, self.colour)
+        position = particles["position"]
         title, behind = "spheres\nall", np.ones(len(position), bool)
         if self.cut:
             middle = float(self.bounds[self.depth].mean())
             behind = position[:, self.depth] >= middle if self.depth == 1 else position[:, self.depth] <= middle
             title = f"spheres\nbehind {'xy'[self.depth]} = {middle:.3g} m"
-        colours, limits = self.colours, self.limits["spheres"]
+        shades, limits = colours.colour_map(self.colour), self.limits["spheres"]
         view = rendering.View(self.bounds, self.depth, pixels)
-        image = rendering.spheres(view, position[behind], particles["radius"][behind], values[behind], limits, colours)
+        image = rendering.spheres(view, position[behind], particles["radius"][behind], values[behind], limits, shades)
         axes.imshow(image, extent=self._extent, interpolation="antialiased")
-        if self.colour == AGGLOMERATE:
+        if self.colour == colours.AGGLOMERATE:
             title = title.replace("spheres", "agglomerates, grey: single")
         else:
-            _colour_bar(axes, colours, limits, self.label)
+            _colour_bar(axes, shades, limits, colours.label(self.run, self.colour))
         axes.set_title(title, loc="left")
 
     def _voidage(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
@@ -178,21 +150,21 @@ class Stage:
 
     def _streamlines(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
         velocity, where = self._slice(self.run.fluid("velocity", snapshot))
-        speed = _magnitude(velocity)
-        self._cells(axes, speed, _part_of("YlGnBu", 0.0, 0.65), self.limits["streamlines"], "fluid speed  [m/s]")
+        speed = colours.magnitude(velocity)
+        self._cells(axes, speed, colours.part_of("YlGnBu", 0.0, 0.65), self.limits["streamlines"], "fluid speed  [m/s]")
         if min(speed.shape) > 1 and speed.max() > 0.0:
             across, up = velocity[..., 1 - self.depth], velocity[..., 2]
             axes.streamplot(*self._centres, across, up, color=BLUE, linewidth=0.7, arrowsize=0.7, density=1.1)
         axes.set_title(f"fluid\nat {where}", loc="left")
 
-    def _cells(self, axes: Axes, values: np.ndarray, colours: Any, limits: tuple[float, float], label: str) -> None:
+    def _cells(self, axes: Axes, values: np.ndarray, shades: Any, limits: tuple[float, float], label: str) -> None:
         """Draw a slice of cells with its colour bar."""
         low, high = _corners(self.run)
         extent = low[1 - self.depth], high[1 - self.depth], low[2], high[2]
         axes.imshow(
-            values, origin="lower", extent=extent, cmap=colours, vmin=limits[0], vmax=limits[1], interpolation="nearest"
+            values, origin="lower", extent=extent, cmap=shades, vmin=limits[0], vmax=limits[1], interpolation="nearest"
         )
-        _colour_bar(axes, colours, limits, label)
+        _colour_bar(axes, shades, limits, label)
 
     # ------------------------------------------------------------ geometry
 
@@ -235,58 +207,15 @@ class Stage:
             side.set_color("#888888")
 
 
-# ---------------------------------------------------------------- values, colours and surfaces
+# ---------------------------------------------------------------- colour bars and surfaces
 
 
-def _values(particles: dict[str, np.ndarray], colour: str) -> np.ndarray:
-    """The values that colour the spheres; of a vector its magnitude."""
-    if "radius" not in particles:
-        raise InputError("particles", sorted(particles), "recorded with their radius")
-    name = "velocity" if colour == "speed" else colour
-    if name not in particles:
-        raise InputError("colour", colour, nearest(colour, ["speed", *sorted(particles)]))
-    values = particles[name]
-    if name == AGGLOMERATE:
-        return _scattered(values)
-    return _magnitude(values) if values.ndim == 2 else values.astype(float)
-
-
-def _scattered(names: np.ndarray) -> np.ndarray:
-    """A number for each agglomerate, alike for the same name in all snapshots; 0 for those of a single particle."""
-    _, place, size = np.unique(names, return_inverse=True, return_counts=True)
-    mixed = (0.6180339887498949 * names.astype(float)) % 1.0  # neighbouring names get distant colours
-    return np.where(size[place] > 1, SINGLE + (1.0 - SINGLE) * mixed, 0.0)
-
-
-def _many_colours() -> Any:
-    """Grey for single particles, and all hues for agglomerates."""
-    import matplotlib as mpl
-    from matplotlib.colors import ListedColormap
-
-    hues = mpl.colormaps["turbo"](np.linspace(0.05, 0.95, 256))
-    hues[: int(256 * SINGLE)] = (0.78, 0.78, 0.78, 1.0)
-    return ListedColormap(hues)
-
-
-def _magnitude(vectors: np.ndarray) -> np.ndarray:
-    length: np.ndarray = np.linalg.norm(vectors, axis=-1)
-    return length
-
-
-def _part_of(name: str, begin: float, end: float) -> Any:
-    """Part of a colour map, without colours so dark that shading or lines on them cannot be seen."""
-    import matplotlib as mpl
-    from matplotlib.colors import ListedColormap
-
-    return ListedColormap(mpl.colormaps[name](np.linspace(begin, end, 256)))
-
-
-def _colour_bar(axes: Axes, colours: Any, limits: tuple[float, float], label: str) -> None:
+def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str) -> None:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     figure: Any = axes.figure
-    bar = figure.colorbar(ScalarMappable(Normalize(*limits), colours), ax=axes, fraction=0.08, pad=0.03, aspect=30)
+    bar = figure.colorbar(ScalarMappable(Normalize(*limits), shades), ax=axes, fraction=0.08, pad=0.03, aspect=30)
     bar.set_label(label)
     bar.outline.set_visible(False)
     bar.ax.locator_params(axis="y", nbins=6)
@@ -299,7 +228,7 @@ def _corners(run: Run) -> tuple[np.ndarray, np.ndarray]:
     return low, low + np.array(grid.cells) * np.array(grid.spacing)
 
 
-def _bounds(run: Run, snapshots: Sequence[int]) -> np.ndarray:
+def bounds_of(run: Run, snapshots: Sequence[int]) -> np.ndarray:
     """The space in view (3, 2) [m]: the grid up to somewhat above the highest bed, or else the particles."""
     if run.grid is not None:
         low, high = _corners(run)
@@ -320,7 +249,7 @@ def _bounds(run: Run, snapshots: Sequence[int]) -> np.ndarray:
     return np.stack([low - margin, high + margin], axis=1)
 
 
-def _title(run: Run) -> str:
+def title_of(run: Run) -> str:
     """Title of the case, or name of the folder."""
     name = tomllib.loads(run.case_text).get("title")
     return name if isinstance(name, str) else run.folder.resolve().name

@@ -1,85 +1,71 @@
-"""The report of a run as one self-contained HTML page: warnings, results, laws, figures, case, versions."""
+"""The report of a run as one self-contained HTML page: answer, warnings by what to do, figures, details."""
 
 from __future__ import annotations
 
-import base64
-import io
 import math
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from cfddem.analysis.bed_laws import weight_over_floor
-from cfddem.analysis.fluctuations import impacts
-from cfddem.analysis.profiles import Profiles, profiles_of
-from cfddem.analysis.report import case_of, recorded_regimes
+from cfddem.analysis.measured import with_files
+from cfddem.analysis.report import case_of
 from cfddem.analysis.report import report as summary
-from cfddem.analysis.report_text import spelled, steadiness
-from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
-from cfddem.backend.errors import RunFailed
-from cfddem.case.schema import Case
+from cfddem.analysis.report_markdown import markdown
+from cfddem.analysis.report_text import number, spelled, steadiness
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
-from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, SKY, blank, draw_regimes, label, panels
-from cfddem.plotting.wave_figures import BED, draw_impacts, draw_map
-from cfddem.preflight.bed_waves import is_liquid_bed
+from cfddem.plotting.curves import encoded, save
+from cfddem.plotting.report_figures import figures_of
 
 Rows = list[tuple[str, ...]]
 
 
-def page(folder: Path, output: Path | None = None, result: dict[str, Any] | None = None) -> Path:
+def page(
+    folder: Path, output: Path | None = None, result: dict[str, Any] | None = None, data: Sequence[Path] = ()
+) -> Path:
     """Write the report of a run as a page.
 
     folder   of the run
     output   HTML; NAME-report.html in the current folder if not given
     result   of :func:`cfddem.analysis.report.report`, if it has been made already
+    data     files of measured points beside those of the case
     returns  the file
     """
     folder = Path(folder)
-    run, result = open_run(folder), summary(folder) if result is None else result
+    run, result = open_run(folder), summary(folder, data) if result is None else result
     output = Path(f"{folder.resolve().name}-report.html" if output is None else output)
-    write_whole(output, render(run, result).encode())
+    write_whole(output, render(run, result, data).encode())
     return output
 
 
-def render(run: Run, result: dict[str, Any]) -> str:
+def markdown_page(folder: Path, output: Path, result: dict[str, Any] | None = None, data: Sequence[Path] = ()) -> Path:
+    """Write the report of a run as Markdown, with its figures as PNG files beside it.
+
+    output  Markdown; figures are named after it
+    others  as :func:`page`
+    returns  the file
+    """
+    run, result = open_run(folder), summary(folder, data) if result is None else result
+    places = {}
+    for name, (drawn, caption) in figures_of(run, with_files(case_of(run), data), result).items():
+        place = output.with_name(f"{output.stem}-{name}.png")
+        save(drawn, place, dots_per_inch=110)
+        places[caption] = place.name
+    write_whole(output, markdown(result, places).encode())
+    return output
+
+
+def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
     """The page as text."""
-    case, (begin, end), steps = case_of(run), result["window"], result["steps"]
+    case, (begin, end), steps = with_files(case_of(run), data), result["window"], result["steps"]
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
-    figures = {"series": _encoded(_series(run, case, begin, end))}
-    captions = {}
-    if (found := _profiles(run, case, begin)) is not None:
-        figures["profiles"] = _encoded(_draw_profiles(found, result["measures"].get("bed_height", {}).get("mean")))
-        captions["profiles_caption"] = (
-            f"Means over {found.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: bed "
-            "height."
-        )
-    if (regimes := recorded_regimes(run, begin)) is not None:
-        figure, axes = panels(1, width=6.4, height=4.6)
-        draw_regimes(axes, regimes)
-        figures["collisions"] = _encoded(figure)
-        captions["collisions_caption"] = (
-            f"{regimes.collisions:.0f} collisions in the averaging window. Above the dashed line the film pressure "
-            "keeps the solids apart, below it the asperities. To the right of the orange line most collisions end in "
-            "contact."
-        )
-    if result["impacts"].get("rate", 0.0) > 0.0:
-        figure, axes = panels(1, width=6.4, height=3.8)
-        temperature = result["measures"].get("granular_temperature", {}).get("mean")
-        draw_impacts(axes, impacts(run.collisions, begin, end, int(run.history["particle_count"][-1])), temperature)
-        figures["impacts"] = _encoded(figure)
-    if is_liquid_bed(case) and len(run.times) >= FEWEST_TIMES and "radius" in run.particle_fields:
-        figure, axes = panels(1, width=8.0, height=3.8)
-        height = result["measures"]["bed_height"]["mean"]
-        found_map = layer_map(run, case)
-        draw_map(axes, found_map, waves(found_map, BED[0] * height, BED[1] * height, begin), (begin, end))
-        figures["waves"] = _encoded(figure)
+    drawn = figures_of(run, case, result)
     text: str = _template().render(
         result=result,
         status=f"{result['status']} at {end:g} s; {counts}; means from {begin:g} to {end:g} s",
+        answers=_answers(result["answers"]),
         measures=_measures(result["measures"]),
         laws=_laws(result["laws"]),
         ledger=[(spelled(name), f"{value:.2g}") for name, value in result["ledger"].items()],
@@ -88,8 +74,7 @@ def render(run: Run, result: dict[str, Any]) -> str:
         wall_time=_wall_time(result["wall_time"]),
         provenance=_provenance(result["provenance"]),
         case_text=run.case_text,
-        figures=figures,
-        **captions,
+        figures={name: (encoded(figure), caption) for name, (figure, caption) in drawn.items()},
     )
     return text
 
@@ -102,6 +87,19 @@ def _template() -> Any:
 
 
 # ---------------------------------------------------------------- tables
+
+
+def _answers(found: list[dict[str, Any]]) -> list[dict[str, str]]:
+    marks = {True: "good", False: "bad", None: "open"}
+    return [
+        {
+            "name": each["name"],
+            "value": number(each["value"], each["error"], each["unit"]).replace("+-", "±"),
+            "verdict": each["verdict"].replace("+-", "±"),
+            "mark": marks[each["holds"]],
+        }
+        for each in found
+    ]
 
 
 def _measures(measures: dict[str, Any]) -> list[dict[str, str]]:
@@ -159,74 +157,3 @@ def _provenance(values: dict[str, Any]) -> Rows:
         else:
             rows.append((name, " ".join(map(str, each)) if isinstance(each, list) else str(each)))
     return rows
-
-
-# ---------------------------------------------------------------- figures
-
-
-def _encoded(figure: Any) -> str:
-    """A figure as PNG in base64."""
-    image = io.BytesIO()
-    figure.savefig(image, format="png", dpi=110, facecolor="white")
-    return base64.b64encode(image.getvalue()).decode()
-
-
-def _series(run: Run, case: Case, begin: float, end: float) -> Any:
-    """Bed height, pressure drop over the buoyant weight, and granular temperature in time, with their means."""
-    history, weight = run.history, weight_over_floor(case)
-    curves = [("bed height\n[m]", history["bed_height"])]
-    if "pressure_drop" in history:
-        named = "pressure drop\n[Pa]" if weight is None else "pressure drop\nover weight  [-]"
-        curves.append((named, history["pressure_drop"] / (weight or 1.0)))
-    if "granular_temperature" in history:
-        curves.append(("granular\ntemperature  [m2/s2]", history["granular_temperature"]))
-    inside = history["time"] >= begin
-    curves = [each for each in curves if np.isfinite(each[1][inside]).any()]
-    figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.8 * len(curves), sharex=True)
-    for each, (name, values) in zip(axes, curves):
-        each.axvspan(begin, end, color="#f3f3f3", zorder=0)
-        each.plot(history["time"], values, color=BLUE)
-        each.hlines(np.nanmean(values[inside]), begin, end, color=ORANGE, linewidth=1.2)
-        each.set_ylabel(name)
-    axes[-1].set_xlabel("time  [s]")
-    figure.align_ylabels()
-    return figure
-
-
-def _profiles(run: Run, case: Case, begin: float) -> Profiles | None:
-    """The profiles of a run; None if no snapshot in the window can be read, or none has a quantity to show."""
-    try:
-        found = profiles_of(run, case, begin)
-    except RunFailed:
-        return None
-    return None if found is None or (found.voidage is None and found.upward is None) else found
-
-
-def _draw_profiles(found: Profiles, bed_height: float | None) -> Any:
-    """Voidage, solids flux and granular temperature against height, as far as they are recorded."""
-    columns = (found.voidage is not None) + 2 * (found.upward is not None)
-    figure, axes = blank(1, columns, width=2.8 * columns + 0.4, height=3.8, sharey=True)
-    remaining = list(axes)
-    if found.voidage is not None and found.voidage_spread is not None:
-        panel = remaining.pop(0)
-        low, high = found.voidage - found.voidage_spread, found.voidage + found.voidage_spread
-        panel.fill_betweenx(found.height, low, high, color=SKY, alpha=0.4, linewidth=0)
-        panel.plot(found.voidage, found.height, color=BLUE)
-        label(panel, "voidage", "-", "", "")
-    if found.upward is not None and found.downward is not None and found.temperature is not None:
-        flux, temperature = remaining
-        flux.plot(found.upward, found.height, color=GREEN, label="up")
-        flux.plot(found.downward, found.height, color=ORANGE, label="down")
-        flux.legend(frameon=False, fontsize=9.5)
-        label(flux, "solids flux", "m/s", "", "")
-        temperature.plot(found.temperature, found.height, color=BLUE)
-        label(temperature, "granular temperature", "m2/s2", "", "")
-    for panel in axes:
-        panel.set_ylabel("")
-        panel.set_ylim(0.0, float(found.height[-1] + found.height[0]))
-        panel.locator_params(axis="x", nbins=4)
-        panel.xaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
-        if bed_height is not None:
-            panel.axhline(bed_height, color=GREY, linewidth=1.0, linestyle="--")
-    axes[0].set_ylabel("height  [m]")
-    return figure

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from cfddem.case.input_errors import field_of
 from cfddem.case.schema import Case
 from cfddem.io.quantities import shown_unit
-from cfddem.plotting.curves import blank, label, legend, save, shades
+from cfddem.plotting.curves import BLUE, blank, label, legend, save, shades
 
 SHOWN = ("bed_height", "bed_voidage", "pressure_drop")
 """Measures in the figure."""
@@ -52,14 +52,37 @@ def sweep_figure(points: Sequence[Point], path: Path) -> bool:
         if not numeric:
             panel.set_xticks(range(len(ticks)), list(ticks))
         unit = shown_unit(points[0].measures[name][2])
-        label(panel, first, _unit(first) if numeric else "-", name.replace("_", " "), unit)
+        label(panel, first, unit_of(first) if numeric else "-", name.replace("_", " "), unit)
     if others and len(groups) <= MOST_LABELLED:
         legend(panels[0])
     save(figure, path)
     return True
 
 
-def _unit(key: str) -> str:
+def sample_figure(points: Sequence[Point], path: Path) -> bool:
+    """Draw the means of runs with sampled values: a row for each measure, a column for each key.
+
+    returns  whether there was anything to draw
+    """
+    names = [name for name in SHOWN if points and all(name in each.measures for each in points)]
+    if not names:
+        return False
+    keys = list(points[0].values)
+    figure, panels = blank(
+        len(names), len(keys), width=0.6 + 3.4 * len(keys), height=0.6 + 2.8 * len(names), sharex="col", sharey="row"
+    )
+    for place, panel in enumerate(panels):
+        name, key = names[place // len(keys)], keys[place % len(keys)]
+        mean, error = zip(*(each.measures[name][:2] for each in points))
+        bars = [0.0 if math.isnan(each) else each for each in error]
+        panel.errorbar([each.values[key] for each in points], mean, yerr=bars, fmt="o", color=BLUE, capsize=2.0)
+        label(panel, key, unit_of(key), name.replace("_", " "), shown_unit(points[0].measures[name][2]))
+        panel.label_outer()
+    save(figure, path)
+    return True
+
+
+def unit_of(key: str) -> str:
     """Unit of a key of a case, from its description."""
     found = re.search(r"\[([^\]]*)\]$", field_of(Case, key.split(".")) or "")
     return found[1] if found else "-"

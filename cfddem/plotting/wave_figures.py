@@ -81,7 +81,7 @@ def draw_map(axes: object, found: LayerMap, wave: Waves, window: tuple[float, fl
         vmax=float(found.solid_fraction.max()), shading="nearest", rasterized=True,
     )  # fmt: skip
     axes.figure.colorbar(shades, ax=axes, label="solid fraction  [-]")
-    axes.set_ylim(1e3 * found.height[0], top)
+    axes.set(xlim=(found.time[0], found.time[-1]), ylim=(1e3 * found.height[0], top))
     if np.isfinite(wave.speed) and wave.speed > 0.0:
         begin, passage = window[0], 0.7e-3 * top / wave.speed
         axes.plot([begin, begin + passage], [0.1 * top, 0.8 * top], color=ORANGE, linewidth=2.0)

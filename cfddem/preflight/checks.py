@@ -10,6 +10,7 @@ from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.bed_waves import check_waves
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.cost_estimate import CostEstimate, available_memory
+from cfddem.preflight.data_checks import check_data
 from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel, check_wall_drag
 from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
 from cfddem.preflight.issue import Issue
@@ -54,6 +55,7 @@ def find_issues(
         *check_walls_and_feeds(case),
         *check_steps(case, steps),
         *check_cost(case, cost),
+        *check_data(case),
     ]
     if case.fluid is not None:
         found += [*check_kernel(case, steps), *check_flow(case, bed), *check_drag(case, bed)]

@@ -128,7 +128,7 @@ def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             "particles to the lid",
             f"use less; fluidisation begins at {bed.onset:.2g} m/s. Or set bed.fixed = true",
         )  # fmt: skip
-    elif bed.inlet < bed.onset and case.bed.start == "poured":
+    elif bed.inlet < bed.onset and case.bed.start in ("poured", "expanded"):
         yield Issue(
             "warning", "bed.inlet_velocity",
             f"{bed.inlet:.3g} m/s is below minimum fluidisation, {bed.onset:.3g} m/s: the bed stays packed",

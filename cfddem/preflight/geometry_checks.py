@@ -57,7 +57,7 @@ def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             "error", count, f"the poured bed is {bed.poured_height:.3g} m high, above the lid at {column.height:.3g} m",
             remedy,
         )  # fmt: skip
-    elif bed.voidage < 1.0 and bed.height > 0.9 * column.height and start == "poured":
+    elif bed.voidage < 1.0 and bed.height > 0.9 * column.height and start in ("poured", "expanded"):
         severity: Severity = "error" if bed.height > 1.2 * column.height else "warning"
         yield Issue(
             severity, "column.height",

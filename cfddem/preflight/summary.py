@@ -8,11 +8,13 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from cfddem.backend import html
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import estimate_bed
@@ -23,6 +25,8 @@ from cfddem.preflight.issue import WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.step_estimate import estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
+
+_EXTREME, _UNITS = "too large or too small for the correlations", "give all values in SI units: m, kg, s, Pa"
 
 
 class PreflightError(CfddemError):
@@ -67,6 +71,12 @@ class Preflight:
             out.append(row.line())
         return [*out, "", *self.issue_lines()]
 
+    def _repr_html_(self) -> str:
+        """All numbers, errors and warnings, in a notebook."""
+        issues: list[tuple[str, ...]] = [(each.severity, each.key, each.reason, each.remedy) for each in self.issues]
+        numbers: list[tuple[str, ...]] = [(each.name, f"{each.value:.4g}", each.unit, each.note) for each in self.rows]
+        return html.table(f"{self.title}: {self.status}", issues + numbers)
+
     def issue_lines(self) -> list[str]:
         """Errors and warnings as text, at most 100 columns wide."""
         if not self.issues:
@@ -107,8 +117,23 @@ def _preflight(case: Case, title: str) -> Preflight:
         return Preflight(title, (), (Issue("error", key, reason, failure.remedy or "change it"),))
     except (ArithmeticError, ValueError):
         key, value = most_extreme(case)
-        reason = f"{value:g} is too large or too small for the correlations"
-        return Preflight(title, (), (Issue("error", key, reason, "give all values in SI units: m, kg, s, Pa"),))
+        return Preflight(title, (), (Issue("error", key, f"{value:g} is {_EXTREME}", _UNITS),))
+
+
+@contextmanager
+def refused_extremes(case: Case) -> Iterator[None]:
+    """Refuse a case whose values overflow in the estimates inside a `with` block.
+
+    errors  InputError
+    """
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except CfddemError:
+        raise
+    except (ArithmeticError, ValueError):
+        key, value = most_extreme(case)
+        raise InputError(key, value, f"a value that is not {_EXTREME}", _UNITS) from None
 
 
 def most_extreme(case: Case) -> tuple[str, float]:

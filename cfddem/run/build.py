@@ -142,6 +142,7 @@ def flow_of(
     )
     owned = spheres.without_ghosts()
     fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(owned.position, owned.radius)))
+    fluid.set_velocity((0.0, 0.0, 0.0))  # the flow at the start passes between the particles
     added_mass = AddedMass(case.laws.added_mass_law, fluid.density)
     exchange = Exchange(
         spheres,
@@ -248,6 +249,7 @@ def bridge_laws_of(case: Case) -> BridgeLaws | None:
         minimum_gap=liquid.minimum_gap or max(materials_of(case)["roughness_gap"].ravel().tolist()),
         wall_contact_angle=None if liquid.wall_contact_angle is None else math.radians(liquid.wall_contact_angle),
         wall_share=liquid.wall_share,
+        film_density=liquid.film_density,
         wall_film=liquid.wall_thickness,
         wall_patch=case.bed.diameter if liquid.wall_share > 0.0 else 0.0,
     )

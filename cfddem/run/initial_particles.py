@@ -23,9 +23,13 @@ from cfddem.particles.state import Particles
 from cfddem.particles.state import make_particles as make_bodies
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
 from cfddem.particles.walls.shapes import Wall
+from cfddem.preflight.bed_estimate import estimate_bed
 
 SPECIES = Field("species", dtype=np.int32, snapshot=True, meaning="number of the species, in the order of the case")
 """Declared on the particles of a mixture."""
+
+LARGEST_EXPANDED_FRACTION = 0.55
+"""Largest solid fraction of an expanded start [-]; a random packing takes long to find near 0.64."""
 
 LARGEST_OVERLAP = 0.02
 """Largest overlap of a particle with a wall of the case at the start, over the radius [-]."""
@@ -47,11 +51,12 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
                 at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
             ).particles  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
-    elif bed.start == "packed":
-        share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(case.column.size)
+    elif bed.start in ("packed", "expanded"):
+        space = (*case.column.size[:2], case.column.height if bed.start == "packed" else expanded_height(case))
+        share = float((math.pi / 6.0 * diameters**3).sum()) / math.prod(space)
         x, y, z = periodic_directions(case)
         repeats = (x, y, z or bed.fixed)  # fixed particles are a slice of a longer bed
-        places, _ = random_packing(diameters, share, bed.seed, shape=case.column.size, periodic=repeats)
+        places, _ = random_packing(diameters, share, bed.seed, shape=space, periodic=repeats)
     elif bed.start == "placed":
         places = np.array(bed.positions, float)
     elif bed.species:
@@ -94,6 +99,12 @@ def liquid_of(liquid: Liquid, radius: Array, seed: int) -> Array:
     dry = count - round(liquid.share_of_wet_particles * count)
     volume[np.random.default_rng((seed, _WET)).permutation(count)[:dry]] = 0.0
     return volume
+
+
+def expanded_height(case: Case) -> float:
+    """Height of the bed in the flow, by the balance of weight and drag; at most that of the column [m]."""
+    lowest = sum(case.volumes.values()) / (LARGEST_EXPANDED_FRACTION * case.column.floor_area)
+    return min(case.column.height, max(lowest, estimate_bed(case).height))
 
 
 def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) -> Array:

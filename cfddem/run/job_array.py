@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError
 from cfddem.preflight.summary import preflight
-from cfddem.run.sweep import cases_of, make_output
+from cfddem.run.sweep import Over, cases_of, make_output
 
 SLURM = """#!/bin/bash
 # One run a task. Set partition, account and time; then: sbatch {script}
@@ -28,7 +28,7 @@ srun bash -c "exec $(sed -n "${{SLURM_ARRAY_TASK_ID}}p" {jobs})"
 
 
 def write_jobs(
-    path: Path, over: Mapping[str, Sequence[Any]], output: Path, overrides: Mapping[str, Any] | None = None
+    path: Path, over: Over, output: Path, overrides: Mapping[str, Any] | None = None
 ) -> tuple[Path, Path, int]:
     """Write `jobs.txt`, one command for each run of a sweep, and `jobs.slurm`, which starts them; nothing is run.
 
@@ -53,9 +53,9 @@ def write_jobs(
             words += ["--set", f"{key}={_text(value)}"]
         lines.append(shlex.join(words))
     jobs, script = output / "jobs.txt", output / "jobs.slurm"
-    jobs.write_text("\n".join(lines) + "\n")
+    jobs.write_text("\n".join(lines) + "\n", encoding="utf-8")
     names = {"name": output.name, "count": len(lines), "output": output, "script": script}
-    script.write_text(SLURM.format(jobs=shlex.quote(str(jobs)), **names))
+    script.write_text(SLURM.format(jobs=shlex.quote(str(jobs)), **names), encoding="utf-8")
     return jobs, script, len(lines)
 
 

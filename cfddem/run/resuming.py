@@ -39,7 +39,9 @@ def status_restored_on_refusal(written: RunFolder, before: Mapping[str, Any]) ->
 
 def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float | None) -> Case:
     """The case of a folder, with the intervals of a checkpoint and perhaps a new end [s]."""
-    overrides = ({} if state is None else state["overrides"]) | ({} if until is None else {"run.until": until})
+    overrides = ({} if state is None else state["overrides"]) | (
+        {} if until is None else {"run.until": until, "run.until_error": {}}
+    )
     return Case.from_toml(folder / "case.toml", overrides)
 
 

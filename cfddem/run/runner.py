@@ -13,19 +13,21 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed, RunStopped, UnstableStep
+from cfddem.case.compare import require_measured_units
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
-from cfddem.io.folder import make_folder, read_about, require_free
+from cfddem.io.folder import AVERAGES_FROM, make_folder, read_about, require_free
+from cfddem.io.kept_files import keep_files, with_kept_files
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, of_fields
 from cfddem.io.rank_folders import folder_of_ranks
-from cfddem.io.surfaces import keep_surfaces, with_kept_surfaces
 from cfddem.io.writer import RunFolder
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
 from cfddem.particles.guard import guard
 from cfddem.run import history
+from cfddem.run.known_means import averages_from, require_measures_of
 from cfddem.run.progress import Status
 from cfddem.run.resuming import (
     case_to_continue,
@@ -69,6 +71,7 @@ class Run:
         self.rows_per_snapshot = max(1, round(self.every / (plan.history_every or self.every / 10.0)))
         self.interval = self.every / self.rows_per_snapshot
         self.row = folder.last_row
+        self._why = ""  # the run ends before its end
         self._stop = StopRequest()
         self._pace_from: tuple[float, float] | None = None  # wall time and simulated time after the first step [s]
         self._reported_at = clock.monotonic()
@@ -100,8 +103,10 @@ class Run:
         """
         folder, text = Path(folder), case.to_toml() if text is None else text
         history.require_shared(case, communicator.size)
+        require_measures_of(case)
+        require_measured_units(case, {name: each.unit for name, each in history.all_columns(case).items()})
         communicator.by_first(lambda: _prepare_folder(folder, text, case))
-        case = with_kept_surfaces(case, folder)
+        case = with_kept_files(case, folder)
         begun = clock.monotonic()
         simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
         simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # initial packing, compilation for it
@@ -130,7 +135,7 @@ class Run:
 
         A run that was killed before its first checkpoint starts again.
 
-        until   new end [s]
+        until   new end [s]; the run then goes on to it, whatever `run.until_error` says
         others  as in `begin`
         errors  InputError if the folder holds no run, or one that cannot be continued
         """
@@ -149,7 +154,11 @@ class Run:
                 simulation = restored(case, state, folder, fields, callbacks, communicator)
                 simulation.wall.seconds.update(written.about.get("wall_time", {}))
         written.drop_after(-1.0 if state is None else simulation.time)
+        if until is not None:
+            written.note(AVERAGES_FROM, None)
         run = cls(simulation, written, report)
+        if written.about.get(AVERAGES_FROM) is not None:
+            run._why = str(before["message"])
         if state is None:
             run._write_initial_state()
         return run
@@ -171,6 +180,8 @@ class Run:
                 if with_snapshot:
                     self._write_snapshot()
                 self._report()
+                if with_snapshot and self._means_are_known():
+                    break
             self._write_checkpoint()
             self._finish()
 
@@ -193,6 +204,22 @@ class Run:
                 self._pace_from = clock.monotonic(), self.simulation.time
             if clock.monotonic() - self._reported_at > REPORT_EVERY:
                 self._report()
+
+    def _means_are_known(self) -> bool:
+        """Whether the means that `run.until_error` names are known, on all ranks; record then where they begin."""
+        plan = self.simulation.case.run
+        if not plan.until_error:
+            return False
+        start = self.simulation.communicator.by_first(
+            lambda: averages_from(self.folder.history, plan.until_error, plan.average_from or 0.0)
+        )
+        if math.isnan(start):
+            return False
+        self.end = self.simulation.time
+        names = " and ".join(name.replace("_", " ") for name in plan.until_error)
+        self._why = f"when the error of {names} was small enough (run.until_error)"
+        self.folder.note(AVERAGES_FROM, start)
+        return True
 
     def _stopped(self) -> bool:
         """Whether the run is to stop, on all ranks."""
@@ -221,7 +248,7 @@ class Run:
     def _finish(self) -> None:
         """Record that the run finished; or that it was stopped, and raise RunStopped."""
         if self.simulation.time >= self.end * _SAME:
-            self.folder.finish("finished")
+            self.folder.finish("finished", self._why)
             return
         self.folder.finish("stopped", self._stop.name)
         where = f"at t = {self.simulation.time:.6g} s"
@@ -281,7 +308,10 @@ class Run:
         """Write the full state, with the intervals, which would otherwise follow from a new end."""
         begin, simulation = clock.monotonic(), self.simulation
         with simulation.wall.part("checkpoints"):
-            plan = {"run.until": self.end, "run.every": self.every, "run.history_every": self.interval}
+            plan = {
+                "run.until": self.end, "run.every": self.every, "run.history_every": self.interval,
+                "run.until_error": simulation.case.run.until_error,
+            }  # fmt: skip
             state: dict[str, Any] = {"time": simulation.time, "overrides": plan, "simulation": simulation.checkpoint()}
             if simulation.particle_solver.collisions is not None:
                 state["collisions"] = self._gathered(simulation.particle_solver.collisions.table)
@@ -295,7 +325,7 @@ def _prepare_folder(folder: Path, text: str, case: Case) -> None:
     """Make the folder of a new run, before its preparation, which may take long."""
     require_free(folder, text)
     make_folder(folder)
-    keep_surfaces(case, folder)
+    keep_files(case, folder)
 
 
 def quantities_of(simulation: Simulation) -> Quantities:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend import html
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
@@ -145,6 +146,18 @@ class Simulation:
         """Continue until a time [s]."""
         while self.time < time * (1.0 - 1e-12):
             self.step(time)
+
+    def _repr_html_(self) -> str:
+        """The state in a few numbers, and the particles, in a notebook."""
+        rows = [
+            ("time", f"{self.time:.4g} s of {self.case.run.until:g} s"),
+            ("fluid steps", f"{self.steps}"),
+            ("particles", f"{len(self.owned.position)}"),
+            ("limit of the last step", self.limiting if self.steps else "-"),
+        ]
+        owned = self.owned
+        drawing = html.spheres(owned.position, owned.radius, owned.velocity, self.case.column.size)
+        return html.table(self.case.title or "Simulation", rows, drawing)
 
     # ------------------------------------------------------------ checkpoints
 

@@ -23,6 +23,9 @@ from cfddem.case.schema import Case
 from cfddem.io.quantities import shown_unit
 from cfddem.preflight.summary import preflight
 
+Over = Mapping[str, Sequence[Any]] | Sequence[Mapping[str, Any]]
+"""Values by key, of which all combinations are run; or sets of values."""
+
 MOST = 10_000
 """Largest number of runs."""
 
@@ -90,7 +93,7 @@ def run_name(values: Mapping[str, Any]) -> str:
 
 def sweep(
     path: Path,
-    over: Mapping[str, Sequence[Any]],
+    over: Over,
     output: Path,
     *,
     overrides: Mapping[str, Any] | None = None,
@@ -98,10 +101,10 @@ def sweep(
     scheduler: str | None = None,
     progress: Callable[[Outcome], None] = lambda _: None,
 ) -> list[Outcome]:
-    """Run a case for every combination of values.
+    """Run a case for every combination of values, or for every set of values.
 
     path       of the case file
-    over       values by key
+    over       values by key, of which all combinations are run; or sets of values
     output     folder of the sweep: one folder per run, `sweep.csv`, `sweep.png`
     overrides  values that all runs share
     jobs       number of concurrent runs; if more than one, each uses one thread
@@ -118,7 +121,7 @@ def sweep(
     place = output.absolute() if scheduler else output  # workers have other working folders
     outcomes: dict[str, Outcome] = {}
     work = [(case, values, place / name, jobs > 1) for name, (case, values) in runs.items()]
-    for outcome in _on_this_machine(work, jobs) if scheduler is None else _on_workers(work, scheduler):
+    for outcome in on_this_machine(work, jobs) if scheduler is None else _on_workers(work, scheduler):
         outcomes[outcome.name] = outcome
         progress(outcome)
         if outcome.status == "stopped":  # stopping one run stops the sweep
@@ -129,7 +132,7 @@ def sweep(
         for name, (_, values) in runs.items()
     ]
     write_table(ordered, output / "sweep.csv")
-    _write_figure(ordered, output / "sweep.png")
+    _write_figure(ordered, output / "sweep.png", not isinstance(over, Mapping))
     return ordered
 
 
@@ -144,7 +147,7 @@ _Work = list[tuple[Case, dict[str, Any], Path, bool]]
 """Arguments of `_one` for each run."""
 
 
-def _on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
+def on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
     """Outcomes as runs end, several runs at a time."""
     from joblib import Parallel, delayed
 
@@ -169,18 +172,24 @@ def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
             yield done.result()
 
 
-def cases_of(
-    path: Path, over: Mapping[str, Sequence[Any]], overrides: Mapping[str, Any]
-) -> dict[str, tuple[Case, dict[str, Any]]]:
+def cases_of(path: Path, over: Over, overrides: Mapping[str, Any]) -> dict[str, tuple[Case, dict[str, Any]]]:
     """Case and changed values of every run, by its name."""
     runs: dict[str, tuple[Case, dict[str, Any]]] = {}
-    for combination in itertools.product(*over.values()):
-        values = dict(zip(over, combination))
+    for values in _sets(over):
         case, name = Case.from_toml(path, {**overrides, **values}), run_name(values)
         if name in runs:
             raise InputError("--over", name, "a different name for every run", "a value is given twice")
         runs[name] = case, values
     return runs
+
+
+def _sets(over: Over) -> Iterator[dict[str, Any]]:
+    """Values of every run."""
+    if isinstance(over, Mapping):
+        for combination in itertools.product(*over.values()):
+            yield dict(zip(over, combination))
+    else:
+        yield from map(dict, over)
 
 
 def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> Outcome:
@@ -241,10 +250,11 @@ def write_table(outcomes: Sequence[Outcome], path: Path) -> None:
     fresh.replace(path)
 
 
-def _write_figure(outcomes: Sequence[Outcome], path: Path) -> None:
-    from cfddem.plotting.sweep_figure import Point, sweep_figure
+def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool) -> None:
+    from cfddem.plotting.sweep_figure import Point, sample_figure, sweep_figure
 
-    sweep_figure([Point(each.values, each.measures) for each in outcomes if each.measures], path)
+    draw = sample_figure if sampled else sweep_figure
+    draw([Point(each.values, each.measures) for each in outcomes if each.measures], path)
 
 
 def failures(outcomes: Sequence[Outcome]) -> Iterator[str]:

@@ -38,7 +38,7 @@ ROOMS = {
 }
 """Folder of modules -> title and sentence."""
 
-TABLES = {"material": "[material.NAME]", "pair": "[pair.NAME.NAME]"} | {
+TABLES = {"material": "[material.NAME]", "pair": "[pair.NAME.NAME]", "compare": "[compare.NAME]"} | {
     name: f"[[{name}]]" for name in ("wall", "feed", "outlet")
 }
 """Headings of tables of a case file that have names of their own."""
@@ -245,10 +245,25 @@ def on_files(files: Any, config: Any) -> Any:
     """Add the generated pages."""
     from mkdocs.structure.files import File
 
-    generated = [*reference(), *gallery(), ("changes.md", (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "]("))]
+    generated = [*reference(), *gallery(), *notebooks(), ("changes.md", changes())]
     for address, content in generated:
         files.append(File.generated(config, address, content=content))
     return files
+
+
+def notebooks() -> list[tuple[str, str]]:
+    """Address and content of the pages of the notebooks, and of the files to download."""
+    if str(TOOLS) not in sys.path:
+        sys.path.insert(0, str(TOOLS))
+    import notebooks as made
+
+    return list(made.files())
+
+
+def changes() -> str:
+    """CHANGELOG.md with links to pages of the site."""
+    text = (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "](")
+    return re.sub(r"\]\(scenarios/[\w/]*?(\w+)/README\.md\)", r"](gallery/\1.md)", text)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:

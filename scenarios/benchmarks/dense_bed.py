@@ -7,13 +7,9 @@ the speed of a shared machine varies.
 
 from __future__ import annotations
 
-import importlib.util
-import re
-import resource
+import math
 import statistics
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.compile import use_threads
-from cfddem.backend.errors import CfddemError, InputError
+from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
@@ -31,6 +27,8 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
+from scenarios.benchmarks import lammps
+from scenarios.benchmarks.memory import bytes_of_step, triad
 
 DATA = Path(__file__).parents[1] / "data"
 DIAMETER, STEP = 1e-3, 1e-5
@@ -52,7 +50,6 @@ WATER = BridgeLaws(
     minimum_gap=1e-7,
 )
 BLOCKS = {1_000: (1, 1), 10_000: (1, 1), 100_000: (5, 2), 1_000_000: (10, 10)}
-STYLES = {"granular": "granular", "legacy": "gran/hertz/history"}
 
 
 def positions(count: int) -> tuple[np.ndarray, tuple[float, float]]:
@@ -99,30 +96,39 @@ def bench(
     count    particles: 1 000, 10 000, 100 000 or 1 000 000
     threads  of both codes
     film     with the film of water
-    bridges  with a liquid bridge on every contact, of a film of 0.2 % of the diameter
+    bridges  with a liquid bridge on every contact, of a film of 0.2 % of the diameter; the bed without is a peer
     rounds   measurements of each code, taken in turn; their medians count
     steps    of one measurement
     full     with films that resist sliding and rolling, too; the same bed with normal films is a peer
-    returns  what was run, the medians, and the speed over that of each LAMMPS style
+    returns  what was run, the medians, the speed over that of each LAMMPS style or why it did not run (`lammps`), and
+             the bytes that a step must move with the share of the memory speed that this is
     """
     steps = steps or max(20, 20_000_000 // count)
+    bandwidth = triad(threads)
     use_threads(threads)
-    run = bed(count, film or full, bridges, "full" if full else "normal")
-    run.advance(STEP, steps)
-    normal = bed(count, True, bridges) if full else None
-    if normal is not None:
-        normal.advance(STEP, steps)
-    peers = [] if film or full or bridges or importlib.util.find_spec("lammps") is None else list(STYLES)
-    speeds: dict[str, list[float]] = {name: [] for name in ("cfddem", *(STYLES[peer] for peer in peers))}
+    runs = {"cfddem": bed(count, film or full, bridges, "full" if full else "normal")}
+    if full:
+        runs["normal films"] = bed(count, True, bridges)
+    if bridges:
+        runs["without bridges"] = bed(count, film or full, motions="full" if full else "normal")
+    dry = not (film or full or bridges)
+    note = lammps.missing(threads) if dry else "has no such bed"
+    speeds: dict[str, list[float]] = {name: [] for name in runs}
+    for run in runs.values():
+        run.advance(STEP, steps)
     for _ in range(rounds):
-        speeds["cfddem"].append(_speed(run, steps))
-        if normal is not None:
-            speeds.setdefault("normal films", []).append(_speed(normal, steps))
-        for peer in peers:
-            speeds[STYLES[peer]].append(_lammps(count, threads, peer, steps))
+        for name, run in runs.items():
+            speeds[name].append(_speed(run, steps))
+        for style, name in {} if note else lammps.STYLES.items():
+            found = lammps.speed(*positions(count), DIAMETER, GRAIN.density, threads, style, steps)
+            if isinstance(found, str):
+                note = found
+                break
+            speeds.setdefault(name, []).append(found)
     medians = {name: statistics.median(measured) for name, measured in speeds.items()}
     ratios = {name: medians["cfddem"] / medians[name] for name in medians if name != "cfddem"}
-    pairs = run.edges.between_particles / count
+    run = runs["cfddem"]
+    moved = bytes_of_step(run)
     return {
         "particles": count,
         "threads": threads,
@@ -130,10 +136,14 @@ def bench(
         "films that resist sliding": full,
         "bridges per particle": 0.0 if run.bridges is None else run.bridges.count / count,
         "steps": steps,
-        "listed pairs per particle": pairs,
-        "peak memory of the process [MB]": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000.0,
+        "listed pairs per particle": run.edges.between_particles / count,
+        "peak memory of the process [MB]": _peak_memory(),
         "million particle-steps per second": medians,
         "ratio": ratios,
+        "lammps": note,
+        "bytes of a particle-step": moved / count,
+        "triad [GB/s]": bandwidth / 1e9,
+        "share of the triad": moved / count * medians["cfddem"] * 1e6 / bandwidth,
     }
 
 
@@ -158,45 +168,17 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f"{speed:.2f} million particle-steps/s" + (f"; cfddem is {ratio:.2f} times as fast" if ratio else ""),
         )
     yield "memory", f"{result['peak memory of the process [MB]']:.0f} MB at most, Python and compiler included"
-    if not result["ratio"] and not result["film"] and not result["bridges per particle"]:
-        yield "LAMMPS", "not installed; pip install 'lammps[mpi]' to compare in the same run"
+    moved, share = result["bytes of a particle-step"], result["share of the triad"]
+    yield "", f"{moved:.0f} bytes a particle-step: {share:.2f} of the triad, {result['triad [GB/s]']:.1f} GB/s"
+    if result["lammps"] and not water:
+        yield "LAMMPS", result["lammps"]
 
 
-def _lammps(count: int, threads: int, style: str, steps: int) -> float:
-    """Speed of LAMMPS on the same bed, in million particle-steps a second."""
-    centres, (width, depth) = positions(count)
-    with tempfile.TemporaryDirectory() as folder:
-        data = Path(folder, "bed.data")
-        _write_lammps_data(data, centres, width, depth)
-        variables = {"data": data, "style": style, "nwarm": max(10, steps // 4), "nmeas": max(10, steps // 3)}
-        arguments = [word for name, value in variables.items() for word in ("-var", name, str(value))]
-        program = [str(Path(sys.executable).with_name("lmp"))]
-        ranks = ["mpiexec", "-n", str(threads)] if threads > 1 else []
-        log = Path(folder, "log")
-        command = [
-            *ranks,
-            *program,
-            "-in",
-            str(DATA / "dense_bed.lammps"),
-            "-screen",
-            "none",
-            "-log",
-            str(log),
-            *arguments,
-        ]
-        finished = subprocess.run(command, capture_output=True, text=True, check=False)
-        if finished.returncode != 0:
-            raise CfddemError(f"LAMMPS did not run: {finished.stderr.strip().splitlines()[-1:]}")
-        loops = re.findall(r"Loop time of (\S+) on .* for (\d+) steps with (\d+) atoms", log.read_text())[1:]
-    return statistics.median(int(done) * int(atoms) / float(taken) / 1e6 for taken, done, atoms in loops)
-
-
-def _write_lammps_data(path: Path, centres: np.ndarray, width: float, depth: float) -> None:
-    top = centres[:, 2].max() + 2e-3
-    head = f"bed\n\n{len(centres)} atoms\n1 atom types\n\n"
-    head += f"0 {width} xlo xhi\n0 {depth} ylo yhi\n-1e-4 {top} zlo zhi\n\nAtoms\n\n"
-    lines = (
-        f"{row + 1} 1 {DIAMETER} {GRAIN.density:g} {x:.17g} {y:.17g} {z:.17g}\n"
-        for row, (x, y, z) in enumerate(centres)
-    )
-    path.write_text(head + "".join(lines))
+def _peak_memory() -> float:
+    """Peak memory of the process [MB]; NaN on Windows, which does not provide it."""
+    try:
+        import resource
+    except ImportError:
+        return math.nan
+    unit = 1e6 if sys.platform == "darwin" else 1e3
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

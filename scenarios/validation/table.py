@@ -96,12 +96,13 @@ def _size(difference: float) -> float:
     return float("inf") if difference != difference else abs(difference)
 
 
-def validate(name: str, output: Path, json: bool = False) -> bool:
+def validate(name: str, output: Path, json: bool = False, data: Sequence[Path] = ()) -> bool:
     """Run a target, print its table and write its files into `output`/`name`.
 
     name     one of TARGETS
     output   folder for all targets
     json     print the table as JSON
+    data     files of measured points, for targets that have a function `compare_data`
     returns  whether every limit holds
     """
     folder = Path(output) / name
@@ -113,7 +114,9 @@ def validate(name: str, output: Path, json: bool = False) -> bool:
         raise InputError("output", str(output), "a folder that can be written", str(refusal)) from refusal
     begin = perf_counter()
     with _progress(name) as progress:
-        rows: Sequence[Row] = import_module(TARGETS[name]).study(folder, progress)
+        module = import_module(TARGETS[name])
+        compared: Sequence[Row] = [module.compare_data(folder, path) for path in data]  # wrong files end early
+        rows: Sequence[Row] = [*module.study(folder, progress), *compared]
     seconds = perf_counter() - begin
     report = {
         "target": name,
@@ -125,7 +128,7 @@ def validate(name: str, output: Path, json: bool = False) -> bool:
     }
     text = _json.dumps(_finite(report), indent=1)
     with replacing(folder / "table.json") as path:
-        path.write_text(text + "\n")
+        path.write_text(text + "\n", encoding="utf-8")
     if json:
         print(text)
     else:
@@ -205,7 +208,7 @@ def write_histories(path: Path, groups: Mapping[str, Columns]) -> None:
 
 def reference(name: str) -> dict[str, list[str]]:
     """Columns of a file in scenarios/data; its `#` lines give the source."""
-    text = resources.files("scenarios").joinpath("data", f"{name}.csv").read_text()
+    text = resources.files("scenarios").joinpath("data", f"{name}.csv").read_text(encoding="utf-8")
     heading, *lines = csv.reader(line for line in text.splitlines() if not line.startswith("#"))
     return {title: [line[place] for line in lines] for place, title in enumerate(heading)}
 

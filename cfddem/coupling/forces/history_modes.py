@@ -18,7 +18,7 @@ import closures.compiled  # noqa: F401  lets compiled loops call laws by their n
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.law_set import Slot
 from cfddem.fluid.grid import Array
-from cfddem.particles.vectors import NOTHING, minus, times
+from cfddem.particles.vectors import NOTHING, minus, of_row, times
 from closures.history import RATE_RATIO, basset
 
 FIRST, LAST = -20, 11
@@ -162,11 +162,6 @@ def _advance(kernel, modes, gain, last, now):
     return x, y, z
 
 
-@inline
-def _vector(rows, n):
-    return rows[n, 0], rows[n, 1], rows[n, 2]
-
-
 @threaded
 def scales(slip, radius, viscosity, voidage, density, shortest, longest, time, stokes):
     """Time t_c of every particle, and the force of its memory per slip, with the kernel at t_c.
@@ -185,7 +180,7 @@ def scales(slip, radius, viscosity, voidage, density, shortest, longest, time, s
 
 @inline
 def _remember_one(memory, around, kernel, step, last_step, n):
-    slip, before = _vector(around.slip, n), _vector(memory.before, n)
+    slip, before = of_row(around.slip, n), of_row(memory.before, n)
     time, stokes = around.time[n], around.stokes[n]
     now = _row(step / time)
     growth = stokes * _second(kernel, now)
@@ -198,7 +193,7 @@ def _remember_one(memory, around, kernel, step, last_step, n):
             growth_last = stokes * _second(kernel, last)
         sum_of_modes = _advance(kernel, memory.modes[n], times(time / last_step, change), last, now)
         past = times(stokes * time / step, sum_of_modes)
-        missing = minus(times(last_step * growth_last, change), _vector(memory.newest, n))
+        missing = minus(times(last_step * growth_last, change), of_row(memory.newest, n))
     memory.conductance[n] = conductance
     for d in range(3):
         memory.force[n, d] = past[d] + missing[d] / step - conductance * slip[d]

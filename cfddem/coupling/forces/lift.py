@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
-from cfddem.backend.compile import inline, prange, threaded
+from cfddem.backend.compile import prange, threaded
 from cfddem.fluid.grid import Array
-from cfddem.particles.vectors import cross, dot, minus, times
+from cfddem.particles.vectors import cross, dot, minus, of_row, times
 from closures.lift import magnus, saffman_mei
 
 
@@ -26,16 +26,11 @@ def lift_force(slip: Array, curl: Array, spin: Array, radius: Array, density: fl
     return force
 
 
-@inline
-def _vector(rows, n):
-    return rows[n, 0], rows[n, 1], rows[n, 2]
-
-
 @threaded
 def _lift(slip, curl, spin, radius, density, viscosity, force):
     """Saffman-Mei along slip x curl; Magnus along slip x (spin - curl/2)."""
     for n in prange(len(radius)):
-        u, w = _vector(slip, n), _vector(curl, n)
+        u, w = of_row(slip, n), of_row(curl, n)
         diameter, kinematic = 2.0 * radius[n], viscosity[n] / density
         speed, turning = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
         reynolds = diameter * speed / kinematic
@@ -43,7 +38,7 @@ def _lift(slip, curl, spin, radius, density, viscosity, force):
         size = math.sqrt(dot(across, across))
         stokes = 3.0 * math.pi * viscosity[n] * diameter * speed
         shear = stokes * saffman_mei(reynolds, diameter * diameter * turning / kinematic) / max(size, 1e-300)
-        relative = minus(_vector(spin, n), times(0.5, w))
+        relative = minus(of_row(spin, n), times(0.5, w))
         twist = cross(u, relative)
         rolled = math.pi / 8.0 * density * diameter**3 * magnus(reynolds)
         for d in range(3):

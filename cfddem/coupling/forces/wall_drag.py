@@ -24,7 +24,7 @@ from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
-from cfddem.particles.vectors import NOTHING, dot, flat, minus, plus, times
+from cfddem.particles.vectors import NOTHING, dot, flat, minus, of_row, plus, times
 from cfddem.particles.walls.arrays import wall_arrays
 from cfddem.particles.walls.nearest_point import nearest
 from cfddem.particles.walls.shapes import Mesh, Wall
@@ -69,11 +69,6 @@ class WallDrag:
 
 
 @inline
-def _vector(rows, n):
-    return rows[n, 0], rows[n, 1], rows[n, 2]
-
-
-@inline
 def _factors(gap, film, shear):
     """What a wall adds to the drag factor towards it and along it."""
     across = towards_wall(gap) - 1.0
@@ -115,4 +110,4 @@ def _beside_one(place, radius, viscosity, slip, kind, shape, options, n, terms):
 def _beside(position, radius, viscosity, slip, kind, shape, options, terms):
     """Conductance and explicit force of every particle."""
     for n in prange(len(radius)):
-        _beside_one(_vector(position, n), radius[n], viscosity[n], _vector(slip, n), kind, shape, options, n, terms)
+        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(slip, n), kind, shape, options, n, terms)

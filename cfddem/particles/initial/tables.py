@@ -48,7 +48,7 @@ def read_particles(path: str | Path, density: float | None = None, material: int
 
 
 def _columns(path: Path) -> dict[str, np.ndarray]:
-    with path.open() as lines:
+    with path.open(encoding="utf-8") as lines:
         head = next((line for line in lines if line.strip() and not line.startswith("#")), "")
     names = [name.split("[")[0].strip() for name in head.split(",")]
     for name in names:
@@ -67,7 +67,7 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
 
 
 def _lines_before_numbers(path: Path) -> int:
-    with path.open() as lines:
+    with path.open(encoding="utf-8") as lines:
         for number, line in enumerate(lines):
             if line.strip() and not line.startswith("#"):
                 return number + 1

@@ -33,6 +33,7 @@ from cfddem.particles.pair_graph import geometry
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import put, times
 from closures.liquid_film import film_thickness, film_volume
+from closures.numbers import capillary
 
 LIQUID = Field(
     "liquid", "m3", halo=("start",), snapshot=True, meaning="volume of the liquid film on the particle, without bridges"
@@ -68,6 +69,11 @@ FIELDS = (
     ),
 )
 """What pairs remember of their bridges."""
+
+INERTIA_FIELDS = (
+    Field("bridge_impact_speed", "m/s", role="memory", meaning="speed at which the bodies have met; 0 once parted"),
+)
+"""The same, of films with inertia."""
 
 FLAT = 1e100
 """Radius of a wall, in the laws that share liquid [m]."""
@@ -125,6 +131,13 @@ def bridge_state(k, gap, reduced_radius, memory, p, capillary_number=0.0):
         gap, memory.bridge_film[k], memory.bridge_volume[k], reduced_radius, memory.bridge_gap[k],
         n.viscosity, n.surface_tension, n.contact_angle, capillary_number, p,
     )  # fmt: skip
+
+
+@inline
+def capillary_number_of(speed, p):
+    """Capillary number of bodies that part or meet at this speed; 0 without surface tension."""
+    n = numbers_of(p)
+    return capillary(n.viscosity, abs(speed), n.surface_tension) if n.surface_tension > 0.0 else 0.0
 
 
 @inline

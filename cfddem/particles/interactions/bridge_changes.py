@@ -16,6 +16,7 @@ from cfddem.particles.collision_events import move_event
 from cfddem.particles.interactions.bridge import (
     FLAT,
     bridge_state,
+    capillary_number_of,
     find_closed,
     numbers_of,
     renew_bridge,
@@ -24,6 +25,7 @@ from cfddem.particles.interactions.bridge import (
 from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
 from cfddem.particles.interactions.slots import (
+    BRIDGE_INERTIA,
     RECORD,
     WALL_LIQUID,
     WALLS,
@@ -43,7 +45,6 @@ from cfddem.particles.vectors import NOTHING, at, dot, put
 from cfddem.particles.walls.nearest_point import touched_distance
 from closures.liquid_film import film_thickness
 from closures.minimum_gap import glass_transition
-from closures.numbers import capillary
 
 
 @part
@@ -64,10 +65,8 @@ def longest_gap(k, particles, edges, memory, shift, p):
     """Gap at which the bridge of edge k breaks; it grows with the speed at which the bodies part."""
     separation, distance, gap = geometry(k, particles, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    n = numbers_of(p)
     parting = max(dot(relative_velocity(k, particles, edges), separation) / distance, 0.0)
-    number = capillary(n.viscosity, parting, n.surface_tension) if n.surface_tension > 0.0 else 0.0
-    state = bridge_state(k, gap, reduced_radius, memory, p, number)
+    state = bridge_state(k, gap, reduced_radius, memory, p, capillary_number_of(parting, p))
     return max(state.film, bridge_rupture(state))
 
 
@@ -186,6 +185,8 @@ def _move_bridge(memory, k, to):
     """Let the bridge of edge k continue at another piece of the same wall."""
     memory.bridge_film[to], memory.bridge_volume[to] = memory.bridge_film[k], memory.bridge_volume[k]
     memory.bridge_gap[to], memory.bridge_accounted[to] = memory.bridge_gap[k], memory.bridge_accounted[k]
+    if BRIDGE_INERTIA:
+        memory.bridge_impact_speed[to] = memory.bridge_impact_speed[k]
     put(memory.bridge_impulse, to, at(memory.bridge_impulse, k))
     put(memory.bridge_couple, to, at(memory.bridge_couple, k))
     clear_bridge(k, memory)
@@ -309,4 +310,6 @@ def clear_bridge(k, memory):
     memory.bridge_film[k] = 0.0
     memory.bridge_volume[k] = 0.0
     memory.bridge_resistance[k] = 0.0
+    if BRIDGE_INERTIA:
+        memory.bridge_impact_speed[k] = 0.0
     put(memory.bridge_force, k, NOTHING)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from cfddem.backend.compile import inline, part, prange, serial
-from cfddem.particles.interactions.bridge import bridge_state, resistance_across
-from cfddem.particles.interactions.bridge_solution import at_gap, speed_after_bridge
+from cfddem.particles.interactions.bridge import bridge_state, capillary_number_of, numbers_of, resistance_across
+from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, speed_after_bridge
 from cfddem.particles.interactions.film import clamp_speed
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
-from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_SLIDING, WALLS, bridge_impulses
+from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_INERTIA, BRIDGE_SLIDING, WALLS, bridge_impulses
 from cfddem.particles.pair_graph import edge_role, geometry
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
+from closures.film_impact import pair_added_mass
 
 
 @serial
@@ -68,6 +69,24 @@ def _rates(k, particles, edges, memory, lever):
 
 
 @inline
+def reverse_film(k, state, step, rate, inverse_mass, memory):
+    """Change of the rate of the gap where the film is reversed with its bodies, as they part after contact [m/s].
+
+    rate          of the gap after the resistance [m/s]
+    inverse_mass  of the reduced mass [1/kg]
+    """
+    floor, end = held_gap(state), state.gap + step * rate
+    if state.gap > floor and end <= floor:
+        memory.bridge_impact_speed[k] = -rate
+    struck = memory.bridge_impact_speed[k]
+    if not (struck > 0.0 and rate > 0.0 and end > floor):
+        return 0.0
+    memory.bridge_impact_speed[k] = 0.0
+    added = pair_added_mass(numbers_of(state.p).film_density, state.film, state.reduced_radius) * inverse_mass
+    return max((rate - added * struck) / (1.0 + added), 0.0) - rate
+
+
+@inline
 def bridge_impulse(k, particles, edges, memory, shift, p, step):
     """Impulse and couple of the bridge of edge k over the coming step.
 
@@ -77,20 +96,26 @@ def bridge_impulse(k, particles, edges, memory, shift, p, step):
     separation, distance, gap = geometry(k, particles, edges, shift)
     normal = times(1.0 / distance, separation)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    state = bridge_state(k, gap, reduced_radius, memory, p)
     velocity = relative_velocity(k, particles, edges)
+    speed = new_speed = dot(velocity, normal)
+    state = bridge_state(k, gap, reduced_radius, memory, p, capillary_number_of(speed, p))
     turning, radii = times(particles.radius[i], at(particles.spin, i)), particles.radius[i]
     if k < edges.between_particles:
         turning, radii = plus(turning, times(particles.radius[j], at(particles.spin, j))), radii + particles.radius[j]
     lever = distance / radii
     along, sideways = _rates(k, particles, edges, memory, lever)
 
-    speed = new_speed = dot(velocity, normal)
     if BRIDGE_FILM:
         new_speed = speed_after_bridge(speed, state, memory.bridge_accounted[k], step, along)
         new_speed = clamp_speed(new_speed, speed)
+    by_film = (new_speed - speed) / along
+    if BRIDGE_INERTIA:
+        inverse_mass = pair_mass_and_radius(k, particles, edges)[1]
+        turned = reverse_film(k, state, step, new_speed, inverse_mass, memory)
+        by_film += turned / inverse_mass
+        new_speed += turned
     memory.bridge_accounted[k] = gap + step * new_speed
-    impulse = times((new_speed - speed) / along, normal)
+    impulse = times(by_film, normal)
     couple = NOTHING
     if BRIDGE_SLIDING:
         resistance = resistance_across(at_gap(state, gap + 0.5 * step * new_speed))

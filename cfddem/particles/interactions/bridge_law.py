@@ -147,6 +147,7 @@ class BridgeNumbers(NamedTuple):
     wall_share: float  # [-]
     wall_film: float  # [m]
     wall_patch: float  # [m]
+    film_density: float  # [kg/m3]
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,8 @@ class BridgeLaws:
                          and speed, "lian" or "willett" by its volume, "film" where the films separate, or a function
     share                part of a body's liquid that flows into a new bridge: "shi_mccarthy", "none", or a function of
                          radius and other_radius
+    film_density         of the liquid: the added mass of the film is reversed with the bodies; 0 for a film
+                         without inertia [kg/m3]
     wall_contact_angle   on walls, for the redistribution "contact_angle"; as on particles if not given [rad]
     redistribution       part of a broken bridge that a body gets: "half", "radius" by the radii, "contact_angle" by
                          the cosines of the contact angles, or a function
@@ -193,12 +196,13 @@ class BridgeLaws:
     wall_share: float = 0.0
     wall_film: float = 0.0
     wall_patch: float = 0.0
+    film_density: float = 0.0
     wall_contact_angle: float | None = None
     parameters: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def check(self) -> None:
         """Refuse values that no liquid has, unknown words, and functions that cannot be compiled."""
-        for name in ("viscosity", "surface_tension", "minimum_gap", "wall_film", "wall_patch"):
+        for name in ("viscosity", "surface_tension", "minimum_gap", "wall_film", "wall_patch", "film_density"):
             if not 0.0 <= (value := getattr(self, name)) < math.inf:
                 raise InputError(name, value, "at least 0 and finite")
         for name in ("contact_angle", "wall_contact_angle"):
@@ -212,6 +216,8 @@ class BridgeLaws:
             raise InputError("wall_share", 0.0, "above 0 where walls have a film")
         if self.wall_share > 0.0 and self.wall_patch == 0.0:
             raise InputError("wall_patch", 0.0, "above 0 where walls carry liquid", "take a particle diameter")
+        if self.film_density > 0.0 and self.film == "none":
+            raise InputError("film_density", self.film_density, "0 without a film", 'or choose film = "deforming"')
         for name, value in self.parameters.items():
             if name in BridgeState._fields or not math.isfinite(value):
                 raise InputError(f"parameters.{name}", value, "a finite number with a name of its own")
@@ -264,6 +270,7 @@ class BridgeLaws:
                 made[slot] = adapted(function, "bridge", of_bridge)
         return made | {
             "BRIDGE_FILM": "bridge_resistance" in made,
+            "BRIDGE_INERTIA": self.film_density > 0.0,
             "BRIDGE_SLIDING": "sliding_resistance" in made,
             "BRIDGE_PULL": "bridge_pull" in made,
             "BRIDGE_POTENTIAL": "bridge_potential" in made,

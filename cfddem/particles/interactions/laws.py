@@ -123,6 +123,8 @@ class Laws(NamedTuple):
             fields += rolling.FIELDS
         if self.bridge is not None:
             fields += bridge.FIELDS
+            if self.bridge.film_density > 0.0:
+                fields += bridge.INERTIA_FIELDS
         if self.minimum_gap is not None or self.lubrication is not None:
             fields.append(film.OUTSIDE)
         return fields
@@ -135,7 +137,7 @@ class Laws(NamedTuple):
     @property
     def kept_apart(self) -> set[str]:
         """Fields that inactive triangles do not take over: there is one bridge, at the nearest of them."""
-        return set() if self.bridge is None else {field.name for field in bridge.FIELDS}
+        return set() if self.bridge is None else {field.name for field in (*bridge.FIELDS, *bridge.INERTIA_FIELDS)}
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""

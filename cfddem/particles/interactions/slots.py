@@ -43,7 +43,7 @@ class BridgeState(NamedTuple):
     viscosity: float  # [Pa s]
     surface_tension: float  # [N/m]
     contact_angle: float  # [rad]
-    capillary_number: float  # of the speed at which the bodies part [-]
+    capillary_number: float  # of the speed at which the bodies part; in resistances, or meet [-]
     p: tuple[float, ...]  # numbers of the laws, with those of a user's functions
 
 
@@ -111,6 +111,7 @@ film_outside = Slot("film_outside")
 
 BRIDGE = Slot("BRIDGE")  # bodies carry liquid, which forms bridges
 BRIDGE_FILM = Slot("BRIDGE_FILM")  # bridges resist along the line of centres
+BRIDGE_INERTIA = Slot("BRIDGE_INERTIA")  # films of bridges are reversed with the bodies at contact
 BRIDGE_SLIDING = Slot("BRIDGE_SLIDING")  # bridges resist across it
 BRIDGE_PULL = Slot("BRIDGE_PULL")  # bridges attract
 BRIDGE_POTENTIAL = Slot("BRIDGE_POTENTIAL")  # the resistance along the line of centres has a potential
@@ -129,6 +130,7 @@ returned_share = Slot("returned_share")  # (both radii, both contact angles): pa
 # ---------------------------------------------------------------- loops
 
 WALLS = Slot("WALLS")  # there are walls
+TRIANGLES = Slot("TRIANGLES")  # some of them are surfaces of triangles
 RECORD = Slot("RECORD")  # collisions are recorded
 pair_forces = Slot("pair_forces")
 update_films = Slot("update_films")

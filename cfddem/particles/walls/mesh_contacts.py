@@ -18,7 +18,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, serial
 from cfddem.particles.collision_events import move_event
-from cfddem.particles.interactions.slots import RECORD, copy_memory
+from cfddem.particles.interactions.slots import RECORD, TRIANGLES, copy_memory
 from cfddem.particles.vectors import at, dot, minus, times
 from cfddem.particles.walls.nearest_point import (
     DISTANCE,
@@ -175,7 +175,7 @@ def wall_contacts(particles, edges, minimum_gap, walls, free, cutoff_ratio):
     cutoff_ratio  reach of films over R*; 0 without films [-]
     """
     touch(particles, edges, walls, free)
-    if len(walls.cell_member) > 0:
+    if TRIANGLES:
         neighbours = _Neighbours(
             edges.between_particles,
             edges.first,

@@ -16,12 +16,7 @@ import numpy as np
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
-
-CONSTANT, EMPTY_RIM = 0.58, 1.4
-"""C and k of Beverloo, Leniger & van de Velde, Chem. Eng. Sci. 15 (1961) 260, for spheres [-]."""
-
-STEEP = -0.35
-"""Exponent of the correction for cones by Rose & Tanaka, The Engineer 208 (1959) 465; from memory [-]."""
+from closures import discharge as laws_of_discharge
 
 
 @dataclass(frozen=True)
@@ -34,18 +29,12 @@ class Discharge:
 
 
 def beverloo(case: Case) -> float:
-    r"""Discharge of the first wall, a cone, by Beverloo with a correction for its angle [kg/s].
-
-    .. math:: W = C\,\rho_b\,\sqrt g\,(D - k d)^{5/2}\,(\tan\theta)^{-0.35}
-
-    with the bulk density rho_b of a poured bed, the diameter D of the orifice and the half angle theta of the cone.
-    """
+    """Discharge of the first wall, a cone, by Beverloo with a correction for its angle [kg/s]."""
     cone = case.wall[0]
-    orifice = 2.0 * (cone.radius or 0.0)
     slope = ((cone.top_radius or 0.0) - (cone.radius or 0.0)) / (cone.length or 1.0)
-    bulk = POURED_SOLID_FRACTION * case.solid.density
-    free = orifice - EMPTY_RIM * case.bed.diameter
-    return float(CONSTANT * bulk * math.sqrt(math.hypot(*case.laws.gravity)) * free**2.5 * slope**STEEP)
+    bulk, gravity = POURED_SOLID_FRACTION * case.solid.density, math.hypot(*case.laws.gravity)
+    flat = laws_of_discharge.beverloo(bulk, 2.0 * (cone.radius or 0.0), case.bed.diameter, gravity)
+    return flat * laws_of_discharge.cone_factor(slope)
 
 
 def discharge(run: Run, case: Case) -> Discharge:

@@ -10,64 +10,66 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 EXCHANGES = 50
-"""Largest number of exchanges between the two sets; then the last set is taken."""
+"""Largest number of exchanges between the two sets; then the last set is taken and the step counted."""
 
 
 def coupled(
-    matrix: np.ndarray, outflow: np.ndarray, shadow: np.ndarray, velocity: float, share: float
+    matrix: np.ndarray, outflow: np.ndarray, projected: np.ndarray, velocity: float, share: float
 ) -> tuple[np.ndarray, float]:
     """Pressure and bead speed for which the outflow of every cell and the bead's displacement add to zero.
 
-    matrix    lower bands of the pressure equation
-    outflow   of each cell before the pressure [m3/s]
-    shadow    projected area of the bead in each cell [m2]
-    velocity  of the bead before the pressure [m/s]
-    share     time step over its mass [s/kg]
+    matrix     lower bands of the pressure equation
+    outflow    of each cell before the pressure [m3/s]
+    projected  projected area of the bead in each cell [m2]
+    velocity   of the bead before the pressure [m/s]
+    share      time step over its mass [s/kg]
     """
-    both = np.stack([-outflow, shadow], axis=1)
+    both = np.stack([-outflow, projected], axis=1)
     at_rest, moving = solveh_banded(matrix, both, overwrite_b=True, lower=True, check_finite=False).T
-    speed = float((velocity + share * (shadow @ at_rest)) / (1.0 + share * (shadow @ moving)))
+    speed = float((velocity + share * (projected @ at_rest)) / (1.0 + share * (projected @ moving)))
     return at_rest - speed * moving, speed
 
 
 def with_voids(
-    matrix: np.ndarray, outflow: np.ndarray, shadow: np.ndarray, velocity: float, share: float, floor: float,
+    matrix: np.ndarray, outflow: np.ndarray, projected: np.ndarray, velocity: float, share: float, floor: float,
     closing: np.ndarray,
-) -> tuple[np.ndarray, float, np.ndarray]:  # fmt: skip
-    """The same with a lowest pressure; returns also the rate at which the void of each cell grows [m3/s].
+) -> tuple[np.ndarray, float, np.ndarray, bool]:  # fmt: skip
+    """The same with a lowest pressure.
 
     floor    lowest pressure [Pa]
     closing  void of each cell over the time step [m3/s]
+    returns  pressure, speed, the rate at which the void of each cell grows [m3/s], and whether every cell satisfies its
+             inequality
     """
     void = closing > 0.0
     for _ in range(EXCHANGES):
         pressure, speed = _with_fixed(
-            matrix, outflow + np.where(void, 0.0, closing), shadow, velocity, share, floor * void
+            matrix, outflow + np.where(void, 0.0, closing), projected, velocity, share, floor * void
         )
-        growth = np.where(void, _times(matrix, pressure) + outflow + shadow * speed, -closing)
+        growth = np.where(void, _times(matrix, pressure) + outflow + projected * speed, -closing)
         opens, shuts = ~void & (pressure < floor), void & (growth < -closing)
         if not (opens.any() or shuts.any()):
-            break
+            return pressure, speed, growth, True
         void = (void | opens) & ~shuts
-    return pressure, speed, growth
+    return pressure, speed, growth, False
 
 
 def _with_fixed(
-    matrix: np.ndarray, outflow: np.ndarray, shadow: np.ndarray, velocity: float, share: float, fixed: np.ndarray
+    matrix: np.ndarray, outflow: np.ndarray, projected: np.ndarray, velocity: float, share: float, fixed: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Pressure and bead speed with the pressure given in some cells, where `fixed` is not 0."""
     known = fixed != 0.0
     if not known.any():
-        return coupled(matrix, outflow, shadow, velocity, share)
+        return coupled(matrix, outflow, projected, velocity, share)
     free = matrix.copy()
     free[:, known] = 0.0
     for band in range(1, len(matrix)):
         free[band, :-band][known[band:]] = 0.0
     free[0, known] = 1.0
-    both = np.stack([-outflow - _times(matrix, fixed), shadow], axis=1)
+    both = np.stack([-outflow - _times(matrix, fixed), projected], axis=1)
     both[known] = np.stack([fixed[known], np.zeros(known.sum())], axis=1)
     at_rest, moving = solveh_banded(free, both, overwrite_b=True, lower=True, check_finite=False).T
-    speed = float((velocity + share * (shadow @ at_rest)) / (1.0 + share * (shadow @ moving)))
+    speed = float((velocity + share * (projected @ at_rest)) / (1.0 + share * (projected @ moving)))
     return at_rest - speed * moving, speed
 
 

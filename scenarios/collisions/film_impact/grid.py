@@ -2,7 +2,7 @@
 
 Cells are squares of width dx in the plane of radius and height. Pressure is at their centres, radial velocity u on the
 faces at r = i dx, vertical velocity w on the faces at z = j dx. The plate is at z = 0. Only the lower half of the bead
-bounds the liquid; the space above it, within its shadow, is closed.
+bounds the liquid; the space above it, within its projected area, is closed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from cfddem.backend.compile import inline, serial
 
 FAR = 1e30
-"""Height of the bead's surface outside its shadow [m]."""
+"""Height of the bead's surface outside its projected area [m]."""
 
 TINY = 1e-6
 """Open share of a cell that the bead fills but for a corner: liquid passes through it, and pressure too."""

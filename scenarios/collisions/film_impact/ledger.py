@@ -61,7 +61,7 @@ def _length(filled, liquid, i, j, k, m):
 
 
 @serial
-def pressure_losses(u, w, before_u, before_w, ease, liquid, filled, open_u, open_w, dx, density, outer_open):
+def pressure_losses(u, w, before_u, before_w, mobility, liquid, filled, open_u, open_w, dx, density, outer_open):
     """Losses of the pressure step: of impulses, and of thin gaps [J]."""
     radial, vertical = liquid.shape
     impulsive, viscous = 0.0, 0.0
@@ -69,7 +69,7 @@ def pressure_losses(u, w, before_u, before_w, ease, liquid, filled, open_u, open
         for j in range(vertical):
             mass = density * 2.0 * math.pi * i * dx**3 * open_u[i, j] * _length(filled, liquid, i - 1, j, i, j)
             impulsive += 0.5 * mass * (u[i, j] - before_u[i, j]) ** 2
-            viscous += mass * (1.0 / ease[i, j] - 1.0) * u[i, j] ** 2
+            viscous += mass * (1.0 / mobility[i, j] - 1.0) * u[i, j] ** 2
     for i in range(radial):
         for j in range(1, vertical + 1):
             mass = density * math.pi * dx**3 * (2.0 * i + 1.0) * open_w[i, j]

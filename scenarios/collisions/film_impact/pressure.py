@@ -42,6 +42,7 @@ class Voids:
 
     floor: float  # lowest pressure, below 0 [Pa]
     volume: np.ndarray  # void in each cell [m3]
+    unsettled: int = 0  # steps in which the cells with voids were not found
     work: float = 0.0  # that opened them, less what they gave back when they closed [J]
 
 
@@ -76,11 +77,13 @@ def number_cells(liquid, number):
 
 
 @serial
-def assemble(number, filled, liquid, open_u, open_w, ease_u, u, w, dx, rate, outer_open, matrix, outflow, shadow):
+def assemble(
+    number, filled, liquid, open_u, open_w, mobility_u, u, w, dx, rate, outer_open, matrix, outflow, projected
+):
     """Rows of the pressure equation: lower bands of the matrix, outflow of each cell, projected area of the bead.
 
-    ease_u  factor of velocity and pressure gradient by the resistance of thin gaps
-    rate    time step over density
+    mobility_u  factor of velocity and pressure gradient by the resistance of thin gaps
+    rate        time step over density
     """
     radial, vertical = liquid.shape
     for i in range(radial):
@@ -89,14 +92,14 @@ def assemble(number, filled, liquid, open_u, open_w, ease_u, u, w, dx, rate, out
             c = number[i, j]
             if c < 0:
                 continue
-            shadow[c] = ring * (open_w[i, j] - open_w[i, j + 1])
+            projected[c] = ring * (open_w[i, j] - open_w[i, j + 1])
             for side in range(4):
                 k, m = i + (side == 1) - (side == 0), j + (side == 3) - (side == 2)
                 if k < 0 or m < 0 or (k == radial and not outer_open):
                     continue
                 if side < 2:
                     face = max(i, k)
-                    area = 2.0 * math.pi * face * dx * dx * open_u[face, j] * ease_u[face, j]
+                    area = 2.0 * math.pi * face * dx * dx * open_u[face, j] * mobility_u[face, j]
                     flow = u[face, j] if side == 1 else -u[face, j]
                 else:
                     face = max(j, m)
@@ -110,7 +113,7 @@ def assemble(number, filled, liquid, open_u, open_w, ease_u, u, w, dx, rate, out
 
 
 @serial
-def correct(number, filled, liquid, open_u, open_w, ease_u, u, w, p, dx, rate, outer_open):
+def correct(number, filled, liquid, open_u, open_w, mobility_u, u, w, p, dx, rate, outer_open):
     """Subtract the pressure gradient on every open face of a liquid cell; closed faces have no flow."""
     radial, vertical = liquid.shape
     for i in range(radial + 1):
@@ -125,7 +128,7 @@ def correct(number, filled, liquid, open_u, open_w, ease_u, u, w, p, dx, rate, o
             low = p[number[i - 1, j]] if left else 0.0
             high = p[number[i, j]] if right else 0.0
             length = distance(filled, liquid, i - 1, j, i, j) if left else distance(filled, liquid, i, j, i - 1, j)
-            u[i, j] = ease_u[i, j] * (u[i, j] - rate * (high - low) / (dx * length))
+            u[i, j] = mobility_u[i, j] * (u[i, j] - rate * (high - low) / (dx * length))
     for i in range(radial):
         for j in range(vertical + 1):
             below = j > 0 and liquid[i, j - 1]
@@ -152,14 +155,14 @@ class Solved:
 
 def solve(
     grid: Grid, bead: Bead, flow: tuple[np.ndarray, np.ndarray], cells: tuple[np.ndarray, np.ndarray],
-    ease: np.ndarray, density: float, dt: float, voids: Voids | None = None,
+    mobility: np.ndarray, density: float, dt: float, voids: Voids | None = None,
 ) -> Solved:  # fmt: skip
     """Make velocities and bead satisfy continuity; changes both.
 
-    flow   radial and vertical velocity on the faces, before the pressure [m/s]
-    cells  which cells are liquid, and their filled share
-    ease   factor of the radial faces by the resistance of thin gaps [-]
-    voids  of a liquid that cavitates; their volume is updated
+    flow      radial and vertical velocity on the faces, before the pressure [m/s]
+    cells     which cells are liquid, and their filled share
+    mobility  factor of the radial faces by the resistance of thin gaps [-]
+    voids     of a liquid that cavitates; their volume is updated
     """
     (u, w), (liquid, filled) = flow, cells
     number = np.empty(liquid.shape, dtype=np.int64)
@@ -168,21 +171,24 @@ def solve(
     if count == 0:
         bead.force = 0.0
         return Solved(pressure, 0.0, 0.0)
-    matrix, outflow, shadow = np.zeros((band + 1, count)), np.zeros(count), np.zeros(count)
-    open_faces = (grid.open_u, grid.open_w, ease)
+    matrix, outflow, projected = np.zeros((band + 1, count)), np.zeros(count), np.zeros(count)
+    open_faces = (grid.open_u, grid.open_w, mobility)
     rate = dt / density
-    assemble(number, filled, liquid, *open_faces, u, w, grid.dx, rate, grid.outer_open, matrix, outflow, shadow)
+    assemble(number, filled, liquid, *open_faces, u, w, grid.dx, rate, grid.outer_open, matrix, outflow, projected)
     matrix[0, matrix[0] == 0.0] = 1.0
     share = dt / bead.mass
     if voids is None:
-        p, bead.velocity = coupled(matrix, outflow, shadow, bead.velocity, share)
+        p, bead.velocity = coupled(matrix, outflow, projected, bead.velocity, share)
     else:
         closing = voids.volume[liquid] / dt
-        p, bead.velocity, growth = with_voids(matrix, outflow, shadow, bead.velocity, share, voids.floor, closing)
+        p, bead.velocity, growth, settled = with_voids(
+            matrix, outflow, projected, bead.velocity, share, voids.floor, closing
+        )
+        voids.unsettled += not settled
         voids.volume[liquid] = np.maximum(voids.volume[liquid] + growth * dt, 0.0)
         voids.volume[~liquid] = 0.0
         voids.work -= float(p @ growth) * dt
-    bead.force = float(shadow @ p)
+    bead.force = float(projected @ p)
     correct(number, filled, liquid, *open_faces, u, w, p, grid.dx, rate, grid.outer_open)
     pressure[liquid] = p
     return Solved(pressure, bead.force, float(grid.ring @ pressure[:, 0]))

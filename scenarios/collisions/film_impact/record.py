@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.result import COLUMNS, Frame, Moment
 from scenarios.collisions.film_impact.solver import Impact
 
@@ -13,7 +14,7 @@ from scenarios.collisions.film_impact.solver import Impact
 class Record:
     """Rows and frames of one impact."""
 
-    def __init__(self, impact: Impact) -> None:
+    def __init__(self, impact: Impact | SmoothedImpact) -> None:
         self.impact = impact
         self.rows: list[tuple[float, ...]] = []
         self.frames: dict[str, Frame] = {}

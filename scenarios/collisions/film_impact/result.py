@@ -56,6 +56,7 @@ class FilmImpact:
     steps: int
     cells: int  # in the depth of the film
     seconds: float  # of the computation
+    warnings: tuple[str, ...]
     history: dict[str, np.ndarray] = field(repr=False)  # columns of COLUMNS
     frames: dict[str, Frame] = field(repr=False)  # at P1 to P4
 

@@ -149,11 +149,11 @@ class Impact:
     def solve_pressure(self, dt: float) -> None:
         """Make velocities and bead satisfy continuity."""
         grid, bead = self.grid, self.bead
-        ease = viscosity.ease_of_gaps(grid, bead.radius, bead.gap, self.kinematic, dt)
+        mobility = viscosity.mobility_of_gaps(grid, bead.radius, bead.gap, self.kinematic, dt)
         cells, before, arrived = (self.liquid, self.filled), (self.u.copy(), self.w.copy()), bead.velocity
-        self.solved = pressure.solve(grid, bead, (self.u, self.w), cells, ease, self.density, dt, self.voids)
+        self.solved = pressure.solve(grid, bead, (self.u, self.w), cells, mobility, self.density, dt, self.voids)
         impulsive, viscous = ledger.pressure_losses(
-            self.u, self.w, *before, ease, *cells, grid.open_u, grid.open_w, grid.dx, self.density, grid.outer_open
+            self.u, self.w, *before, mobility, *cells, grid.open_u, grid.open_w, grid.dx, self.density, grid.outer_open
         )
         self.losses.viscous += viscous
         self.losses.impulsive += impulsive

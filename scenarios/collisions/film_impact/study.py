@@ -17,16 +17,27 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError
+from cfddem.backend.errors import InputError, nearest
 from cfddem.case.materials import Material
 from closures.film_impact import film_added_mass
+from scenarios.collisions.film_impact.cavitation import EXCHANGES
 from scenarios.collisions.film_impact.grid import Grid
+from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.materials import GLASS, Liquid, liquid_named, touching_gap
 from scenarios.collisions.film_impact.pressure import Bead
 from scenarios.collisions.film_impact.record import Record
 from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact
 from scenarios.collisions.film_impact.solver import Impact, Settings
 from scenarios.collisions.film_impact.volume import overfilled
+
+METHODS = {"grid": 20, "isph": 5}
+"""Method -> cells or layers of particles in the film, if not given."""
+
+OF_GRID: dict[str, float | None] = {
+    "cavitation": None, "wetted_share": None, "wetted_missing": 0.5, "domain": 1.0, "flip": 0.97,
+    "particles_per_side": 3, "courant": 0.5,
+}  # fmt: skip
+"""Options of the method "grid" alone, and their defaults."""
 
 LONGEST = 30.0
 """A bead that has not left after this many times film/velocity has stuck."""
@@ -41,10 +52,11 @@ def impact(
     film: float = 0.4e-3,
     velocity: float = 0.5,
     *,
+    method: str = "grid",
     solid: Material = GLASS,
     plate: Material = GLASS,
     viscosity: float | None = None,
-    cells: int = 20,
+    cells: int | None = None,
     gap_rule: str = "fixed",
     minimum_gap: float = 1e-6,
     cavitation: float | None = None,
@@ -55,7 +67,7 @@ def impact(
     particles_per_side: int = 3,
     courant: float = 0.5,
     gravity: float = 9.81,
-    progress: Callable[[Impact], None] | None = None,
+    progress: Callable[[Impact | SmoothedImpact], None] | None = None,
 ) -> FilmImpact:
     """Let a bead fall through a liquid film onto a plate.
 
@@ -63,9 +75,11 @@ def impact(
     liquid              "water" or "m5", or a Liquid
     film                depth of the film at rest [m]
     velocity            of the bead towards the plate where it meets the film [m/s]
+    method              "grid": axisymmetric grid with liquid particles; "isph": smoothed particles in three dimensions,
+                        the method of the paper at its coarsest resolution, with an error of about 6 %
     solid, plate        of the bead and of the plate; the dry restitution is the bead's
     viscosity           replaces that of the liquid, dynamic [Pa s]
-    cells               in the depth of the film
+    cells               in the depth of the film; 20 if not given, and 5 layers of particles with "isph"
     gap_rule            gap at which the solids touch: "fixed", the "roughness" of the solids, or "elastohydrodynamic"
     minimum_gap         of the rule "fixed" [m]
     cavitation          lowest pressure of the liquid, below 0, such as -1e5; without it, it holds any suction [Pa]
@@ -83,6 +97,12 @@ def impact(
     0.98
     """
     poured = liquid_named(liquid, viscosity)
+    if method not in METHODS:
+        raise InputError("method", method, nearest(method, METHODS))
+    cells = METHODS[method] if cells is None else cells
+    if method == "isph":
+        _check_of_grid(cavitation=cavitation, wetted_share=wetted_share, wetted_missing=wetted_missing, domain=domain,
+                       flip=flip, particles_per_side=particles_per_side, courant=courant)  # fmt: skip
     _check(diameter=diameter, film=film, velocity=velocity, gravity=gravity, domain=domain, flip=flip, courant=courant)
     _check_film(film, diameter)
     _check_whole(cells=cells, particles_per_side=particles_per_side)
@@ -91,18 +111,15 @@ def impact(
         raise InputError("minimum_gap", gap, f"below a cell, {film / cells:g} m", "the film is too thin for this gap")
     if cavitation is not None and not (math.isfinite(cavitation) and cavitation < 0.0):
         raise InputError("cavitation", cavitation, "below 0 and finite", "it is a pressure relative to the air")
-    settings = Settings(
-        minimum_gap=gap,
-        flip=flip,
-        per_side=particles_per_side,
-        missing=wetted_missing,
-        guessed=wetted_share,
-        cavitation=cavitation,
-        courant=courant,
-    )
+    settings = Settings(minimum_gap=gap, flip=flip, per_side=particles_per_side, missing=wetted_missing,
+                        guessed=wetted_share, cavitation=cavitation, courant=courant)  # fmt: skip
     bead = Bead(0.5 * diameter, solid.density * math.pi / 6.0 * diameter**3, film, -velocity)
-    grid = grid_for(diameter, film, cells, domain)
-    run = Impact(grid, bead, film, poured.density, poured.viscosity, solid.restitution, gravity, settings)
+    of_liquid = (poured.density, poured.viscosity, solid.restitution, gravity, settings)
+    run: Impact | SmoothedImpact
+    if method == "isph":
+        run = SmoothedImpact(bead, film, cells, *of_liquid)
+    else:
+        run = Impact(grid_for(diameter, film, cells, domain), bead, film, *of_liquid)
     return follow(run, velocity, solid.density, progress)
 
 
@@ -113,7 +130,12 @@ def grid_for(diameter: float, film: float, cells: int, domain: float = 1.0) -> G
     return Grid(math.ceil(domain * width / dx), 5 * cells, dx)
 
 
-def follow(run: Impact, velocity: float, density: float, progress: Callable[[Impact], None] | None) -> FilmImpact:
+def follow(
+    run: Impact | SmoothedImpact,
+    velocity: float,
+    density: float,
+    progress: Callable[[Impact | SmoothedImpact], None] | None,
+) -> FilmImpact:
     """Step until the bead passes the undisturbed surface again, or sticks."""
     begin, record, bead = perf_counter(), Record(run), run.bead
     while True:
@@ -147,13 +169,13 @@ def sweep(
     return results
 
 
-def _stuck(run: Impact, velocity: float) -> bool:
+def _stuck(run: Impact | SmoothedImpact, velocity: float) -> bool:
     """Whether the bead has turned back before it left, stands still, or bounces without end."""
     fallen_back = run.contacts > 0 and run.bead.velocity <= 0.0 and run.bead.gap > 0.1 * run.film
     return fallen_back or run.contacts >= BOUNCES or run.time > LONGEST * run.film / velocity
 
 
-def _result(run: Impact, record: Record, density: float, seconds: float) -> FilmImpact:
+def _result(run: Impact | SmoothedImpact, record: Record, density: float, seconds: float) -> FilmImpact:
     """The result from the end of the run and its record."""
     bead, history, speed = run.bead, record.history(), -record.p1.velocity
     rebounds, energy = math.isfinite(record.p4.velocity), 0.5 * bead.mass * speed**2
@@ -191,9 +213,20 @@ def _result(run: Impact, record: Record, density: float, seconds: float) -> Film
         steps=run.steps,
         cells=round(run.film / run.grid.dx),
         seconds=seconds,
+        warnings=_warnings(run),
         history=history,
         frames=record.frames,
     )
+
+
+def _warnings(run: Impact | SmoothedImpact) -> tuple[str, ...]:
+    """What the user of the result has to know."""
+    if isinstance(run, Impact) and run.voids is not None and run.voids.unsettled:
+        some = f"in {run.voids.unsettled} of {run.steps} steps the cells that cavitate were not found"
+        return (
+            f"{some} in {EXCHANGES} trials; the pressure may be below {run.voids.floor:g} Pa. Use a smaller courant.",
+        )
+    return ()
 
 
 def _check(**given: float) -> None:
@@ -212,6 +245,13 @@ def _check(**given: float) -> None:
         holds, limit, remedy = limits.get(name, (value > 0.0, "above 0 and finite", ""))
         if not (holds and math.isfinite(value)):
             raise InputError(name, value, limit, remedy)
+
+
+def _check_of_grid(**given: float | None) -> None:
+    """Refuse options of the grid for another method."""
+    for name, value in given.items():
+        if value != OF_GRID[name]:
+            raise InputError(name, value, 'left out with method = "isph"', "it is an option of the grid")
 
 
 def _check_film(film: float, diameter: float) -> None:

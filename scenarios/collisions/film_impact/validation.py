@@ -16,6 +16,7 @@ import numpy as np
 from closures.restitution import singh, singh_crossover
 from scenarios.collisions.film_impact.figures import Case, draw_laws, draw_moments, draw_motion, draw_restitution
 from scenarios.collisions.film_impact.film_laws import laws_of
+from scenarios.collisions.film_impact.isph.checks import layer_at_rest, taylor_green
 from scenarios.collisions.film_impact.materials import LIQUIDS
 from scenarios.collisions.film_impact.result import COLUMNS, FilmImpact
 from scenarios.collisions.film_impact.study import impact, sweep
@@ -49,6 +50,12 @@ SENSITIVITIES: dict[str, dict[str, Any]] = {
 }
 """Changes of the oil impact at 10 cells, one at a time."""
 
+SMOOTHED: dict[str, tuple[float, str, float, float]] = {
+    "5.5 mm, m5, 0.5 m/s": (5.5e-3, "m5", 0.45e-3, 0.5),
+    "8 mm, water, 1 m/s": (8e-3, "water", 0.4e-3, 1.0),
+}
+"""Impacts that are repeated with smoothed particles."""
+
 PEAK = 0.02
 """Least height of a peak of the liquid's energy above what surrounds it, over the highest."""
 
@@ -58,7 +65,7 @@ oil = partial(impact, 5.5e-3, "m5", 0.45e-3, 0.5)
 
 def study(folder: Path, progress: Progress) -> list[Row]:
     """Run convergence, sensitivities and the sweep; write histories and figures; return the table."""
-    rows = convergence(progress) + sensitivities(progress)
+    rows = convergence(progress) + sensitivities(progress) + smoothed(progress)
     cases = {case: sweep(VELOCITIES, progress, diameter=case[0], liquid=case[1], film=case[2]) for case in CASES}
     rows += fit(cases) + conservation(cases) + words(cases) + film_laws(cases)
     fastest = {case: results[-1] for case, results in cases.items()}
@@ -105,6 +112,46 @@ def sensitivities(progress: Progress) -> list[Row]:
         Row("oil, 0.5 m/s: spread of e over the tracked wetted radii", np.ptp(tracked), 0.0, 0.03),
         Row("oil, 0.5 m/s: spread of e over the guessed wetted radii", np.ptp(guessed)),
     ]
+
+
+def smoothed(progress: Progress) -> list[Row]:
+    """The method of the paper, smoothed particles at its coarsest resolution: exact solutions, and two impacts."""
+    progress("smoothed particles")
+    at_rest = layer_at_rest(10)
+    rows = [
+        Row(
+            "smoothed particles, layer at rest: force on the plate over its weight",
+            1.0 + at_rest.plate_force,
+            1.0,
+            0.02,
+        ),
+        Row("smoothed particles, layer at rest: largest speed over 0.5 m/s", at_rest.largest_speed / 0.5, 0.0, 0.01),
+        Row("smoothed particles, Taylor-Green vortex of 50 x 50: speed", 1.0 + taylor_green(50), 1.0, 0.01),
+    ]
+    for name, case in SMOOTHED.items():
+        progress(f"{name} with smoothed particles")
+        result, on_grid = impact(*case, method="isph"), impact(*case, cells=10)
+        disordered = not (result.p1.time < result.p2.time <= result.p3.time < result.p4.time)
+        rows += [
+            Row(
+                f"{name}: restitution by smoothed particles and on the grid",
+                result.restitution,
+                on_grid.restitution,
+                0.1,
+            ),
+            Row(f"{name}: the same, speed at the plate", result.p2.velocity, on_grid.p2.velocity, unit="m/s"),
+            Row(
+                f"{name}: the same, speed once the liquid has turned",
+                result.turned_speed,
+                on_grid.turned_speed,
+                unit="m/s",
+            ),
+            Row(f"{name}: P1 to P4 of the smoothed particles out of order", float(disordered), 0.0, 0.0),
+            Row(f"{name}: peaks of the liquid's energy with smoothed particles", float(peaks(result))),
+            Row(f"{name}: energy that the smoothed particles leave unexplained", result.ledger_error, 0.0),
+            Row(f"{name}: time with smoothed particles", result.seconds, unit="s"),
+        ]
+    return rows
 
 
 def fit(cases: dict[Case, list[FilmImpact]]) -> list[Row]:

@@ -23,21 +23,21 @@ CLOSEST = 0.1
 """Least distance of a wall [cells]."""
 
 
-def ease_of_gaps(grid: Grid, radius: float, gap: float, viscosity: float, dt: float) -> np.ndarray:
+def mobility_of_gaps(grid: Grid, radius: float, gap: float, viscosity: float, dt: float) -> np.ndarray:
     """Factor of the radial velocity in thin gaps, 1/(1 + 12 nu dt/h^2), for each radial face.
 
     viscosity  kinematic [m2/s]
     returns    (radial + 1, vertical) [-]; 1 where the gap is resolved
     """
     height = heights(grid, radius, gap)
-    ease = np.ones(grid.radial + 1)
+    mobility = np.ones(grid.radial + 1)
     thin = height < THIN * grid.dx
-    ease[thin] = 1.0 / (1.0 + 12.0 * viscosity * dt / height[thin] ** 2)
-    return np.ascontiguousarray(np.broadcast_to(ease[:, None], grid.open_u.shape))
+    mobility[thin] = 1.0 / (1.0 + 12.0 * viscosity * dt / height[thin] ** 2)
+    return np.ascontiguousarray(np.broadcast_to(mobility[:, None], grid.open_u.shape))
 
 
 def heights(grid: Grid, radius: float, gap: float) -> np.ndarray:
-    """Height of the underside of the bead over each radial face; infinite outside its shadow [m]."""
+    """Height of the underside of the bead over each radial face; infinite outside its projected area [m]."""
     r = np.arange(grid.radial + 1) * grid.dx
     below = r < radius
     inside = np.where(below, r, 0.0)

@@ -14,7 +14,7 @@ SHARE, FARTHEST = 0.25, 0.1
 """Shift of a particle in a step down the gradient of the filled share, in cells, and the largest."""
 
 BLOCK = 4
-"""Cells along each side of the blocks in which liquid and room are compared."""
+"""Half the width of the tents with which liquid and room are compared [cells]."""
 
 
 @serial
@@ -42,20 +42,26 @@ def beside(filled, open_cell, k, m, i, j):
 def overfilled(grid: Grid, particles: np.ndarray, volume: np.ndarray) -> float:
     """Liquid that lies where there is no room for it, over all liquid [-].
 
-    Summed over blocks of four cells by four, in which the number of particles varies little.
+    Liquid and room are summed with tents of four cells to each side, which add up to 1. Sums over blocks with sharp
+    edges would count the particles that happen to lie on one side of an edge: 1 to 2.5 % in a lattice that is merely
+    stretched.
 
     particles  radius and height in the first two columns [m]
     volume     of each particle [m3]
     """
-    held = np.zeros(grid.open_cell.shape)
-    place = np.minimum((particles[:, :2] / grid.dx).astype(int), np.array(held.shape) - 1)
-    np.add.at(held, (place[:, 0], place[:, 1]), volume)
+    cells = np.stack(np.meshgrid(*(np.arange(length) + 0.5 for length in grid.open_cell.shape), indexing="ij"), axis=-1)
     room = grid.open_cell * (grid.ring * grid.dx)[:, None]
-    return float(np.maximum(_blocks(held) - _blocks(room), 0.0).sum() / held.sum())
+    held = _tents(particles[:, :2] / grid.dx, volume, grid)
+    return float(np.maximum(held - _tents(cells.reshape(-1, 2), room.ravel(), grid), 0.0).sum() / volume.sum())
 
 
-def _blocks(cells: np.ndarray) -> np.ndarray:
-    """Sums over blocks; an incomplete block at an end is left out."""
-    radial, vertical = (length // BLOCK for length in cells.shape)
-    whole = cells[: radial * BLOCK, : vertical * BLOCK]
-    return np.asarray(whole.reshape(radial, BLOCK, vertical, BLOCK).sum(axis=(1, 3)))
+def _tents(places: np.ndarray, volume: np.ndarray, grid: Grid) -> np.ndarray:
+    """Volumes at places, in cells, summed with tents around every fourth corner of the cells."""
+    sums = np.zeros([length // BLOCK + 2 for length in grid.open_cell.shape])
+    most = np.array(grid.open_cell.shape) - 1e-9
+    corner, share = np.divmod(np.minimum(places, most) / BLOCK, 1.0)
+    i, j = corner.astype(int).T
+    for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        weight = np.abs(1.0 - a - share[:, 0]) * np.abs(1.0 - b - share[:, 1])
+        np.add.at(sums, (i + a, j + b), weight * volume)
+    return sums

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from cfddem.backend.errors import InputError, UnstableStep, nearest
+from cfddem.backend.html import table
 from cfddem.backend.law_choice import GAP_ARGUMENTS, called_by_name, chosen
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
@@ -76,6 +77,12 @@ class Collision:
         """The result without its histories, ready for JSON."""
         names = [name for name in self.__dataclass_fields__ if name not in ("time", "gap", "history")]
         return {name: plain(getattr(self, name)) for name in names}
+
+    def _repr_html_(self) -> str:
+        """The result in a notebook."""
+        rows = [(name.replace("_", " "), f"{value:.4g}" if isinstance(value, float) else f"{value}")
+                for name, value in self.summary().items() if value not in (None, [])]  # fmt: skip
+        return table(f"Collision: {self.outcome.replace('_', ' ')}", rows)
 
 
 def collide(

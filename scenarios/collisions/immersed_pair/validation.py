@@ -22,6 +22,7 @@ from scenarios.collisions.bouncing_sphere.study import SPEED as FALL_SPEED
 from scenarios.collisions.bouncing_sphere.study import bounce, collision, shares_of_loss, speed_after_contact
 from scenarios.collisions.immersed_pair import checks, figures
 from scenarios.collisions.immersed_pair.checks import CUTOFF, DRY, SPEED, WATER
+from scenarios.collisions.immersed_pair.measured import compare_points
 from scenarios.collisions.immersed_pair.study import MATERIALS, collide
 from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, worst
 
@@ -37,6 +38,15 @@ CLASSES: dict[str, tuple[str, float, tuple[float, float, float]]] = {
 def study(folder: Path, progress: Progress) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
     return in_parts(PARTS, figures.draw, folder, progress)
+
+
+def compare_data(folder: Path, path: Path) -> Row:
+    """A row and a figure for measured restitutions of head-on collisions of Delrin at the speed of the target."""
+    found = compare_points(path, lambda **point: collide(MATERIALS["delrin"], velocity=SPEED, **point),
+                          folder / f"measured_{path.stem}.png").comparison  # fmt: skip
+    points = found.points
+    rows = zip(points.place, found.computed, points.value)
+    return worst(f"measured {points.quantity}, {points.name}: {found.score()['verdict']}", rows)
 
 
 def gap_histories(curves: Curves) -> list[Row]:

@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, label, legend, panels, save
 from scenarios.collisions.three_spheres.study import OUTCOMES, Triplet, centres, outcomes
 
-COLOURS = {"FA": "#3b3b3b", "PA1": BLUE, "PA2": RED, "PA3": ORANGE, "FS": "#dcebf5"}
+COLOURS = {"FA": "#3b3b3b", "PA1": BLUE, "PA2": GREEN, "PA3": ORANGE, "FS": "#dcebf5"}
 MEANINGS = {
     "FA": "FA: all three stick",
     "PA1": "PA1: sphere 1 leaves",

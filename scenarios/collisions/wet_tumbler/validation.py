@@ -68,7 +68,7 @@ def _draw_growth(path: Path, runs: list[Tumbling]) -> None:
     numbers = [run.capillary_number for run in runs]
     axes[1].loglog(numbers, [run.late(run.mean_size) for run in runs], "o-", color="#0b4f8a", label="mean")
     axes[1].loglog(
-        numbers, [run.late(run.weighed_size) for run in runs], "s--", color="#e07b00", label="that a sphere is in"
+        numbers, [run.late(run.weighed_size) for run in runs], "s--", color="#e08a00", label="that a sphere is in"
     )
     label(axes[1], "capillary number of the stirring", "-", "size, later half of the run", "spheres")
     decades(axes[1], *numbers)

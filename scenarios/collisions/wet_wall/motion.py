@@ -22,6 +22,9 @@ from scenarios.collisions.ode import event
 LONGEST = 1.0
 """A sphere that has not left a phase after this time has stuck [s]."""
 
+NECK = 1e-3
+"""Least radius of the neck of a bridge, over that of the sphere."""
+
 BOUNCES = 30.0
 """A contact that lasts this many Hertz times is a sphere at rest on the wall."""
 
@@ -80,43 +83,74 @@ class Bridge(NamedTuple):
     azimuthal: float
 
 
-def bridge(wet: Wet, height: float) -> Bridge:
+class Toroid(NamedTuple):
+    """What the shape of a bridge depends on, apart from the height of the sphere."""
+
+    radius: float  # of the sphere
+    film: float  # thickness of the layer
+    half_filling_angle: float
+    contact_angle: float
+    smallest_arc: float
+
+
+def toroid_of(wet: Wet) -> Toroid:
+    """The bridge of an impact."""
+    return Toroid(wet.radius, wet.film, wet.half_filling_angle, wet.contact_angle, wet.smallest_arc)
+
+
+def bridge(toroid: Toroid, height: float) -> Bridge:
     """Shape of the bridge while the centre is at a height."""
-    line_radius = wet.radius * math.sin(wet.half_filling_angle)
-    line_height = height - wet.radius * math.cos(wet.half_filling_angle) - wet.film
-    angles = wet.half_filling_angle, wet.contact_angle
-    arc = max(capillary.meridional_radius(line_height, *angles), wet.smallest_arc)
-    return Bridge(line_radius, line_height, arc, capillary.azimuthal_radius(line_radius, arc, *angles))
+    filled, wetting = toroid.half_filling_angle, toroid.contact_angle
+    line_radius = toroid.radius * math.sin(filled)
+    line_height = height - toroid.radius * math.cos(filled) - toroid.film
+    arc = max(capillary.meridional_radius(line_height, filled, wetting), toroid.smallest_arc)
+    return Bridge(line_radius, line_height, arc, capillary.azimuthal_radius(line_radius, arc, filled, wetting))
 
 
-def pull(wet: Wet, height: float) -> float:
+def pull(toroid: Toroid, surface_tension: float, height: float) -> float:
     """Capillary pull towards the wall [N]."""
-    toroid = bridge(wet, height)
-    neck = max(toroid.azimuthal, 1e-3 * wet.radius)  # only trial steps reach a closed neck
-    angles = wet.half_filling_angle, wet.contact_angle
-    return capillary.toroid_pull(wet.surface_tension, toroid.line_radius, toroid.meridional, neck, *angles)
+    line_radius, _, arc, azimuthal = bridge(toroid, height)
+    neck = max(azimuthal, NECK * toroid.radius)  # only trial steps reach a closed neck
+    filled, wetting = toroid.half_filling_angle, toroid.contact_angle
+    return capillary.toroid_pull(surface_tension, line_radius, arc, neck, filled, wetting)
 
 
-def volume(wet: Wet, height: float) -> float:
+def volume(toroid: Toroid, height: float) -> float:
     """Liquid in the bridge [m3]."""
-    _, line_height, arc, neck = bridge(wet, height)
-    angles = wet.half_filling_angle, wet.contact_angle
-    return max(0.0, capillary.toroid_volume(wet.radius, arc, neck, line_height, *angles))
+    _, line_height, arc, neck = bridge(toroid, height)
+    filled, wetting = toroid.half_filling_angle, toroid.contact_angle
+    return max(0.0, capillary.toroid_volume(toroid.radius, arc, neck, line_height, filled, wetting))
 
 
 def length_left(wet: Wet, height: float, speed: float) -> float:
     """How far the bridge can still be stretched before it ruptures [m]."""
     number = numbers.capillary(wet.viscosity, max(speed, 0.0), wet.surface_tension)
-    longest = capillary.rupture_length(number, wet.contact_angle, volume(wet, height))
+    longest = capillary.rupture_length(number, wet.contact_angle, volume(toroid_of(wet), height))
     return longest - (height - wet.radius - wet.length_from)
 
 
-def resistance(wet: Wet, height: float, speed: float) -> float:
+def resistance(
+    radius: float,
+    gap: float,
+    speed: float,
+    half_filling_angle: float,
+    viscosity: float,
+    density: float,
+    smallest_gap: float,
+) -> float:
     """Viscous resistance along the normal: drag of the wetted part or the film's, whichever is larger [kg/s]."""
-    width = 2.0 * wet.radius * math.sin(wet.half_filling_angle)
-    drag = layer.white(numbers.reynolds(wet.liquid_density, abs(speed), width, wet.viscosity))
-    film = lubrication.film_strength(wet.viscosity, wet.radius) / max(height - wet.radius, wet.smallest_gap)
-    return max(3.0 * math.pi * wet.viscosity * width * drag, film)
+    width = 2.0 * radius * math.sin(half_filling_angle)
+    drag = layer.white(numbers.reynolds(density, abs(speed), width, viscosity))
+    film = lubrication.film_strength(viscosity, radius) / max(gap, smallest_gap)
+    return max(3.0 * math.pi * viscosity * width * drag, film)
+
+
+def resistance_of(wet: Wet, height: float, speed: float) -> float:
+    """The same of an impact [kg/s]."""
+    return resistance(
+        wet.radius, height - wet.radius, speed, wet.half_filling_angle, wet.viscosity, wet.liquid_density,
+        wet.smallest_gap,
+    )  # fmt: skip
 
 
 def film_along(wet: Wet, height: float, along: float, spin: float) -> tuple[float, float]:
@@ -137,7 +171,8 @@ def touch(wet: Wet, state: Any) -> tuple[float, float, float]:
 
     A sliding contact carries friction times the normal force, with its sign, also in the weak pull that ends a damped
     contact. The tangential impulse of a contact that slides throughout is therefore friction times the normal impulse.
-    A truncated spring follows Coulomb's limit, less the force of the dashpot, within a small part of the contact time.
+    A truncated spring follows Coulomb's limit, less the force of the dashpot, within a small part of the contact time;
+    as in the particle engine, such a contact has no friction while it pulls.
     """
     overlap = max(wet.radius - state[HEIGHT], 0.0)
     damping = contact.hertz_damping(wet.damping_ratio, wet.mass, wet.stiffness, overlap)
@@ -152,6 +187,7 @@ def touch(wet: Wet, state: Any) -> tuple[float, float, float]:
     if wet.cutting_time > 0.0 and stiffness > 0.0:
         carried = max(limit - math.copysign(damping, pulled) * slip, 0.0)
         rate -= (state[DISPLACEMENT] - math.copysign(carried / stiffness, pulled)) / wet.cutting_time
+        return normal, -math.copysign(limit, pulled), rate
     return normal, -math.copysign(wet.friction * normal, pulled * normal), rate
 
 
@@ -159,16 +195,16 @@ def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
     """Rates of all columns in one phase."""
     inertia = 0.4 * wet.mass * wet.radius**2
     wetted, in_layer, on_bridge = phase != "II", phase in ("I", "III"), phase == "IV"
-    pulled = phase in wet.pulled_in
+    pulled, toroid = phase in wet.pulled_in, toroid_of(wet)
 
     def of(_: float, state: Any) -> list[float]:
         height, speed, along, spin = state[HEIGHT], state[SPEED], state[ALONG], state[SPIN]
         pressed = sideways = couple = touched = drawn = viscous = rubbed = stretched = 0.0
         if wetted:
             above = max(height, wet.radius)  # phases in the layer end there; only trial steps go below
-            viscous = -resistance(wet, above, speed) * speed
+            viscous = -resistance_of(wet, above, speed) * speed
             if pulled:
-                drawn = -pull(wet, above)
+                drawn = -pull(toroid, wet.surface_tension, above)
             if in_layer:
                 sideways, couple = film_along(wet, above, along, spin)
             rubbed = viscous * speed + sideways * along + couple * spin
@@ -176,7 +212,7 @@ def rates(wet: Wet, phase: str) -> Callable[[float, Any], list[float]]:
             pressed, sideways, stretched = touch(wet, state)
             couple = wet.radius * sideways
             touched = pressed * speed + sideways * along + couple * spin
-        weight = wet.mass + (wet.liquid_density * volume(wet, height) if on_bridge else 0.0)
+        weight = wet.mass + (wet.liquid_density * volume(toroid, height) if on_bridge else 0.0)
         fall = weight * wet.gravity
         return [
             speed,
@@ -242,7 +278,7 @@ def follow(wet: Wet, speed: float, along: float, spin: float, tolerance: float) 
         ends[phase] = time
         if not found.t_events[0].size:
             return Path(np.concatenate(times), np.hstack(states), np.concatenate(phases), ends, True)
-    if not dry and bridge(wet, state[HEIGHT]).azimuthal <= 1e-3 * wet.radius:
+    if not dry and bridge(toroid_of(wet), state[HEIGHT]).azimuthal <= NECK * wet.radius:
         raise RunFailed(
             f"the neck of the bridge closed at a height of {state[HEIGHT] - wet.radius:.3g} m before the bridge broke; "
             "the toroid does not describe it, take a larger half_filling_angle"
@@ -252,6 +288,7 @@ def follow(wet: Wet, speed: float, along: float, spin: float, tolerance: float) 
 
 def _ends(wet: Wet, phase: str) -> tuple[Any, Any]:
     """Events that end a phase: the sphere reaches its end, or comes to rest while it moves out."""
+    toroid = toroid_of(wet)
 
     def at_wall(_: float, state: Any) -> float:
         return float(state[HEIGHT] - wet.radius)
@@ -260,7 +297,7 @@ def _ends(wet: Wet, phase: str) -> tuple[Any, Any]:
         return float(state[HEIGHT] - wet.radius - wet.film)
 
     def breaks(_: float, state: Any) -> float:
-        closed = bridge(wet, state[HEIGHT]).azimuthal - 1e-3 * wet.radius
+        closed = bridge(toroid, state[HEIGHT]).azimuthal - NECK * wet.radius
         return min(length_left(wet, state[HEIGHT], state[SPEED]), closed)
 
     def rests(_: float, state: Any) -> float:

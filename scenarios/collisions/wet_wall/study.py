@@ -24,6 +24,7 @@ from cfddem.particles.material_pairs import pair_table
 from closures import capillary, contact, timescales
 from scenarios.collisions.results import plain
 from scenarios.collisions.wet_wall import motion
+from scenarios.collisions.wet_wall.engine import follow as follow_in_engine
 from scenarios.collisions.wet_wall.materials import BALLS, GLASS, LIQUIDS, Ball, Liquid, half_filling, sliding_friction
 from scenarios.collisions.wet_wall.motion import COLUMNS, Path, Wet, follow
 
@@ -82,6 +83,7 @@ def impact(
     smallest_gap: float = 0.5e-6,
     gravity: float = 9.81,
     tolerance: float = 1e-10,
+    solver: str = "equations",
 ) -> Impact:
     """Let a sphere strike a wall that carries a liquid layer, from above.
 
@@ -102,7 +104,8 @@ def impact(
     smallest_arc        floor of r_m for layers in which the toroid is singular; such layers are refused without [m]
     smallest_gap        below it the film's resistance no longer grows [m]
     gravity             towards the wall [m/s2]
-    tolerance           of the integration, relative
+    tolerance           of the equations, relative
+    solver              "equations" phase by phase, or the "particles" engine, which cuts the spring and pulls always
     returns             :class:`Impact`
 
     Raises InputError where the contact line of the bridge lies within the layer while the solids touch.
@@ -130,7 +133,11 @@ def impact(
         _refuse_the_singular(wet)
     if _named("spring", spring, {"kept": False, "cut": True}):
         wet = wet._replace(cutting_time=CUTTING * timescales.hertz_time(wet.mass, wet.stiffness, velocity))
-    path = follow(wet, velocity, along, spin, tolerance)
+    if _named("solver", solver, {"equations": False, "particles": True}):
+        _refuse_other_readings(wet, oblique)
+        path = follow_in_engine(wet, (ball.material, wall), velocity, along, spin)
+    else:
+        path = follow(wet, velocity, along, spin, tolerance)
     return replace(_result(path, wet, velocity, along, spin, filled, rubs), warnings=_nearly_singular(wet))
 
 
@@ -194,6 +201,14 @@ def _wet(
     )
 
 
+def _refuse_other_readings(wet: Wet, oblique: bool) -> None:
+    """Refuse readings of the equations that the particle engine does not have."""
+    if oblique and wet.cutting_time == 0.0:
+        raise InputError("spring", "kept", '"cut" with solver="particles", for an impact that slides')
+    if wet.film > 0.0 and wet.pulled_in != PULLED_IN["always"]:
+        raise InputError("capillary_phases", None, '"always" with solver="particles"')
+
+
 def _refuse_the_singular(wet: Wet) -> None:
     """Refuse a toroid whose contact line lies within the layer: its arc has no radius."""
     height = wet.radius * (1.0 - math.cos(wet.half_filling_angle))
@@ -213,7 +228,7 @@ def _nearly_singular(wet: Wet) -> tuple[str, ...]:
     """Warn if the suction before contact grows so much that the result depends on the arc of the toroid."""
     if wet.film == 0.0 or wet.pulled_in == PULLED_IN["bridge"]:
         return ()
-    arc = motion.bridge(wet, wet.radius).meridional
+    arc = motion.bridge(motion.toroid_of(wet), wet.radius).meridional
     if arc > SLENDER * wet.radius:
         return ()
     return (
@@ -230,7 +245,7 @@ def _result(
     rebounds, wetted = not path.stuck, filled is not None
     height, speed = float(end[motion.HEIGHT]), float(end[motion.SPEED])
     met = path.state[motion.SPEED, np.argmax(path.phase == 2)] if (path.phase == 2).any() else 0.0
-    broken = motion.volume(wet, height) if wetted and rebounds else None
+    broken = motion.volume(motion.toroid_of(wet), height) if wetted and rebounds else None
     return Impact(
         outcome="rebound" if rebounds else "stick",
         restitution=speed / velocity if rebounds else 0.0,

@@ -29,6 +29,23 @@ FLOOR = 5e-6
 """Least radius of the arc in layers whose toroid is singular; such curves are drawn dotted [m]."""
 
 
+IMPACTS = (  # sphere, liquid, film, half-filling angle, speed, angle, spin, friction
+    ("glass_1.74", "water", 100e-6, 35.0, 0.35, 0.0, 0.0, 0.0),
+    ("glass_1.74", "water", 200e-6, 45.0, 0.6, 0.0, 0.0, 0.0),
+    ("glass_0.91", "water", 100e-6, 45.0, 1.0, 0.0, 0.0, 0.0),
+    ("alumina_1.74", "glycerol_51", 200e-6, 43.0, 2.0, 0.0, 0.0, 0.0),
+    *(("alumina_1.74", "tween", 100e-6, 35.0, 1.0, angle, -960.0, 0.16) for angle in (10.0, 30.0, 50.0, 80.0)),
+)
+STICKING: tuple[tuple[str, str, float, float, float | None], ...] = (  # and the floor of the arc
+    ("glass_1.74", "water", 100e-6, 0.345, None),
+    ("glass_1.74", "water", 200e-6, 0.456, None),
+    ("glass_0.91", "water", 100e-6, 0.587, None),
+    ("alumina_1.74", "tween", 100e-6, 0.549, None),
+    ("alumina_1.74", "water", 100e-6, 0.652, FLOOR),  # nearly singular: 0.673 without the floor
+)
+"""Velocities below which spheres stick, with limits of 2 % [m/s]."""
+
+
 def study(folder: Path, progress: Progress) -> list[Row]:
     """Run all parts, write histories and figures, and return the table."""
     rows: list[Row] = []
@@ -43,13 +60,7 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 def solution(_: Path, __: Curves) -> list[Row]:
     """Wet wall: against a second solution of the same equations."""
     normal, along, spins = [], [], []
-    for sphere, liquid, film, filled, speed, angle, spin, friction in (
-        ("glass_1.74", "water", 100e-6, 35.0, 0.35, 0.0, 0.0, 0.0),
-        ("glass_1.74", "water", 200e-6, 45.0, 0.6, 0.0, 0.0, 0.0),
-        ("glass_0.91", "water", 100e-6, 45.0, 1.0, 0.0, 0.0, 0.0),
-        ("alumina_1.74", "glycerol_51", 200e-6, 43.0, 2.0, 0.0, 0.0, 0.0),
-        *(("alumina_1.74", "tween", 100e-6, 35.0, 1.0, angle, -960.0, 0.16) for angle in (10.0, 30.0, 50.0, 80.0)),
-    ):
+    for sphere, liquid, film, filled, speed, angle, spin, friction in IMPACTS:
         ours = impact(sphere, liquid, film, speed, angle=angle, spin=spin, friction=friction)
         e, e_t, omega = independent(sphere, liquid, film, filled, speed, angle, spin, friction)
         normal.append((speed, ours.restitution, e))
@@ -63,16 +74,34 @@ def solution(_: Path, __: Curves) -> list[Row]:
     ]
 
 
+def engine(_: Path, __: Curves) -> list[Row]:
+    """Wet wall: the particle engine against the equations, and the velocities below which it lets spheres stick."""
+    times, normal, along, spins, slowest = [], [], [], [], []
+    for sphere, liquid, film, _filled, speed, angle, spin, friction in IMPACTS:
+        given: dict[str, Any] = {"angle": angle, "spin": spin, "friction": friction, "spring": "cut"}
+        ours = impact(sphere, liquid, film, speed, **given, solver="particles")
+        reference = impact(sphere, liquid, film, speed, **given)
+        times.append((speed, ours.duration / reference.duration, 1.0))
+        normal.append((speed, ours.restitution, reference.restitution))
+        if angle:
+            along.append((angle, ours.restitution_tangential, reference.restitution_tangential))
+            spins.append((angle, ours.spin / reference.spin, 1.0))
+    for sphere, liquid, film, published, arc in STICKING:
+        found = sticking_velocity(sphere, liquid, film, precision=2e-3, smallest_arc=arc, solver="particles")
+        slowest.append((published, found / published, 1.0))
+    return [
+        worst("wet wall, particle engine over equations: time until the bridge breaks", times, 0.005),
+        worst("wet wall, particle engine: restitution against the equations", normal, 0.005),
+        worst("wet wall, particle engine: tangential restitution against the equations", along, 0.005),
+        worst("wet wall, particle engine over equations: spin", spins, 0.01),
+        worst("wet wall, particle engine: velocities of sticking over the published ones", slowest, 0.02),
+    ]
+
+
 def sticking(_: Path, __: Curves) -> list[Row]:
     """Wet wall: velocities below which spheres stick."""
     rows = []
-    for sphere, liquid, film, reference, arc in (
-        ("glass_1.74", "water", 100e-6, 0.345, None),
-        ("glass_1.74", "water", 200e-6, 0.456, None),
-        ("glass_0.91", "water", 100e-6, 0.587, None),
-        ("alumina_1.74", "tween", 100e-6, 0.549, None),
-        ("alumina_1.74", "water", 100e-6, 0.652, FLOOR),  # nearly singular: 0.673 without the floor
-    ):
+    for sphere, liquid, film, reference, arc in STICKING:
         found = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc)
         floor = "" if arc is None else f", arc >= {arc * 1e6:.0f} um"
         name = f"wet wall: {sphere} sticks, {liquid}, {film * 1e6:.0f} um{floor}"
@@ -296,5 +325,5 @@ def _plot(axes: Any, results: list[Impact], colour: Any, line: str, name: str) -
 
 
 PARTS: tuple[Callable[[Path, Curves], list[Row]], ...] = (
-    solution, sticking, head_on, energy, oblique, spinning, liquids,
+    solution, engine, sticking, head_on, energy, oblique, spinning, liquids,
 )  # fmt: skip

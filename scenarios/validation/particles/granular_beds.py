@@ -15,6 +15,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Cone, Cylinder, Plane
+from closures.discharge import beverloo
 from scenarios.validation.particles.single_sphere import DOWN, GRAVITY
 
 DIAMETER = 1e-3
@@ -132,8 +133,8 @@ def hopper(count: int, outlet: float, seconds: float) -> tuple[float, float]:
 
     outlet   diameter of the hole [particle diameters]
     seconds  length of the run
-    returns  discharge of the later half of the run, and that of Beverloo, Leniger & van de Velde (1961) with
-             C = 0.58, k = 1.4 and a bulk density of 0.58 of that of the particles [kg/s]
+    returns  discharge of the later half of the run, and that of Beverloo et al. with a bulk density of
+             0.58 of that of the particles [kg/s]
     """
     drum, hole = 1.25 * outlet * DIAMETER, 0.5 * outlet * DIAMETER
     layers = math.ceil(1.3 * count * DIAMETER**2 / (math.pi * drum**2))
@@ -154,5 +155,4 @@ def hopper(count: int, outlet: float, seconds: float) -> tuple[float, float]:
         run.advance(2e-5, int(seconds / 20 / 2e-5))
         out.append((run.time, mass * float((run.particles.position[:, 2] < -DIAMETER).sum())))
     time, gone = np.array(out[10:]).T
-    size = (outlet - 1.4) * DIAMETER
-    return float(np.polyfit(time, gone, 1)[0]), 0.58 * 0.58 * grain.density * math.sqrt(GRAVITY) * size**2.5
+    return float(np.polyfit(time, gone, 1)[0]), beverloo(0.58 * grain.density, outlet * DIAMETER, DIAMETER, GRAVITY)

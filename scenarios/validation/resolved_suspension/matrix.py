@@ -127,7 +127,7 @@ def run(
     home.mkdir(parents=True, exist_ok=True)
     row_file, state_file = home / "row.json", home / "state.npz"
     if row_file.exists():
-        done: dict[str, Any] = json.loads(row_file.read_text())
+        done: dict[str, Any] = json.loads(row_file.read_text(encoding="utf-8"))
         if done["until"] >= until:
             return done
     kept = Kept(prepare(point))
@@ -148,7 +148,7 @@ def run(
         "even": even(point, kept.series),
     }
     with replacing(row_file) as fresh:
-        fresh.write_text(json.dumps(row, indent=1) + "\n")
+        fresh.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
     return row
 
 
@@ -165,7 +165,7 @@ def write_table(rows: list[dict[str, Any]], path: Path, made: str) -> None:
     """
     lines = ",\n".join(json.dumps(row, separators=(",", ":")) for row in rows)
     with replacing(path) as fresh:
-        fresh.write_text(f'{{"made": {json.dumps(made)},\n"rows": [\n{lines}\n]}}\n')
+        fresh.write_text(f'{{"made": {json.dumps(made)},\n"rows": [\n{lines}\n]}}\n', encoding="utf-8")
 
 
 def main() -> None:

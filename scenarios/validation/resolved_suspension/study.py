@@ -38,8 +38,8 @@ def verified(folder: Path, progress: Progress) -> list[Row]:
         if not file.exists():
             progress((part.__doc__ or "").splitlines()[0])
             with replacing(file) as fresh:
-                fresh.write_text(json.dumps([row.as_dict() for row in part()], indent=1) + "\n")
-        rows += [_row(each) for each in json.loads(file.read_text())]
+                fresh.write_text(json.dumps([row.as_dict() for row in part()], indent=1) + "\n", encoding="utf-8")
+        rows += [_row(each) for each in json.loads(file.read_text(encoding="utf-8"))]
     return rows
 
 
@@ -64,6 +64,6 @@ def measured(row: dict[str, Any]) -> list[Row]:
 
 def stored() -> list[dict[str, Any]]:
     """Rows of table.json: the runs of the matrix that are finished and kept with the package."""
-    text = resources.files(__package__).joinpath("table.json").read_text()
+    text = resources.files(__package__).joinpath("table.json").read_text(encoding="utf-8")
     rows: list[dict[str, Any]] = json.loads(text)["rows"]
     return rows

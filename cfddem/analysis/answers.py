@@ -1,0 +1,193 @@
+"""The answer of a run in a few lines: bed height, voidage, pressure drop and regime, each with its error and a verdict.
+
+A verdict compares a mean with what it should be, in units of its standard error.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cfddem.analysis.bed_laws import FROM_HEIGHT, FROM_PRESSURE, weight_over_floor
+from cfddem.case.schema import Case
+from cfddem.io.reading import Run
+from cfddem.preflight.bed_estimate import BedEstimate, estimate_bed
+
+AGREES = 2.0
+"""A mean agrees with a number if it differs by at most this many standard errors."""
+
+CLOSE = 5e-3
+"""Relative difference up to which a mean equals a number for all practical purposes, whatever its error."""
+
+CARRIED = 0.9
+"""Share of the buoyant weight that the flow carries at least in a fluidised bed."""
+
+DRIFTING = 0.02
+"""Largest drift over the mean with which a mean can be used."""
+
+STILL = 0.01
+"""Largest speed of particles at rest, over the speed after a fall of one diameter."""
+
+
+class Answer(NamedTuple):
+    """One quantity that a reader asks for first."""
+
+    name: str
+    value: float | str  # a number, or a regime in words
+    error: float  # standard error of a number; NaN if unknown
+    unit: str
+    verdict: str  # in words
+    holds: bool | None  # true: as expected; false: not as expected, or not to be used; None: nothing to compare with
+
+
+def answers(
+    run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], defluidised: bool = False
+) -> list[dict[str, Any]]:
+    """The answers of a run, most important first.
+
+    measures, laws  of :func:`cfddem.analysis.report.report`
+    defluidised     a wet bed has come to rest although it is blown
+    returns         fields of :class:`Answer` as plain values
+    """
+    found = [*_speed(laws), *_height(case, measures, laws), *_voidage(measures, laws), *_drop(measures, laws)]
+    regime, reason, holds = _classified(run, case, measures)
+    if defluidised:
+        regime, holds = "defluidised", False
+    return [each._asdict() for each in (*found, Answer("regime", regime, math.nan, "", reason, holds))]
+
+
+def agreement(computed: float, error: float, expected: float, name: str) -> tuple[str, bool | None]:
+    """Whether a mean agrees with a number, in words and as a truth value; None without an error.
+
+    computed, error, expected  same unit; the error is NaN if it is unknown
+    name                       of the number, in the sentence
+
+    >>> agreement(0.98, 0.02, 1.0, "the weight")
+    ('agrees with the weight: 2.0 % below it, 1.0 standard errors', True)
+    >>> agreement(0.98, 0.002, 1.0, "the weight")
+    ('differs from the weight: 2.0 % below it, 10.0 standard errors', False)
+    """
+    off = computed - expected
+    percent = 100.0 * abs(off) / abs(expected) if expected else math.inf
+    side = f"{percent:.1f} % {'below' if off < 0.0 else 'above'} it"
+    if percent <= 100.0 * CLOSE:
+        return f"equals {name} to {max(percent, 0.01):.2g} %", True
+    if math.isnan(error):
+        return f"{side.removesuffix(' it')} {name}; no error is known", None
+    errors = abs(off) / error if error > 0.0 else math.inf
+    word = "agrees with" if errors <= AGREES else "differs from"
+    count = f"{errors:.1f}" if errors < 1000.0 else "over 1000"
+    return f"{word} {name}: {side}, {count} standard errors", errors <= AGREES
+
+
+def _speed(laws: list[dict[str, Any]]) -> Iterator[Answer]:
+    """Last speed of a single sphere against its terminal velocity."""
+    for row in laws:
+        if row["law"].startswith("terminal velocity"):
+            words, holds = agreement(row["computed"], math.nan, row["expected"], f"the {row['law']}")
+            yield Answer("settling speed", row["computed"], math.nan, "m/s", words, holds)
+
+
+def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) -> Answer:
+    """An answer from a measure, with how steady it is; a mean that drifts much is not to be used."""
+    drift, mean = measure["drift"], measure["mean"]
+    if measure["stationary"] or drift == 0.0:
+        steady = "steady"
+    elif math.isnan(drift):
+        steady = "too few rows to say whether it is steady"
+    else:
+        share = abs(drift) / abs(mean) if mean else math.inf
+        steady = f"still drifts by {100.0 * share:.2g} % within the window"
+        if share > DRIFTING:
+            steady, holds = f"{steady}, do not use the mean", False
+    verdict = f"{steady}; {verdict}" if verdict else steady
+    return Answer(name, measure["mean"], measure["error"], measure["unit"], verdict, holds)
+
+
+def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
+    """Bed height, and the heights that published expansion laws give for the same particles."""
+    if "bed_height" not in measures or case.particle_count == 1:
+        return
+    height = measures["bed_height"]
+    verdict = ""
+    published = _published(laws)
+    if published:
+        solids = height["mean"] * (1.0 - measures[FROM_HEIGHT]["mean"])
+        low, high = (solids / (1.0 - each) for each in (min(published), max(published)))
+        verdict = f"published laws give {low:.3g} to {high:.3g} m"
+    yield _mean("bed height", height, verdict, None)
+
+
+def _published(laws: list[dict[str, Any]]) -> list[float]:
+    """Voidages by published expansion laws."""
+    return [row["expected"] for row in laws if row["law"].startswith("voidage by ")]
+
+
+def _voidage(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
+    """The voidage to believe: that from the bed height, which published laws were fitted to."""
+    if FROM_HEIGHT not in measures:
+        return
+    voidage, published = measures[FROM_HEIGHT], _published(laws)
+    verdict, holds = "", None
+    if published:
+        low, high, mean = min(published), max(published), voidage["mean"]
+        margin = AGREES * (0.0 if math.isnan(voidage["error"]) else voidage["error"])
+        holds = low - margin <= mean <= high + margin
+        off = max(low - mean, mean - high)
+        where = "within" if off <= 0.0 else f"{off:.3f} {'below' if mean < low else 'above'}"
+        verdict = f"{where} the published laws, {low:.3f} to {high:.3f}"
+    if FROM_PRESSURE in measures:
+        verdict += f"; use this value, from the height; the pressure gives {measures[FROM_PRESSURE]['mean']:.3f}"
+    yield _mean("bed voidage", voidage, verdict.removeprefix("; "), holds)
+
+
+def _drop(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
+    """Pressure drop against the weight of the bed, or against Ergun for a packed one."""
+    if "pressure_drop" not in measures:
+        return
+    drop, names = measures["pressure_drop"], ("pressure drop by the buoyant weight", "pressure drop by Ergun")
+    for row in laws:
+        if row["law"] in names:
+            expected = "the buoyant weight" if row["law"] == names[0] else "the law of Ergun"
+            words, holds = agreement(drop["mean"], drop["error"], row["expected"], expected)
+            yield _mean("pressure drop", drop, words, holds)
+            return
+    yield _mean("pressure drop", drop, "", None)
+
+
+# ---------------------------------------------------------------- regime
+
+
+def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, str, bool | None]:
+    """The state of the particles in words, what it was concluded from, and whether it is as expected."""
+    fastest = run.history.get("largest_speed", np.zeros(1))[-1]
+    moving = f"the fastest particle moves at {fastest:.2g} m/s"
+    fall = math.sqrt(math.hypot(*case.laws.gravity) * case.bed.largest_diameter)
+    at_rest = bool(fastest <= STILL * fall)
+    if case.bed.fixed:
+        return "packed bed of fixed particles", "they do not move", None
+    weight = weight_over_floor(case)
+    flows = case.fluid is not None and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
+    if case.particle_count == 1:
+        return ("sphere at rest", moving, None) if at_rest and not flows else ("sphere in motion", moving, None)
+    bed, drop = estimate_bed(case), measures.get("pressure_drop")
+    if not flows or drop is None or weight is None or not weight > 0.0 or not bed.onset > 0.0:
+        return ("particles at rest", moving, None) if at_rest else ("particles in motion", moving, None)
+    error = "" if math.isnan(drop["error"]) else f" +- {100.0 * drop['error'] / weight:.1f}"
+    carried = f"the flow carries {100.0 * drop['mean'] / weight:.1f}{error} % of the buoyant weight"
+    ratio = f"the inlet velocity is {bed.inlet / bed.onset:.2g} times that of minimum fluidisation"
+    share = drop["mean"] / weight
+    return _of_a_bed(case, bed, share), f"{carried}; {ratio}", (share >= CARRIED) == (bed.inlet > bed.onset)
+
+
+def _of_a_bed(case: Case, bed: BedEstimate, carried: float) -> str:
+    """The regime of a bed whose flow carries a share of its weight."""
+    assert case.fluid is not None
+    if carried < CARRIED:
+        return "packed" if bed.inlet <= bed.onset else "not fully fluidised"
+    if case.bed.jet is not None:
+        return "fluidised with a jet"
+    return "fluidised, expanded" if case.fluid.is_liquid else "fluidised, bubbling"

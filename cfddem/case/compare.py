@@ -1,0 +1,179 @@
+"""Measured data that a case names: the report draws them beside the run and scores the run against them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.bed import Positive
+from cfddem.case.data_table import Array, Column, read_table
+from cfddem.case.materials import Checked
+from cfddem.case.walls import with_surfaces_of
+
+if TYPE_CHECKING:
+    from cfddem.case.schema import Case
+
+COPIES = "measured"
+"""Folder inside a run folder with copies of the measured data."""
+
+ABSCISSAE = ("time", "height")
+"""Columns that say where a point was measured; without one, the points are means over the averaging window."""
+
+PROFILES = {"voidage": "1", "granular_temperature": "m2/s2"}
+"""Quantities that a run has against height, and their units."""
+
+ERROR = "error"
+"""Column of the standard errors."""
+
+
+class CaseData(Checked):
+    """Measured points of one quantity, in a CSV file beside the case."""
+
+    file: str = Field(description="CSV file whose header has units; its place is relative to the case file")
+    quantity: str | None = Field(
+        None, description="measure that was measured, as in the report; default: the name of the column of values"
+    )
+    column: str | None = Field(None, description="column of values; default: the only one beside time, height, error")
+    error: Positive | None = Field(None, description="standard error of every point, unless a column gives it [SI]")
+    relative_error: Positive | None = Field(None, description="standard error over the value, instead of error [-]")
+    weight: Positive = Field(1.0, description="weight in a calibration [-]")
+
+    @model_validator(mode="after")
+    def _one_error(self) -> CaseData:
+        if self.error is not None and self.relative_error is not None:
+            raise InputError("relative_error", self.relative_error, "left out where error is given")
+        if "\0" in self.file or not self.file:
+            raise InputError("file", self.file, "the name of a file")
+        return self
+
+
+@dataclass(frozen=True)
+class Points:
+    """Measured points in SI units."""
+
+    name: str  # of the data
+    quantity: str
+    unit: str
+    against: str  # "time", "height" or "" for means
+    place: Array  # (n,) time [s] or height [m]; zeros for means
+    value: Array  # (n,)
+    error: Array  # (n,) standard errors; NaN if unknown
+    weight: float = 1.0
+
+
+def points_of(name: str, data: CaseData) -> Points:
+    """Read measured points.
+
+    name    of the data
+    data    with a path that can be opened
+    errors  InputError, one line
+    """
+    path = Path(data.file)
+    columns = {each.name: each for each in read_table(path)}
+    against = [each for each in ABSCISSAE if each in columns]
+    if len(against) > 1:
+        raise InputError(f"{path}", None, "a table with one of time and height")
+    others = [each for each in columns if each not in (*against, ERROR)]
+    wanted = "_".join(data.column.lower().split()) if data.column is not None else None
+    if wanted is None and len(others) != 1:
+        found = ", ".join(others) or "none"
+        raise InputError(f"{path}", None, f"a table with one column of values; found {found}", "name one: column")
+    if wanted is not None and wanted not in columns:
+        raise InputError(f"compare.{name}.column", data.column, nearest(wanted, others))
+    chosen = columns[wanted or others[0]]
+    place = columns[against[0]].values if against else np.zeros(len(chosen.values))
+    if against and columns[against[0]].unit != {"time": "s", "height": "m"}[against[0]]:
+        raise InputError(
+            f"{path} {against[0]}", None, f"given in units of {'time' if against[0] == 'time' else 'length'}"
+        )
+    return Points(
+        name, data.quantity or chosen.name, chosen.unit, against[0] if against else "", place, chosen.values,
+        _errors(path, data, chosen, columns.get(ERROR)), data.weight,
+    )  # fmt: skip
+
+
+def _errors(path: Path, data: CaseData, chosen: Column, column: Column | None) -> Array:
+    """Standard error of every point."""
+    if column is not None:
+        if column.unit != chosen.unit:
+            raise InputError(f"{path} error", column.unit, f"given in the unit of {chosen.name}, {chosen.unit}")
+        if not (column.values > 0.0).all():
+            raise InputError(f"{path} error", float(column.values.min()), "above 0", "leave the column out if unknown")
+        return column.values
+    if data.relative_error is not None:
+        if (chosen.values == 0.0).any():
+            raise InputError(f"{path} {chosen.name}", 0.0, "not 0 with relative_error", "give error, or a column error")
+        return data.relative_error * np.abs(chosen.values)
+    return np.full(len(chosen.values), np.nan if data.error is None else data.error)
+
+
+def require_measured_units(case: Case, units: Mapping[str, str]) -> None:
+    """Refuse measured data that a run of the case will not have, or will have in another unit, before it runs.
+
+    units   of the columns of the history, by their names
+    errors  InputError
+    """
+    for name, data in case.compare.items():
+        points = points_of(name, data)
+        known = PROFILES if points.against == "height" else {key: each for key, each in units.items() if key != "time"}
+        if points.quantity not in known:
+            raise InputError(f"compare.{name}.quantity", points.quantity, nearest(points.quantity, known))
+        require_unit(points, known[points.quantity])
+
+
+def require_unit(points: Points, unit: str) -> None:
+    """Refuse points in another unit.
+
+    errors  InputError
+    """
+    if points.unit != unit:
+        raise InputError(f"compare.{points.name} unit", points.unit, f"a unit of {points.quantity}, such as {unit}")
+
+
+# ---------------------------------------------------------------- places of files
+
+
+def with_files_of(case: Case, folder: Path) -> Case:
+    """The case with the places of its surface files and measured data; a run folder has copies of both.
+
+    folder  of the case file; other paths are relative to it
+    errors  InputError for measured data outside of the folder, unless their whole path is given
+    """
+    case = with_surfaces_of(case, folder)
+    is_run = (folder / "run.json").is_file()
+    files = {}
+    for name, data in case.compare.items():
+        copy = copy_of(folder, name)
+        files[name] = os.path.abspath(copy if is_run and copy.is_file() else _inside(folder, name, data.file))
+    return with_data(case, files)
+
+
+def with_data(case: Case, files: dict[str, str]) -> Case:
+    """The case with other files of measured data, by their names."""
+    if not files:
+        return case
+    data = {name: each.model_copy(update={"file": files[name]}) for name, each in case.compare.items()}
+    return case.model_copy(update={"compare": data})
+
+
+def copy_of(folder: Path, name: str) -> Path:
+    """Copy of measured data in a run folder."""
+    return folder / COPIES / f"{name}.csv"
+
+
+def _inside(folder: Path, name: str, file: str) -> Path:
+    """The path of a file that lies in a folder, or was given as a whole."""
+    path = Path(file)
+    if path.is_absolute():
+        return path
+    if not os.path.realpath(folder / path).startswith(os.path.realpath(folder) + os.sep):
+        remedy = "give the whole path, or copy the file there"
+        raise InputError(f"compare.{name}.file", file, f"inside the folder of the case, {folder.resolve()}", remedy)
+    return folder / path

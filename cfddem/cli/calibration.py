@@ -1,0 +1,75 @@
+"""The command `calibrate`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from cfddem.cli.cases import CASE, SET
+from cfddem.cli.printing import announce_compilation
+
+
+def calibrate(
+    case: Annotated[Path | None, Parameter(help=CASE)] = None,
+    *,
+    vary: Annotated[list[str], Parameter(help="KEY=LOW..HIGH; may be repeated; 'KEY=LOW..HIGH log'", negative="")],
+    match: Annotated[
+        list[Path] | None,
+        Parameter(help="CSV file of measured points with errors, beside those of the case", negative=""),
+    ] = None,
+    trials: Annotated[int, Parameter(help="number of runs, with those of earlier calls")] = 30,
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-calibration")] = None,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Find values of a case for which it agrees with measured data, with errors; say which the data do not identify.
+
+    After a stop, the same command continues. Trials that fail are recorded, and the search goes on.
+    Exit code: 3 if every trial fails.
+
+    The data need a column of errors. See the page "Calibration".
+
+    Example: cfddem calibrate box.toml --match measured.csv --vary material.glass.restitution=0.6..1
+    """
+    from cfddem.analysis.report_text import as_json
+    from cfddem.case.gallery import find_case, overrides
+    from cfddem.run.calibration import Trial
+    from cfddem.run.calibration import calibrate as search
+    from cfddem.run.samples import variables
+
+    path = find_case(case)
+    folder = output or Path(f"{path.stem}-calibration")
+
+    def progress(trial: Trial) -> None:
+        values = ", ".join(f"{key.split('.')[-1]} {value:.4g}" for key, value in trial.values.items())
+        result = f"mean square difference {trial.chi2:.4g}" if trial.computed else trial.status[:60]
+        print(f"{trial.number:>4}  {values:<40}  {result}", file=sys.stderr if json else sys.stdout, flush=True)
+
+    if jobs == 1:
+        announce_compilation()
+    found = search(
+        path, match or (), variables(vary), folder, trials=trials, jobs=jobs, overrides=overrides(set or []),
+        progress=progress,
+    )  # fmt: skip
+    print(as_json(found.summary()) if json else "\n".join(lines(found.summary(), folder)))
+    if not found.finished:
+        sys.exit(3)
+
+
+def lines(result: dict, folder: Path) -> list[str]:  # type: ignore[type-arg]
+    """The result of a calibration as text."""
+    out = [""]
+    for each in result["estimates"]:
+        value = f"{each['value']:.4g} +- {each['error']:.2g}"
+        out += [f"{each['key']:<34} {value:<22} of {each['low']:g} to {each['high']:g}", f"  {each['verdict']}"]
+    if not result["estimates"]:
+        out.append("too few finished trials for an estimate; repeat the command with more --trials")
+    if result["best"] is not None:
+        chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
+        out += ["", f"reduced chi-squared of the best trial: {result['best']['chi2']:.3g}{chi2}"]
+    out += [f"{result['trials']} trials, {result['failed']} failed; table and figure in {folder}"]
+    return out

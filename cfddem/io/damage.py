@@ -1,0 +1,110 @@
+"""What is checked in the files of a run, which a crash of the disk, another program or a user may have changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import CfddemError, RunFailed
+
+VECTORS = ("position", "velocity", "spin", "force")
+"""Particle fields with three components."""
+
+_UNREADABLE = (OSError, KeyError, IndexError, RuntimeError, TypeError, ValueError, AttributeError)
+"""What h5py raises for damaged files; the kind of the damage decides which."""
+
+
+@contextmanager
+def damage_named(path: Path, remedy: str = "move the file elsewhere and retry") -> Iterator[None]:
+    """Report a file that cannot be read as damaged.
+
+    errors  RunFailed, one line
+    """
+    try:
+        yield
+    except CfddemError:
+        raise
+    except _UNREADABLE as damage:
+        what = " ".join(str(damage).split())[:200]
+        raise RunFailed(f"{path}: the file is damaged ({what}); {remedy}") from damage
+
+
+def require_about(about: Any) -> None:
+    """Refuse a `run.json` whose values have other types than those that are written.
+
+    errors  ValueError
+    """
+    if not isinstance(about, dict) or not isinstance(about["format"], int):
+        raise ValueError("it is not a table with a format")
+    for name, kind in {"status": str, "message": str, "provenance": dict, "quantities": dict}.items():
+        if not isinstance(about[name], kind):
+            raise ValueError(f"{name} is not a {'text' if kind is str else 'table'}")
+    if about["precision"] not in ("single", "double"):
+        raise ValueError("precision is neither single nor double")
+    for names in about["quantities"].values():
+        for each in names.values():
+            if not 2 <= len(each) <= 3 or not all(isinstance(part, str) for part in each):
+                raise ValueError("quantities are not pairs of unit and meaning")
+    wall = about.get("wall_time", {})
+    if not isinstance(wall, dict) or not all(_is_number(each) for each in wall.values()):
+        raise ValueError("wall_time is not a table of numbers")
+    if not _is_number(about.get("averages_from") or 0.0):
+        raise ValueError("averages_from is not a time")
+    _require_grid(about["grid"])
+
+
+def _require_grid(grid: Any) -> None:
+    if grid is None:
+        return
+    if not isinstance(grid, dict) or set(grid) != {"cells", "spacing", "origin"}:
+        raise ValueError("grid is not a table of cells, spacing and origin")
+    for name, values in grid.items():
+        good = isinstance(values, list) and len(values) == 3 and all(_is_number(each) for each in values)
+        if not good or (name != "origin" and min(values) <= 0) or (name == "cells" and not _are_whole(values)):
+            raise ValueError(f"grid.{name} is not three numbers")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e300
+
+
+def _are_whole(values: list[Any]) -> bool:
+    return all(isinstance(each, int) for each in values)
+
+
+def require_columns(columns: Mapping[str, np.ndarray]) -> None:
+    """Refuse columns of a table that are not numbers in equal number.
+
+    errors  ValueError
+    """
+    for name, column in columns.items():
+        if np.ndim(column) != 1 or column.dtype.kind not in "fiub":
+            raise ValueError(f"{name} is not a column of numbers")
+    if len({len(column) for column in columns.values()}) > 1:
+        raise ValueError("its columns have different lengths")
+
+
+def require_particles(fields: Mapping[str, np.ndarray]) -> None:
+    """Refuse particle fields that are not numbers with one row for each particle.
+
+    errors  ValueError
+    """
+    for name, values in fields.items():
+        vector = np.ndim(values) == 2 and values.shape[1] == 3
+        if np.ndim(values) not in (1, 2) or values.dtype.kind not in "fiub" or (name in VECTORS and not vector):
+            raise ValueError(f"particles/{name} has the shape {np.shape(values)}")
+    if len({len(values) for values in fields.values()}) > 1:
+        raise ValueError("particle fields have different numbers of rows")
+
+
+def require_cells(values: np.ndarray, name: str, shape: tuple[int, int, int]) -> None:
+    """Refuse a fluid field that does not fit the grid.
+
+    errors  ValueError
+    """
+    if values.shape not in (shape, (*shape, 3)) or values.dtype.kind not in "fiub":
+        raise ValueError(f"fluid/{name} has the shape {values.shape}")

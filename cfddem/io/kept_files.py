@@ -1,0 +1,41 @@
+"""Copies of the files of a case in its run folder, so that the folder is enough to resume and report the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cfddem.backend.errors import InputError
+from cfddem.case import compare
+from cfddem.case.schema import Case
+from cfddem.case.walls import copy_of, with_surfaces
+from cfddem.io.files import reason, write_whole
+
+
+def keep_files(case: Case, folder: Path) -> None:
+    """Copy the surface files of a case into a run folder, as `surfaces/wall_NUMBER.stl`, and its measured data.
+
+    errors  InputError if a file cannot be read
+    """
+    for number, wall in enumerate(case.wall):
+        if wall.file is not None:
+            _copy(f"wall.{number}.file", wall.file, copy_of(folder, number), "STL file")
+    for name, data in case.compare.items():
+        _copy(f"compare.{name}.file", data.file, compare.copy_of(folder, name), "CSV file")
+
+
+def with_kept_files(case: Case, folder: Path) -> Case:
+    """The case with the copies of its files in a run folder."""
+    folder = folder.absolute()
+    surfaces = {n: str(copy_of(folder, n)) for n, wall in enumerate(case.wall) if wall.file is not None}
+    data = {name: str(compare.copy_of(folder, name)) for name in case.compare}
+    return compare.with_data(with_surfaces(case, surfaces), data)
+
+
+def _copy(key: str, file: str, path: Path, kind: str) -> None:
+    try:
+        content = Path(file).read_bytes()
+    except (OSError, ValueError) as failure:
+        why = reason(failure) if isinstance(failure, OSError) else str(failure)
+        raise InputError(key, file, f"a readable {kind}", why) from None
+    path.parent.mkdir(exist_ok=True)
+    write_whole(path, content)

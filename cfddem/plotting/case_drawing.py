@@ -1,0 +1,251 @@
+"""A drawing of a case from the front, before it runs: column, cells, bed, inflow, walls, feeds and outlets."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cfddem.backend.errors import CfddemError
+from cfddem.case.column_grid import grid_of
+from cfddem.case.liquid import Spray
+from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import extent, triangles
+from cfddem.case.walls import CaseWall
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank
+from cfddem.preflight.bed_estimate import estimate_bed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_SPHERES, MOST_CELLS, MOST_TRIANGLES = 3000, 80, 2000
+"""Largest number of spheres that are drawn one by one, of cells in a direction, and of triangles of a surface."""
+
+LEGIBLE: dict[str, Any] = {"bbox": {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 1.0}}
+"""Of a text over particles."""
+
+_HEIGHT, _NARROWEST, _WIDEST, _FACTS = 5.0, 1.0, 5.0, 2.9  # of the column on paper, and of the text beside it [inch]
+
+
+def case_drawing(case: Case, bed_height: float | None = None) -> Figure:
+    """Draw a case as seen along y.
+
+    bed_height  measured height, marked by a line [m]
+    returns     the figure, for :func:`cfddem.plotting.curves.save`
+    """
+    width, _, height = case.column.size
+    tall = height / width
+    across = min(max(_HEIGHT / tall, _NARROWEST), _WIDEST)
+    figure, (axes, text) = blank(
+        1, 2, width=across + 1.3 + _FACTS, height=min(across * tall, _HEIGHT) + 1.1, width_ratios=[across + 1.0, _FACTS]
+    )
+    _cells(axes, case)
+    _particles(axes, case)
+    for wall in case.wall:
+        _wall(axes, wall, width, height)
+    for boxes, name, colour in ((case.feed, "feed", GREEN), (case.outlet, "outlet", RED)):
+        for box in boxes:
+            _box(axes, box.corner, box.size, name, colour)
+    if case.spray is not None:
+        _spray(axes, case.spray)
+    _column(axes, case)
+    _inflow(axes, case)
+    if bed_height is not None and math.isfinite(bed_height):
+        axes.axhline(bed_height, color=ORANGE, linewidth=1.6, linestyle="--")
+        axes.text(1.05 * width, bed_height, "bed height", color=ORANGE, fontsize=9.5, va="center", clip_on=False)
+    margin = 0.04 * max(width, height)
+    low = -0.16 * height if case.bed.fastest_inflow > 0.0 and case.column.ends == "flow" else -margin
+    axes.set(xlim=(-margin, width + margin), ylim=(low, height + margin), xlabel="x  [m]", ylabel="z  [m]")
+    axes.set_aspect("equal")
+    axes.grid(False)
+    axes.locator_params(axis="x", nbins=max(1, int(across / 0.7)))
+    text.axis("off")
+    text.text(0.0, 1.0, "\n".join(_facts(case)), va="top", ha="left", fontsize=9.5, transform=text.transAxes)
+    return figure
+
+
+def _column(axes: Axes, case: Case) -> None:
+    """Sides, floor and lid: thick where they are walls, dashed where periodic."""
+    width, _, height = case.column.size
+    sides = "--" if case.column.sides == "periodic" else "-"
+    ends = {"flow": ":", "closed": "-", "periodic": "--"}[case.column.ends]
+    for x in (0.0, width):
+        axes.plot([x, x], [0.0, height], color="#222222", linewidth=2.2, linestyle=sides)
+    for z in (0.0, height):
+        axes.plot([0.0, width], [z, z], color="#222222", linewidth=1.6, linestyle=ends)
+
+
+def _cells(axes: Axes, case: Case) -> None:
+    """The lines of the grid of the fluid; none if they are too many to be seen."""
+    if case.fluid is None:
+        return
+    try:
+        grid = grid_of(case)
+    except CfddemError:
+        return
+    (nx, _, nz), (dx, _, dz) = grid.shape[::-1], grid.spacing
+    if max(nx, nz) <= MOST_CELLS:
+        axes.vlines(np.arange(1, nx) * dx, 0.0, nz * dz, color="#e2e2e2", linewidth=0.6, zorder=0)
+        axes.hlines(np.arange(1, nz) * dz, 0.0, nx * dx, color="#e2e2e2", linewidth=0.6, zorder=0)
+
+
+def _particles(axes: Axes, case: Case) -> None:
+    """The particles at the start, in an order that shows their size; a plain area if they are too many."""
+    from matplotlib.collections import EllipseCollection
+    from matplotlib.patches import Rectangle
+
+    bed, diameter = case.bed, case.bed.diameter
+    corner, size = _start(case)
+    if bed.positions:
+        centres = np.array(bed.positions)[:, ::2]
+    else:
+        rows, columns = size[1] / (0.87 * diameter), size[0] / diameter
+        if rows * columns > MOST_SPHERES:
+            axes.add_patch(Rectangle(corner, *size, facecolor=BLUE, alpha=0.35, linewidth=0))
+            return
+        share = 1.0 if bed.start == "poured" else min(1.0, 1.5 * _solid_fraction(case))
+        centres = _lattice(corner, size, diameter)
+        kept = np.random.default_rng(1).random(len(centres)) < share
+        centres = centres[kept]
+    wide = np.full(len(centres), diameter)
+    axes.add_collection(
+        EllipseCollection(
+            wide, wide, np.zeros(len(centres)), units="x", offsets=centres, transOffset=axes.transData, facecolor=BLUE,
+            alpha=0.55, edgecolor="white", linewidth=0.3,
+        )
+    )  # fmt: skip
+
+
+def _start(case: Case) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lower corner and size (x, z) of the region that holds the particles at the start [m]."""
+    bed, (width, _, height) = case.bed, case.column.size
+    if bed.start_corner is not None and bed.start_size is not None:
+        return bed.start_corner[::2], bed.start_size[::2]
+    if bed.start in ("poured", "expanded"):
+        with np.errstate(all="ignore"):
+            estimate = estimate_bed(case)
+            height = min(height, estimate.poured_height if bed.start == "poured" else estimate.height)
+    return (0.0, 0.0), (width, height)
+
+
+def _solid_fraction(case: Case) -> float:
+    size = _start(case)[1]
+    return sum(case.volumes.values()) / max(size[0] * size[1] * case.column.size[1], 1e-300)
+
+
+def _lattice(corner: tuple[float, float], size: tuple[float, float], diameter: float) -> np.ndarray:
+    """Centres of a hexagonal arrangement in a rectangle (n, 2) [m]."""
+    rows = max(int((size[1] - diameter) / (0.87 * diameter)) + 1, 1)
+    found = []
+    for row in range(rows):
+        first = 0.5 * diameter * (1 + row % 2)
+        x = corner[0] + np.arange(first, size[0] - 0.49 * diameter, diameter)
+        found.append(np.stack([x, np.full(len(x), corner[1] + (0.5 + 0.87 * row) * diameter)], axis=1))
+    return np.concatenate(found)
+
+
+def _inflow(axes: Axes, case: Case) -> None:
+    """Arrows of the inflow below the floor, longer in the jet, with the velocities."""
+    bed, (width, _, height) = case.bed, case.column.size
+    if case.column.ends != "flow" or bed.fastest_inflow <= 0.0:
+        return
+    jet = bed.jet
+    half = 0.5 * jet.width if jet is not None else 0.0
+    for x in (np.arange(7) + 0.5) * width / 7.0:
+        within = jet is not None and abs(x - 0.5 * width) <= half
+        speed = jet.velocity if within and jet is not None else bed.highest_inlet_velocity
+        length = 0.09 * height * speed / bed.fastest_inflow
+        if length > 0.0:
+            axes.annotate("", (x, 0.0), (x, -length), arrowprops={"arrowstyle": "-|>", "color": SKY, "linewidth": 1.4})
+    words = f"{bed.highest_inlet_velocity:.3g} m/s" + ("" if jet is None else f", jet {jet.velocity:.3g} m/s")
+    axes.text(0.5 * width, -0.105 * height, words, ha="center", va="top", fontsize=9.5, color=BLUE)
+
+
+def _box(axes: Axes, corner: Any, size: Any, name: str, colour: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    wide, tall = size[0], size[2]
+    axes.add_patch(Rectangle((corner[0], corner[2]), wide, tall, fill=False, edgecolor=colour, linewidth=1.4))
+    axes.text(
+        corner[0] + 0.5 * wide, corner[2] + tall, name, color=colour, fontsize=9.5, ha="center", va="bottom", **LEGIBLE
+    )
+
+
+def _spray(axes: Axes, spray: Spray) -> None:
+    """The spray zone: a box, or the outline of a cone."""
+    if spray.corner is not None and spray.size is not None:
+        _box(axes, spray.corner, spray.size, "spray", SKY)
+    elif spray.nozzle is not None and spray.length is not None:
+        tip, axis = np.array(spray.nozzle)[::2], np.array(spray.direction)[::2] / math.hypot(*spray.direction)
+        half = spray.length * math.tan(math.radians(0.5 * spray.angle)) * np.array([-axis[1], axis[0]])
+        end = tip + spray.length * axis
+        axes.fill(*zip(tip, end + half, end - half), facecolor=SKY, alpha=0.3, edgecolor=SKY)
+        axes.text(tip[0], tip[1], " spray", color=BLUE, fontsize=9.5, va="bottom")
+
+
+OUTLINE: dict[str, Any] = {"color": "#222222", "linewidth": 1.6}
+
+
+def _wall(axes: Axes, wall: CaseWall, width: float, height: float) -> None:
+    """The outline of a wall as seen along y."""
+    if wall.shape == "surface":
+        _surface(axes, wall)
+    elif wall.shape == "plane":
+        (nx, _, nz), (px, _, pz) = wall.normal, wall.point
+        if abs(nx) + abs(nz) > 0.0:
+            axes.axline((px, pz), (px - nz, pz + nx), **OUTLINE)
+    else:
+        _round(axes, wall, 2.0 * max(width, height))
+
+
+def _surface(axes: Axes, wall: CaseWall) -> None:
+    """Edges of triangles; nothing of a surface that cannot be read, because the check of the case says so."""
+    try:
+        corners = triangles(wall)[:MOST_TRIANGLES, :, ::2]
+    except CfddemError:
+        return
+    for each in corners:
+        axes.fill(*each.T, facecolor=GREY, alpha=0.15, edgecolor=GREY, linewidth=0.3)
+
+
+def _round(axes: Axes, wall: CaseWall, far: float) -> None:
+    """Sides and caps of a cone or cylinder, or its circle if seen along its axis.
+
+    far  length of a wall without ends, to each side [m]
+    """
+    axis, begin = np.array(wall.axis)[::2] / math.hypot(*wall.axis), np.array(wall.point)[::2]
+    radius = wall.radius or 0.0
+    if math.hypot(*axis) < 0.5 and extent(wall) is not None:
+        angle = np.linspace(0.0, 2.0 * math.pi, 100)
+        axes.plot(begin[0] + radius * np.cos(angle), begin[1] + radius * np.sin(angle), **OUTLINE)
+        return
+    end = begin + (wall.length or far) * axis
+    if wall.length is None:
+        begin = begin - far * axis
+    normal = np.array([-axis[1], axis[0]])
+    radii = radius, radius if wall.top_radius is None else wall.top_radius
+    for side in (-1.0, 1.0):
+        axes.plot(*zip(begin + side * radii[0] * normal, end + side * radii[1] * normal), **OUTLINE)
+    if wall.caps:
+        for centre, size in zip((begin, end), radii):
+            axes.plot(*zip(centre - size * normal, centre + size * normal), **OUTLINE)
+
+
+def _facts(case: Case) -> list[str]:
+    """What the drawing cannot show, one line each."""
+    width, depth, height = case.column.size
+    box = f"width {width:.4g} m\ndepth {depth:.4g} m\nheight {height:.4g} m"
+    lines = [f"cylinder\ndiameter {width:.4g} m\nheight {height:.4g} m" if case.column.shape == "cylinder" else box]
+    lines.append(f"sides {case.column.sides.replace('_', ' ')}\nends {case.column.ends}")
+    lines.append("")
+    for name, species in case.species.items():
+        material = case.material_of(species)
+        lines.append(f"{case.counts[name]} spheres of {name}\nd = {species.diameter:.4g} m")
+        lines.append(f"{material.density:.4g} kg/m3, friction {material.friction:.3g}")
+    if case.fluid is not None:
+        lines += ["", f"fluid {case.fluid.density:.4g} kg/m3", f"viscosity {case.fluid.viscosity:.3g} Pa s"]
+        cells = case.column.cell
+        lines.append(f"cells {cells if isinstance(cells, float) else max(cells):.3g} m")
+    return lines

@@ -1,0 +1,121 @@
+"""The colours of spheres: which quantities of a run can colour them, their values, limits and colour maps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.io.quantities import shown_unit
+from cfddem.io.reading import Run
+
+SPEED = "speed"
+"""Magnitude of the velocity."""
+
+AGGLOMERATE = "agglomerate"
+"""The field whose values are names: every agglomerate gets a colour of its own."""
+
+COLLISIONS = "collisions"
+"""Number of recorded collisions of each particle that ended since the previous snapshot."""
+
+SINGLE = 0.04
+"""Part of the colours that is for single particles."""
+
+_PLACES = ("id", "position")
+
+
+def choices(run: Run) -> list[str]:
+    """Quantities of a run that can colour its spheres, the most useful first."""
+    known = set(run.particle_fields)
+    found = [SPEED] if "velocity" in known else []
+    found += [name for name in ("liquid", AGGLOMERATE) if name in known]
+    found += [COLLISIONS] if run.collisions_of(-1) else []
+    return found + sorted(known - {"velocity", *_PLACES, *found})
+
+
+def values(run: Run, snapshot: int, colour: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The particles of a snapshot, and the value of each one's colour.
+
+    colour  speed, collisions, or a recorded field; of a vector its magnitude
+    errors  InputError for an unknown field
+    """
+    particles = run.particles(snapshot)
+    if "radius" not in particles:
+        raise InputError("particles", sorted(particles), "recorded with their radius")
+    name = "velocity" if colour == SPEED else colour
+    if name == COLLISIONS and name not in particles and (recorded := run.collisions_of(snapshot)):
+        return particles, _collision_counts(particles["id"], recorded)
+    if name not in particles:
+        raise InputError("colour", colour, nearest(colour, [SPEED, *sorted(particles)]))
+    found = particles[name]
+    if name == AGGLOMERATE:
+        return particles, scattered(found)
+    return particles, magnitude(found) if found.ndim == 2 else found.astype(float)
+
+
+def limits(found: np.ndarray, colour: str) -> tuple[float, float]:
+    """Values of the first and the last colour; a few extreme values lie beyond."""
+    if colour == AGGLOMERATE:
+        return 0.0, 1.0
+    high = float(np.quantile(found, 0.998)) if found.size else 1.0
+    low = 0.0 if found.size == 0 or found.min() >= 0.0 else float(found.min())
+    return low, high if high > low else low + 1.0
+
+
+def label(run: Run, colour: str) -> str:
+    """Label of the colour bar of the spheres."""
+    if colour == AGGLOMERATE:
+        return "agglomerate; grey: single spheres"
+    if colour == COLLISIONS and colour not in run.particle_fields:
+        return "collisions since previous snapshot  [-]"
+    name = "velocity" if colour == SPEED else colour
+    return f"{colour.replace('_', ' ')}  [{shown_unit(run.quantities['particles'][name].unit)}]"
+
+
+def colour_map(colour: str) -> Any:
+    """Colour map of the spheres."""
+    return _many_colours() if colour == AGGLOMERATE else part_of("viridis", 0.12, 1.0)
+
+
+def scattered(names: np.ndarray) -> np.ndarray:
+    """A number for each agglomerate, alike for the same name in all snapshots; 0 for those of a single particle."""
+    _, place, size = np.unique(names, return_inverse=True, return_counts=True)
+    mixed = (0.6180339887498949 * names.astype(float)) % 1.0  # neighbouring names get distant colours
+    return np.where(size[place] > 1, SINGLE + (1.0 - SINGLE) * mixed, 0.0)
+
+
+def magnitude(vectors: np.ndarray) -> np.ndarray:
+    """Length of each vector."""
+    length: np.ndarray = np.linalg.norm(vectors, axis=-1)
+    return length
+
+
+def part_of(name: str, begin: float, end: float) -> Any:
+    """Part of a colour map, without colours so dark that shading or lines on them cannot be seen."""
+    import matplotlib as mpl
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(mpl.colormaps[name](np.linspace(begin, end, 256)))
+
+
+def _collision_counts(ids: np.ndarray, recorded: dict[str, np.ndarray]) -> np.ndarray:
+    """Recorded collisions of each particle, whose ids increase; those with walls count once."""
+    counts = np.zeros(len(ids))
+    if not len(ids):
+        return counts
+    for end in ("first", "second"):
+        place = np.minimum(np.searchsorted(ids, recorded[end]), len(ids) - 1)
+        found = ids[place] == recorded[end]
+        np.add.at(counts, place[found], recorded["weight"][found])
+    return counts
+
+
+def _many_colours() -> Any:
+    """Grey for single particles, and a map whose lightness changes, for all readers, for agglomerates."""
+    import matplotlib as mpl
+    from matplotlib.colors import ListedColormap
+
+    hues = mpl.colormaps["plasma"](np.linspace(0.0, 0.95, 256))
+    hues[: int(256 * SINGLE)] = (0.78, 0.78, 0.78, 1.0)
+    return ListedColormap(hues)

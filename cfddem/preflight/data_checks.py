@@ -1,0 +1,29 @@
+"""Checks of measured data before a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cfddem.backend.errors import InputError
+from cfddem.case.compare import points_of
+from cfddem.case.schema import Case
+from cfddem.preflight.issue import Issue
+
+
+def check_data(case: Case) -> Iterator[Issue]:
+    """Check that measured data can be read, and lie within the run."""
+    for name, data in case.compare.items():
+        key = f"compare.{name}"
+        try:
+            points = points_of(name, data)
+        except InputError as failure:
+            value = "" if failure.value is None else f" = {failure.value!r}"
+            yield Issue(
+                "error", key, f"{failure.field}{value} must be {failure.limit}", failure.remedy or "correct the file"
+            )
+            continue
+        end, unit = (case.run.until, "s") if points.against == "time" else (case.column.height, "m")
+        if points.against and not ((points.place >= 0.0) & (points.place <= end)).any():
+            low, high = points.place.min(), points.place.max()
+            reason = f"all points lie at {low:.3g} to {high:.3g} {unit}, outside of 0 to {end:.3g} {unit}"
+            yield Issue("warning", key, reason, "check the unit of the column, or change the case")

@@ -1,0 +1,41 @@
+# %% [markdown]
+# # A sweep
+#
+# The same case for several inlet velocities, one folder each; then a table and a figure.
+
+# %%
+from pathlib import Path
+
+from cfddem.case.gallery import copy_from_gallery
+from cfddem.run.sweep import sweep
+
+case = Path("liquid_bed.toml")
+if not case.exists():
+    copy_from_gallery("liquid-bed", case)
+shared = {"bed.count": 400, "column.height": 0.0125, "run.until": 0.2, "run.average_from": 0.1, "run.every": 0.02}
+outcomes = sweep(case, {"bed.inlet_velocity": [0.025, 0.035, 0.045]}, Path("velocities"), overrides=shared)
+
+# %% [markdown]
+# Runs that have finished are kept: run the cell again, and nothing is computed twice. `sweep.csv` has one line per run:
+
+# %%
+import pandas
+
+pandas.read_csv("velocities/sweep.csv").dropna(axis=1, how="all").iloc[:, :8]
+
+# %% [markdown]
+# Bed height with its error against the inlet velocity:
+
+# %%
+import matplotlib.pyplot as plt
+
+velocity = [each.values["bed.inlet_velocity"] for each in outcomes]
+height = [each.measures["bed_height"][0] for each in outcomes]
+error = [each.measures["bed_height"][1] for each in outcomes]
+figure, axes = plt.subplots(figsize=(6, 3.4), layout="constrained")
+axes.errorbar(velocity, height, error, marker="o", capsize=3)
+axes.set(xlabel="inlet velocity  [m/s]", ylabel="bed height  [m]")
+plt.show()
+
+# %% [markdown]
+# These runs are short, so that the page is quick. Means that last need runs of seconds: set `run.until` and `run.average_from` to what the bed needs.

@@ -1,0 +1,39 @@
+"""All benchmarks of the commands, as one table of plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+from scenarios.beds.gas_bed import study as gas_bed
+from scenarios.benchmarks import dense_bed, fluid_box
+
+SIZES = (10_000, 100_000)
+"""Particles of the dense beds."""
+
+Benchmark = tuple[Callable[[int], dict[str, Any]], Callable[[dict[str, Any]], Iterator[tuple[str, str]]]]
+
+
+def benchmarks() -> dict[str, Benchmark]:
+    """Name -> function of the number of threads, and its lines."""
+    bed, lines = dense_bed.bench, dense_bed.rows
+    found: dict[str, Benchmark] = {"dense bed of 10000, bridges": (partial(bed, 10_000, bridges=True), lines)}
+    for size in SIZES:
+        found[f"dense bed of {size}"] = partial(bed, size), lines
+        found[f"dense bed of {size}, films"] = partial(bed, size, film=True), lines
+    return found | {"fluid": (fluid_box.bench, fluid_box.rows), "gas bed": (gas_bed.bench, gas_bed.rows)}
+
+
+def bench(threads: int = 1) -> dict[str, Any]:
+    """Results of all benchmarks by name, one after the other.
+
+    threads  of each
+    """
+    return {name: measure(threads) for name, (measure, _) in benchmarks().items()}
+
+
+def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """The results as lines of a table."""
+    for name, (_, lines) in benchmarks().items():
+        yield from lines(result[name])

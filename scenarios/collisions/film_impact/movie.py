@@ -1,0 +1,83 @@
+"""A movie of an impact: the bead in the film, the liquid coloured by its pressure."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import SymLogNorm
+
+from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
+from scenarios.collisions.film_impact.record import Record
+from scenarios.collisions.film_impact.result import Frame
+from scenarios.collisions.film_impact.solver import Impact
+from scenarios.collisions.film_impact.study import impact
+
+FRAMES, FRAMES_PER_SECOND = 60, 12
+"""Frames at equal intervals of time, and how fast they are shown."""
+
+AFTER_CONTACT = 8
+"""Steps after contact that have a frame each: the suction lasts for microseconds."""
+
+LINEAR, HIGHEST = 1.0, 1e4
+"""Pressure up to which the colours are linear, and that at their ends [kPa]."""
+
+
+def movie(
+    path: Path, diameter: float = 8e-3, liquid: str = "water", film: float = 0.4e-3, velocity: float = 1.0
+) -> None:
+    """Compute an impact on the grid, and write its movie.
+
+    path  of the movie, a GIF
+    """
+    frames: list[Frame] = []
+    turning: list[int] = []
+    last = 1.1 * impact(diameter, liquid, film, velocity, cells=5).p4.time
+
+    def keep(run: Impact | SmoothedImpact) -> None:
+        turning.extend([run.steps] * (run.contacts > 0 and len(turning) < AFTER_CONTACT))
+        due = run.time >= last * (len(frames) - len(turning)) / FRAMES
+        if due or turning[-1:] == [run.steps]:
+            frames.append(Record(run).frame())
+
+    impact(diameter, liquid, film, velocity, progress=keep)
+    figure, axis = plt.subplots(figsize=(7.2, 2.4), layout="constrained")
+    first, radius = frames[0], 0.5 * diameter
+    wide, high = len(first.liquid) * first.dx * 1e3, first.liquid.shape[1] * first.dx * 1e3
+    image = axis.imshow(
+        _shown(first).T, origin="lower", extent=(-wide, wide, 0.0, high), cmap="RdBu_r",
+        norm=SymLogNorm(LINEAR, vmin=-HIGHEST, vmax=HIGHEST), interpolation="nearest",
+    )  # fmt: skip
+    figure.colorbar(image, ax=axis, label="pressure  [kPa]", ticks=[-1e4, -100, -1, 1, 100, 1e4], shrink=0.9)
+    across = np.linspace(-radius, radius, 400) * 1e3
+    axis.set_facecolor("#dde6dd")
+    axis.set(xlim=(-wide, wide), ylim=(0.0, 0.7 * high), xlabel="radius  [mm]", ylabel="height  [mm]")
+    clock = axis.set_title("", loc="left")
+    beads: list[PolyCollection] = []
+
+    def draw(number: int) -> list[object]:
+        frame = frames[number]
+        for bead in beads:
+            bead.remove()
+        under = 1e3 * (frame.gap + radius) - np.sqrt((1e3 * radius) ** 2 - across**2)
+        beads[:] = [axis.fill_between(across, under, 1e4 * radius, color="#a8a8a8", edgecolor="#444444", zorder=3)]
+        image.set_data(_shown(frame).T)
+        clock.set_text(f"{diameter * 1e3:g} mm, {liquid}, {velocity:g} m/s: {frame.time * 1e3:.3f} ms")
+        return [image, clock, *beads]
+
+    FuncAnimation(figure, draw, frames=len(frames)).save(path, PillowWriter(fps=FRAMES_PER_SECOND), dpi=100)  # type: ignore[arg-type]
+    plt.close(figure)
+
+
+def _shown(frame: Frame) -> np.ndarray:
+    """Pressure in kPa in the liquid cells, mirrored at the axis; NaN elsewhere."""
+    pressure = np.where(frame.liquid, frame.pressure / 1e3, np.nan)
+    return np.concatenate([pressure[::-1], pressure])
+
+
+if __name__ == "__main__":
+    movie(Path(sys.argv[1] if len(sys.argv) > 1 else "film_impact.gif"))

@@ -1,0 +1,49 @@
+"""What a case compiles on a new machine: only what it uses."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LOOPS = {"liquid-bed": 39, "gas-bed": 36, "settling": 38, "wet-bed": 43}
+"""Most compiled loops of a case; helpers within them do not count."""
+
+COUNT = """
+import sys
+from numba.core import event
+from cfddem.case.gallery import gallery
+from cfddem.case.schema import Case
+from cfddem.run.simulation import Simulation
+
+class Counter(event.Listener):
+    depth = loops = 0
+    def on_start(self, seen):
+        self.depth += 1
+        self.loops += self.depth == 1
+    def on_end(self, seen):
+        self.depth -= 1
+
+counter = Counter()
+event.register("numba:compile", counter)
+few = {"bed.count": 100, "bed.start": "suspended"}
+case = Case.from_toml(gallery()[sys.argv[1]], {} if sys.argv[1] == "settling" else few)
+simulation = Simulation(case)
+simulation.step()
+simulation.step()
+print(counter.loops)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_case_compiles_only_what_it_uses(name: str, tmp_path: Path) -> None:
+    """In a process of its own, with an empty cache."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": "1"}
+    ran = subprocess.run(
+        [sys.executable, "-c", COUNT, name], env=environment, capture_output=True, text=True, check=True
+    )
+    assert 0 < int(ran.stdout) <= LOOPS[name]
