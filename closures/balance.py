@@ -6,6 +6,7 @@ argument, a function of Reynolds number and voidage. Compiled loops do not call 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from closures.numbers import archimedes as archimedes_number
@@ -21,7 +22,8 @@ def reynolds_in_balance(archimedes: float, voidage: float, drag: Drag) -> float:
     archimedes  Ar, >= 0 [-]
     voidage     eps; 1 for an isolated sphere, that of the packed bed for minimum fluidisation [-]
     drag        F(reynolds, voidage); Re F must increase with Re
-    returns     Re on the superficial velocity [-], to 1e-12 relative
+    returns     Re on the superficial velocity [-], to 1e-12 relative; NaN if no flow carries the bed, because the drag
+                of a law beyond its range may fall with the velocity
 
     >>> from closures.drag import ergun
     >>> round(reynolds_in_balance(1900 / 0.125, 0.5, ergun), 2)      # 1.75 Re^2 + 75 Re = 1900
@@ -36,6 +38,8 @@ def reynolds_in_balance(archimedes: float, voidage: float, drag: Drag) -> float:
     low = high = archimedes / 18.0
     while excess(high) < 0.0:
         high *= 2.0
+    if math.isinf(high):
+        return math.nan
     while excess(low) > 0.0:
         low *= 0.5
     return _root(excess, low, high)

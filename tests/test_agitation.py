@@ -162,6 +162,7 @@ def test_mean_force_on_fixed_particles_is_unchanged() -> None:
     assert forces[1] == pytest.approx(forces[0], rel=5e-3)
 
 
+@pytest.mark.slow
 def test_the_power_of_agitation_is_a_line_of_the_energy_ledger() -> None:
     """It heats the particles as much as drag on their random motion cools them, within 5 %.
 

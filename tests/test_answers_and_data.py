@@ -78,7 +78,7 @@ def test_agreement_is_counted_in_standard_errors() -> None:
 def test_markdown_has_the_answer_first_and_no_signs_of_its_own(tmp_path: Path) -> None:
     text = markdown(report(made_up(tmp_path / "run")), {"The case": "case.png"})
     assert text.startswith("# Beads \\<in> water & more\n")
-    assert text.index("**bed height**") < text.index("![The case](case.png)") < text.index("## Means")
+    assert text.index("**bed height**") < text.index("![The case](<case.png>)") < text.index("## Means")
 
 
 def test_the_report_is_written_as_markdown_with_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,6 +166,36 @@ def test_profiles_are_compared_at_the_measured_heights(tmp_path: Path) -> None:
     assert score["points"] == 2 and score["rms"] == pytest.approx(math.sqrt((off**2).mean()))
 
 
+STEPS = "[[0.0, 0.02], [1.0, 0.02], [1.02, 0.05], [2.0, 0.05]]"
+
+
+def test_a_curve_over_velocity_is_compared_with_the_steps_of_the_inlet(tmp_path: Path) -> None:
+    """A curve as measured: two quantities, each with errors, against velocity. The bed grows by 1 mm/s."""
+    text = BED.replace("inlet_velocity = 0.05", f"inlet_velocity = {STEPS}")
+    folder = made_up(tmp_path / "run", text, trend=1e-3)
+    curve = csv_file(
+        tmp_path,
+        "velocity [mm/s], bed height [mm], bed height error [mm], pressure drop [Pa]\n"
+        f"20, 40.75, 0.1, {WEIGHT}\n50, 41.75, 0.1, {WEIGHT}\n80, 45, 0.1, {WEIGHT}\n",
+        "curve.csv",
+    )
+    height, drop = report(folder, [curve])["measured"]
+    assert (height["points"], height["outside"], height["against"]) == (2, 1, "inlet_velocity")
+    assert height["holds"] is True and abs(height["bias"]) < 5e-5, "second half of each step"
+    assert drop["holds"] is None and drop["relative_rms"] < 0.01
+    steady = made_up(tmp_path / "steady")  # at 50 mm/s all the time
+    (one, _) = report(steady, [curve])["measured"]
+    assert one["points"] == 1 and one["outside"] == 2
+
+
+def test_velocities_that_the_inlet_does_not_hold_are_named(tmp_path: Path) -> None:
+    csv_file(tmp_path, "superficial velocity [m/s], bed height [m]\n0.02, 0.04\n0.03, 0.04\n")
+    text = BED.replace("inlet_velocity = 0.05", f"inlet_velocity = {STEPS}")
+    (tmp_path / "case.toml").write_text(text + '[compare.curve]\nfile = "points.csv"\n')
+    (issue,) = (each for each in preflight(Case.from_toml(tmp_path / "case.toml")).issues if "curve" in each.key)
+    assert "does not hold 1 of 2 velocities: 0.03 m/s" in issue.reason and "steps" in issue.remedy
+
+
 def test_the_page_shows_measured_points(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made_up(tmp_path / "run")
     csv_file(tmp_path, "bed voidage [-]\n0.66\n")
@@ -189,7 +219,9 @@ def test_the_page_shows_measured_points(tmp_path: Path, monkeypatch: pytest.Monk
         ("time [s], bed height [mm]\n1, 1_0\n", "a finite number"),
         ("time [s], time [s]\n1, 2\n", "no other column has"),
         ("time [mm], bed height [mm]\n1, 2\n", "units of time"),
+        ("velocity [mm], bed height [mm]\n1, 2\n", "units of velocity"),
         ("time [s], height [m], bed height [mm]\n1, 2, 3\n", "one of time and height"),
+        ("velocity [m/s], height [m]\n1, 2\n", "call the height of a bed: bed height"),
         ("time [s], bed height [mm], voidage [-]\n1, 2, 3\n", "name one: column"),
         ("time [s], bed height [mm], error [s]\n1, 2, 3\n", "in the unit of bed_height"),
         ("time [s], bed height [mm], error [mm]\n1, 2, 0\n", "above 0"),

@@ -194,10 +194,16 @@ def test_a_killed_trial_does_not_count(box: Path, monkeypatch: pytest.MonkeyPatc
         (("--vary", "material.glass.restitution=0.5..1", "--trials", "0"), "at least 1"),
         (("--vary", "material.glass.restitution=0.5..1", "--match", "none.csv"), "does not exist"),
         (("--vary", "material.glass.restitution=0.5..1", "--match", "bare.csv"), "standard errors"),
+        (("--vary", "material.glass.restitution=0.5..1", "--match", "depth.csv"), "did you mean 'bed_height'"),
+        (("--vary", "material.glass.restitution=0.5..1", "--match", "curve.csv"), "a velocity that the case holds"),
+        (("--vary", "material.glass.restitution=0.5..1", "--match", "unit.csv"), "a unit of bed_height, such as m"),
     ],
 )
 def test_wrong_input_of_a_calibration_is_one_line(box: Path, words: tuple[str, ...], said: str) -> None:
     (box / "bare.csv").write_text("bed height [m]\n0.04\n")
+    (box / "depth.csv").write_text("bed heigth [m], error [m]\n0.04, 0.001\n")
+    (box / "curve.csv").write_text("velocity [m/s], bed height [m], bed height error [m]\n7, 0.04, 0.001\n")
+    (box / "unit.csv").write_text("bed height [s], error [s]\n0.04, 0.001\n")
     matched = () if "--match" in words else ("--match", "cooling.csv")
     done = call("calibrate", "case.toml", *words, *matched)
     assert (done.code, done.err.count("\n")) == (2, 1) and said in done.err, done.err

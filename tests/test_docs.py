@@ -81,7 +81,7 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
-LONG = {"user-law", "contact-law", "wet-particles", "cluster", "walls"}
+LONG = {"averages", "user-law", "contact-law", "wet-particles", "cluster", "walls"}
 """Pages with many laws, each of which is compiled."""
 
 
@@ -175,6 +175,34 @@ def test_displayed_equations_are_paragraphs(page: Path) -> None:
     for paragraph in re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL).split("\n\n"):
         if "$$" in paragraph:
             assert re.fullmatch(r"\$\$[^$]*\$\$", paragraph.strip()), paragraph
+
+
+SECTIONS = ["What you'll learn", "Problem", "Code", "Results", "Adapt this", "Reproduce this"]
+"""Headings of every page of the gallery."""
+
+GALLERY = [page for page in PAGES if "scenarios" in page.parts and page.parent.name != "scenarios"]
+
+TOP = re.compile(
+    r"# [^\n]+\n\n!\[[^\]]{10,}\]\(\S+\)\n\n\*\*(?P<headline>[^*]+)\*\*\n\n"
+    r"(?P<command>`[^`]+`): (?P<time>[^\n]+) on one core\.\n\n## "
+)
+"""What a page of the gallery begins with: title, picture, main result, command and run time."""
+
+NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+@pytest.mark.parametrize("page", GALLERY, ids=lambda page: page.parent.name)
+def test_gallery_pages_follow_one_pattern(page: Path) -> None:
+    """A picture, one main result and the run time come first; the list of cases says the same."""
+    text = page.read_text()
+    top = TOP.match(text)
+    assert top, "must begin with a title, a picture, the main result in bold, and `command`: TIME on one core."
+    assert re.findall(r"^## (.*)$", text, re.M) == SECTIONS
+    assert set(NUMBER.findall(top["headline"])) <= set(NUMBER.findall(text[top.end() :])), (
+        "a number that the page lacks"
+    )
+    row = f"| {top['headline']} | {top['command']} | {top['time']} |"
+    assert row in (ROOT / "scenarios" / "README.md").read_text()
 
 
 PLACE = re.compile(r"`([\w/]+(?:\.py|/))`(?:: ((?:`[\w.]+`(?:, )?)+))?")

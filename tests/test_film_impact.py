@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from cfddem.backend.errors import InputError
+from closures.bridge import deforming_potential
 from closures.film_impact import film_added_mass, reduced_impact, reversal_restitution, slowest_rebound
 from closures.restitution import davis_sitison, singh
 from scenarios.collisions.film_impact import FilmImpact, Liquid, impact
@@ -114,6 +115,7 @@ def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.Captur
     words = ("--diameter", "5.5e-3", "--liquid", "m5", "--film", "0.45e-3", "--velocity", "0.5")
     assert json.loads(printed(*words, "--json"))["restitution"] == pytest.approx(oil(5).restitution, abs=1e-12)
     assert "viscous_energy" in printed(*words)
+    assert "surface_energy" in printed(*words, "--surface-tension", "0.0192", "--contact-angle", "20")
     with pytest.raises(InputError, match="film"):
         printed("--film", "4e-3")
 
@@ -181,6 +183,8 @@ def test_a_viscous_film_without_inertia_is_that_of_davis_and_sitison() -> None:
     viscous = Liquid(density=100.0, viscosity=2580.0 * diameter * velocity / (9.0 * 20.0))
     result = impact(diameter, viscous, film, velocity, cells=5, gravity=0.0)
     assert result.restitution == pytest.approx(davis_sitison(20.0, 0.98, 1e-6 / film), abs=0.02)
+    slowed = 1.0 + deforming_potential(1e-6, film) / 20.0
+    assert result.p2.velocity == pytest.approx(-slowed * velocity, rel=0.01)
 
 
 def test_films_without_inertia_rebound_too_much() -> None:

@@ -83,3 +83,5 @@ def test_smoothed_particles_agree_with_the_grid(case: tuple[float, str, float, f
     assert result.p2.velocity == pytest.approx(on_grid.p2.velocity, rel=0.02)
     assert result.highest_pressure > 0.0 > result.lowest_pressure
     assert result.cells == 5
+    assert abs(result.ledger_error) < 0.02
+    assert 0.05 < result.energies["exchange"] < 0.2  # what the projection of the particles loses

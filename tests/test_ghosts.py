@@ -122,7 +122,7 @@ def finished(spheres: Particles, given: dict[str, Any], steps: int, **others: An
     return run
 
 
-@pytest.mark.parametrize(("film", "walls"), [slow(False, False), slow(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize(("film", "walls"), [slow(False, False), slow(True, False), (False, True), slow(True, True)])
 def test_bits_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> None:
     """The same spheres with the same ids in other rows, over several neighbour lists."""
     spheres, given = settings(film, walls)
@@ -164,7 +164,7 @@ def divided(size: int, axis: int, length: float) -> Slabs:
 @pytest.mark.parametrize(
     ("film", "walls", "liquid"),
     [slow(False, False, False), slow(True, False, False), (False, True, False), slow(True, True, False),
-     slow(False, False, True), (True, True, True)],
+     slow(False, False, True), slow(True, True, True)],
 )  # fmt: skip
 def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, liquid: bool, ranks: int) -> None:
     """Over several lists, with particles that change their rank and pairs across the planes and the periodic border."""

@@ -183,6 +183,7 @@ def turned(shape: Callable[[float], float], time: float) -> float:
     return float(quad(smooth, 0.0, time**0.25, limit=2000)[0])
 
 
+@pytest.mark.slow
 def test_exponentials_and_convolution_agree_at_constant_slip_speed() -> None:
     """A slip that turns at constant speed, for 10 to 100 000 steps of 2 % of t_c: the force within 0.2 %."""
     speed, kinematic = 0.1, VISCOSITY / WATER

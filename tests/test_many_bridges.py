@@ -161,6 +161,7 @@ def test_syrup_is_stable_over_a_hundred_thousand_steps() -> None:
     sheared(100_000)
 
 
+@pytest.mark.slow
 def test_spheres_come_and_go() -> None:
     """Bridges of removed spheres break and give them half of the liquid; inserted spheres bring theirs, or are dry."""
     places = np.array([[0, 0, 0], [1.02, 0, 0], [2.04, 0, 0]]) * 2.0 * RADIUS

@@ -131,7 +131,8 @@ def test_the_study_is_one_command_and_goes_on_where_it_was(tmp_path: Path, monke
     def fluidised(described: Study, velocity: float, **changes: Any) -> FluidisedBed:
         computed.append(changes["laws.agitation"])
         voidage = study.PUBLISHED.get(velocity, 0.6)
-        return FluidisedBed(velocity, 1.0, 1.0, voidage, voidage, voidage, 3.0, 0.02, 0.01)
+        voidage += 0.001 * (changes["bed.seed"] - 1.0)
+        return FluidisedBed(velocity, 1.0, 1.0, voidage, voidage, voidage, 0.59, 0.61, 3.0, 0.02, 0.01, voidage)
 
     monkeypatch.setattr(study, "run", box)
     monkeypatch.setattr(study, "fluidise", fluidised)
@@ -140,6 +141,8 @@ def test_the_study_is_one_command_and_goes_on_where_it_was(tmp_path: Path, monke
     rows = {row["quantity"]: row for row in table["rows"]}
     assert rows["density ratio 7, solid fraction 0.45: collision rate"]["value"] == pytest.approx(1.0, rel=1e-12)
     assert rows["alginate at 9 mm/s: voidage"]["limit"] == 0.015
-    assert len(computed) == len(set(computed) - {"none", "free_spheres"}) + 11
+    packings = rows["alumina at 120 mm/s, without agitation: voidage"]
+    assert packings["value"] == pytest.approx(0.601, rel=1e-12) and packings["note"].endswith("error 0.00058")
+    assert len(computed) == len(set(computed) - {"none", "free_spheres"}) + 28
     before = len(computed)
     assert validate("agitation", tmp_path) and len(computed) == before

@@ -17,10 +17,12 @@ from made_up_run import made_up
 
 import closures
 from cfddem.backend import html as drawn
+from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.preflight.summary import preflight
 from cfddem.run import notebook as run_notebook
+from cfddem.run.notebook import run_case
 from cfddem.run.progress import Status
 from closures.drag import di_felice
 
@@ -69,6 +71,15 @@ def test_the_check_and_a_run_show_their_numbers(tmp_path: Path) -> None:
     assert is_whole(text) and "u_mf" in text
     text = open_run(made_up(tmp_path / "run", rows=41))._repr_html_()
     assert is_whole(text) and "<td>status</td><td>finished</td>" in text and text.count("<circle") == 3
+
+
+def test_only_a_run_folder_is_overwritten(tmp_path: Path) -> None:
+    """A folder of another program, which has a `run.json` too, keeps its files."""
+    (tmp_path / "run.json").write_text('{"format": "of another program"}')
+    (tmp_path / "data").write_text("results of a year")
+    with pytest.raises(InputError, match="a run folder to be overwritten"):
+        run_case(Case.from_text(TEXT), tmp_path, overwrite=True)
+    assert (tmp_path / "data").read_text() == "results of a year"
 
 
 def test_a_drawing_shows_near_spheres_last_and_fast_ones_yellow() -> None:

@@ -51,7 +51,7 @@ def test_a_bed_that_breaks_up_without_agitation_is_warned_of() -> None:
     assert "waves of 33 mm grow" in issue.reason and "free_spheres" in issue.remedy
     quiet = ({"laws__agitation": "pseudo_turbulence"}, {"bed__count": 600}, {"bed__fixed": True})
     for changes in (*quiet, {"bed__inlet_velocity": 0.03}):
-        assert "laws.agitation" not in [each.key for each in made(**changes).issues], changes
+        assert not any("waves" in each.reason for each in made(**changes).issues), changes
 
 
 def test_a_fluid_without_viscosity_gets_no_profile_warning() -> None:
@@ -168,6 +168,9 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
             "laws.drag",
             "its drag differs by",
         ),
+        ({"laws.drag": "schiller_naumann"}, "warning", "laws.drag", "is for single spheres"),
+        ({"laws.lift": True}, "warning", "laws.lift", "lift is 0.42 % of the drag"),
+        ({"laws.agitation": "free_spheres"}, "warning", "laws.agitation", "changes bed heights by up to 2 %"),
         ({"fluid.viscosity": 0.0}, "error", "fluid.viscosity", "drag laws need a viscosity above 0"),
         ({"laws.gravity": [0, 0, 9.81]}, "error", "laws.gravity", "is not negative"),
         ({"column.width": 40.0, "column.cell": 0.16, "bed.count": 1_000_000_000}, "error", "bed.count", "GB of memory"),

@@ -108,7 +108,7 @@ def test_a_law_evaluated_outside_of_its_range_is_named_with_the_range(
     assert len(said) == 1 and all(each in said[0] for each in [*ranges, "cfddem explain"])
     first = next(place for place, line in enumerate(lines(run)) if "warning: " in line and "outside of" in line)
     assert all(len(line) <= 100 for line in lines(run))
-    assert "cfddem explain" in " ".join(lines(run)[first : first + 2])  # in two lines
+    assert "cfddem explain" in " ".join(lines(run)[first : first + 4])
 
 
 ALONE = """

@@ -37,6 +37,7 @@ def stirred(point: Point, steps: int) -> Suspension:
     return suspension
 
 
+@pytest.mark.slow
 def test_momentum_of_spheres_and_fluid_is_conserved_to_round_off(one_thread):
     suspension = stirred(SMALL, 60)
     assert suspension.solver.particles.count == 15

@@ -114,6 +114,7 @@ def test_a_film_of_finite_extent_takes_the_impulse_of_its_potential(register: Sh
     assert run.restitution > collide(glass, **given).restitution + 0.05  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_the_minimum_gap_is_what_the_law_says(register: Shelve) -> None:
     """Of the largest approach speed."""
     own = register("minimum_gap", thick)
@@ -138,6 +139,7 @@ def test_the_minimum_gap_is_at_least_that_of_asperities_and_at_most_a_fiftieth_o
     assert most.minimum_gap == pytest.approx(0.02 * 3.175e-3)
 
 
+@pytest.mark.slow
 def test_uses_outside_of_the_range_are_counted(register: Shelve) -> None:
     """None inside, one a pair and step for a film; counts survive new lists and checkpoints."""
     inside = stirred(100, lubrication=register("lubrication", brenner, viscosity=(1e-3, 1e-1), gap=(1e-9, 1.0)))
@@ -198,6 +200,7 @@ def test_laws_that_the_loop_cannot_call_are_refused_by_name(register: Shelve) ->
         Laws(minimum_gap=elastohydrodynamic).check()
 
 
+@pytest.mark.slow
 def test_a_law_that_gives_nan_stops_the_run(register: Shelve) -> None:
     def lost(approach_speed: float) -> float:
         return math.sqrt(-approach_speed)

@@ -113,6 +113,7 @@ def test_liquid_passes_between_particles_and_walls_and_is_kept() -> None:
     assert bridges.liquid == others.liquid
 
 
+@pytest.mark.slow
 def test_a_bridge_draws_a_disc_of_the_wall_and_returns_half() -> None:
     """At most what the patch has; the rest of the wall keeps its film."""
     run, bridges = above(Plane(), (0.0, 0.0, RADIUS + GAP), WET_WALLS)

@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cfddem.preflight.summary import refuse_errors
 from scenarios.beds.wet_bed import validation
-from scenarios.beds.wet_bed.validation import ANGLES, Means, directions, over_packings, rows, state
+from scenarios.beds.wet_bed.validation import (
+    ANGLES,
+    Means,
+    directions,
+    over_packings,
+    plan,
+    rows,
+    state,
+    study,
+    windows,
+)
 
 
 def test_the_pulls_of_the_states_are_as_their_names_say() -> None:
@@ -23,10 +35,16 @@ def test_the_pulls_of_the_states_are_as_their_names_say() -> None:
         refuse_errors(case)
 
 
+def made_up(pressure: float, temperature: float) -> Means:
+    """Means with an error in time of 2 %."""
+    values = 0.05, 0.01, pressure, temperature, 0.01
+    return Means(*((each, 0.02 * each) for each in values))
+
+
 def test_the_table_has_errors_and_ratios() -> None:
-    assert over_packings([2.0, 2.0, 2.0]) == (2.0, 0.0)
-    dry = [Means(0.05, 0.01, 100.0, 1e-3, 0.01)] * 3
-    wet = [Means(0.05, 0.01, 100.0 * each, 5e-4, 0.01) for each in (1.9, 2.0, 2.1)]
+    assert over_packings([(2.0, 0.3)] * 3) == (2.0, 0.0)
+    dry = [made_up(100.0, 1e-3)] * 3
+    wet = [made_up(100.0 * each, 5e-4) for each in (1.9, 2.0, 2.1)]
     found = {name: dry if name == "dry" else wet for name in ANGLES}
     table = {row.quantity: row for row in directions(found, {name: 0.3 + 0.1 * (name != "dry") for name in ANGLES})}
     row = table["weak: pressure deviation larger than dry, logarithm of the ratio"]
@@ -34,4 +52,40 @@ def test_the_table_has_errors_and_ratios() -> None:
     assert table["weak: temperature smaller than dry, logarithm of the ratio"].value == pytest.approx(math.log(2.0))
     assert table["strong: minimum fluidisation over that of the dry bed"].value == pytest.approx(4.0 / 3.0)
     assert [row.unit for row in rows("dry", dry)] == ["m", "m", "Pa", "m2/s2", "m"]
-    assert validation.UNTIL == 10.1 and len(validation.SEEDS) == 3
+
+
+def test_the_table_of_one_packing_and_two_states_takes_errors_from_time() -> None:
+    """What has not been computed has no rows."""
+    found = {"dry": [made_up(100.0, 1e-3)], "strong": [made_up(150.0, 5e-4)]}
+    table = {row.quantity: row for row in directions(found, {"dry": 0.3})}
+    assert len(table) == 3 and not any("fluidisation" in name for name in table)
+    row = table["strong: pressure deviation larger than dry, logarithm of the ratio"]
+    assert row.value == pytest.approx(math.log(1.5)) and "0.028" in row.note
+
+
+def test_all_states_advance_before_one_goes_further(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One packing in all states first; the whole plan has three packings of 10.1 s and a ramp in each state."""
+    pieces = [(name, until) for name, _, until in plan()]
+    assert [name for name, _ in pieces[:4]] == [f"{name}_1" for name in ANGLES]
+    far = {name: max(until for piece, until in pieces if piece == name) for name, _ in pieces}
+    assert far == {f"{name}_{seed}": 10.1 for name in ANGLES for seed in (1, 2, 3)} | {f"{n}_ramp": 4.6 for n in ANGLES}
+    asked: list[float] = []
+    monkeypatch.setattr(validation, "advanced", lambda case, folder, name, progress, until: asked.append(until))
+    study(tmp_path, lambda text: None, hours=-1.0)
+    assert asked == []
+    study(tmp_path, lambda text: None)
+    assert len(asked) == len(pieces)
+
+
+def test_states_are_compared_over_the_same_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    times = {"dry_1": 2.1, "weak_1": 1.6, "strong_1": 0.7, "dry_2": 0.3}
+    monkeypatch.setattr(validation, "reached", lambda home: times.get(home.name, 0.0))
+    assert windows(tmp_path) == {"dry": {1: 1.6}, "weak": {1: 1.6}}
+
+
+def test_errors_in_time_are_those_of_a_known_series() -> None:
+    """Independent normal values: the error of their deviation is deviation / sqrt(2 n)."""
+    values = np.random.default_rng(1).normal(5.0, 2.0, 4000)
+    deviation, error = validation._deviation(values)
+    assert deviation == pytest.approx(2.0, rel=0.03)
+    assert error == pytest.approx(2.0 / math.sqrt(8000.0), rel=0.25)

@@ -109,7 +109,7 @@ def test_liquid_is_conserved_to_round_off(ran: Ran) -> None:
 
 @pytest.mark.slow
 def test_the_energy_budget_of_a_kicked_bed_closes() -> None:
-    """Change of the stored energy that no line explains, 0.0016 of the energy put in; without a fluid 0.0002."""
+    """Change of the stored energy that no line explains: 0.0006 of the energy put in; a quarter at half the step."""
     simulation = Simulation(Case.from_text(BED).with_(**{"run.energy_budget": True}))
     simulation.particles.velocity += np.random.default_rng(1).normal(0.0, 0.2, (1100, 3))
     simulation.energy = simulation._ledger()
@@ -117,7 +117,7 @@ def test_the_energy_budget_of_a_kicked_bed_closes() -> None:
     assert simulation.energy is not None
     row = simulation.energy.row()
     assert row["energy_bridge"] > 0.3 * row["energy_put_in"]
-    assert abs(row["energy_remainder"]) < 2e-3 * row["energy_put_in"], row
+    assert abs(row["energy_remainder"]) < 1e-3 * row["energy_put_in"], row
 
 
 def test_measures_agree_with_a_search_from_particle_to_particle(ran: Ran) -> None:

@@ -14,7 +14,16 @@ import numpy as np
 from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.series import block_average
 from cfddem.backend.errors import InputError, nearest
-from cfddem.case.compare import PROFILES, CaseData, Points, points_of, require_unit
+from cfddem.case.compare import (
+    HELD,
+    PROFILES,
+    CaseData,
+    Points,
+    points_of,
+    require_unit,
+    unknown_quantity,
+    value_columns,
+)
 from cfddem.case.data_table import Array
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
@@ -29,8 +38,8 @@ class MeasuredComparison:
 
     points: Points
     computed: Array  # (n,) of the run at each point; NaN where it has no value
-    computed_error: float  # standard error of the run's mean; 0 for points in time or height
-    line: tuple[Array, Array]  # the run: time or height, and value; empty for means
+    computed_error: float | Array  # standard errors of the run's means; 0 for points in time or height
+    line: tuple[Array, Array]  # the run: time, height or velocity, and value; empty for means
 
     @property
     def inside(self) -> np.ndarray:
@@ -89,13 +98,17 @@ def compared_with_measured(run: Run, case: Case, begin: float) -> list[MeasuredC
 
 
 def with_files(case: Case, files: Sequence[Path]) -> Case:
-    """A case with measured data from further files, named after them."""
+    """A case with measured data from further files, named after them and, of several, their columns of values."""
     data: dict[str, CaseData] = {}
     for path in files:
-        name = re.sub(r"\W+", "_", path.stem)[:24] or "data"
-        if name in case.compare or name in data:
-            raise InputError("data", str(path), "a file with a name that no other data have", f"{name} is taken")
-        data[name] = CaseData(file=str(path.absolute()))
+        columns = value_columns(path)
+        for column in columns or [""]:
+            name = re.sub(r"\W+", "_", path.stem)[:24] or "data"
+            if len(columns) > 1:
+                name = f"{name}_{column}"
+            if name in case.compare or name in data:
+                raise InputError("data", str(path), "a file with a name that no other data have", f"{name} is taken")
+            data[name] = CaseData(file=str(path.absolute()), column=column or None)
     return case.model_copy(update={"compare": {**case.compare, **data}})
 
 
@@ -109,7 +122,7 @@ def compared_at(run: Run, case: Case, points: Points, begin: float) -> MeasuredC
         return _profile(run, case, points, begin)
     if points.quantity not in run.history:
         known = [name for name in run.history if name not in ("time", "step")]
-        raise InputError(f"compare.{points.name}.quantity", points.quantity, nearest(points.quantity, known))
+        raise unknown_quantity(points.name, points.quantity, known)
     require_unit(points, run.unit(points.quantity))
     time, values = run.history["time"], run.history[points.quantity]
     usable = np.isfinite(values)
@@ -119,9 +132,31 @@ def compared_at(run: Run, case: Case, points: Points, begin: float) -> MeasuredC
             return MeasuredComparison(points, np.full(len(points.value), np.nan), 0.0, (time, values))
         computed = np.interp(points.place, time, values, left=np.nan, right=np.nan)
         return MeasuredComparison(points, computed, 0.0, (time, values))
+    if points.against == "inlet_velocity":
+        return _at_velocities(case, points, time, values, begin)
     average = block_average(values[time >= begin])
     error = 0.0 if math.isnan(average.error) else average.error
     return MeasuredComparison(points, np.full(len(points.value), average.mean), error, (time[:0], values[:0]))
+
+
+def _at_velocities(case: Case, points: Points, time: Array, values: Array, begin: float) -> MeasuredComparison:
+    """Means of a run while its inlet has the measured velocities: over the second half of each time it is held."""
+    inlet = case.bed.inlet_velocity
+    steady = isinstance(inlet, float)
+    velocity = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    computed, error = np.full((2, len(points.value)), np.nan)
+    for place, wanted in enumerate(points.place):
+        rows = np.flatnonzero(np.isclose(velocity, wanted, rtol=HELD, atol=0.0))
+        if steady:
+            rows = rows[time[rows] >= begin]
+        else:
+            parts = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+            rows = np.concatenate([part[len(part) // 2 :] for part in parts])
+        if len(rows):
+            average = block_average(values[rows])
+            computed[place], error[place] = average.mean, 0.0 if math.isnan(average.error) else average.error
+    order = np.argsort(points.place)
+    return MeasuredComparison(points, computed, error, (points.place[order], computed[order]))
 
 
 def _profile(run: Run, case: Case, points: Points, begin: float) -> MeasuredComparison:

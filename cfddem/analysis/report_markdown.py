@@ -26,7 +26,7 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
         *_table(("", "value", "verdict"), map(_answer, result["answers"])),
         *_measured(result["measured"]),
         *_advice(result["advice"]),
-        *(f"![{caption}]({place})" for caption, place in (figures or {}).items()),
+        *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),
         "## Means",
         *_table(("measure", "mean", "in time"), map(_measure, result["measures"].items())),
         *(["## Published laws", *_table(("law", "run", "law", "run / law", "unit"), laws)] if result["laws"] else ()),

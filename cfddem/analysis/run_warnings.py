@@ -11,6 +11,7 @@ from cfddem.analysis.bed_laws import weight_over_floor
 from cfddem.analysis.defluidisation import defluidisation
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
+from cfddem.preflight import law_ranges
 from cfddem.preflight.bed_estimate import estimate_bed
 from closures.registry import Law
 
@@ -95,12 +96,15 @@ def _range_warnings(run: Run, case: Case, begin: float) -> Found:
         if outside := _gained(run, "out_of_range_count", begin):
             laws = [law for law in (drag, *pair_laws) if law is not None and law.ranges]
             ranges = "; ".join(f"{law.name} {law.fitted_for}" for law in laws)
-            yield LAWS, f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}; {REMEDY}"
+            text = f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}"
+            yield LAWS, f"{text}{_effect(case)}; {REMEDY}"
     elif drag is not None:
-        yield from _beyond("drag law", drag, _gained(run, "out_of_range_count", begin), evaluations)
+        outside = _gained(run, "out_of_range_count", begin)
+        yield from _beyond("drag law", drag, outside, evaluations, effect=_effect(case))
     if isinstance(agitation, Law):
         outside = _gained(run, "agitation_out_of_range_count", begin)
-        yield from _beyond("law of agitation", agitation, outside, evaluations, AGITATION_SHARE)
+        effect = f"; {law_ranges.AGITATED}"
+        yield from _beyond("law of agitation", agitation, outside, evaluations, AGITATION_SHARE, effect)
 
 
 def _gained(run: Run, name: str, begin: float) -> int:
@@ -109,10 +113,27 @@ def _gained(run: Run, name: str, begin: float) -> int:
     return int(column[-1] - column[np.searchsorted(run.history["time"], begin)]) if len(column) else 0
 
 
-def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float = LEAST_SHARE) -> Found:
+def _effect(case: Case) -> str:
+    """What a drag law outside of its range changes in the mean state of the bed, as estimated before the run."""
+    law = case.laws.drag_law
+    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+        return ""
+    try:
+        bed = estimate_bed(case)
+        if not law_ranges.outside(law, law_ranges.state_of(case, bed)):
+            return f"; by estimate, the bed as a whole is inside the range of {law.name}"
+        found = law_ranges.effect_of_drag(case, law, bed)
+    except (ArithmeticError, ValueError):  # values beyond all correlations
+        return ""
+    return f"; {found}" if found else ""
+
+
+def _beyond(
+    kind: str, law: Law, outside: int, evaluations: float, share: float = LEAST_SHARE, effect: str = ""
+) -> Found:
     """Warning that a law was used outside of its range in more than a share of its uses."""
     if evaluations and outside > share * evaluations:
-        share_outside = f"{100.0 * outside / evaluations:.2g} % of its uses: {law.fitted_for}; {REMEDY}"
+        share_outside = f"{100.0 * outside / evaluations:.2g} % of its uses: {law.fitted_for}{effect}; {REMEDY}"
         yield LAWS, f"the {kind} {law.name} was evaluated outside of its fitted range in {share_outside}"
 
 

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 FEWEST = 16
 """Fewest values from which an error is estimated."""
 
+ROUNDING = 1e-12
+"""Relative difference below which values are equal: a packed bed is constant to rounding [-]."""
+
 
 def even(time: Array, values: Array, count: int | None = None) -> tuple[float, Array]:
     """Interpolate a series linearly at even intervals.
@@ -104,6 +107,8 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     count = len(means)
     if count < FEWEST:
         return Stationarity(False, 0, float("nan"), float("nan"))
+    if np.ptp(series) <= ROUNDING * float(np.abs(series).max()):
+        return Stationarity(True, 0, 0.0, 0.0)
     left = np.arange(count, 0, -1.0)
     tail, square = np.cumsum(means[::-1])[::-1], np.cumsum(((means - means.mean()) ** 2)[::-1])[::-1]
     spread = square - left * (tail / left - means.mean()) ** 2
@@ -114,7 +119,7 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     drift = second.mean() - first.mean()
     # without detrending, a trend within a half would look like a long correlation time and enlarge the error
     error = float(np.hypot(block_average(detrend(first)).error, block_average(detrend(second)).error))
-    rounding = 1e-12 * float(np.abs(rest).max())  # a packed bed is constant to rounding
+    rounding = ROUNDING * float(np.abs(rest).max())
     stationary = cut <= count // 2 and bool(abs(drift) <= limit * error + rounding)
     return Stationarity(stationary, start, float(drift), error)
 
@@ -149,3 +154,41 @@ def spectrum(values: Array, interval: float, segments: int = 3) -> Spectrum:
     bend = left - 2.0 * top + right
     shift = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
     return Spectrum(frequency, density, float((peak + np.clip(shift, -0.5, 0.5)) * frequency[1]))
+
+
+class MeanFrequency(NamedTuple):
+    """Mean frequency of an oscillation and its standard error."""
+
+    frequency: float  # [Hz]; NaN with fewer than two whole periods
+    error: float  # from the scatter of the periods, taken as independent [Hz]; NaN with fewer than three
+    periods: int  # whole periods in the record
+
+
+def mean_frequency(values: Array, interval: float, band: float = 0.5) -> MeanFrequency:
+    r"""Mean frequency of an irregular oscillation, from the times between its crests.
+
+    .. math:: f = \frac{n}{t_n - t_0},\qquad s_f = \frac{f\,s_T}{\bar T\sqrt n}
+
+    values    (n,), any unit
+    interval  between two values [s]
+    band      half width of the band around the trend that a crest must leave, over the standard deviation [-]
+    returns   MeanFrequency
+
+    A period begins where the series rises out of the band after it has been below. The error says what a short record
+    is worth: the peak of a spectrum has none.
+    """
+    series = np.asarray(values, float)
+    if interval <= 0.0 or len(series) < FEWEST:
+        raise InputError("values", len(series), f"at least {FEWEST} values at a positive interval")
+    series = detrend(series)
+    level = band * float(series.std())
+    side = np.where(series > level, 1, np.where(series < -level, -1, 0))
+    outside = np.flatnonzero(side)
+    begins = outside[1:][(side[outside[1:]] == 1) & (side[outside[:-1]] == -1)] * interval
+    lengths = np.diff(begins)
+    count = len(lengths)
+    if count < 2:
+        return MeanFrequency(float("nan"), float("nan"), count)
+    mean = float(lengths.mean())
+    error = float(lengths.std(ddof=1)) / mean**2 / np.sqrt(count) if count > 2 else float("nan")
+    return MeanFrequency(1.0 / mean, error, count)

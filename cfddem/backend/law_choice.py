@@ -73,7 +73,7 @@ def _named(kind: str, name: str) -> Law:
         registry.load_package_laws()
     if name not in laws:
         known = [*BUILT_IN[kind], *(each.name for each in laws.values() if _can_be_called(kind, each))]
-        remedy = "cfddem explain lists all laws"
+        remedy = "cfddem explain lists all laws; for one of your own see docs/how-to/user-law.md"
         raise InputError(kind, shown(name), nearest(name, dict.fromkeys(known)), remedy)
     return laws[name]
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,14 +25,21 @@ if TYPE_CHECKING:
 COPIES = "measured"
 """Folder inside a run folder with copies of the measured data."""
 
-ABSCISSAE = ("time", "height")
-"""Columns that say where a point was measured; without one, the points are means over the averaging window."""
+ABSCISSAE = {"time": "s", "height": "m", "inlet_velocity": "m/s"}
+"""Columns that say where a point was measured, and their units; without one, the points are means over the averaging
+window."""
+
+VELOCITIES = ("velocity", "superficial_velocity", "gas_velocity", "liquid_velocity")
+"""Other names of a column of inlet velocities."""
+
+HELD = 0.01
+"""Relative difference up to which a case holds a measured velocity [-]."""
 
 PROFILES = {"voidage": "1", "granular_temperature": "m2/s2"}
 """Quantities that a run has against height, and their units."""
 
 ERROR = "error"
-"""Column of the standard errors."""
+"""Column of the standard errors; with several columns of values, `NAME error` is that of one."""
 
 
 class CaseData(Checked):
@@ -61,8 +70,8 @@ class Points:
     name: str  # of the data
     quantity: str
     unit: str
-    against: str  # "time", "height" or "" for means
-    place: Array  # (n,) time [s] or height [m]; zeros for means
+    against: str  # "time", "height", "inlet_velocity", or "" for means
+    place: Array  # (n,) time [s], height [m] or velocity [m/s]; zeros for means
     value: Array  # (n,)
     error: Array  # (n,) standard errors; NaN if unknown
     weight: float = 1.0
@@ -76,11 +85,12 @@ def points_of(name: str, data: CaseData) -> Points:
     errors  InputError, one line
     """
     path = Path(data.file)
-    columns = {each.name: each for each in read_table(path)}
+    columns = _columns(path)
     against = [each for each in ABSCISSAE if each in columns]
     if len(against) > 1:
-        raise InputError(f"{path}", None, "a table with one of time and height")
-    others = [each for each in columns if each not in (*against, ERROR)]
+        remedy = "call the height of a bed: bed height" if "height" in against else ""
+        raise InputError(f"{path}", None, f"a table with one of {' and '.join(against)}", remedy)
+    others = _value_columns(columns)
     wanted = "_".join(data.column.lower().split()) if data.column is not None else None
     if wanted is None and len(others) != 1:
         found = ", ".join(others) or "none"
@@ -89,14 +99,45 @@ def points_of(name: str, data: CaseData) -> Points:
         raise InputError(f"compare.{name}.column", data.column, nearest(wanted, others))
     chosen = columns[wanted or others[0]]
     place = columns[against[0]].values if against else np.zeros(len(chosen.values))
-    if against and columns[against[0]].unit != {"time": "s", "height": "m"}[against[0]]:
-        raise InputError(
-            f"{path} {against[0]}", None, f"given in units of {'time' if against[0] == 'time' else 'length'}"
-        )
+    if against and columns[against[0]].unit != ABSCISSAE[against[0]]:
+        kind = {"time": "time", "height": "length"}.get(against[0], "velocity")
+        raise InputError(f"{path} {against[0]}", None, f"given in units of {kind}")
     return Points(
         name, data.quantity or chosen.name, chosen.unit, against[0] if against else "", place, chosen.values,
-        _errors(path, data, chosen, columns.get(ERROR)), data.weight,
+        _errors(path, data, chosen, columns.get(f"{chosen.name}_{ERROR}", columns.get(ERROR))), data.weight,
     )  # fmt: skip
+
+
+def value_columns(path: Path) -> list[str]:
+    """Names of the columns of values of a file of measured points.
+
+    errors  InputError, one line
+    """
+    return _value_columns(_columns(path))
+
+
+def _columns(path: Path) -> dict[str, Column]:
+    """The columns of a file by their names; a velocity is that of the inlet."""
+    columns = {each.name: each for each in read_table(path)}
+    for name in VELOCITIES:
+        if name in columns and "inlet_velocity" not in columns:
+            columns["inlet_velocity"] = columns.pop(name)
+    return columns
+
+
+def _value_columns(columns: Mapping[str, Column]) -> list[str]:
+    return [each for each in columns if each not in ABSCISSAE and each != ERROR and not each.endswith(f"_{ERROR}")]
+
+
+def held(case: Case, velocities: Array) -> np.ndarray:
+    """Whether a case holds each of some inlet velocities, all the time or during a step of its table (n,) bool."""
+    inlet = case.bed.inlet_velocity
+    if isinstance(inlet, float):
+        steps = [inlet]
+    else:
+        steps = [low for (_, low), (_, high) in pairwise(inlet) if math.isclose(low, high, rel_tol=HELD)]
+        steps += [velocity for time, velocity in inlet[-1:] if time < case.run.until]
+    return np.array([any(math.isclose(each, step, rel_tol=HELD) for step in steps) for each in velocities])
 
 
 def _errors(path: Path, data: CaseData, chosen: Column, column: Column | None) -> Array:
@@ -124,8 +165,18 @@ def require_measured_units(case: Case, units: Mapping[str, str]) -> None:
         points = points_of(name, data)
         known = PROFILES if points.against == "height" else {key: each for key, each in units.items() if key != "time"}
         if points.quantity not in known:
-            raise InputError(f"compare.{name}.quantity", points.quantity, nearest(points.quantity, known))
+            raise unknown_quantity(name, points.quantity, known)
         require_unit(points, known[points.quantity])
+
+
+def unknown_quantity(name: str, quantity: str, known: Iterable[str]) -> InputError:
+    """The error of measured data of a quantity that no run has.
+
+    name   of the data
+    known  measures of the run
+    """
+    remedy = "name the column after a measure of the report, such as bed height or pressure drop"
+    return InputError(f"compare.{name}.quantity", quantity, nearest(quantity, known), remedy)
 
 
 def require_unit(points: Points, unit: str) -> None:

@@ -52,7 +52,8 @@ def find_case(name: Path | None) -> Path:
         here = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
         if len(here) != 1:
             found = ", ".join(path.name for path in here) or "none"
-            raise InputError("case", None, f"given, unless the folder holds exactly one TOML file (found: {found})")
+            limit = f"given, unless the folder holds exactly one TOML file (found: {found})"
+            raise InputError("case", None, limit, "cfddem new liquid-bed writes one" if found == "none" else "")
         return here[0]
     if name.is_file():
         return name

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.printing import announce_compilation
-from scenarios.validation.targets import ONLY_IF_NAMED, TARGETS
+from scenarios.validation.targets import ONLY_IF_NAMED, PIECEMEAL, TARGETS
 
 
 def validate(
@@ -26,6 +26,10 @@ def validate(
     data: Annotated[
         list[Path] | None, Parameter(help="CSV file of measured points; for binary-collision", negative="")
     ] = None,
+    hours: Annotated[
+        float | None,
+        Parameter(help="of wet-beds: begin no further piece after this time; the next call goes on with the rest"),
+    ] = None,
     json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
 ) -> None:
     """Reproduce published results and compare; exits 1 if a limit is exceeded.
@@ -39,36 +43,50 @@ def validate(
         raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
     if data and target != "binary-collision":
         raise InputError("--data", target, "used with binary-collision", "cfddem report --data takes data of a run")
+    if hours is not None and target not in PIECEMEAL:
+        raise InputError("--hours", hours, f"used with {', '.join(PIECEMEAL)}")
+    if hours is not None and not hours >= 0.0:
+        raise InputError("--hours", hours, "at least 0")
     names = [name for name in TARGETS if name not in ONLY_IF_NAMED] if target == "all" else [target]
-    held = [run(name, output, json, data or ()) for name in names]  # every target runs, even after a failure
+    held = [run(name, output, json, data or (), hours) for name in names]  # every target runs, even after a failure
     if not all(held):
         sys.exit(1)
 
 
 def bench(
-    target: Annotated[str, Parameter(help="dem, fluid, bed, or all")] = "dem",
+    target: Annotated[str, Parameter(help="dem, fluid, bed, scaling, or all")] = "dem",
     *,
     particles: Annotated[int, Parameter(help="of dem: 1000, 10000, 100000 or 1000000")] = 10_000,
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="dem with the film of water", negative="")] = False,
     films: Annotated[Literal["full"] | None, Parameter(help="with films that resist sliding and rolling, too")] = None,
-    bridges: Annotated[bool, Parameter(help="dem with a liquid bridge on every contact", negative="")] = False,
+    bridges: Annotated[
+        bool,
+        Parameter(
+            help="dem with a liquid bridge on every contact; bed: a wet bed beside the same bed dry", negative=""
+        ),
+    ] = False,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
-    """Measure the speed of this machine: a dense bed of spheres (dem), boxes of fluid, a gas bed (bed).
+    """Measure the speed of this machine: a dense bed of spheres (dem), boxes of fluid (fluid), a gas bed (bed).
 
+    "scaling" shows how cost grows with particles, cells, sizes, the reach of films, and threads if given.
     Each is compared with the memory speed of the machine, and with other codes where they are installed or published.
 
     Example: cfddem bench dem --particles 10000
     """
     announce_compilation()
     from scenarios.beds.gas_bed import study as gas_bed
-    from scenarios.benchmarks import dense_bed, fluid_box, table
+    from scenarios.beds.wet_bed import study as wet_bed
+    from scenarios.benchmarks import dense_bed, fluid_box, scaling, table
+
+    bed = wet_bed if bridges else gas_bed
 
     targets = {
         "dem": (lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"), dense_bed.rows),
         "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),
-        "bed": (lambda: gas_bed.bench(threads), gas_bed.rows),
+        "bed": (lambda: bed.bench(threads), bed.rows),
+        "scaling": (lambda: scaling.bench(threads), scaling.rows),
         "all": (lambda: table.bench(threads), table.rows),
     }
     if target not in targets:

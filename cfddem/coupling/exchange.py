@@ -36,6 +36,7 @@ from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler, SampledFlow
 from cfddem.coupling.self_disturbance import SelfDisturbance
+from cfddem.coupling.self_disturbance_walls import WallsOfGrid
 from cfddem.coupling.terms import CouplingTerms, FluidForces
 from cfddem.coupling.transfer import Transfer
 from cfddem.coupling.velocity_gradient import change_along, vorticity_at
@@ -88,7 +89,8 @@ class Exchange:
         self.lift, self.torque, self.viscous_stress = lift, torque, viscous_stress and fluid.model == "A"
         self.drag, self.agitation, self.history = Drag(drag, fluid.model), agitation, history
         self.wall_drag = wall_drag
-        self.self_disturbance = SelfDisturbance(kernel) if self_disturbance else None
+        walls = None if wall_drag is None else WallsOfGrid(kernel, fluid.boundaries)
+        self.self_disturbance = SelfDisturbance(kernel, walls) if self_disturbance else None
         self.flow = FlowSampler(fluid, kernel, self.self_disturbance, self.drag.needs_sizes)
         self.pressure, self.added_mass = PressureForce(fluid, kernel), added_mass or AddedMass(0.0, fluid.density)
         self.momentum = Transfer(

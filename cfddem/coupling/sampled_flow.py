@@ -64,7 +64,7 @@ class FlowSampler:
         """What every particle adds itself: modes of its disturbance (N, modes, 3) [m/s], and solid fraction (N,)."""
         if self.self_disturbance is None:
             return np.zeros((particles.count, 0, 3)), np.zeros(particles.count)
-        return particles["disturbance_modes"], self.self_disturbance.solid(cell_map)
+        return self.self_disturbance.own(particles, cell_map)
 
     def _diameter_ratio(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Diameter of every particle over the Sauter mean around it (N,) [-]; 1 unless sizes are sampled.

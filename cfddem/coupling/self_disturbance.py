@@ -29,6 +29,7 @@ import closures.compiled  # noqa: F401  lets compiled loops call laws by their n
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
+from cfddem.coupling.self_disturbance_walls import WallsOfGrid
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
@@ -44,20 +45,24 @@ class SelfDisturbance:
     """Disturbance of every particle by its own force and volume.
 
     kernel  of the run; its tables are found once for each grid
+    walls   of the grid that stop the disturbance, where a law of the drag beside walls acts; None for none
     """
 
     fields = (DISTURBANCE,)
 
-    def __init__(self, kernel: FilterKernel) -> None:
-        grid = kernel.grid
+    def __init__(self, kernel: FilterKernel, walls: WallsOfGrid | None = None) -> None:
+        grid, self._walls = kernel.grid, walls
         self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
         self._tables = tables(kernel)
 
-    def solid(self, cell_map: ParticleCellMap) -> Array:
-        """Own part of the solid fraction that every particle gathers (N,) [-]."""
-        own = np.empty(len(cell_map.volume))
-        _self_solid_fraction(cell_map.position, cell_map.volume, self._tables.solid, *self._cell, own)
-        return own
+    def own(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
+        """What every particle gathers of its own: modes (N, modes, 3) [m/s], and solid fraction (N,) [-]."""
+        modes, solid = particles[DISTURBANCE.name], np.empty(len(cell_map.volume))
+        _self_solid_fraction(cell_map.position, cell_map.volume, self._tables.solid, *self._cell, solid)
+        if self._walls is None:
+            return modes, solid
+        left = self._walls.left(cell_map)
+        return modes * left.flow, solid * left.solid
 
     def advance(
         self,
@@ -76,9 +81,10 @@ class SelfDisturbance:
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         density    of the fluid [kg/m3]
         """
+        left = np.empty((0, 0, 3)) if self._walls is None else self._walls.left(cell_map).flow
         _build_up(
             cell_map.position, *self._cell, drag, slip, screening, *self._tables[1:], density, particles.viscosity,
-            step, particles.disturbance_modes,
+            step, left, particles.disturbance_modes,
         )  # fmt: skip
 
 
@@ -121,9 +127,9 @@ def _steady(moving, slowest, wave_number, shares):
 @threaded
 def _build_up(
     position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
-    viscosity, step, modes_of,
+    viscosity, step, left, modes_of,
 ):  # fmt: skip
-    """Exact relaxation of every mode towards its value under a steady force."""
+    """Exact relaxation of every mode towards its value under a steady force; walls leave a share of it (or empty)."""
     modes = rates.shape[1]
     for n in prange(len(position)):
         diffusivity = viscosity[n] / density
@@ -142,6 +148,8 @@ def _build_up(
             for k in range(modes):
                 steady = scale * _at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
                 rate = diffusivity * (rates[d, k] + decay)
-                left = math.exp(-step * (rate + screening[n]))
+                remaining = math.exp(-step * (rate + screening[n]))
                 steady *= rate / (rate + screening[n])
-                modes_of[n, k, d] = steady + left * (modes_of[n, k, d] - steady)
+                if len(left) > 0:
+                    steady *= left[n, k, d]
+                modes_of[n, k, d] = steady + remaining * (modes_of[n, k, d] - steady)

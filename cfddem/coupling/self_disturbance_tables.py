@@ -41,14 +41,18 @@ class Tables(NamedTuple):
 
 def tables(kernel: FilterKernel) -> Tables:
     """The tables of a grid and its kernel."""
+    return tables_of(spacing_of(kernel), tuple(kernel.strength), kernel.sweeps)
+
+
+def spacing_of(kernel: FilterKernel) -> tuple[float, ...]:
+    """Spacing of the lattice of a grid [m]: that of its cells; across a grid one cell thick the smallest of others."""
     grid = kernel.grid
     spacing, flat = np.array(grid.spacing), np.array(grid.cells) == 1
-    spacing = np.where(flat, spacing[~flat].min() if (~flat).any() else spacing[0], spacing)
-    return _tables(tuple(spacing), tuple(kernel.strength), kernel.sweeps)
+    return tuple(np.where(flat, spacing[~flat].min() if (~flat).any() else spacing[0], spacing))
 
 
 @lru_cache(maxsize=16)
-def _tables(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Tables:
+def tables_of(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Tables:
     """Sums over the waves of a lattice; the flow of its periodic images is subtracted in the mean."""
     counts = np.rint(CELLS * max(spacing) / np.array(spacing)).astype(int)
     waves = np.meshgrid(*(2.0 * np.pi * np.fft.fftfreq(n) for n in counts[::-1]), indexing="ij")[::-1]
@@ -90,8 +94,12 @@ def _tables(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int
 def _modes(laplacian: Array) -> Array:
     """Number of the mode of each wave; waves of similar eigenvalue belong to one mode."""
     finite = np.where(np.isfinite(laplacian), laplacian, 1.0)
-    smallest, largest = float(np.min(laplacian)), float(finite.max())
-    mode: Array = (MODES * np.log(finite / smallest) / np.log(largest / smallest)).astype(int)
+    return mode_of(finite, float(np.min(laplacian)), float(finite.max()))
+
+
+def mode_of(rates: Array, smallest: float, largest: float) -> Array:
+    """Number of the mode of waves with these rates over the viscosity, between the smallest and largest one."""
+    mode: Array = (MODES * np.log(rates / smallest) / np.log(largest / smallest)).astype(int)
     return np.clip(mode, 0, MODES - 1)
 
 

@@ -20,10 +20,11 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
-from cfddem.particles.energy_of_bridges import BridgeEnergies
-from cfddem.particles.energy_of_contacts import CHANNELS, WALLS, count_motion, count_work, room_for_count
+from cfddem.particles.energy_of_bridges import RESISTANCE, BridgeEnergies
+from cfddem.particles.energy_of_contacts import BY_IMPULSES, CHANNELS, WALLS, count_motion, count_work, room_for_count
 from cfddem.particles.energy_of_shear import CHANNELS as OF_SHEAR
 from cfddem.particles.energy_of_shear import ShearEnergies
+from cfddem.particles.impulse_motion import keep_motion
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 from cfddem.particles.vectors import flat
 
@@ -76,11 +77,12 @@ class Energies:
             if self._bridges is not None and not first:
                 self._bridges.count(solver, 0.0, 0.0, 0.5 * step)  # a new list forgets the half kick that follows
         particles = solver.particles
-        self._count.ahead[:] = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
+        ahead = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
+        keep_motion(self._count, particles, step, ahead)
         if self._bridges is not None:
-            self._bridges.before(solver, step, self._count.ahead)
+            self._bridges.before(solver, step, ahead)
         if self._shear is not None:
-            self._shear.before(solver, step, self._count.ahead)
+            self._shear.before(solver, step, ahead)
 
     def after(self, solver: ParticleSolver, step: float, last: bool) -> None:
         """Count after a step [s]; `last` of an advance."""
@@ -140,9 +142,11 @@ class Energies:
         count_motion(particles, count, gravity, np.array(solver.free, float), step, before, after)
         p = solver.laws.parameters
         self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
-        self.totals[: len(CHANNELS)] += solver.communicator.sum(count.totals[0], axis=0)
+        counted = solver.communicator.sum(count.totals[0], axis=0)
+        self.totals[: len(CHANNELS)] += counted[: len(CHANNELS)]
         if self._bridges is not None:
             done, by_walls = self._bridges.count(solver, step, before, after)
+            done[RESISTANCE] -= counted[BY_IMPULSES]
             self.totals[len(CHANNELS) :][: len(done)] += done
             self.totals[WALLS] += by_walls
         if self._shear is not None:

@@ -6,7 +6,7 @@ pull acts alone belong to these lines, so that the account closes to the accurac
 
 A pull in a stiff film gives particles energy in each kick that the impulse of the film takes again: more than passes at
 the speed at which they drift. The line of the resistance is therefore what pull and resistance together take beyond
-what the pull stores.
+what the pull stores. The same holds for the springs of contacts (`energy_of_contacts.BY_IMPULSES`).
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _resisted(k, particles, edges, memory, count, step):
 
 
 @inline
-def _note(k, memory, lost):
+def note_bridge_loss(k, memory, lost):
     """Add what the bridge of edge k has lost to its collision, where one is recorded."""
     if RECORD and not np.isnan(memory.begin[k]):
         before = memory.lost_to_bridge[k]
@@ -156,7 +156,7 @@ def _count_bridge(k, particles, edges, memory, count, shift, p, step, before, af
         lost, by_wall = _resisted(k, particles, edges, memory, count, step)
         totals[RESISTANCE] += lost
         totals[BY_WALLS] += by_wall
-        _note(k, memory, lost)
+        note_bridge_loss(k, memory, lost)
     if change < 0:
         totals[BROKEN] += count.held[k] - count.pulled[k]
     held, pulled = count.held[k], count.pulled[k]
@@ -174,7 +174,7 @@ def _count_bridge(k, particles, edges, memory, count, shift, p, step, before, af
     elif step > 0.0 and held != 0.0 and memory.bridge_resistance[k] > 0.0:
         surplus = pulled + work + count.held[k] - held
         totals[RESISTANCE] -= surplus
-        _note(k, memory, -surplus)
+        note_bridge_loss(k, memory, -surplus)
     count.pulled[k], by_wall = _pulled(k, particles, edges, memory, after, 1.0)
     totals[BY_WALLS] += by_wall
 

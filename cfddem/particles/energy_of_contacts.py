@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, threaded
+from cfddem.particles.energy_of_bridges import note_bridge_loss
+from cfddem.particles.impulse_motion import taken_by_impulses
 from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.slots import (
+    BRIDGE,
     FILM,
     RECORD,
     RESCALED,
@@ -39,6 +42,9 @@ CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffeni
 """Energy lost to films, dashpots, sliding and rolling; energy gained from moving walls, from tangential springs whose
 stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
+BY_IMPULSES = len(CHANNELS)
+"""Place after the channels: work of springs at speeds that the impulses of bridges have taken again."""
+
 ALMOST = 1.0 - 1e-9
 """A contact slides if its tangential force is this share of Coulomb's limit or more."""
 
@@ -47,6 +53,7 @@ class Count(NamedTuple):
     """State of the count between two steps, as compiled loops take it."""
 
     ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
+    spin_ahead: np.ndarray  # (N, 3) likewise [rad/s]
     moved: np.ndarray  # (N, 3) distance moved during the half kicks around this instant [m]
     turned: np.ndarray  # (N, 3) angle turned meanwhile [rad]
     drifted: np.ndarray  # (N, 3) displacement of the particle in the step [m]
@@ -55,16 +62,21 @@ class Count(NamedTuple):
     power: np.ndarray  # (n,) going into the tangential spring [W]
     held: np.ndarray  # (n,) energy of the normal spring [J]
     yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
-    totals: np.ndarray  # (2, CHUNKS, channels); the second half is of pairs that another rank adds [J]
+    push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with bridges [N]
+    twist: np.ndarray  # (n, 3) its moment over the radius, the same on both bodies [N]
+    totals: np.ndarray  # (2, CHUNKS, channels + 1); the second half is of pairs that another rank adds [J]
 
 
 def room_for_count(solver: ParticleSolver) -> Count:
     """A count with all values 0, for the present particles and pairs."""
     number, count = len(solver.edges.first), solver.particles.count
-    ahead, moved, turned, drifted = np.zeros((4, count, 3))
+    ahead, spin_ahead, moved, turned, drifted = np.zeros((5, count, 3))
     spring, stiffness, power, held, yielded = np.zeros((5, number))
-    totals = np.zeros((2, CHUNKS, len(CHANNELS)))
-    return Count(ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, totals)
+    push, twist = np.zeros((2, number, 3))
+    totals = np.zeros((2, CHUNKS, len(CHANNELS) + 1))
+    return Count(
+        ahead, spin_ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, push, twist, totals
+    )
 
 
 @threaded
@@ -122,6 +134,21 @@ def _film_works(k, particles, edges, memory, count, step):
 
 
 @inline
+def _outrun(k, particles, edges, memory, count, step):
+    """Work of the springs of edge k in the first half kick, at the speed that impulses took before the bodies moved.
+
+    The springs give it, and the impulses of bridges take it again: none of it is stored.
+    """
+    i, j = edges.first[k], edges.second[k]
+    slowed, turned = taken_by_impulses(i, particles, count, step)
+    turned = times(particles.radius[i], turned)
+    if k < edges.between_particles:
+        other, also = taken_by_impulses(j, particles, count, step)
+        slowed, turned = minus(slowed, other), plus(turned, times(particles.radius[j], also))
+    return 0.5 * step * (dot(at(count.push, k), slowed) + dot(at(count.twist, k), turned))
+
+
+@inline
 def _forget(k, count, totals, step):
     """Clear the count of a contact that has ended; the energy of its tangential spring is lost."""
     totals[STIFFENING] -= 0.5 * count.stiffness[k] * count.spring[k] if step > 0.0 else 0.0
@@ -130,6 +157,8 @@ def _forget(k, count, totals, step):
     count.power[k] = 0.0
     count.held[k] = 0.0
     count.yielded[k] = 0.0
+    put(count.push, k, NOTHING)
+    put(count.twist, k, NOTHING)
 
 
 @inline
@@ -166,6 +195,11 @@ def _slides(row, minimum_gap, pressed, tangent):
 @inline
 def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, duration, totals):
     """Count what the contact of edge k has done, and keep what its springs hold; nothing if the solids do not touch."""
+    if BRIDGE and step > 0.0:
+        outrun = _outrun(k, particles, edges, memory, count, step)
+        totals[BY_IMPULSES] += outrun
+        if memory.bridge_film[k] > 0.0:
+            note_bridge_loss(k, memory, -outrun)
     separation, distance, gap = geometry(k, particles, edges, shift)
     minimum_gap = memory.minimum_gap[k]
     if not gap < minimum_gap:
@@ -214,6 +248,9 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
     count.power[k] = rate
     count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
     count.yielded[k] = yielded
+    if BRIDGE:
+        put(count.push, k, minus(times(elastic, normal), times(tangential, spring)))
+        put(count.twist, k, times(tangential * stretch, cross(normal, spring)))
 
 
 @threaded

@@ -30,3 +30,11 @@ def mean_motion(i, particles, count, step):
     velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
     spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
     return times(0.5, plus(at(count.ahead, i), velocity)), times(0.5, plus(at(count.spin_ahead, i), spin))
+
+
+@inline
+def taken_by_impulses(i, particles, count, step):
+    """Velocity and spin that all impulses of the step have taken from particle i."""
+    velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
+    spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
+    return minus(at(count.ahead, i), velocity), minus(at(count.spin_ahead, i), spin)

@@ -335,12 +335,18 @@ def between(i, j, image, position, shift):
 
 
 @inline
+def of_two_spheres(k, particles, edges, shift):
+    """Separation from the second sphere of a pair to the first, its length, and the sum of the radii."""
+    i, j = edges.first[k], edges.second[k]
+    separation = between(i, j, edges.image[k], particles.position, shift)
+    return separation, math.sqrt(dot(separation, separation)), particles.radius[i] + particles.radius[j]
+
+
+@inline
 def geometry(k, particles, edges, shift):
     """Separation from the second body to the first, its length, and the gap."""
-    i, j = edges.first[k], edges.second[k]
     if k < edges.between_particles:
-        separation = between(i, j, edges.image[k], particles.position, shift)
-        distance = math.sqrt(dot(separation, separation))
-        return separation, distance, distance - (particles.radius[i] + particles.radius[j])
+        separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+        return separation, distance, distance - radii
     distance = touched_distance(edges, k)
-    return times(distance, touched(edges, k, NORMAL)), distance, distance - particles.radius[i]
+    return times(distance, touched(edges, k, NORMAL)), distance, distance - particles.radius[edges.first[k]]

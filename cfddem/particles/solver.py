@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.stopwatch import Stopwatch
@@ -63,7 +64,7 @@ class ParticleSolver:
     after    an earlier run over the same particles and walls, whose pair memory is taken over
     communicator  path to sums, extremes and decisions over all ranks
     division  of space among the ranks; needed if there are several. All ranks pass all particles
-    balance   move the planes of the division when particles become unequally many
+    balance   move its planes when particles become unequally many
     """
 
     def __init__(
@@ -262,16 +263,15 @@ class ParticleSolver:
             self.energies.restore(state["energies"])
 
     def _integrate(self, step: float, steps: int) -> tuple[int, float, int]:
-        if self._loop is _NO_LOOP or self._threads != self.lists.many:
-            self._threads = self.lists.many
-            self._loop = specialise(integrate, self.choices, self._threads)
+        threads = self.lists.many and use_threads(None) > 1  # one thread gains nothing from loops for all
+        if self._loop is _NO_LOOP or self._threads != threads:
+            self._threads, self._loop = threads, specialise(integrate, self.choices, threads)
             if self.communicator.size > 1:
                 self._loop = StepsWithGhosts(self.choices, self._threads, self.lists.ghosts, self.communicator)
         log = _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first))
-        cutoff_ratio = self.laws.cutoff_ratio if self.laws.film else 0.0
         return self._loop(  # type: ignore[no-any-return]
-            *self._views, self.table, cutoff_ratio, self._parameters, self.free, self.gravity, step, steps,
-            self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log,
+            *self._views, self.table, self.laws.cutoff_ratio if self.laws.film else 0.0, self._parameters, self.free,
+            self.gravity, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log,
         )  # fmt: skip
 
     def _take_list(self, edges: Edges) -> None:

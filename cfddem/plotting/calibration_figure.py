@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from cfddem.case.compare import ABSCISSAE
 from cfddem.io.quantities import shown_unit
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, SKY, blank, label, legend, save
 from cfddem.plotting.sweep_figure import unit_of
@@ -69,7 +70,7 @@ def _series(panel: Axes, found: Found, data: Points, part: slice) -> None:
     panel.plot(data.place, found.best.computed[part], color=BLUE, marker=".", label="best trial")
     style: dict[str, Any] = {"fmt": "o", "color": ORANGE, "capsize": 2.5, "zorder": 3}
     panel.errorbar(data.place, data.value, yerr=data.error, label="measured", **style)
-    axis = {"time": ("time", "s"), "height": ("height", "m")}[data.against]
+    axis = (data.against.replace("_", " "), ABSCISSAE[data.against])
     label(panel, *axis, data.quantity.replace("_", " "), shown_unit(data.unit))
 
 

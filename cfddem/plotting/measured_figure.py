@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.analysis.measured import MeasuredComparison
+from cfddem.case.compare import ABSCISSAE
 from cfddem.io.quantities import shown_unit
 from cfddem.plotting.curves import BLUE, ORANGE, blank, label, legend
 
@@ -23,13 +24,16 @@ def measured_figure(found: Sequence[MeasuredComparison]) -> Any:
             panel.plot(each.line[1], each.line[0], color=BLUE, label="run")
             panel.errorbar(points.value, points.place, xerr=bars, label="measured", **style)
             label(panel, name, shown_unit(points.unit), "height", "m", points.name)
-        elif points.against == "time":
-            panel.plot(*each.line, color=BLUE, label="run")
+        elif points.against:
+            marker = "o-" if points.against == "inlet_velocity" else "-"
+            panel.plot(*each.line, marker, color=BLUE, label="run")
             panel.errorbar(points.place, points.value, yerr=bars, label="measured", **style)
-            label(panel, "time", "s", name, shown_unit(points.unit), points.name)
+            axis = (points.against.replace("_", " "), ABSCISSAE[points.against])
+            label(panel, *axis, name, shown_unit(points.unit), points.name)
         else:
             place, mean = np.arange(len(points.value)) + 1.0, float(each.computed[0])
-            panel.axhspan(mean - each.computed_error, mean + each.computed_error, color=BLUE, alpha=0.2, linewidth=0)
+            error = float(np.max(each.computed_error))
+            panel.axhspan(mean - error, mean + error, color=BLUE, alpha=0.2, linewidth=0)
             panel.axhline(mean, color=BLUE, label="run")
             panel.errorbar(place, points.value, yerr=bars, label="measured", **style)
             label(panel, "measurement", "-", name, shown_unit(points.unit), points.name)

@@ -14,6 +14,7 @@ from cfddem.preflight.data_checks import check_data
 from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel, check_wall_drag
 from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
 from cfddem.preflight.issue import Issue
+from cfddem.preflight.law_ranges import check_ranges
 from cfddem.preflight.step_estimate import StepEstimate
 from cfddem.preflight.wall_checks import check_walls_and_feeds
 from cfddem.preflight.wet_estimate import WetEstimate, check_wet
@@ -58,7 +59,7 @@ def find_issues(
         *check_data(case),
     ]
     if case.fluid is not None:
-        found += [*check_kernel(case, steps), *check_flow(case, bed), *check_drag(case, bed)]
+        found += [*check_kernel(case, steps), *check_flow(case, bed), *check_drag(case), *check_ranges(case, bed)]
         found += check_waves(case, bed)
     return sorted(found, key=lambda each: each.severity != "error")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import points_of
+from cfddem.case.compare import Points, held, points_of
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import Issue
 
@@ -22,8 +22,22 @@ def check_data(case: Case) -> Iterator[Issue]:
                 "error", key, f"{failure.field}{value} must be {failure.limit}", failure.remedy or "correct the file"
             )
             continue
+        if points.against == "inlet_velocity":
+            yield from _check_velocities(case, key, points)
+            continue
         end, unit = (case.run.until, "s") if points.against == "time" else (case.column.height, "m")
         if points.against and not ((points.place >= 0.0) & (points.place <= end)).any():
             low, high = points.place.min(), points.place.max()
             reason = f"all points lie at {low:.3g} to {high:.3g} {unit}, outside of 0 to {end:.3g} {unit}"
             yield Issue("warning", key, reason, "check the unit of the column, or change the case")
+
+
+def _check_velocities(case: Case, key: str, points: Points) -> Iterator[Issue]:
+    """Check that the case holds the velocities of measured points."""
+    missing = points.place[~held(case, points.place)]
+    if len(missing):
+        listed = ", ".join(f"{each:.3g}" for each in missing[:5]) + (" ..." if len(missing) > 5 else "")
+        yield Issue(
+            "warning", key, f"the inlet does not hold {len(missing)} of {len(points.place)} velocities: {listed} m/s",
+            "give bed.inlet_velocity in steps, [[0, 0.01], [0.1, 0.01], [0.11, 0.02], [0.2, 0.02]]",
+        )  # fmt: skip

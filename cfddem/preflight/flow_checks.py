@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from inspect import signature
 
 import numpy as np
 
@@ -12,7 +11,6 @@ from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.step_estimate import StepEstimate
-from closures.registry import REGISTRY, Law, load_built_in_laws
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
@@ -136,25 +134,12 @@ def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
 
 
-def check_drag(case: Case, bed: BedEstimate) -> Iterator[Issue]:
-    """Check that the drag law is used within its range, and suits unequal particles."""
+def check_drag(case: Case) -> Iterator[Issue]:
+    """Check that the drag law suits unequal particles."""
     law = case.laws.drag_law
     if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
         return
-    voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
     ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
-    values = [("reynolds", bed.reynolds), ("voidage", voidage), *(("diameter_ratio", each) for each in ratios)]
-    chosen = {"laws.drag": law, "laws.added_mass": case.laws.added_mass_law}
-    for key, each in ((key, each) for key, each in chosen.items() if isinstance(each, Law)):
-        for name, value in values:
-            low, high = each.ranges.get(name, (-math.inf, math.inf))
-            if not low <= value <= high:
-                yield Issue(
-                    "warning", key,
-                    f"{each.name} was fitted to {name} {low:g} to {high:g}, but the bed has {value:.3g}"
-                    + (_difference(each, bed.reynolds, voidage) if key == "laws.drag" else ""),
-                    "choose another law; cfddem explain lists all with their ranges",
-                )  # fmt: skip
     if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
         yield Issue(
             "warning", "laws.drag",
@@ -162,20 +147,3 @@ def check_drag(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             f"{max(ratios) / min(ratios):.3g}",
             'use "beetstra_polydisperse": the drag on each size decides which species sinks',
         )  # fmt: skip
-
-
-def _difference(law: Law, reynolds: float, voidage: float) -> str:
-    """How far the drag factor of a law lies from those of the laws that were fitted here, in words."""
-    load_built_in_laws()
-    others = []
-    for other in REGISTRY["drag"].values():
-        given = {"reynolds": reynolds, "voidage": voidage}
-        ranges = (other.ranges.get(name, (-math.inf, math.inf)) for name in given)
-        plain = len(signature(other.function).parameters) == len(given)
-        if other is not law and plain and all(low <= each <= high for (low, high), each in zip(ranges, given.values())):
-            others.append(other.function(reynolds, voidage))
-    if not others or len(signature(law.function).parameters) != 2:
-        return ""
-    apart = [100.0 * (law.function(reynolds, voidage) / each - 1.0) for each in others]
-    count = f"{len(others)} laws" if len(others) > 1 else "1 law"
-    return f"; its drag differs by {min(apart):+.0f} to {max(apart):+.0f} % from that of the {count} fitted here"

@@ -12,6 +12,7 @@ from cfddem.case.liquid import Liquid
 from cfddem.case.schema import Case
 from cfddem.preflight.collision_estimate import CollisionEstimate, pair_row, reduced
 from cfddem.preflight.issue import Issue
+from cfddem.preflight.law_ranges import effect_of_bridge
 from closures import bridge, capillary, capillary_pull, numbers
 from closures.liquid_film import film_thickness
 
@@ -105,7 +106,7 @@ def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
     elif liquid.pull == "willett" and wet.volume_ratio > WILLETT:
         yield Issue(
             "warning", key, f"bridges of {wet.volume_ratio:.2g} R^3; the pull of Willett was fitted below "
-            f"{WILLETT:g} R^3", 'use less liquid, or compare with liquid.pull = "lambert"',
+            f"{WILLETT:g} R^3{_effect(liquid, wet)}", 'use less liquid, or compare with liquid.pull = "lambert"',
         )  # fmt: skip
     if liquid.contact_angle > 90.0:
         yield Issue(
@@ -123,6 +124,12 @@ def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
             f"{2.0 * wet.film:.2g} m: they do not resist", "use more liquid, or a smaller gap",
         )  # fmt: skip
     yield from _check_spray(case)
+
+
+def _effect(liquid: Liquid, wet: WetEstimate) -> str:
+    """What the law of Willett changes beyond its range, in words."""
+    radius = (wet.volume / wet.volume_ratio) ** (1.0 / 3.0)
+    return effect_of_bridge(math.radians(liquid.contact_angle), 0.5 * radius, wet.volume, wet.rupture)
 
 
 def _check_spray(case: Case) -> Iterator[Issue]:

@@ -24,11 +24,11 @@ from cfddem.analysis.measured import compared_at, with_files
 from cfddem.analysis.report import window_of
 from cfddem.analysis.response import Response, fewest_runs, response
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
-from cfddem.case.compare import Points, points_of
+from cfddem.case.compare import Points, held, points_of, require_measured_units
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.reading import open_run
-from cfddem.run import sweep
+from cfddem.run import history, sweep
 from cfddem.run.samples import Array, Variable, unit_samples
 
 STUDY = "calibration"
@@ -129,6 +129,7 @@ def calibrate(
         raise InputError("--trials" if trials < 1 else "--jobs", min(trials, jobs), "at least 1")
     case = with_files(Case.from_toml(path, overrides), match)
     data = _data(case)
+    require_measured_units(case, history.units_of(case))
     for low_or_high in (0.0, 1.0):  # both ends of all ranges are valid values
         case.with_(**{each.key: each.value(low_or_high) for each in varied})
     sweep.make_output(output)
@@ -162,6 +163,9 @@ def _data(case: Case) -> list[Points]:
         if not np.isfinite(each.error).all():  # local: of measured points
             remedy = "add a column error, or relative_error in [compare] of the case"
             raise InputError(f"data {each.name}", None, "given with standard errors", remedy)
+        if each.against == "inlet_velocity" and not held(case, each.place).all():  # local: measured points
+            missing, remedy = float(each.place[~held(case, each.place)][0]), "give bed.inlet_velocity in steps"
+            raise InputError(f"data {each.name} inlet_velocity", missing, "a velocity that the case holds", remedy)
     return data
 
 

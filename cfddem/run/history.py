@@ -101,6 +101,11 @@ def all_columns(case: Case) -> dict[str, Quantity]:
     return found
 
 
+def units_of(case: Case) -> dict[str, str]:
+    """Unit of every column of the history of a case."""
+    return {name: each.unit for name, each in all_columns(case).items()}
+
+
 def require_shared(case: Case, ranks: int) -> None:
     """Refuse measures of a user that do not say that they are right on several ranks."""
     for name, each in MEASURES.items():

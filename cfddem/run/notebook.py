@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.compile import announce_compilation
+from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
+from cfddem.io.folder import read_about
 from cfddem.io.reading import Run, open_run
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run import runner
@@ -35,16 +37,17 @@ def run_case(
 ) -> Run:
     """Check a case, run it in a new folder with a progress bar, and open the result.
 
-    overwrite          delete a run that the folder holds
+    overwrite          delete the run that the folder holds
     fields, callbacks  of the simulation
     returns            the run, to read its fields and history
-    errors             PreflightError if the check finds errors; InputError if the folder holds a run
+    errors             PreflightError if the check finds errors; InputError if the folder holds a run,
+                       or, with overwrite, a run.json that is not that of a run
     """
     folder = Path(folder)
     for issue in refuse_errors(case).issues:
         print("\n".join(issue.lines()), file=sys.stderr)
     if overwrite and (folder / "run.json").exists():
-        shutil.rmtree(folder)
+        _delete_run(folder)
     with notebook_line() if in_notebook() else live_line() as line:
         with warmup(case):
             prepared = runner.Run.begin(
@@ -52,6 +55,16 @@ def run_case(
             )
         prepared.go()
     return open_run(folder)
+
+
+def _delete_run(folder: Path) -> None:
+    """Delete a run folder; a folder of something else is refused."""
+    try:
+        read_about(folder)
+    except CfddemError as failure:
+        remedy = "choose another folder, or delete this one yourself"
+        raise InputError("folder", str(folder), "a run folder to be overwritten", remedy) from failure
+    shutil.rmtree(folder)
 
 
 def in_notebook() -> bool:

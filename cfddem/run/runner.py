@@ -104,7 +104,7 @@ class Run:
         folder, text = Path(folder), case.to_toml() if text is None else text
         history.require_shared(case, communicator.size)
         require_measures_of(case)
-        require_measured_units(case, {name: each.unit for name, each in history.all_columns(case).items()})
+        require_measured_units(case, history.units_of(case))
         communicator.by_first(lambda: _prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
         begun = clock.monotonic()

@@ -63,10 +63,13 @@ def positions(count: int) -> tuple[np.ndarray, tuple[float, float]]:
     return np.concatenate(tiles), (across * side, along * side)
 
 
-def bed(count: int = 10_000, film: bool = False, bridges: bool = False, motions: str = "normal") -> ParticleSolver:
+def bed(
+    count: int = 10_000, film: bool = False, bridges: bool = False, motions: str = "normal", reach: float = 1.0
+) -> ParticleSolver:
     """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges.
 
     motions  that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
+    reach    of films over the reduced radius
     """
     centres, (width, depth) = positions(count)
     grains = make_particles(centres, 0.5 * DIAMETER, GRAIN.density, viscosity=1e-3 if film else 0.0)
@@ -76,7 +79,7 @@ def bed(count: int = 10_000, film: bool = False, bridges: bool = False, motions:
         grains,
         pair_table([GRAIN]),
         walls=[Plane()],
-        laws=Laws(film=film, film_motions=motions, bridge=WATER if bridges else None),
+        laws=Laws(film=film, film_motions=motions, cutoff_ratio=reach, bridge=WATER if bridges else None),
         gravity=(0.0, 0.0, -9.81),
         box=(width, depth, None),
     )
@@ -95,11 +98,11 @@ def bench(
 
     count    particles: 1 000, 10 000, 100 000 or 1 000 000
     threads  of both codes
-    film     with the film of water
+    film     with the film of water; the same bed without films is a peer
     bridges  with a liquid bridge on every contact, of a film of 0.2 % of the diameter; the bed without is a peer
     rounds   measurements of each code, taken in turn; their medians count
     steps    of one measurement
-    full     with films that resist sliding and rolling, too; the same bed with normal films is a peer
+    full     with films that resist sliding and rolling, too; the bed with normal films is a further peer
     returns  what was run, the medians, the speed over that of each LAMMPS style or why it did not run (`lammps`), and
              the bytes that a step must move with the share of the memory speed that this is
     """
@@ -107,6 +110,8 @@ def bench(
     bandwidth = triad(threads)
     use_threads(threads)
     runs = {"cfddem": bed(count, film or full, bridges, "full" if full else "normal")}
+    if film or full:
+        runs["without films"] = bed(count, bridges=bridges)
     if full:
         runs["normal films"] = bed(count, True, bridges)
     if bridges:

@@ -54,11 +54,14 @@ def bench(threads: int = 1) -> dict[str, Any]:
     """
     speed = triad(threads)
     use_threads(threads)
-    return {"threads": threads, "triad [GB/s]": speed / 1e9, "boxes": [_measure(cells, speed) for cells in CELLS]}
+    return {"threads": threads, "triad [GB/s]": speed / 1e9, "boxes": [measure(cells, speed) for cells in CELLS]}
 
 
-def _measure(cells: tuple[int, int, int], speed: float) -> dict[str, Any]:
-    """Median of some steps after some to warm up."""
+def measure(cells: tuple[int, int, int], speed: float) -> dict[str, Any]:
+    """Median of some steps in a box after some to warm up.
+
+    speed  of the memory [bytes/s]
+    """
     fluid, voidage, drag, momentum = box(cells)
     times, iterations = [], []
     for n in range(1, WARM + MEASURED + 1):
@@ -72,9 +75,10 @@ def _measure(cells: tuple[int, int, int], speed: float) -> dict[str, Any]:
     return {
         "cells": list(cells),
         "step [s]": median,
-        "longest accepted [s]": CELLS[cells],
+        "longest accepted [s]": CELLS.get(cells),
         "step of icoFoam [s]": ICOFOAM.get(cells),
         "pressure iterations": work,
+        "bytes": moved,
         "share of the triad": moved / speed / median,
     }
 

@@ -50,6 +50,11 @@ def bytes_of_step(run: ParticleSolver) -> float:
     What a pair remembers is read and written once, what it hands to its particles is written and read once; a film
     or a bridge needs one further pass over the graph, and a film over its memory. New lists do not count.
     """
-    pairs, passes = len(run.edges.first), 1 + run.laws.film + (run.bridges is not None)
-    memory = sum(2 * array.nbytes for array in run.edges.arrays.values())
-    return memory + pairs * (passes * GRAPH_BYTES + INCIDENT_BYTES) + len(run.particles.radius) * PARTICLE_BYTES
+    return len(run.edges.first) * bytes_of_pair(run) + len(run.particles.radius) * PARTICLE_BYTES
+
+
+def bytes_of_pair(run: ParticleSolver) -> float:
+    """Part of a pair in these bytes."""
+    passes = 1 + run.laws.film + (run.bridges is not None)
+    memory = sum(2 * array.nbytes for array in run.edges.arrays.values()) / max(len(run.edges.first), 1)
+    return memory + passes * GRAPH_BYTES + INCIDENT_BYTES

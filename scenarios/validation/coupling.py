@@ -107,6 +107,12 @@ def landings(curves: Curves) -> list[Row]:
             last = away[gaps < 2.0 * landing.RADIUS].max()
             rows.append(Row(f"{name}: the same in the last diameter over the floor", last, 0.0, 0.05))
             rows.append(Row(f"{name}: largest speed over measured", speeds.max() / fastest, 1.0))
+        for cell in (4.0, 2.0):
+            name = f"ten Cate {spheres['case'][row]} over a floor, coupled run, cells of {cell:g} d"
+            gaps, speeds = landing.land_on_grid(density, viscosity, cell)
+            exact = landing.landing_ode(density, viscosity, "nearest", gaps, floor_alone=True)
+            away = float(np.abs(speeds - exact).max()) / terminal
+            rows.append(Row(f"{name}: largest deviation from the equation of motion, over u_inf", away, 0.0, 0.01))
     return rows
 
 
@@ -202,21 +208,26 @@ def _draw(folder: Path, curves: Curves) -> None:
         terminal["uncorrected"][0],
         "o-",
         color=GREY,
-        label="without self-disturbance correction",
+        label="uncorrected",
     )
-    axes[0].semilogx(terminal["reynolds"][0], terminal["velocity"][0], "o-", color=BLUE, label="taken out, worst")
+    axes[0].semilogx(
+        terminal["reynolds"][0], terminal["velocity"][0], "s-", color=BLUE, label="corrected, worst of nine"
+    )
     axes[0].axhline(1.0, color="black", linewidth=0.5)
     label(axes[0], "Reynolds number", "-", "terminal velocity over that of the drag law", "-")
-    legend(axes[0])
+    legend(axes[0], loc="upper right", title="self-disturbance")
     fall = curves["release/Mordant"]
     axes[1].plot(fall["time"][0], fall["speed"][0], color=BLUE, label="run")
     axes[1].plot(fall["time"][0], fall["equation"][0], ":", color=ORANGE, label="equation of motion")
     label(axes[1], "time", "s", "speed of fall", "m/s")
     legend(axes[1])
-    for material, colour in (("alumina", BLUE), ("alginate", ORANGE)):
+    for material, colour, marker in (("alumina", BLUE, "o"), ("alginate", ORANGE, "s")):
         beds = curves[f"liquid_bed/{material}"]
-        axes[2].loglog(beds["voidage"][0], beds["velocity"][0], "o-", color=colour, label=material)
+        axes[2].loglog(beds["voidage"][0], beds["velocity"][0], f"{marker}-", color=colour, label=material)
         axes[2].loglog(beds["expected"][0], beds["velocity"][0], ":", color=colour, label="mean of published laws")
+    axes[2].set_xticks([0.55, 0.6, 0.7, 0.8], ["0.55", "0.6", "0.7", "0.8"])
+    axes[2].set_yticks([0.01, 0.03, 0.1, 0.3], ["0.01", "0.03", "0.1", "0.3"])
+    axes[2].minorticks_off()
     label(axes[2], "voidage", "-", "superficial velocity", "m/s")
     legend(axes[2])
     save(figure, folder / "coupling.png")

@@ -32,6 +32,19 @@ def finished(case: Case, folder: Path, name: str, progress: Progress, changes: d
     return open_run(home)
 
 
+def advanced(case: Case, folder: Path, name: str, progress: Progress, until: float) -> None:
+    """Advance the run of a case in its folder to a time [s]; nothing if it is there. A later time continues it."""
+    home = folder / name
+
+    def live(status: Status) -> None:
+        progress(f"{name}: {status.time:.3g} of {status.end:g} s")
+
+    if not (home / "run.json").exists():
+        Run.begin(case.with_(**{"run.until": until}), home, report=live, progress=progress).go()
+    elif (run := open_run(home)).status != "finished" or run.times[-1] < until * (1.0 - 1e-9):
+        Run.resume(home, until=max(until, float(run.times[-1])), report=live, progress=progress).go()
+
+
 def kept(path: Path, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """Numbers by name from a file; computed and written where there is none.
 

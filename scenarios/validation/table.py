@@ -96,13 +96,16 @@ def _size(difference: float) -> float:
     return float("inf") if difference != difference else abs(difference)
 
 
-def validate(name: str, output: Path, json: bool = False, data: Sequence[Path] = ()) -> bool:
+def validate(
+    name: str, output: Path, json: bool = False, data: Sequence[Path] = (), hours: float | None = None
+) -> bool:
     """Run a target, print its table and write its files into `output`/`name`.
 
     name     one of TARGETS
     output   folder for all targets
     json     print the table as JSON
     data     files of measured points, for targets that have a function `compare_data`
+    hours    after which a target of `PIECEMEAL` begins no further piece; the table is made of those there are
     returns  whether every limit holds
     """
     folder = Path(output) / name
@@ -116,7 +119,8 @@ def validate(name: str, output: Path, json: bool = False, data: Sequence[Path] =
     with _progress(name) as progress:
         module = import_module(TARGETS[name])
         compared: Sequence[Row] = [module.compare_data(folder, path) for path in data]  # wrong files end early
-        rows: Sequence[Row] = [*module.study(folder, progress), *compared]
+        limited = {} if hours is None else {"hours": hours}
+        rows: Sequence[Row] = [*module.study(folder, progress, **limited), *compared]
     seconds = perf_counter() - begin
     report = {
         "target": name,

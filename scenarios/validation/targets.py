@@ -21,3 +21,6 @@ TARGETS: dict[str, str] = {
 
 ONLY_IF_NAMED = ("resolved", "wet-beds")
 """Targets that take up to a day; `all` leaves them out."""
+
+PIECEMEAL = ("wet-beds",)
+"""Targets that make their table of what has been computed, and go on with the rest another time."""

@@ -27,6 +27,7 @@ TABLES = [
     "time [s], bed height [mm], error [mm]\n0.0, 40.1, 0.4\n0.5, 41.2, 0.4\n1.0, 40.7, 0.5\n",
     "# a comment\nheight [mm], voidage [-]\n5, 0.45\n15, 0.52\n25, 0.61\n",
     "pressure drop [Pa]\n130\n131\n129\n",
+    "velocity [mm/s], bed height [mm], bed height error [mm]\n30, 39.5, 0.3\n50, 40.1, 0.3\n",
 ]
 
 COMMANDS = """

@@ -31,7 +31,7 @@ import closures.compiled  # noqa: F401  lets compiled loops call laws by their n
 from cfddem.backend.compile import inline
 from cfddem.backend.law_set import specialise
 from cfddem.coupling.forces import history_modes
-from cfddem.coupling.forces.history_modes import FASTEST, SLOWEST, Memory, Surroundings, columns, exponentials
+from cfddem.coupling.forces.history_modes import Memory, Scales, columns, exponentials
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -60,6 +60,13 @@ class HistoryTerms(NamedTuple):
     conductance: Array  # of the implicit part, as a drag (N,) [kg/s]
     force: Array  # explicit part on every particle, its opposite on the fluid (N, 3) [N]
     factor: Array  # of the impulse of the implicit part (N,) [-]
+
+
+def _room(count: int) -> tuple[HistoryTerms, Scales]:
+    """Arrays for the terms and scales of so many particles."""
+    time, stokes, part, growth = np.empty((4, count))
+    terms = HistoryTerms(np.empty(count), np.empty((count, 3)), np.empty(count))
+    return terms, Scales(time, stokes, np.empty(count, np.int64), part, growth)
 
 
 @inline
@@ -96,6 +103,7 @@ class History:
             "history_modes", "m/s", columns(self._kernel), "memory", meaning="changes of the slip, as they fade"
         )
         self.fields = (SLIP, NEWEST, self._modes)
+        self._terms, self._found = _room(0)
         self._scales = specialise(history_modes.scales, {"memory_time": scale})
 
     def terms(
@@ -106,16 +114,18 @@ class History:
         drag       conductance of the drag (N,) [kg/s]
         inertia    mass and added mass (N,); infinite for fixed particles [kg]
         last_step  0 at the start [s]
+        returns    arrays that the next step overwrites
         """
-        terms = HistoryTerms(np.empty(particles.count), np.empty((particles.count, 3)), np.empty(particles.count))
+        if len(self._terms.factor) != particles.count:
+            self._terms, self._found = _room(particles.count)
+        terms, found = self._terms, self._found
         memory = Memory(particles[SLIP.name], particles[NEWEST.name], particles[self._modes.name], *terms)
-        voidage = flow.voidage if self.model == "B" else flow.voidage[:0]
-        around = Surroundings(flow.slip, drag, inertia, np.empty(particles.count), np.empty(particles.count))
         self._scales(
-            flow.slip, particles.radius, particles.viscosity, voidage, float(self.density), step * FASTEST,
-            step * SLOWEST, around.time, around.stokes,
+            flow.slip, drag, inertia, particles.radius, particles.viscosity,
+            flow.voidage if self.model == "B" else flow.voidage[:0], float(self.density), self._kernel, float(step),
+            *found, terms.conductance, terms.factor,
         )  # fmt: skip
-        history_modes.remember(memory, around, self._kernel, float(step), float(last_step))
+        history_modes.remember(memory, flow.slip, found, self._kernel, float(step), float(last_step))
         return terms
 
     def store(self, particles: Particles, implicit: Array, terms: HistoryTerms, step: float) -> None:

@@ -27,7 +27,8 @@ FIRST, LAST = -20, 11
 SLOWEST, FASTEST = 2.0**-FIRST, 2.0**-LAST
 """t_c over the step, at most and at least: a slower or faster memory is cut to this."""
 
-ROWS = 64
+ROW_BITS = 6
+ROWS = 1 << ROW_BITS
 """Rows of the table between a step and twice this step."""
 
 COMPLETE = 1.0 - 1e-3
@@ -77,14 +78,14 @@ class Memory(NamedTuple):
     factor: Array  # of the impulse of the implicit part, see `implicit_part` (N,)
 
 
-class Surroundings(NamedTuple):
-    """Each particle and the flow around it, as the loop takes them."""
+class Scales(NamedTuple):
+    """Scales of the memory of every particle, and its place in the table of the coming step."""
 
-    slip: Array  # (N, 3) [m/s]
-    drag: Array  # conductance (N,) [kg/s]
-    inertia: Array  # (N,) [kg]
     time: Array  # t_c (N,) [s]
     stokes: Array  # force of the memory per slip, with the kernel at t_c (N,) [kg/s]
+    row: np.ndarray  # of the table (N,)
+    part: Array  # of the way to the next row (N,)
+    growth: Array  # B, force per change of the slip in the step (N,) [kg/s]
 
 
 @inline
@@ -110,17 +111,26 @@ def implicit_part(drag, growth, time):
     return conductance, growth / given if given > 0.0 else 1.0
 
 
+_MANTISSA, _UNIT = np.int64(52 - ROW_BITS), 2.0 ** (ROW_BITS - 52)
+_REST, _FIRST_ROW = np.int64((1 << (52 - ROW_BITS)) - 1), np.int64((FIRST + 1023) << ROW_BITS)
+_LAST_ROW = np.int64((LAST - FIRST) * ROWS - 1)
+"""Bits of a number below those of its row; weight of the lowest; their mask; row of the number 0.0 in the table."""
+
+
 @inline
 def _row(time):
-    """Row of the table before a step over t_c, and how far the step is from it to the next row."""
-    mantissa, exponent = math.frexp(time)
-    place = (2.0 * mantissa - 1.0) * ROWS
-    row = (exponent - 1 - FIRST) * ROWS + int(place)
+    """Row of the table before a step over t_c, and how far the step is from it to the next row.
+
+    Exponent and first bits of the mantissa are the row, the other bits the rest.
+    """
+    bits = np.float64(time).view(np.int64)
+    row = (bits >> _MANTISSA) - _FIRST_ROW
+    part = np.float64(bits & _REST) * _UNIT
     if row < 0:
-        return 0, 0.0
-    if row >= (LAST - FIRST) * ROWS:
-        return (LAST - FIRST) * ROWS - 1, 1.0
-    return row, place - math.floor(place)
+        return np.int64(0), 0.0
+    if row > _LAST_ROW:
+        return _LAST_ROW, 1.0
+    return row, part
 
 
 @inline
@@ -141,71 +151,73 @@ def _advance(kernel, modes, gain, last, now):
     for k in range(before, until):  # the particle slows down or the step is shorter: more modes than before
         for d in range(3):
             modes[4 + 3 * k + d] = modes[1 + 3 * before + d]
-    low, high, part = kernel.fading[now[0]], kernel.fading[now[0] + 1], now[1]
+    low, high, part, share = kernel.fading[now[0]], kernel.fading[now[0] + 1], now[1], kernel.share
     low_last, high_last, part_last = kernel.fading[last[0]], kernel.fading[last[0] + 1], last[1]
-    rest = kernel.rest[until]
-    x, y, z = rest * gain[0], rest * gain[1], rest * gain[2]
+    x, y, z = times(kernel.rest[until], gain)
     for k in range(until):
         fading, here = low[k] + part * (high[k] - low[k]), 1 + 3 * k
-        faded = fading
-        if last != now:
-            faded = low_last[k] + part_last * (high_last[k] - low_last[k])
-        along, across, up = modes[here], modes[here + 1], modes[here + 2]
-        along += faded * (gain[0] - along)
-        across += faded * (gain[1] - across)
-        up += faded * (gain[2] - up)
+        faded = low_last[k] + part_last * (high_last[k] - low_last[k])
+        along = modes[here] + faded * (gain[0] - modes[here])
+        across = modes[here + 1] + faded * (gain[1] - modes[here + 1])
+        up = modes[here + 2] + faded * (gain[2] - modes[here + 2])
         modes[here], modes[here + 1], modes[here + 2] = along, across, up
-        share = fading * kernel.share[k]
-        x, y, z = x + share * along, y + share * across, z + share * up
+        left = fading * share[k]
+        x, y, z = x + left * along, y + left * across, z + left * up
     modes[0] = until
     modes[1 + 3 * until], modes[2 + 3 * until], modes[3 + 3 * until] = gain
     return x, y, z
 
 
 @threaded
-def scales(slip, radius, viscosity, voidage, density, shortest, longest, time, stokes):
-    """Time t_c of every particle, and the force of its memory per slip, with the kernel at t_c.
+def scales(
+    slip, drag, inertia, radius, viscosity, voidage, density, kernel, step, time_of, stokes_of, row_of_table,
+    part_of_row, growth_of, conductance, factor,
+):  # fmt: skip
+    """Time scale of every particle, and the implicit part of its history force in the coming step.
 
-    voidage            by whose inverse the force is larger; empty for 1
-    shortest, longest  t_c, to which it is cut [s]
-    time, stokes       filled [s], [kg/s]
+    drag     conductance (N,) [kg/s]
+    inertia  (N,) [kg]
+    voidage  by whose inverse the force is larger; empty for 1
+    time_of, ...  filled, see `Scales` and `Memory`
     """
+    longest, shortest = step * SLOWEST, step * FASTEST
     for n in prange(len(radius)):
         diameter, kinematic = 2.0 * radius[n], max(viscosity[n], 1e-300) / density
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
-        time[n] = max(min(memory_time(speed, diameter, kinematic), longest), shortest)
+        time = max(min(memory_time(speed, diameter, kinematic), longest), shortest)
         scale = 1.0 / voidage[n] if len(voidage) else 1.0
-        stokes[n] = scale * 3.0 * math.pi * viscosity[n] * diameter * basset(time[n], speed, diameter, kinematic)
+        stokes = scale * 3.0 * math.pi * viscosity[n] * diameter * basset(time, speed, diameter, kinematic)
+        place = _row(step / time)
+        growth = stokes * _second(kernel, place)
+        conductance[n], factor[n] = implicit_part(drag[n], growth, step / inertia[n])
+        time_of[n], stokes_of[n], growth_of[n] = time, stokes, growth
+        row_of_table[n], part_of_row[n] = place
 
 
 @inline
-def _remember_one(memory, around, kernel, step, last_step, n):
-    slip, before = of_row(around.slip, n), of_row(memory.before, n)
-    time, stokes = around.time[n], around.stokes[n]
-    now = _row(step / time)
-    growth = stokes * _second(kernel, now)
-    conductance, memory.factor[n] = implicit_part(around.drag[n], growth, step / around.inertia[n])
+def _remember_one(memory, slips, found, kernel, step, last_step, n):
+    slip, before = of_row(slips, n), of_row(memory.before, n)
     past, missing = NOTHING, NOTHING
     if last_step > 0.0 and not math.isnan(before[0]):
-        change, last, growth_last = minus(slip, before), now, growth
+        time, stokes, now, growth_last = found.time[n], found.stokes[n], (found.row[n], found.part[n]), found.growth[n]
+        change, last = minus(slip, before), now
         if last_step != step:
             last = _row(last_step / time)
             growth_last = stokes * _second(kernel, last)
         sum_of_modes = _advance(kernel, memory.modes[n], times(time / last_step, change), last, now)
         past = times(stokes * time / step, sum_of_modes)
         missing = minus(times(last_step * growth_last, change), of_row(memory.newest, n))
-    memory.conductance[n] = conductance
     for d in range(3):
-        memory.force[n, d] = past[d] + missing[d] / step - conductance * slip[d]
+        memory.force[n, d] = past[d] + missing[d] / step - memory.conductance[n] * slip[d]
         memory.before[n, d] = slip[d]
 
 
 @threaded
-def remember(memory, around, kernel, step, last_step):
+def remember(memory, slip, found, kernel, step, last_step):
     """Advance the memory of every particle over the last step, and find the force of the coming one."""
-    for n in prange(len(around.drag)):
+    for n in prange(len(slip)):
         # in a function: the compiler drops what a parallel loop itself writes through the members of a tuple
-        _remember_one(memory, around, kernel, step, last_step, n)
+        _remember_one(memory, slip, found, kernel, step, last_step, n)
 
 
 @threaded

@@ -2,9 +2,9 @@ r"""Extra drag of particles beside walls, by the laws of :mod:`closures.wall_dra
 
 .. math:: F = 6\pi\eta R\,\sum_w\left[(\lambda_n-1)\,nn + (\lambda_t-1)(1-nn)\right]\cdot(u-v)
 
-over the nearest wall or all walls, with n the normal of the wall, less what the films of the particle solver apply. The
-sum over walls is an approximation. At finite Re it is added to the drag of the drag law: creeping flow near the wall,
-which is too much far from it.
+over the nearest wall or all walls, with n the normal of the wall, less what the films of the particle solver apply.
+Every flat or round face is a wall: a capped cylinder has three. The sum over walls is an approximation. At finite Re it
+is added to the drag of the drag law: creeping flow near the wall, which is too much far from it.
 
 The transfer of momentum is implicit with one number per particle. This is the conductance along the slip; the
 remainder, which turns the slip, is explicit. With the drag, the conductance is at least half of that in any direction,

@@ -141,6 +141,12 @@ class _Pouring:
         self.slow = 0.1 * math.sqrt(gravity * float(run.particles.radius.min()))
 
     def go(self, step: float, steps: int) -> None:
+        """Advance the bed, and give up when it does not come to rest.
+
+        step    [s]
+        steps   number of steps
+        errors  RunFailed if the particles still move after `patience` fall times
+        """
         self.run.advance(step, steps)
         self.time += steps * step
         if self.time > self.patience * self.fall_time:

@@ -17,7 +17,7 @@ from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP, held_gap
 from cfddem.particles.interactions.film import clamp_speed
 from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_PULL, BRIDGE_SLIDING, bridge_pull
-from cfddem.particles.pair_graph import between
+from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times
 
 WetParticles = namedtuple(
@@ -44,9 +44,7 @@ def pair_bridge(n, particles, edges, memory, shift, p):
     """Pull of the bridge of a pair, its resistance if it is closed, and whether one forms."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation = between(i, j, edges.image[k], particles.position, shift)
-    radii = particles.radius[i] + particles.radius[j]
-    distance = math.sqrt(dot(separation, separation))
+    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
     gap, reduced_radius = distance - radii, particles.radius[i] * particles.radius[j] / radii
     state = bridge_state(k, gap, reduced_radius, memory, p)
     film = particles.film_thickness[i] + particles.film_thickness[j]
@@ -66,10 +64,8 @@ def pair_bridge_impulse(n, particles, edges, memory, shift, step):
     """Impulse of the bridge of a pair that stays closed in this step; marks the others."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation = between(i, j, edges.image[k], particles.position, shift)
-    distance = math.sqrt(dot(separation, separation))
+    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
     normal = times(1.0 / distance, separation)
-    radii = particles.radius[i] + particles.radius[j]
     gap, lever = distance - radii, distance / radii
     resistance = memory.bridge_resistance[k]
     resists = resistance > 0.0

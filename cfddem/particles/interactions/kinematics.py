@@ -6,12 +6,11 @@ normal turns, and the part of the contact that belongs to a triangle.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from cfddem.backend.compile import inline
-from cfddem.particles.pair_graph import between, geometry
-from cfddem.particles.vectors import at, dot, minus, plus, times
+from cfddem.particles.pair_graph import geometry, of_two_spheres
+from cfddem.particles.vectors import at, minus, plus, times
 from cfddem.particles.walls.nearest_point import SURFACE, TURN, touched
 
 
@@ -36,9 +35,7 @@ def sphere_kinematics(k, particles, edges, shift, free):
     """Kinematics of two spheres."""
     i, j = edges.first[k], edges.second[k]
     radius, spin, inverse_mass = particles.radius, particles.spin, particles.inverse_mass
-    separation = between(i, j, edges.image[k], particles.position, shift)
-    distance = math.sqrt(dot(separation, separation))
-    radii = radius[i] + radius[j]
+    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
     inverse_sum = 1.0 / radii
     relative = minus(at(particles.velocity, i), at(particles.velocity, j))
     rate = 1.0 / distance

@@ -6,7 +6,6 @@ one. `over_pairs` writes such a loop around a function of one pair that takes it
 
 from __future__ import annotations
 
-import math
 from collections import namedtuple
 from collections.abc import Callable, Collection, Iterable
 from typing import Any, NamedTuple
@@ -35,7 +34,7 @@ from cfddem.particles.interactions.slots import (
     read_memory,
     write_memory,
 )
-from cfddem.particles.pair_graph import between, memory_class
+from cfddem.particles.pair_graph import memory_class, of_two_spheres
 from cfddem.particles.vectors import NOTHING, at, dot, minus, put, times
 
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
@@ -92,9 +91,8 @@ def pair_film(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio):
     """Film of one pair of particles that cannot touch."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation = between(i, j, edges.image[k], particles.position, shift)
-    radii = particles.radius[i] + particles.radius[j]
-    gap = math.sqrt(dot(separation, separation)) - radii
+    _, distance, radii = of_two_spheres(k, particles, edges, shift)
+    gap = distance - radii
     reduced_radius = particles.radius[i] * particles.radius[j] / radii
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
@@ -109,11 +107,8 @@ def pair_impulse(n, particles, edges, memory, shift, cutoff_ratio, step):
     """Impulse of the film of one pair of particles."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation = between(i, j, edges.image[k], particles.position, shift)
-    distance = math.sqrt(dot(separation, separation))
-    normal = times(1.0 / distance, separation)
-    radii = particles.radius[i] + particles.radius[j]
-    gap = distance - radii
+    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+    normal, gap = times(1.0 / distance, separation), distance - radii
     reduced_radius = particles.radius[i] * particles.radius[j] / radii
     speed = dot(minus(at(particles.velocity, i), at(particles.velocity, j)), normal)
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])

@@ -11,15 +11,13 @@ Impulses act on the bodies before those of normal films, from the velocities aft
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.kinematics import relative_velocity
 from cfddem.particles.interactions.slots import TWIST, shear_impulses
-from cfddem.particles.pair_graph import between, edge_role, geometry
+from cfddem.particles.pair_graph import edge_role, geometry, of_two_spheres
 from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.tangential_lubrication import (
@@ -164,10 +162,9 @@ def pair_shear(n, particles, edges, memory, shift, step):
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     radius, spin, resistance = particles.radius, at(particles.spin, i), memory.shear_resistance[k]
-    separation = between(i, j, edges.image[k], particles.position, shift)
-    distance = math.sqrt(dot(separation, separation))
+    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
     normal = times(1.0 / distance, separation)
-    inverse_sum = 1.0 / (radius[i] + radius[j])
+    inverse_sum = 1.0 / radii
     lever = distance * inverse_sum
     reduced_radius = radius[i] * radius[j] * inverse_sum
     asymmetry = (radius[i] - radius[j]) * inverse_sum
@@ -191,10 +188,9 @@ def pair_shear(n, particles, edges, memory, shift, step):
     moment = cross(couple, normal)
     if TWIST:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-        gap = distance - (radius[i] + radius[j])
         size = twisted(
-            dot(spin, normal), gap, memory.minimum_gap[k], resistance, viscosity, turn_i + turn_j, reduced_radius,
-            asymmetry, 1.0, step,
+            dot(spin, normal), distance - radii, memory.minimum_gap[k], resistance, viscosity, turn_i + turn_j,
+            reduced_radius, asymmetry, 1.0, step,
         )  # fmt: skip
         moment = plus(moment, times(size, normal))
     write_impulse(k, memory, impulse, times(lever, cross(impulse, normal)), moment)

@@ -94,6 +94,7 @@ class Plane(Wall):
     normal: Vector = (0.0, 0.0, 1.0)
 
     def pieces(self) -> list[tuple[int, list[float]]]:
+        """One plane: its point and unit normal."""
         return [(PLANE, [*self.point, *_unit(self.normal)])]
 
     def frame(self) -> tuple[np.ndarray, float]:
@@ -103,6 +104,7 @@ class Plane(Wall):
         return not np.asarray(self.normal)[periodic].any()
 
     def sweep(self) -> float:
+        """Speed along the normal [m/s]; the plane may spin about its normal only."""
         if not self._spins_along(self.normal):
             raise InputError("spin", self.spin, "along the normal of a plane", "take a mesh for a plate that tilts")
         return abs(float(np.dot(self.velocity, _unit(self.normal))))
@@ -124,6 +126,7 @@ class Box(Wall):
             raise InputError("high", self.high, f"above low = {self.low} along every axis")
 
     def pieces(self) -> list[tuple[int, list[float]]]:
+        """Six planes whose normals point inwards."""
         axes = np.eye(3)
         return [(PLANE, [*corner, *(sign * n)]) for corner, sign in ((self.low, 1), (self.high, -1)) for n in axes]
 
@@ -161,6 +164,7 @@ class Cylinder(Wall):
         super().__post_init__()
 
     def pieces(self) -> list[tuple[int, list[float]]]:
+        """A surface of revolution, with caps two planes as well, or one solid cylinder."""
         axis = _unit(self.axis)
         head = [*self.point, *axis, self.radius]
         if self.length is None:
@@ -181,6 +185,7 @@ class Cylinder(Wall):
         return self.length is None and not across and int(periodic.sum()) == 1
 
     def sweep(self) -> float:
+        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
         axis, in_place = _unit(self.axis), self._spins_along(self.axis, self.point)
         if self.length is None and not in_place:
             raise InputError("spin", self.spin, "about the axis of a cylinder without end", "give a length")
@@ -213,6 +218,7 @@ class Cone(Wall):
         super().__post_init__()
 
     def pieces(self) -> list[tuple[int, list[float]]]:
+        """A surface of revolution whose line runs from the lower to the upper end."""
         line = np.array([self.top_radius - self.radius, self.length])
         reach = float(np.linalg.norm(line))
         return [(REVOLVED, [*self.point, *_unit(self.axis), self.radius, *(line / reach), 0.0, reach, 1.0])]
@@ -222,6 +228,7 @@ class Cone(Wall):
         return np.array([self.point, top]), max(self.radius, self.top_radius)
 
     def sweep(self) -> float:
+        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
         return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
 
 
@@ -283,6 +290,7 @@ class Mesh(Wall):
         return cls(vertices=vertices, triangles=corners, **options)
 
     def pieces(self) -> list[tuple[int, list[float]]]:
+        """Corners and unit normal of every triangle."""
         corners = self.vertices[self.triangles]
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -40,9 +40,12 @@ class FluidisedBed:
     voidage: float
     balance: float  # at which the drag law carries a uniform bed
     expected: float  # mean of the published laws
+    lowest: float  # of the published laws
+    highest: float
     exponent: float  # of Richardson and Zaki
     height: float  # [m]
     layers: float  # deviation in time of the solid fraction of layers of 2.5 d in the lower two thirds
+    inside: float  # voidage of these layers
 
 
 def glass(velocity: float) -> Case:
@@ -118,16 +121,20 @@ def fluidise(study: Study, velocity: float, **changes: Any) -> FluidisedBed:
     mean = {name: float(np.mean([row[name] for row in rows])) for name in rows[0]}
     weight = buoyant_weight(described) / described.column.floor_area
     inner = slice(1, max(2, int(2.0 / 3.0 * mean["bed_height"] / (2.5 * described.bed.diameter))))
+    laws = [*expansion_laws(described).values()]
     return FluidisedBed(
         velocity=velocity,
         drop_over_weight=mean["pressure_drop"] / weight,
         carried=(mean["pressure_drop"] + mean["wall_load"]) / weight,
         voidage=mean["bed_voidage"],
         balance=estimate_bed(described).voidage,
-        expected=float(np.mean(list(expansion_laws(described).values()))),
+        expected=float(np.mean(laws)),
+        lowest=min(laws),
+        highest=max(laws),
         exponent=expansion_exponents(described)["Richardson-Zaki"][0],
         height=mean["bed_height"],
         layers=float(np.std(layers, axis=0)[inner].mean()),
+        inside=1.0 - float(np.mean(layers, axis=0)[inner].mean()),
     )
 
 

@@ -6,13 +6,18 @@ the amount of liquid, its viscosity and its surface tension are those of the cas
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from time import process_time
+from typing import Any
 
 import numpy as np
 
+from cfddem.backend.compile import use_threads
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
+from cfddem.run.simulation import Simulation
 
 LIQUIDS: dict[str, dict[str, float] | None] = {
     "dry": None,
@@ -21,6 +26,9 @@ LIQUIDS: dict[str, dict[str, float] | None] = {
     "water 0.1 %": {"viscosity": 1e-3, "surface_tension": 0.0728},
 }
 """States of the bed by name: None is dry, others change keys of the table [liquid]."""
+
+MEASURED = (0.10, 0.20, 0.02)
+"""Begin, end and pieces of the time over which `bench` measures; both beds have been lifted by then [s]."""
 
 
 @dataclass(frozen=True)
@@ -72,3 +80,50 @@ def effects(run: Run, begin: float) -> Effects:
         bridges_per_particle=mean("bridges_per_particle"),
         agglomerate_size=mean("agglomerate_size", 1.0),
     )
+
+
+def bench(threads: int = 1, measured: tuple[float, float, float] = MEASURED) -> dict[str, Any]:
+    """Cost of the bed with oil over that of the same bed dry, in one process, in turn, by processor time.
+
+    threads   of the run
+    measured  begin, end and pieces of the measurement [s]
+    returns   for both beds the processor time of a simulated second and its shares, contacts and bridges; the ratio
+    """
+    use_threads(threads)
+    begin, end, piece = measured
+    beds = {name: Simulation(bed(name).with_(**{"run.particle_step": 1.2e-5})) for name in ("dry", "oil 0.1 %")}
+    for each in beds.values():
+        each.until(begin)
+    before = {name: dict(each.wall.seconds) for name, each in beds.items()}
+    spent = dict.fromkeys(beds, 0.0)
+    for time in np.arange(begin + piece, end + 0.5 * piece, piece):
+        for name, each in beds.items():
+            now = process_time()
+            each.until(float(time))
+            spent[name] += process_time() - now
+    made = {name: _cost(each, before[name], spent[name], end - begin) for name, each in beds.items()}
+    dry, wet = (each["processor [s/s]"] for each in made.values())
+    return {"particles": bed().bed.count, "threads": threads, "beds": made, "wet over dry": wet / dry}
+
+
+def _cost(run: Simulation, before: dict[str, float], spent: float, time: float) -> dict[str, Any]:
+    """What a bed has cost; `spent` processor time over a simulated time [s]."""
+    solver = run.particle_solver
+    parts = {name: seconds - before.get(name, 0.0) for name, seconds in run.wall.seconds.items()}
+    return {
+        "processor [s/s]": spent / time,
+        "shares": {part: seconds / sum(parts.values()) for part, seconds in parts.items() if seconds > 0.0},
+        "listed pairs": solver.edges.between_particles,
+        "contacts": int((solver.gap < 0.0).sum()),
+        "bridges": 0 if solver.bridges is None else solver.bridges.count,
+    }
+
+
+def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """A result of `bench` as lines of a table."""
+    yield "wet bubbling bed", f"{result['particles']} spheres, {result['threads']} thread(s)"
+    for name, each in result["beds"].items():
+        yield name, f"{each['processor [s/s]']:.0f} s of processor per simulated second"
+        yield "", ", ".join(f"{part} {share:.0%}" for part, share in each["shares"].items())
+        yield "", f"{each['listed pairs']} listed pairs, {each['contacts']} contacts, {each['bridges']} bridges"
+    yield "wet over dry", f"{result['wet over dry']:.2f}"

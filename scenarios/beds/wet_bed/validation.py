@@ -1,49 +1,64 @@
 """Mueller's bed with liquid bridges: what they do to height, pressure, bubbles, agitation and minimum fluidisation.
 
 Four states that differ in the pull of their bridges only, each with three packings and one ramp. Runs are kept as
-folders: interrupted ones are continued, finished ones are not repeated. Nothing is fitted and nothing was measured in
-this bed when wet: the rows are predictions.
+folders: interrupted ones are continued, finished ones are not repeated. The runs advance in rounds, so that a table can
+be made at any time. Nothing is fitted and nothing was measured in this bed when wet: the rows are predictions.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cfddem.analysis.bubbles import find_bubbles
+from cfddem.analysis.series import block_average
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run as Written
+from cfddem.io.reading import open_run
 from scenarios.beds.defluidisation.study import layers, onsets
 from scenarios.beds.gas_bed.study import mueller
-from scenarios.validation.kept_runs import finished
+from scenarios.validation.kept_runs import advanced
 from scenarios.validation.table import Progress, Row
 
 ANGLES: dict[str, float | None] = {"dry": None, "weak": 85.0, "medium": 75.0, "strong": 60.0}
 """Contact angle of the oil by state [degrees]; the pulls are 0.7, 2.2 and 4.2 times the weight of a particle."""
 
 SEEDS = (1, 2, 3)
-UNTIL, SETTLED = 10.1, 1.1
-"""End of a run and start of its averages [s]."""
+SETTLED = 0.6
+"""Start of the averages [s]."""
+
+ROUNDS = (1.1, 1.6, 2.1, 3.1, 5.1, 10.1)
+"""Ends of the rounds in which runs advance [s]."""
+
+FEWEST = 0.4
+"""Shortest time that is averaged [s]."""
 
 RAMP = [[0.0, 0.0066], [0.2, 0.66], [0.6, 0.66], [4.6, 0.05]]
 """Inlet velocity of a ramp: the bed is mixed, then slowly defluidised [s, m/s]."""
 
 OIL = {"viscosity": 5e-3, "surface_tension": 0.02, "liquid_fraction": 1e-3}
 
+UNITS = {"height": "m", "height_deviation": "m", "pressure_deviation": "Pa", "temperature": "m2/s2", "bubble": "m"}
+"""Quantities of the table and their units."""
+
+Estimate = tuple[float, float]
+"""A mean and its standard error."""
+
 
 class Means(NamedTuple):
-    """Means of one run."""
+    """Means of one run, each with the standard error that follows from its own variation in time."""
 
-    height: float  # [m]
-    height_deviation: float  # in time [m]
-    pressure_deviation: float  # in time [Pa]
-    temperature: float  # granular temperature [m2/s2]
-    bubble: float  # diameter of a bubble, mean by area [m]
+    height: Estimate  # [m]
+    height_deviation: Estimate  # in time [m]
+    pressure_deviation: Estimate  # in time [Pa]
+    temperature: Estimate  # granular temperature [m2/s2]
+    bubble: Estimate  # diameter of a bubble, mean by area [m]
 
 
 def state(name: str) -> Case:
@@ -56,22 +71,79 @@ def state(name: str) -> Case:
     return case.with_(**rough, title=title, liquid=OIL | {"contact_angle": angle})
 
 
-def study(folder: Path, progress: Progress) -> list[Row]:
-    """Run all states, and return the table."""
-    found = {name: [_run(name, seed, folder, progress) for seed in SEEDS] for name in ANGLES}
-    onset = {name: minimum_fluidisation(name, folder, progress) for name in ANGLES}
+def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row]:
+    """Advance all runs, and return the table.
+
+    hours  after which no further round of a run begins
+    """
+    end = monotonic() + 3600.0 * hours
+    for name, case, until in plan():
+        if monotonic() > end:
+            break
+        advanced(case, folder, name, progress, until)
+    return table(folder)
+
+
+def plan() -> Iterator[tuple[str, Case, float]]:
+    """Folder, case and end [s] of every piece of the study: one packing, then ramps, then the other packings."""
+    for until in ROUNDS[:3]:
+        for name in ANGLES:
+            yield f"{name}_1", _packing(name, 1), until
+    for name in ANGLES:
+        changes: dict[str, Any] = {"bed.inlet_velocity": RAMP, "run.every": 0.05}
+        yield f"{name}_ramp", state(name).with_(**changes), RAMP[-1][0]
+    for seed in SEEDS:
+        for until in ROUNDS:
+            for name in ANGLES:
+                yield f"{name}_{seed}", _packing(name, seed), until
+
+
+def _packing(name: str, seed: int) -> Case:
+    """One state with one packing."""
+    return state(name).with_(**{"bed.seed": seed, "run.average_from": SETTLED})
+
+
+# ---------------------------------------------------------------- the table
+
+
+def table(folder: Path) -> list[Row]:
+    """The rows that the runs so far allow. States are compared over the same times."""
+    found: dict[str, list[Means]] = {}
+    rows_of_states: list[Row] = []
+    for name, ends in windows(folder).items():
+        found[name] = [means(open_run(folder / f"{name}_{seed}"), SETTLED, end) for seed, end in ends.items()]
+        averaged = sum(end - SETTLED for end in ends.values())
+        note = f"packings: {len(ends)} of {len(SEEDS)}; {ROUNDS[-1] - SETTLED:g} s of each are planned"
+        rows_of_states.append(Row(f"{name}: simulated time in the means", averaged, unit="s", note=note))
+        rows_of_states += rows(name, found[name])
+    onset = {name: minimum_fluidisation(name, folder) for name in ANGLES if reached(folder / f"{name}_ramp") > 1.0}
     return [
-        *(row for name, runs in found.items() for row in rows(name, runs)),
-        *(Row(f"{name}: minimum fluidisation on the way down", onset[name], unit="m/s") for name in ANGLES),
+        *rows_of_states,
+        *(Row(f"{name}: minimum fluidisation on the way down", each, unit="m/s") for name, each in onset.items()),
         *directions(found, onset),
     ]
 
 
+def windows(folder: Path) -> dict[str, dict[int, float]]:
+    """State -> packing -> end of the means [s], the same for all states that have come so far."""
+    ends: dict[str, dict[int, float]] = {}
+    for seed in SEEDS:
+        times = {name: reached(folder / f"{name}_{seed}") for name in ANGLES}
+        far = {name: time for name, time in times.items() if time >= SETTLED + FEWEST}
+        for name in far:
+            ends.setdefault(name, {})[seed] = min(far.values())
+    return ends
+
+
+def reached(home: Path) -> float:
+    """Time up to which a run has been written [s]; 0 without one."""
+    return float(open_run(home).times[-1]) if (home / "run.json").exists() else 0.0
+
+
 def rows(name: str, runs: Sequence[Means]) -> list[Row]:
     """Means over the packings, with the standard error of their mean."""
-    named = {"height": "m", "height_deviation": "m", "pressure_deviation": "Pa", "temperature": "m2/s2", "bubble": "m"}
     made = []
-    for quantity, unit in named.items():
+    for quantity, unit in UNITS.items():
         mean, error = over_packings([getattr(each, quantity) for each in runs])
         made.append(Row(f"{name}: {quantity.replace('_', ' ')}", mean, unit=unit, note=f"standard error {error:.2g}"))
     return made
@@ -80,7 +152,7 @@ def rows(name: str, runs: Sequence[Means]) -> list[Row]:
 def directions(found: dict[str, list[Means]], onset: dict[str, float]) -> list[Row]:
     """Ratios to the dry bed, as logarithms: above 0 where they should rise, with their standard errors."""
     made = []
-    for name in (each for each in ANGLES if each != "dry"):
+    for name in (each for each in found if each != "dry" and "dry" in found):
         for quantity, sign in (("bubble", 1.0), ("pressure_deviation", 1.0), ("temperature", -1.0)):
             wet, dry = (over_packings([getattr(run, quantity) for run in found[each]]) for each in (name, "dry"))
             value = sign * math.log(wet[0] / dry[0])
@@ -92,56 +164,77 @@ def directions(found: dict[str, list[Means]], onset: dict[str, float]) -> list[R
                     note=f"standard error {error:.2g}; experiments report above 0",
                 )
             )  # fmt: skip
+    for name in (each for each in onset if each != "dry" and "dry" in onset):
         made.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onset[name] / onset["dry"]))
     return made
 
 
-def over_packings(values: Sequence[float]) -> tuple[float, float]:
-    """Mean, and its standard error.
+def over_packings(values: Sequence[Estimate]) -> Estimate:
+    """Mean over packings and its standard error; of a single packing, that by its variation in time.
 
-    >>> over_packings([1.0, 2.0, 3.0])
+    >>> over_packings([(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)])
     (2.0, 0.5773502691896258)
+    >>> over_packings([(1.0, 0.1)])
+    (1.0, 0.1)
     """
-    return float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(len(values)))
+    if len(values) == 1:
+        return values[0]
+    each = [mean for mean, _ in values]
+    return float(np.mean(each)), float(np.std(each, ddof=1) / math.sqrt(len(each)))
 
 
-def means(run: Written, begin: float) -> Means:
-    """Means of a run from a time on [s]."""
-    late = run.history["time"] >= begin
-    history = {name: column[late] for name, column in run.history.items()}
+# ---------------------------------------------------------------- one run
+
+
+def means(run: Written, begin: float, end: float = math.inf) -> Means:
+    """Means of a run between two times [s]."""
+    inside = (run.history["time"] >= begin) & (run.history["time"] <= end * (1.0 + 1e-9))
+    history = {name: column[inside] for name, column in run.history.items()}
     return Means(
-        float(history["bed_height"].mean()),
-        float(history["bed_height"].std()),
-        float(history["pressure_drop"].std()),
-        float(history["granular_temperature"].mean()),
-        mean_bubble(run, begin),
+        _mean(history["bed_height"]),
+        _deviation(history["bed_height"]),
+        _deviation(history["pressure_drop"]),
+        _mean(history["granular_temperature"]),
+        mean_bubble(run, begin, end),
     )
 
 
-def mean_bubble(run: Written, begin: float) -> float:
-    """Diameter of the bubbles in the snapshots from a time on, weighted by their areas [m]; NaN without any."""
+def _mean(values: np.ndarray) -> Estimate:
+    """Mean and its error of a correlated series."""
+    found = block_average(values)
+    return found.mean, found.error
+
+
+def _deviation(values: np.ndarray) -> Estimate:
+    """Standard deviation of a correlated series, and its error: that of the mean square deviation."""
+    square, error = _mean((values - values.mean()) ** 2)
+    return math.sqrt(square), error / (2.0 * math.sqrt(square)) if square > 0.0 else 0.0
+
+
+def mean_bubble(run: Written, begin: float, end: float = math.inf) -> Estimate:
+    """Diameter of the bubbles in the snapshots between two times, weighted by their areas [m]; NaN without any.
+
+    The error takes bubbles of different snapshots as independent. Snapshots are closer than a bubble lives: it is a
+    lower bound.
+    """
     grid: Any = run.grid
-    diameters: list[np.ndarray] = []
-    for place in np.flatnonzero(run.times >= begin):
+    sums: list[tuple[float, float]] = []
+    for place in np.flatnonzero((run.times >= begin) & (run.times <= end * (1.0 + 1e-9))):
         surface = float(np.interp(run.times[place], run.history["time"], run.history["bed_height"]))
         voidage = run.fluid("voidage", int(place))
-        diameters.append(find_bubbles(voidage, grid.spacing, surface=surface, flat=True)["diameter"])
-    seen = np.concatenate([*diameters, np.zeros(0)])
-    return float((seen**3).sum() / (seen**2).sum()) if len(seen) else math.nan
+        diameter = find_bubbles(voidage, grid.spacing, surface=surface, flat=True)["diameter"]
+        sums.append((float((diameter**3).sum()), float((diameter**2).sum())))
+    cubes, squares = np.array(sums).reshape(-1, 2).T
+    if not squares.sum() > 0.0:
+        return math.nan, math.nan
+    mean = float(cubes.sum() / squares.sum())
+    return mean, float(np.sqrt(((cubes - mean * squares) ** 2).sum()) / squares.sum())
 
 
-def minimum_fluidisation(name: str, folder: Path, progress: Progress) -> float:
+def minimum_fluidisation(name: str, folder: Path) -> float:
     """Velocity at which the pressure drop of the packed bed equals the weight, on the way down [m/s]; NaN if never."""
-    case = state(name)
-    changes = {"bed.inlet_velocity": RAMP, "run.until": RAMP[-1][0], "run.every": 0.05}
-    run = finished(case, folder, f"{name}_ramp", progress, changes)
+    run = open_run(folder / f"{name}_ramp")
     try:
-        return onsets(case.with_(**{"bed.inlet_velocity": RAMP}), run.history, layers(run))[1].velocity
+        return onsets(state(name).with_(**{"bed.inlet_velocity": RAMP}), run.history, layers(run))[1].velocity
     except InputError:
         return math.nan
-
-
-def _run(name: str, seed: int, folder: Path, progress: Progress) -> Means:
-    """One state with one packing."""
-    changes = {"run.until": UNTIL, "bed.seed": seed, "run.average_from": SETTLED}
-    return means(finished(state(name), folder, f"{name}_{seed}", progress, changes), SETTLED)

@@ -7,7 +7,8 @@ grows or shrinks. The set of cells with voids is found by exchanging cells until
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solveh_banded
+
+from scenarios.collisions.film_impact.banded import solve_banded
 
 EXCHANGES = 50
 """Largest number of exchanges between the two sets; then the last set is taken and the step counted."""
@@ -25,7 +26,7 @@ def coupled(
     share      time step over its mass [s/kg]
     """
     both = np.stack([-outflow, projected], axis=1)
-    at_rest, moving = solveh_banded(matrix, both, overwrite_b=True, lower=True, check_finite=False).T
+    at_rest, moving = solve_banded(matrix, both).T
     speed = float((velocity + share * (projected @ at_rest)) / (1.0 + share * (projected @ moving)))
     return at_rest - speed * moving, speed
 
@@ -68,7 +69,7 @@ def _with_fixed(
     free[0, known] = 1.0
     both = np.stack([-outflow - _times(matrix, fixed), projected], axis=1)
     both[known] = np.stack([fixed[known], np.zeros(known.sum())], axis=1)
-    at_rest, moving = solveh_banded(free, both, overwrite_b=True, lower=True, check_finite=False).T
+    at_rest, moving = solve_banded(free, both).T
     speed = float((velocity + share * (projected @ at_rest)) / (1.0 + share * (projected @ moving)))
     return at_rest - speed * moving, speed
 

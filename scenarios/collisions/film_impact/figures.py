@@ -100,6 +100,20 @@ def draw_restitution(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
     save(figure, path)
 
 
+def draw_tension(path: Path, cases: dict[Case, dict[float | None, list[FilmImpact]]]) -> None:
+    """Restitution without surface tension and with it, at each contact angle."""
+    figure, axes = panels(len(cases), width=15.0, height=4.4, sharey=True)
+    for axis, ((diameter, liquid, _), results) in zip(axes, cases.items()):
+        for (angle, each), (colour, mark) in zip(results.items(), ((GREY, "o-"), (BLUE, "s--"), (ORANGE, "^--"))):
+            name = "no surface tension" if angle is None else f"surface tension, {angle:g} degrees"
+            axis.plot([-r.p1.velocity for r in each], [r.restitution for r in each], mark, color=colour, label=name)
+        label(axis, "velocity", "m/s", "restitution", "-", f"{diameter * 1e3:g} mm, {liquid}")
+    for axis in axes[1:]:
+        axis.set_ylabel("")
+    legend(axes[-1], loc="lower right")
+    save(figure, path)
+
+
 def draw_laws(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
     """The same impacts by laws of thin films."""
     chosen = [case for case in cases if case[0] in (8e-3, 2.8e-3) or case[1] == "m5"]

@@ -27,11 +27,12 @@ class Losses:
     impulsive: float = 0.0
     exchange: float = 0.0  # between particles and grid
     voids: float = 0.0  # stored in voids of a liquid that cavitates
+    surface: float = 0.0  # stored in the surface by its tension
 
     @property
     def total(self) -> float:
         """All losses [J]."""
-        return self.contact + self.viscous + self.impulsive + self.exchange + self.voids
+        return self.contact + self.viscous + self.impulsive + self.exchange + self.voids + self.surface
 
 
 @serial
@@ -76,6 +77,21 @@ def pressure_losses(u, w, before_u, before_w, mobility, liquid, filled, open_u, 
             mass *= _length(filled, liquid, i, j - 1, i, j)
             impulsive += 0.5 * mass * (w[i, j] - before_w[i, j]) ** 2
     return impulsive, viscous
+
+
+def while_turning(before: float, after: float, impulsive: float) -> tuple[float, float]:
+    r"""Kinetic energy of the liquid at its least during an impulse, and after it, over that before [-].
+
+    The velocity changes in proportion to the part s of the impulse that has passed, so that the energy is
+
+    .. math:: K(s) = K_0 + s\,(K_1 - K_0 - C) + s^2 C
+
+    with the energies K before and after, and the loss C of the impulse in the liquid [J].
+    """
+    if before <= 0.0 or impulsive <= 0.0:
+        return math.nan, math.nan
+    s = min(max(0.5 * (impulsive + before - after) / impulsive, 0.0), 1.0)
+    return (before + s * (after - before - impulsive) + s * s * impulsive) / before, after / before
 
 
 @serial

@@ -78,12 +78,14 @@ def number_cells(liquid, number):
 
 @serial
 def assemble(
-    number, filled, liquid, open_u, open_w, mobility_u, u, w, dx, rate, outer_open, matrix, outflow, projected
-):
+    number, filled, liquid, open_u, open_w, mobility_u, edge_u, edge_w, u, w, dx, rate, outer_open,
+    matrix, outflow, projected,
+):  # fmt: skip
     """Rows of the pressure equation: lower bands of the matrix, outflow of each cell, projected area of the bead.
 
-    mobility_u  factor of velocity and pressure gradient by the resistance of thin gaps
-    rate        time step over density
+    mobility_u      factor of velocity and pressure gradient by the resistance of thin gaps
+    edge_u, edge_w  pressure at the surface, where it crosses between the cells of a face
+    rate            time step over density
     """
     radial, vertical = liquid.shape
     for i in range(radial):
@@ -101,19 +103,24 @@ def assemble(
                     face = max(i, k)
                     area = 2.0 * math.pi * face * dx * dx * open_u[face, j] * mobility_u[face, j]
                     flow = u[face, j] if side == 1 else -u[face, j]
+                    edge = edge_u[face, j]
                 else:
                     face = max(j, m)
                     area = ring * open_w[i, face]
                     flow = w[i, face] if side == 3 else -w[i, face]
+                    edge = edge_w[i, face]
                 outflow[c] += area * flow
                 link = area * rate / (dx * distance(filled, liquid, i, j, k, m))
                 matrix[0, c] += link
-                if k < radial and m < vertical and number[k, m] >= 0 and number[k, m] < c:
-                    matrix[c - number[k, m], number[k, m]] = -link
+                if k < radial and m < vertical and number[k, m] >= 0:
+                    if number[k, m] < c:
+                        matrix[c - number[k, m], number[k, m]] = -link
+                else:
+                    outflow[c] -= link * edge
 
 
 @serial
-def correct(number, filled, liquid, open_u, open_w, mobility_u, u, w, p, dx, rate, outer_open):
+def correct(number, filled, liquid, open_u, open_w, mobility_u, edge_u, edge_w, u, w, p, dx, rate, outer_open):
     """Subtract the pressure gradient on every open face of a liquid cell; closed faces have no flow."""
     radial, vertical = liquid.shape
     for i in range(radial + 1):
@@ -125,8 +132,8 @@ def correct(number, filled, liquid, open_u, open_w, mobility_u, u, w, p, dx, rat
             if i == 0 or (i == radial and not outer_open) or open_u[i, j] == 0.0:
                 u[i, j] = 0.0
                 continue
-            low = p[number[i - 1, j]] if left else 0.0
-            high = p[number[i, j]] if right else 0.0
+            low = p[number[i - 1, j]] if left else edge_u[i, j]
+            high = p[number[i, j]] if right else edge_u[i, j]
             length = distance(filled, liquid, i - 1, j, i, j) if left else distance(filled, liquid, i, j, i - 1, j)
             u[i, j] = mobility_u[i, j] * (u[i, j] - rate * (high - low) / (dx * length))
     for i in range(radial):
@@ -138,8 +145,8 @@ def correct(number, filled, liquid, open_u, open_w, mobility_u, u, w, p, dx, rat
             if j == 0 or open_w[i, j] == 0.0:
                 w[i, j] = 0.0
                 continue
-            low = p[number[i, j - 1]] if below else 0.0
-            high = p[number[i, j]] if above else 0.0
+            low = p[number[i, j - 1]] if below else edge_w[i, j]
+            high = p[number[i, j]] if above else edge_w[i, j]
             length = distance(filled, liquid, i, j - 1, i, j) if below else distance(filled, liquid, i, j, i, j - 1)
             w[i, j] -= rate * (high - low) / (dx * length)
 
@@ -156,6 +163,7 @@ class Solved:
 def solve(
     grid: Grid, bead: Bead, flow: tuple[np.ndarray, np.ndarray], cells: tuple[np.ndarray, np.ndarray],
     mobility: np.ndarray, density: float, dt: float, voids: Voids | None = None,
+    *, edges: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Solved:  # fmt: skip
     """Make velocities and bead satisfy continuity; changes both.
 
@@ -163,6 +171,7 @@ def solve(
     cells     which cells are liquid, and their filled share
     mobility  factor of the radial faces by the resistance of thin gaps [-]
     voids     of a liquid that cavitates; their volume is updated
+    edges     pressure of the surface on radial and horizontal faces [Pa]; without it 0
     """
     (u, w), (liquid, filled) = flow, cells
     number = np.empty(liquid.shape, dtype=np.int64)
@@ -172,7 +181,8 @@ def solve(
         bead.force = 0.0
         return Solved(pressure, 0.0, 0.0)
     matrix, outflow, projected = np.zeros((band + 1, count)), np.zeros(count), np.zeros(count)
-    open_faces = (grid.open_u, grid.open_w, mobility)
+    edges = (np.zeros_like(u), np.zeros_like(w)) if edges is None else edges
+    open_faces = (grid.open_u, grid.open_w, mobility, *edges)
     rate = dt / density
     assemble(number, filled, liquid, *open_faces, u, w, grid.dx, rate, grid.outer_open, matrix, outflow, projected)
     matrix[0, matrix[0] == 0.0] = 1.0

@@ -40,7 +40,7 @@ class Record:
         velocity = -abs(bead.velocity) / impact.restitution if touched else bead.velocity
         motion = (impact.time, bead.gap, velocity, bead.force, impact.solved.plate)
         pressures = (plate[0], plate.min(), plate.max(), impact.wetted * impact.grid.dx)
-        lost = (losses.contact, losses.viscous, losses.impulsive, losses.exchange, losses.voids)
+        lost = (losses.contact, losses.viscous, losses.impulsive, losses.exchange, losses.voids, losses.surface)
         self.rows.append((*motion, *pressures, kinetic, potential - self.rest, *lost))
 
     def leave(self, height: float) -> None:

@@ -43,6 +43,7 @@ class FilmImpact:
     p3: Moment  # after
     p4: Moment  # it passes the undisturbed surface again
     turned_speed: float  # of the bead once the liquid has turned with it, just after P3 [m/s]
+    turning_energy: tuple[float, float]  # of the liquid, least while it turns, and after, over that before [-]
     fastest: float  # largest speed towards the plate [m/s]
     energies: dict[str, float]  # over the kinetic energy of the bead at P1; see below
     ledger_error: float  # the loss of the bead that the energies leave unexplained, over the same [-]
@@ -55,7 +56,7 @@ class FilmImpact:
     contacts: int
     steps: int
     cells: int  # in the depth of the film
-    seconds: float  # of the computation
+    seconds: float  # processor time of the computation
     warnings: tuple[str, ...]
     history: dict[str, np.ndarray] = field(repr=False)  # columns of COLUMNS
     frames: dict[str, Frame] = field(repr=False)  # at P1 to P4
@@ -67,10 +68,10 @@ class FilmImpact:
         return {name: plain(moments.get(name, getattr(self, name))) for name in names}
 
 
-ENERGIES = ("liquid_kinetic", "liquid_potential", "contact", "viscous", "impulsive", "exchange", "voids")
+ENERGIES = ("liquid_kinetic", "liquid_potential", "contact", "viscous", "impulsive", "exchange", "voids", "surface")
 """Where the energy of the bead goes: what the liquid has at the end, the dry contact, viscous stress, sudden changes of
-the flow (above all at contact), and what particles and grid lose in exchange, an error of the method; and the voids
-of a liquid that cavitates."""
+the flow (above all at contact), and what particles and grid lose in exchange, an error of the method; the voids
+of a liquid that cavitates; and the surface of one with surface tension."""
 
 COLUMNS = {
     "time": "s",
@@ -89,5 +90,6 @@ COLUMNS = {
     "impulsive": "J",
     "exchange": "J",
     "voids": "J",
+    "surface": "J",
 }
 """Columns of the history: pressures are on the plate, energies are those of the liquid and those lost so far."""

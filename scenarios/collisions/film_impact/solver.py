@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenarios.collisions.film_impact import faces, ledger, liquid, pressure, viscosity, volume, wetting
+from scenarios.collisions.film_impact import faces, ledger, liquid, pressure, surface, viscosity, volume, wetting
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.pressure import Bead
 
@@ -23,6 +23,7 @@ class Settings:
     courant: float = 0.5
     contact: bool = True  # the bead rebounds at the minimum gap
     cavitation: float | None = None  # lowest pressure, below 0 [Pa]
+    tension: surface.Tension | None = None  # of the surface
 
 
 @dataclass
@@ -51,7 +52,7 @@ class Impact:
         floor = self.settings.cavitation
         self.voids = None if floor is None else pressure.Voids(floor, np.zeros(grid.open_cell.shape))
         self.solved = pressure.Solved(np.zeros(grid.open_cell.shape), 0.0, 0.0)
-        self.losses = ledger.Losses()
+        self.losses, self.turning = ledger.Losses(), (np.nan, np.nan)
         self.impulses = np.zeros(3)  # on the bead by the liquid, on the liquid by the plate, and of its weight [N s]
 
     @property
@@ -89,6 +90,8 @@ class Impact:
             dt = min(dt, 0.2 * dx**2 / self.kinematic)
         if self.gravity > 0.0:
             dt = min(dt, s.courant * np.sqrt(dx / self.gravity))
+        if s.tension is not None:
+            dt = min(dt, s.tension.longest_step(dx, self.density))
         if bead.gap < dx:
             dt = min(dt, 0.2 * max(bead.gap, s.minimum_gap) / max(abs(bead.velocity), 1e-9))
         return float(dt)
@@ -128,6 +131,18 @@ class Impact:
         self.w[:, 1:] -= self.gravity * dt
         if np.isfinite(bead.mass):
             bead.velocity -= self.gravity * dt
+        if self.settings.tension is not None:
+            self.pull(self.settings.tension, dt)
+
+    def pull(self, tension: surface.Tension, dt: float) -> None:
+        """Pull of the surface on the bead, along its contact line."""
+        grid, bead = self.grid, self.bead
+        contact = surface.contact_radius(self.filled, self.liquid, grid.open_w, grid.open_cell, grid.dx)
+        before, force = bead.velocity, tension.pull(contact, bead.radius)
+        bead.velocity += dt * force / bead.mass
+        self.impulses[0] += dt * force
+        if np.isfinite(bead.mass):
+            self.losses.surface += 0.5 * bead.mass * (before**2 - bead.velocity**2)
 
     def grid_energy(self) -> float:
         """Kinetic energy of the flow on the grid [J]."""
@@ -151,12 +166,22 @@ class Impact:
         grid, bead = self.grid, self.bead
         mobility = viscosity.mobility_of_gaps(grid, bead.radius, bead.gap, self.kinematic, dt)
         cells, before, arrived = (self.liquid, self.filled), (self.u.copy(), self.w.copy()), bead.velocity
-        self.solved = pressure.solve(grid, bead, (self.u, self.w), cells, mobility, self.density, dt, self.voids)
+        turns, moving = self.contacts == 1 and np.isnan(self.turning[0]), self.grid_energy()
+        tension = self.settings.tension
+        edges = None if tension is None else tension.pressure(grid, self.filled, self.liquid, bead.radius, bead.gap)
+        self.solved = pressure.solve(
+            grid, bead, (self.u, self.w), cells, mobility, self.density, dt, self.voids, edges=edges
+        )
+        if edges is not None:
+            power = surface.work(*edges, self.liquid, self.u, self.w, grid.open_u, grid.open_w, grid.dx)
+            self.losses.surface += float(power) * dt
         impulsive, viscous = ledger.pressure_losses(
             self.u, self.w, *before, mobility, *cells, grid.open_u, grid.open_w, grid.dx, self.density, grid.outer_open
         )
         self.losses.viscous += viscous
         self.losses.impulsive += impulsive
+        if turns:
+            self.turning = ledger.while_turning(moving, self.grid_energy(), impulsive)
         if self.voids is not None:
             self.losses.voids = self.voids.work
         if np.isfinite(bead.mass):

@@ -8,6 +8,7 @@ goes on where it was.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -41,6 +42,9 @@ KEPT = (*COMPARED.values(), "averaged", "reynolds")
 
 PUBLISHED = {0.009: 0.635, 0.012: 0.703}
 """Velocity [m/s] and mean of the published voidages of alginate beads, where the law acts."""
+
+ALUMINA = (0.12, 0.157033, 0.20)
+"""Velocities of the beds of alumina [m/s]."""
 
 
 def study(folder: Path, progress: Progress) -> list[Row]:
@@ -111,10 +115,10 @@ def _value(mean: Any) -> float:
 def beds(folder: Path, progress: Progress) -> Iterator[Row]:
     """Beds of glass within the measured range, of alginate at its edge, of alumina far outside."""
 
-    def bed(beads: str, velocity: float, agitation: str) -> FluidisedBed:
-        name = f"bed-{beads}-{1e3 * velocity:g}-{agitation}"
+    def bed(beads: str, velocity: float, agitation: str, seed: int = 1) -> FluidisedBed:
+        name = f"bed-{beads}-{1e3 * velocity:g}-{agitation}-seed{seed}"
         progress(name)
-        changes = {"laws.agitation": agitation}
+        changes = {"laws.agitation": agitation, "bed.seed": seed}
         return FluidisedBed(
             **kept(folder / f"{name}.json", lambda: asdict(fluidise(STUDIES[beads], velocity, **changes)))
         )
@@ -131,8 +135,33 @@ def beds(folder: Path, progress: Progress) -> Iterator[Row]:
         yield Row(f"{name}: voidage", moved, published, 0.015)
         farther = max(abs(moved - published) - abs(quiet - published), 0.0)
         yield Row(f"{name}: farther from the published mean than without agitation", farther, 0.0, 0.005)
-    alumina = bed("alumina", 0.157033, "free_spheres")
-    yield from _expansion("alumina at 157 mm/s, an extrapolation", alumina, 0.02, 0.03)
+    for velocity in ALUMINA:
+        for law in ("free_spheres", "none"):
+            name = (
+                f"alumina at {1e3 * velocity:.0f} mm/s, {'an extrapolation' if law != 'none' else 'without agitation'}"
+            )
+            seeds = [bed("alumina", velocity, law, seed) for seed in (1, 2, 3)]
+            yield from _packings(name, seeds)
+
+
+def _packings(name: str, beds: list[FluidisedBed]) -> Iterator[Row]:
+    """Means of several packings with their standard errors; the limits hold for the means."""
+
+    def mean(quantity: str) -> tuple[float, str]:
+        values = [getattr(each, quantity) for each in beds]
+        error = float(np.std(values, ddof=1)) / math.sqrt(len(values))
+        return float(np.mean(values)), f"{len(values)} seeds, standard error {error:.2g}"
+
+    known, (voidage, note) = beds[0], mean("voidage")
+    yield Row(f"{name}: voidage", voidage, known.balance, 0.02, note=f"balance of weight and drag; {note}")
+    nearest = min(max(voidage, known.lowest), known.highest)
+    spread = f"published laws: {known.lowest:.3f} to {known.highest:.3f}"
+    yield Row(f"{name}: voidage outside of the published laws", abs(voidage - nearest), 0.0, 0.0, note=spread)
+    yield Row(f"{name}: voidage of the layers inside", mean("inside")[0], known.balance, note=mean("inside")[1])
+    layers, note = mean("layers")
+    yield Row(f"{name}: deviation of layers in time", layers, 0.0, 0.03, note=f"layers of 2.5 d; {note}")
+    carried, note = mean("carried")
+    yield Row(f"{name}: pressure drop and wall load over weight", carried, 1.0, 0.01, note=note)
 
 
 def _expansion(name: str, bed: FluidisedBed, limit: float, layers: float | None) -> Iterator[Row]:

@@ -13,7 +13,7 @@ import numpy as np
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.analysis.bubbles import BubbleProfile, bubble_profile, find_bubbles
 from cfddem.analysis.measures import pressure_drop
-from cfddem.analysis.series import block_average, even, spectrum
+from cfddem.analysis.series import block_average, even, mean_frequency, spectrum
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run as Written
@@ -34,13 +34,16 @@ from scenarios.beds.spouted_bed.study import BED_HEIGHT, SPOUTED, profiles
 from scenarios.beds.spouted_bed.study import bed as spout
 from scenarios.validation.beds.refinement import refined
 from scenarios.validation.kept_runs import finished
-from scenarios.validation.table import Progress, Row
+from scenarios.validation.table import Progress, Row, numbers
 
 MUELLER_HEIGHT, PROBE = 0.05, 0.045
 """Measured height of Mueller's bed, and height of the pressure probe in van Wachem's [m]."""
 
 SLABS = np.linspace(0.0, 0.12, 5)
 """Intervals of height in which bubbles are counted [m]."""
+
+TRACE = 600
+"""Values to which a digitised trace is interpolated."""
 
 LEAST_APART = 0.8
 """Largest deviation of the separation from 1 for two species that have separated as predicted."""
@@ -168,9 +171,21 @@ def flat(folder: Path, progress: Progress) -> list[Row]:
             1.0,
         ),
         Row("van Wachem: main frequency of the pressure", spectrum(pressures, between).main, 2.25, 0.45, "Hz"),
+        frequency("pressure", between, pressures),
+        frequency("height", interval, heights),
         *_weight("van Wachem", case, run.history, window),
         *growing(bubbles(run, 2.0)),
     ]
+
+
+def frequency(quantity: str, interval: float, values: np.ndarray) -> Row:
+    """Mean frequency of a signal of van Wachem's bed and of the measured one, within two errors of their difference."""
+    times, trace = numbers(f"vanwachem2001_{quantity}").values()
+    spacing, measured = even(times, trace, TRACE)
+    here, there = mean_frequency(values, interval), mean_frequency(measured, spacing)
+    note = f"{here.periods} periods, error {here.error:.2g}; measured {there.periods}, error {there.error:.2g}"
+    limit = 2.0 * math.hypot(here.error, there.error)
+    return Row(f"van Wachem: mean frequency of the {quantity}", here.frequency, there.frequency, limit, "Hz", note)
 
 
 def bubbles(run: Written, begin: float) -> BubbleProfile:

@@ -1,4 +1,4 @@
-r"""One impact with smoothed particles, step by step; it has the same face as the grid's :class:`~..solver.Impact`.
+r"""One impact with smoothed particles, step by step; it has the same interface as the grid's :class:`~..solver.Impact`.
 
 In a film thinner than the spacing, particles miss a part of the viscous resistance; the bead gets it as an impulse,
 
@@ -67,12 +67,13 @@ class SmoothedImpact:
         """Add up losses and impulses of the step."""
         self.losses.viscous += 4.0 * self.flow.losses["viscous"]
         self.losses.impulsive += 4.0 * self.flow.losses["impulsive"]
+        self.losses.exchange += 4.0 * self.flow.losses["exchange"]
         self.flow.losses = dict.fromkeys(self.flow.losses, 0.0)
         weight = self.density * self.gravity * float(self.volume.sum())
         self.impulses += dt * np.array([self.bead.force, self.flow.plate_force, -weight])
 
     def _move(self, dt: float) -> None:
-        """Move the bead; at the minimum gap it turns. Keep the particles between plate, mirrors and bead."""
+        """Move the bead; at the minimum gap it rebounds. Keep the particles between plate, mirrors and bead."""
         bead, least, before = self.bead, self.settings.minimum_gap, self.bead.gap
         bead.gap = max(before + dt * bead.velocity, least)
         self._resist(before)

@@ -60,7 +60,7 @@ class SmoothedLiquid:
         self.plate = solid(dx) if plate else None
         self.cap = solid(dx, bead.radius) if bead is not None else None
         self.full = kernel.full_sum(dx)
-        self.losses = {"viscous": 0.0, "impulsive": 0.0}  # in this quarter [J]
+        self.losses = {"viscous": 0.0, "impulsive": 0.0, "exchange": 0.0}  # in this quarter [J]
         self.plate_force = 0.0  # on the plate, of the whole film [N]
 
     @property
@@ -101,10 +101,10 @@ class SmoothedLiquid:
 
     def apply_forces(self, dt: float) -> None:
         """Viscous stress with no slip on the solids, and gravity."""
-        before = self.kinetic_energy()
+        before = self.energy()
         if self.viscosity > 0.0:
             self._diffuse(dt * self.viscosity / self.density)
-        self.losses["viscous"] += before - self.kinetic_energy()
+        self.losses["viscous"] += before - self.energy()
         if self.plate is not None:
             self.velocity[:, 2] -= self.gravity * dt
         if self.bead is not None:
@@ -138,7 +138,11 @@ class SmoothedLiquid:
         return np.asarray(kernel.row_sums(self.start, values))
 
     def apply_pressure(self, dt: float) -> None:
-        """Solve for the pressure and the speed of the bead; the velocity becomes free of divergence."""
+        """Solve for the pressure and the speed of the bead; the velocity becomes free of divergence.
+
+        The loss of a projection is that of impulses; what these particles lose or gain beside it is an error.
+        """
+        before, explained = self.energy(), self.losses["impulsive"]
         matrix, alone = self._matrix()
         heavy, bead = self.density / dt, self.bead
         every = (self.start, self.found, self.origin, self.signs, self.gradient, self.stretch)
@@ -165,6 +169,7 @@ class SmoothedLiquid:
             self.pressure = self.pressure + bead.velocity * moving
             slopes[-1] = slopes[-1] - bead.velocity * normal[:, 2]
         self._correct(dt / self.density, [heavy * each for each in slopes])
+        self.losses["exchange"] += before - self.energy() - (self.losses["impulsive"] - explained)
 
     def _thin_gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Which particles lie in a gap too thin for a second layer, and their height over that of the gap."""
@@ -260,6 +265,11 @@ class SmoothedLiquid:
         self.velocity -= rate * gradient
         if self.bead is not None and self.thin.any():
             self.velocity[self.thin, 2] = self.bead.velocity * self.share_of_gap[self.thin]
+
+    def energy(self) -> float:
+        """Kinetic energy of this quarter, with that of the bead [J]."""
+        bead = self.bead
+        return self.kinetic_energy() + (0.125 * bead.mass * bead.velocity**2 if bead is not None else 0.0)
 
     def kinetic_energy(self) -> float:
         """Of this quarter [J]."""

@@ -1,0 +1,166 @@
+"""Laws outside of the ranges for which they were fitted, and what that changes in the result.
+
+The change is estimated by other laws, which were fitted at the state of the bed. Where there are none, the message says
+so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from inspect import signature
+from statistics import median
+
+from cfddem.case.bed import POURED_SOLID_FRACTION
+from cfddem.case.schema import Case
+from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.issue import Issue
+from closures import balance
+from closures.capillary_pull import lambert_energy, rabinovich_energy, willett_energy
+from closures.lift import saffman_mei
+from closures.registry import REGISTRY, Law, law_of, load_built_in_laws
+
+DILUTE = 0.95
+"""Voidage above which a law for single spheres may be used [-]."""
+
+REMEDY = "choose another law; cfddem explain lists all with their ranges"
+
+AGITATED = "inside, agitation changes bed heights by up to 2 % and granular temperatures by a factor of up to 9"
+"""Effect on the beds of the lubrication study with and without agitation."""
+
+
+def check_ranges(case: Case, bed: BedEstimate) -> Iterator[Issue]:
+    """Check that the laws of the fluid's forces are used inside of their ranges."""
+    law = case.laws.drag_law
+    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+        return
+    state = state_of(case, bed)
+    ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
+    if found := outside(law, state, ratios):
+        yield Issue("warning", "laws.drag", found + _and(effect_of_drag(case, law, bed)), REMEDY)
+    added, agitation = case.laws.added_mass_law, case.agitation
+    if isinstance(added, Law) and (found := outside(added, state, ratios)):
+        yield Issue("warning", "laws.added_mass", found + _and(_effect_of_added_mass(case, state)), REMEDY)
+    if isinstance(agitation, Law) and (found := outside(agitation, state)):
+        yield Issue(
+            "warning", "laws.agitation", found + _and(AGITATED), "trust heights more than granular temperatures"
+        )
+    if case.laws.lift and (found := outside(law_of(saffman_mei), state)):
+        yield Issue("warning", "laws.lift", found + _and(_effect_of_lift(case, bed)), "set it to false")
+
+
+def state_of(case: Case, bed: BedEstimate) -> dict[str, float]:
+    """Arguments of laws in the estimated bed, by name."""
+    assert case.fluid is not None
+    voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
+    return {
+        "reynolds": bed.reynolds,
+        "voidage": voidage,
+        "solid_fraction": 1.0 - voidage,
+        "density_ratio": case.solid_density / case.fluid.density,
+    }
+
+
+def outside(law: Law, state: Mapping[str, float], diameter_ratios: Sequence[float] = ()) -> str:
+    """The arguments of a law that lie outside of its range, in words; empty if there are none."""
+    if ignores_voidage(law) and state["voidage"] < DILUTE:
+        return f"{law.name} is for single spheres, but the bed has a voidage of {state['voidage']:.3g}"
+    ranges, values = [], []
+    for name, value in (*state.items(), *(("diameter_ratio", each) for each in diameter_ratios)):
+        low, high = law.ranges.get(name, (-math.inf, math.inf))
+        if not low <= value <= high:
+            ranges.append(f"{name} {low:g} to {high:g}")
+            values.append(f"{value:.3g}")
+    return f"{law.name} was fitted to {' and '.join(ranges)}, but the bed has {' and '.join(values)}" if ranges else ""
+
+
+def ignores_voidage(law: Law) -> bool:
+    """Whether a law of drag is one for single spheres."""
+    return law.kind == "drag" and law.function(1.0, 0.42) == law.function(1.0, 1.0) if _is_plain(law) else False
+
+
+def effect_of_drag(case: Case, law: Law, bed: BedEstimate) -> str:
+    """How far drag, and the number that follows from it, lie from those by the laws that were fitted here.
+
+    returns  words; empty if the law takes other arguments
+    """
+    state = state_of(case, bed)
+    if not _is_plain(law) or not bed.archimedes > 0.0:
+        return ""
+    others = _fitted_here(law, state)
+    if not others:
+        return "no other law was fitted here, so that the error is not known"
+    at = (state["reynolds"], state["voidage"])
+    drag = _spread([law.function(*at) / each.function(*at) for each in others])
+    count = f"the median of the {len(others)} laws" if len(others) > 1 else f"that of {others[0].name}, the one law"
+    if case.bed.fixed:
+        return f"its drag and the pressure drop differ by {drag} from {count} fitted here"
+    text = f"its drag differs by {drag} from {count} fitted here"
+    if (ignores_voidage(law) and state["voidage"] < DILUTE) or (bed.inlet > 0.0 and state["voidage"] >= 1.0):
+        return text
+    name, own = _result(case, bed, law, state)
+    result = [own / each for other in others if (each := _result(case, bed, other, state)[1]) > 0.0]
+    return f"{text}, and the {name} by {_spread(result)}" if own > 0.0 and result else text
+
+
+def effect_of_bridge(angle: float, radius: float, volume: float, rupture: float) -> str:
+    """How far the energy of a bridge by the law of Willett lies from that by other laws, in words.
+
+    angle    of contact [rad]
+    radius   reduced [m]
+    volume   of the bridge [m3]
+    rupture  gap at which it breaks [m]
+    """
+    at = (1.0, angle, radius, volume, rupture)
+    own, others = willett_energy(*at), (lambert_energy(*at), rabinovich_energy(*at))
+    if not all(each > 0.0 for each in (own, *others)):
+        return ""
+    lambert, rabinovich = (f"{100.0 * (own / each - 1.0):+.0f} %" for each in others)
+    return f"; its energy differs by {lambert} from that by Lambert and by {rabinovich} from that by Rabinovich"
+
+
+def _is_plain(law: Law) -> bool:
+    """Whether a law takes Reynolds number and voidage only."""
+    return len(signature(law.function).parameters) == 2
+
+
+def _fitted_here(law: Law, state: Mapping[str, float]) -> list[Law]:
+    """Other laws of drag whose ranges hold the state."""
+    load_built_in_laws()
+    return [
+        each for each in REGISTRY["drag"].values() if each is not law and _is_plain(each) and not outside(each, state)
+    ]
+
+
+def _result(case: Case, bed: BedEstimate, law: Law, state: Mapping[str, float]) -> tuple[str, float]:
+    """The number of interest that follows from a law of drag: its name and value; NaN if there is none."""
+    assert case.fluid is not None
+    if bed.inlet > bed.onset and case.fluid.is_liquid:
+        packed = 1.0 - POURED_SOLID_FRACTION
+        voidage = balance.voidage_in_balance(bed.archimedes, bed.reynolds, law.function, packed)
+        return "bed height", 1.0 / max(1.0 - voidage, 1e-9)
+    name = "velocity of minimum fluidisation" if state["voidage"] < DILUTE and bed.inlet > 0.0 else "settling velocity"
+    return name, balance.reynolds_in_balance(bed.archimedes, state["voidage"], law.function)
+
+
+def _effect_of_added_mass(case: Case, state: Mapping[str, float]) -> str:
+    """Share of the added mass in the inertia of a particle, in words."""
+    carried = case.laws.added_mass_at(state["voidage"]) / state["density_ratio"]
+    return f"the added mass is {100.0 * carried / (1.0 + carried):.2g} % of the inertia of a particle"
+
+
+def _effect_of_lift(case: Case, bed: BedEstimate) -> str:
+    """Lift over drag at a shear of the velocity over the width of the column, in words."""
+    shear = bed.reynolds * case.bed.diameter / min(case.column.size[:2])
+    share = 100.0 * saffman_mei(bed.reynolds, shear) / bed.drag_factor
+    return f"at a shear of the inlet velocity over the width, lift is {share:.2g} % of the drag"
+
+
+def _spread(ratios: list[float]) -> str:
+    """The median of ratios as per cent below or above 1, and their range."""
+    middle, low, high = (f"{100.0 * (each - 1.0):+.0f}" for each in (median(ratios), min(ratios), max(ratios)))
+    return f"{middle} %" if low == high else f"{middle} % (single laws {low} to {high} %)"
+
+
+def _and(text: str) -> str:
+    return f"; {text}" if text else ""
