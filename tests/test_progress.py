@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import math
 import re
@@ -44,11 +45,12 @@ def test_the_log_gets_one_line_per_row_and_a_pipe_gets_none(tmp_path: Path, capf
 
 def test_the_live_line_shows_preparation_and_compilation(monkeypatch: pytest.MonkeyPatch) -> None:
     bar = Progress(disable=True)
-    line, seen = ProgressLine(bar), []
+    line, seen, looking = ProgressLine(bar), [], []
 
     def compiling(what: str) -> None:
         line.compiling(what)
         seen.append((bar.tasks[0].description, bar.tasks[0].fields["status"]))
+        looking.append(gc.isenabled())
 
     line.progress("pouring 10 particles")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
@@ -58,6 +60,7 @@ def test_the_live_line_shows_preparation_and_compilation(monkeypatch: pytest.Mon
         njit(lambda x: helper(x) + 1.0)(1.0)
     finally:
         announce_compilation()
+    assert looking == [False, True] and gc.isenabled()  # Python looks for no garbage within a compilation
     (before, told), (after, nothing) = seen
     assert before == after == "pouring 10 particles"
     assert re.fullmatch(r"compiling loop \d+ \(kept for next time\) \.\.\.", told) and nothing == ""

@@ -1,4 +1,4 @@
-"""Figure of the settling bead: its speed with and without the history force, and the measured times.
+"""Figure of the settling bead: its speed with and without the history force, and the measured fit.
 
 `python -m scenarios.beds.settling.figures OUTPUT.png` runs both cases and draws them.
 """
@@ -16,7 +16,7 @@ from scenarios.validation.table import numbers
 
 
 def figure(path: Path) -> None:
-    """Speed against time: runs, equation of motion, and the measured terminal velocity and time to 95 % of it."""
+    """Speed against time: runs, equation of motion, and the exponential fitted to the measured one."""
     measured = numbers("mordant2000_glass_0p5mm")
     terminal, lasting = float(measured["U_terminal"][0]), float(measured["tau95"][0])
     drawn, axes = panels(width=6.5, height=4.2)
@@ -31,9 +31,10 @@ def figure(path: Path) -> None:
         axes.plot(1e3 * times, 1e3 * equation_of_motion(each, times), color="black", ls=":", lw=1.4)
     axes.plot([], [], color="black", ls=":", lw=1.4, label="equation of motion")
     exponential = 1e3 * terminal * (1.0 - np.exp(-3.0 * times / lasting))
-    axes.plot(1e3 * times, exponential, color=GREY, ls="--", label="Mordant and Pinton (2000)")
-    axes.plot([1e3 * lasting], [0.95e3 * terminal], "o", color=GREY, ms=8)
-    axes.annotate("95 % after 55 ms", (1e3 * lasting, 0.95e3 * terminal), (70.0, 58.0), color="#444444")
+    axes.plot(1e3 * times, exponential, color=GREY, ls="--", label="fit of Mordant and Pinton (2000)")
+    where = (1e3 * lasting, 0.95e3 * terminal)
+    axes.plot(*where, "o", color=GREY, ms=8)
+    axes.annotate(f"95 % after {where[0]:.0f} ms", where, (70.0, 58.0), color="#444444")
     axes.set_xlim(0.0, 200.0)
     axes.set_ylim(0.0, 90.0)
     label(axes, "time", "ms", "speed of fall", "mm/s")

@@ -98,15 +98,14 @@ def continue_into_solids(share, continued, radius, gap):
         r = i + 0.5
         for j in range(vertical):
             z = j + 0.5 - GHOSTS
-            up, apart = gap + radius - z, 0.0
+            up = gap + radius - z
             away = math.sqrt(r * r + up * up)
             if z < 0.0:
                 continued[i, j] = beyond(share, r, z, 0.0, -1.0, -z)
             elif r > radial - GHOSTS:
                 continued[i, j] = beyond(share, r, z, 1.0, 0.0, r - (radial - GHOSTS))
             elif up > 0.0 and away < radius:
-                apart = radius - away
-                continued[i, j] = beyond(share, r, z, -r / away, up / away, apart)
+                continued[i, j] = beyond(share, r, z, -r / away, up / away, radius - away)
 
 
 @inline
