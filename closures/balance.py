@@ -71,6 +71,31 @@ def voidage_in_balance(archimedes: float, reynolds: float, drag: Drag, packed_vo
     return _root(excess, packed_voidage, 1.0)
 
 
+def pressure_gradient(
+    velocity: float, diameter: float, density: float, viscosity: float, voidage: float, drag: Drag
+) -> float:
+    r"""Pressure gradient of the flow through fixed spheres, for any drag law.
+
+    .. math:: \frac{dp}{dz} = \frac{18\,\eta\,(1-\varepsilon)\,F(Re,\varepsilon)\,U}{\varepsilon\,d^2}
+
+    velocity   U, superficial [m/s]
+    diameter   d [m]
+    density    rho_f [kg/m3]
+    viscosity  eta, dynamic [Pa s]
+    voidage    eps [-]
+    drag       F(reynolds, voidage)
+    returns    dp/dz, without the hydrostatic part [Pa/m]
+
+    >>> from closures.bed import ergun_gradient
+    >>> from closures.drag import ergun
+    >>> flow = (0.02, 1e-3, 10.0, 1.5e-3, 0.451335)
+    >>> round(pressure_gradient(*flow, ergun) / ergun_gradient(*flow), 12)
+    1.0
+    """
+    factor = drag(density * velocity * diameter / viscosity, voidage)
+    return 18.0 * viscosity * (1.0 - voidage) * factor * velocity / (voidage * diameter**2)
+
+
 def terminal_velocity(
     diameter: float, density: float, fluid_density: float, viscosity: float, drag: Drag, gravity: float = 9.81
 ) -> float:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import inspect
 import itertools
 import math
+import re
 from collections.abc import Callable, Iterator
 
 from closures.drag import ergun
+from closures.kinds import ARGUMENTS, arguments_of
 from closures.lubrication import film_strength
-from closures.registry import Law, law_of
+from closures.registry import Law, is_built_in, law_of
 
 Curve = Callable[[float], float]
 
@@ -46,7 +48,7 @@ def check(law: Callable[..., float]) -> list[str]:
     law      a function decorated with @closures.law(...)
     returns  one message per violated requirement, with the place; empty if all hold
 
-    every        finite in the stated range; the same value compiled and interpreted
+    every        arguments of its kind; finite in the stated range; the same value compiled and interpreted
     drag         finite at rest; Stokes drag within 5 % for an isolated sphere; increasing with solid fraction; force
                  increasing with velocity; no jump above 0.5 %; 0.3 to 2 times Ergun in a creeping dense bed
     minimum_gap  positive; not decreasing with viscosity, speed or roughness
@@ -64,7 +66,7 @@ def check(law: Callable[..., float]) -> list[str]:
     jumps by -73 % at voidage = 0.8 (reynolds = 1e+03)
     """
     entry = law_of(law)
-    found = list(_finite(entry))
+    found = list(_declared(entry)) or list(_finite(entry))
     if not found:
         found = [*_same_compiled(entry), *REQUIREMENTS.get(entry.kind, _none)(entry)]
     return found
@@ -90,13 +92,23 @@ def _shown(stated: dict[str, float]) -> str:
     return ", ".join(f"{name} = {value:.3g}" for name, value in stated.items())
 
 
+def _declared(entry: Law) -> Iterator[str]:
+    """Arguments of a user's law that nothing can give, or that are missing; helpers of built-in laws take others."""
+    if entry.kind in ARGUMENTS and not is_built_in(entry.function):
+        (may, must), names = ARGUMENTS[entry.kind], _arguments(entry)
+        odd, missing = [each for each in names if each not in may], [each for each in must if each not in names]
+        if odd or missing:
+            what = f"takes {', '.join(odd)}" if odd else f"does not take {', '.join(missing)}"
+            yield f"{what}: not a law of kind {entry.kind}, {arguments_of(entry.kind)}"
+
+
 def _finite(entry: Law) -> Iterator[str]:
     names = _arguments(entry)
     for values in itertools.product(*(samples(entry, name, 4) for name in names)):
         stated = dict(zip(names, values))
         try:
             value = entry.function(**stated)
-        except (ArithmeticError, ValueError) as failure:
+        except Exception as failure:  # whatever a user's function raises
             yield f"fails ({failure}) at {_shown(stated)}"
             return
         if not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -115,12 +127,24 @@ def _same_compiled(entry: Law) -> Iterator[str]:
         try:
             value = compiled(*values)
         except Exception as failure:  # numba raises many types of error, not only its own
-            yield f"cannot be compiled: {' '.join(str(failure).split())[:200]}"
+            yield f"cannot be compiled: {first_cause(failure)}"
             return
         plain = entry.function(*values)
         if not math.isclose(value, plain, rel_tol=1e-12):
             yield f"is {plain:.6g}, but {value:.6g} when compiled, at {_shown(dict(zip(names, values)))}"
             return
+
+
+def first_cause(refusal: Exception) -> str:
+    """The first cause that the compiler gives, in one line, and the remedy.
+
+    >>> first_cause(TypeError("Failed in nopython mode pipeline (step: x)\\nUnknown attribute 'x' of y:\\n\\n z"))
+    "Unknown attribute 'x' of y; use numbers, math and if"
+    """
+    lines = [line.strip() for line in re.sub(r"\x1b\[\d*m", "", str(refusal)).splitlines()]
+    told = [line for line in lines if line and not line.startswith(("Failed in", "During", ">>>"))]
+    cause = told[0].rstrip(":. ") if told else type(refusal).__name__
+    return f"{cause}; use numbers, math and if"
 
 
 def _first_decrease(values: list[float], curve: Curve) -> float | None:
@@ -148,9 +172,6 @@ def _largest_jump(values: list[float], curve: Curve) -> tuple[float, float]:
 
 
 def _drag(entry: Law) -> Iterator[str]:
-    if not {"reynolds", "voidage"} <= set(_arguments(entry)):
-        yield "is not a drag law: it must take reynolds and voidage"
-        return
     sizes = dict.fromkeys(set(_arguments(entry)) - {"reynolds", "voidage"}, 1.0)
     numbers, voidages = samples(entry, "reynolds", 401), samples(entry, "voidage", 401)
 

@@ -14,8 +14,8 @@ def reduced(first: float, second: float) -> float:
     .. math:: x^* = \frac{x_i x_j}{x_i + x_j}
 
     first    x_i, radius [m] or mass [kg]
-    second   x_j, of the other body; infinite for a flat or fixed wall
-    returns  x*, in the same unit
+    second   x_j, of the other body [m] or [kg]; infinite for a flat or fixed wall
+    returns  x* [m] or [kg]
 
     Range: any.
 

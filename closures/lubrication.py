@@ -79,28 +79,28 @@ def film_potential(gap: float, minimum_gap: float, cutoff_gap: float) -> float:
 
 
 @law("lubrication", "difference of the film's potential; series of the inverse hyperbolic tangent")
-def short_film_potential(gap: float, end_gap: float, minimum_gap: float) -> float:
-    r"""Change of the film potential between two nearby gaps on one side of h_min, without branch or logarithm.
+def short_film_potential(gap: float, change: float, minimum_gap: float) -> float:
+    r"""Change of the film potential over a small change of the gap on one side of h_min, without branch or logarithm.
 
-    .. math:: L(h_1) - L(h) = 2\left(t + \tfrac13 t^3 + \tfrac15 t^5 + \dots\right),\ t = \frac{h_1-h}{h_1+h}
-              \quad(h>h_{min});\qquad \frac{\max(h_1,0)^2 - \max(h,0)^2}{2h_{min}^2}\quad(h\le h_{min})
+    .. math:: L(h + x) - L(h) = 2\left(t + \tfrac13 t^3 + \tfrac15 t^5 + \dots\right),\ t = \frac{x}{2h + x}
+              \quad(h>h_{min});\qquad \frac{\max(h + x,0)^2 - \max(h,0)^2}{2h_{min}^2}\quad(h\le h_{min})
 
     gap          h [m]
-    end_gap      h_1, on the same side of h_min [m]
+    change       x; h + x is on the same side of h_min [m]
     minimum_gap  h_min, > 0 [m]
-    returns      L(h_1) - L(h) [-]
+    returns      L(h + x) - L(h) [-]
 
-    Range: gaps that differ by less than a tenth, or lie below h_min; error below 1e-16 there.
+    Range: gaps that change by less than a tenth, or stay below h_min; error below 1e-16 there.
 
-    >>> abs(short_film_potential(1.0, 1.1, 0.1) - math.log(1.1)) < 1e-16
+    >>> abs(short_film_potential(1.0, 0.1, 0.1) - math.log(1.1)) < 1e-16
     True
     """
-    part = (end_gap - gap) / (end_gap + gap)
+    part = change / (2.0 * gap + change)
     square = part * part
     series = 1.0 + square * (
         1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0 + square * (1.0 / 9.0 + square * (1.0 / 11.0))))
     )
-    start, end = max(gap, 0.0), max(end_gap, 0.0)
+    start, end = max(gap, 0.0), max(gap + change, 0.0)
     below = (end - start) * (end + start) * (0.5 / (minimum_gap * minimum_gap))
     return 2.0 * part * series if gap > minimum_gap else below
 
@@ -126,7 +126,7 @@ def film_potential_change(gap: float, change: float, minimum_gap: float, cutoff_
     end = gap + change
     low, high = min(gap, end), max(gap, end)
     if high <= minimum_gap or (low > minimum_gap and high < cutoff_gap and high - low < 0.1 * low):
-        return short_film_potential(gap, end, minimum_gap)
+        return short_film_potential(gap, change, minimum_gap)
     return film_potential(end, minimum_gap, cutoff_gap) - film_potential(gap, minimum_gap, cutoff_gap)
 
 
@@ -187,7 +187,7 @@ def speed_after_film(
     return guess
 
 
-@law("lubrication", "same equation as speed_after_film, by two Newton steps with the series of the potential")
+@law("lubrication", "same equation as speed_after_film; root of a quadratic equation and a step of Halley's method")
 def speed_after_short_step(
     speed: float,
     gap: float,
@@ -199,7 +199,10 @@ def speed_after_short_step(
 ) -> float:
     r"""Rate of the gap after a step with a small change of the gap, without branch or logarithm; NaN otherwise.
 
-    .. math:: u_1 + B\,L(h + u_1\Delta t) = u_0 + B\,L(h_a)
+    .. math:: u_1 - u_0 + B\,[L(h_1) - L(h_a)] = 0,\ h_1 = h + u_1\Delta t;\qquad
+              L(h_1) - L(h_a) = 2\left(t + \tfrac13 t^3 + \dots\right),\ t = \frac{h_1-h_a}{h_1+h_a}\quad(h>h_{min})
+
+    The first term of the series, and the square of the gap below h_min, leave a quadratic equation in u_1.
 
     speed              u_0, rate of the gap before, positive apart [m/s]
     gap                h, at the start of the step [m]
@@ -210,31 +213,36 @@ def speed_after_short_step(
     cutoff_gap         h_co [m]
     returns            u_1, to 1e-14 relative; NaN outside the range [m/s]
 
-    Range: the gap changes by less than a tenth within the film, or stays below h_min. Outside, use
+    Range: the gap changes by less than a tenth within the film, or stays below h_min on one side of 0. Outside, use
     :func:`speed_after_film`.
 
     >>> fast, safe = (f(-1.0, 1.0, 1.001, 0.03, 0.5, 1e-6, 2.0) for f in (speed_after_short_step, speed_after_film))
     >>> abs(fast - safe) < 1e-15, speed_after_short_step(-1.0, 1.0, 1.0, 0.5, 0.5, 1e-6, 2.0)
     (True, nan)
     """
-    # slope of the potential: 1/h in the film, h/h_min^2 below h_min; stored as upper/lower
     inside = gap > minimum_gap
-    square_gap = minimum_gap * minimum_gap
-    weight = step * strength_per_mass
-    total = speed + strength_per_mass * short_film_potential(gap, accounted_gap, minimum_gap)
-    lower, upper = (gap, 1.0) if inside else (square_gap, max(gap, 0.0))
-    guess = total * lower / (lower + weight * upper)
-    last = guess
-    for _ in range(2):
-        end = gap + step * guess
-        excess = guess + strength_per_mass * short_film_potential(gap, end, minimum_gap) - total
-        lower, upper = (end, 1.0) if inside else (square_gap, max(end, 0.0))
-        last = excess * lower / (lower + weight * upper)
-        guess -= last
-    # the last Newton correction bounds the remaining error
+    weight, total = step * strength_per_mass, accounted_gap + gap
+    # a u^2 + b u = c: the equation times h_1 + h_a in the film, times 2 h_min^2 below h_min
+    now, before, square = max(gap, 0.0), max(accounted_gap, 0.0), 2.0 * minimum_gap * minimum_gap
+    returned = strength_per_mass * (before - now) * (before + now)
+    a = step if inside else (step * weight if gap > 0.0 else 0.0)
+    b = total + 2.0 * weight - step * speed if inside else square + 2.0 * weight * now
+    c = speed * total + 2.0 * strength_per_mass * (accounted_gap - gap) if inside else square * speed + returned
+    discriminant = b * b + 4.0 * a * c
+    guess = 2.0 * c / (b + math.sqrt(max(discriminant, 0.0)))
+    # the rest of the series, by one step of Halley's method
+    end = gap + step * guess
+    begin, change = (accounted_gap if inside else minimum_gap), gap - accounted_gap + step * guess
+    excess = guess - speed + strength_per_mass * short_film_potential(begin, change, minimum_gap)
+    inverse = 1.0 / (end * (end + weight) if inside else 1.0)
+    correction = excess * end * end * inverse
+    bent = 0.5 * step * weight * correction * inverse
+    guess -= correction * (1.0 - bent) if inside else 0.0
     end = gap + step * guess
     low, high = min(gap, end, accounted_gap), max(gap, end, accounted_gap)
-    shortly = (low > minimum_gap and high < cutoff_gap and high - low <= 0.1 * low) if inside else high <= minimum_gap
-    missed = strength_per_mass * (step * last) ** 2
-    found = missed <= 1e-14 * (abs(total) + abs(guess)) * (low * low if inside else square_gap)
-    return guess if shortly and found else math.nan
+    if inside:
+        shortly = low > minimum_gap and high < cutoff_gap and high - low <= 0.1 * low
+    else:
+        shortly = high <= minimum_gap and (end >= 0.0 if gap > 0.0 else end <= 0.0)
+    found = not inside or 4.0 * bent * bent * abs(correction) <= 1e-14 * (abs(speed) + abs(guess))
+    return guess if shortly and found and discriminant >= 0.0 else math.nan

@@ -16,7 +16,9 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import getdoc, signature
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+from closures.kinds import BUILT_IN
 
 Function = TypeVar("Function", bound=Callable[..., float])
 
@@ -67,10 +69,14 @@ def law(kind: str, reference: str, **ranges: tuple[float, float]) -> Callable[[F
     reference  source of the equation: authors, journal, DOI, equation number
     ranges     argument=(low, high) for which the law was derived or fitted
     returns    the function, unchanged
+    errors     ValueError, in one line, for a user's law with the name of a built-in law, an unknown kind, or an
+               impossible range
     """
 
     def register(function: Function) -> Function:
         entry = Law(function.__name__, kind, reference, dict(ranges), function)
+        if not is_built_in(function):
+            _refuse_impossible(entry)
         REGISTRY.setdefault(kind, {})[function.__name__] = entry
         compiled = sys.modules.get("closures.compiled")
         if compiled is not None:
@@ -78,6 +84,42 @@ def law(kind: str, reference: str, **ranges: tuple[float, float]) -> Callable[[F
         return function
 
     return register
+
+
+def is_built_in(function: Callable[..., float]) -> bool:
+    """Whether a law belongs to this package.
+
+    >>> from closures.minimum_gap import elastohydrodynamic
+    >>> is_built_in(elastohydrodynamic)
+    True
+    """
+    return function.__module__.startswith("closures.")
+
+
+def _refuse_impossible(entry: Law) -> None:
+    """Refuse a user's law whose name is taken, whose kind is unknown, or with a range that is none."""
+    load_built_in_laws()
+    if entry.kind not in REGISTRY:
+        raise ValueError(f"{entry.name}: kind = {entry.kind!r}: must be one of {', '.join(REGISTRY)}")
+    known = REGISTRY[entry.kind].get(entry.name)
+    if known is not None and is_built_in(known.function):
+        module = known.function.__module__
+        raise ValueError(f"{entry.name} is built in ({module}); choose another name")
+    if entry.name in BUILT_IN.get(entry.kind, ()):
+        raise ValueError(f"{entry.name} has another meaning in laws.{entry.kind}; choose another name")
+    for name, limits in entry.ranges.items():
+        if name not in entry.arguments:
+            taken = ", ".join(entry.arguments)
+            raise ValueError(f"{entry.name}: range of {name}: must be of an argument of the law, one of {taken}")
+        if not _is_range(limits):
+            raise ValueError(f"{entry.name}: {name} = {limits!r}: must be a pair of numbers (low, high), low < high")
+
+
+def _is_range(limits: Any) -> bool:
+    pair = (
+        isinstance(limits, tuple | list) and len(limits) == 2 and all(isinstance(each, int | float) for each in limits)
+    )
+    return pair and bool(limits[0] < limits[1])
 
 
 def law_of(function: Callable[..., float]) -> Law:
@@ -98,7 +140,7 @@ def law_of(function: Callable[..., float]) -> Law:
 GROUP = "cfddem.closures"
 """Group of entry points through which an installed package provides laws."""
 
-_WITHOUT_LAWS = ("check", "compiled", "registry")
+_WITHOUT_LAWS = ("check", "compiled", "kinds", "registry")
 
 
 @cache

@@ -16,6 +16,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from closures.balance import Drag
@@ -73,13 +74,17 @@ class UniformBed:
         >>> round(0.64 * bed.slip(), 3)          # Ferreira et al. (2023) fluidise alumina with 0.157 m/s to 0.64
         0.157
         """
+        return self._slip
+
+    @cached_property
+    def _slip(self) -> float:
+        """Slip by bisection; one value for all waves of the bed."""
         wanted = self.voidage * (self.density - self.fluid_density) * self.gravity
         high = 1e-6
         while self.resistance(self.voidage, high) * high < wanted:
             high *= 2.0
         low = 0.0
-        for _ in range(200):
-            middle = 0.5 * (low + high)
+        while low < (middle := 0.5 * (low + high)) < high:
             low, high = (middle, high) if self.resistance(self.voidage, middle) * middle < wanted else (low, middle)
         return 0.5 * (low + high)
 

@@ -16,6 +16,8 @@ from cfddem.cli.app import app, main
 
 HOME = Path(__file__).parents[1]
 WIDTH = 100
+ANNOUNCED = "cfddem: compiling loops, about a minute the first time\n"
+"""Left out of the errors: whether loops are compiled depends on what the machine has kept."""
 
 
 class Done(NamedTuple):
@@ -36,7 +38,7 @@ def call(*words: str) -> Done:
             main()
         except SystemExit as end:
             code = int(end.code or 0)
-    return Done(code, out.getvalue(), err.getvalue())
+    return Done(code, out.getvalue(), err.getvalue().replace(ANNOUNCED, ""))
 
 
 def cfddem(*words: str, folder: Path | None = None, seconds: float = 900) -> subprocess.CompletedProcess[str]:

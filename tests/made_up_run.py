@@ -51,8 +51,11 @@ def quantities(case: Case) -> dict[str, dict[str, Quantity]]:
     return {"history": all_columns(case), "particles": of_fields(PARTICLE_FIELDS), "fluid": fluid}
 
 
-def made_up(folder: Path, text: str = BED, rows: int = 401, trend: float = 0.0) -> Path:
-    """A synthetic run: the pressure drop carries the weight, the voidage is 0.6, with noise of known strength."""
+def made_up(folder: Path, text: str = BED, rows: int = 401, trend: float = 0.0, **constant: float) -> Path:
+    """A synthetic run: the pressure drop carries the weight, the voidage is 0.6, with noise of known strength.
+
+    constant  columns of the history that keep a value
+    """
     case = Case.from_text(text)
     grid = grid_of(case)
     wet = case.fluid is not None
@@ -73,7 +76,7 @@ def made_up(folder: Path, text: str = BED, rows: int = 401, trend: float = 0.0) 
             "momentum_imbalance": math.nan if k == 0 else 1e-15,
             "volume_imbalance": 1e-9,
             "out_of_range_count": 2000.0 * k,
-        }
+        } | constant
         run.append_history({name: value for name, value in row.items() if wet or name not in OF_THE_FLUID})
         if k % 100 == 0:
             fluid = {"voidage": np.full(grid.shape, 0.6)} if wet else None

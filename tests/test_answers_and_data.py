@@ -6,6 +6,7 @@ import json
 import math
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from command_line import call
@@ -24,6 +25,7 @@ from cfddem.case.data_table import read_table
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.plotting.case_drawing import case_drawing
+from cfddem.plotting.comparison_page import histories
 from cfddem.preflight.summary import preflight
 from cfddem.run.runner import Run
 
@@ -51,7 +53,7 @@ def test_the_answer_says_which_voidage_to_believe_and_what_carries_the_bed(tmp_p
     [
         ((), "fluidised, expanded", True),
         (("inlet_velocity = 0.05", "inlet_velocity = 0.005"), "fluidised, expanded", False),  # carried, but too slow
-        (("[run]", "fixed = true\n[run]"), "packed bed of fixed particles", None),
+        (("[run]", "fixed = true\n[run]"), "fixed bed", None),
         (("inlet_velocity = 0.05", "inlet_velocity = 0.0"), "particles in motion", None),
     ],
 )
@@ -63,9 +65,11 @@ def test_the_regime_follows_from_pressure_and_velocity(
 
 
 def test_a_mean_that_drifts_much_is_not_to_be_used(tmp_path: Path) -> None:
-    little = answer(made_up(tmp_path / "little", trend=1e-3), "bed height")
+    little = answer(made_up(tmp_path / "little", trend=5e-4), "bed height")
     much = answer(made_up(tmp_path / "much", trend=2e-2), "bed height")
-    assert "still drifts by 0." in str(little["verdict"]) and "do not use" not in str(little["verdict"])
+    assert "still drifts by 1.3 % from 1 to 2 s" in str(little["verdict"]) and "do not use" not in str(
+        little["verdict"]
+    )
     assert "do not use the mean" in str(much["verdict"]) and much["holds"] is False
 
 
@@ -73,6 +77,8 @@ def test_agreement_is_counted_in_standard_errors() -> None:
     assert agreement(1.0, 0.1, 1.15, "x")[1] is True and agreement(1.0, 0.1, 1.25, "x")[1] is False
     assert agreement(1.0, math.nan, 1.15, "x") == ("13.0 % below x; no error is known", None)
     assert agreement(1.0, 0.0, 1.0, "x")[1] is True
+    assert agreement(1.0, 1e-6, 1.15, "x") == ("differs from x: 13.0 % below it", False)
+    assert agreement(1.0, 1e-12, 1.15, "x") == ("13.0 % below x; it does not fluctuate", None)
 
 
 def test_markdown_has_the_answer_first_and_no_signs_of_its_own(tmp_path: Path) -> None:
@@ -96,14 +102,18 @@ def test_the_report_is_written_as_markdown_with_figures(tmp_path: Path, monkeypa
 def test_runs_are_compared_by_the_errors_of_their_means(tmp_path: Path) -> None:
     made_up(tmp_path / "a")
     made_up(tmp_path / "b", BED.replace("0.05\n", "0.04\n"))
-    made_up(tmp_path / "c", trend=1e-3)
-    found = compare([tmp_path / name for name in "abc"])
-    assert found["changed"] == {"bed.inlet_velocity": [0.05, 0.04, 0.05]}
+    made_up(tmp_path / "c")
+    with h5py.File(tmp_path / "c" / "history.h5", "r+") as file:
+        file["bed_height"][:] += 1.5e-3
+    made_up(tmp_path / "d", trend=1e-3)
+    found = compare([tmp_path / name for name in "abcd"])
+    assert found["changed"] == {"bed.inlet_velocity": [0.05, 0.04, 0.05, 0.05]}
     height = found["measures"]["bed_height"]["runs"]
     assert height[1]["difference"] == 0.0 and height[2]["difference"] == pytest.approx(1.5e-3, rel=0.01)
     assert height[2]["z"] == pytest.approx(height[2]["difference"] / math.hypot(height[0]["error"], height[2]["error"]))
+    assert math.isnan(height[3]["z"]) and height[3]["verdict"] == "not judged: a mean drifts"
     text = lines(found)
-    assert any("differs" in line for line in text) and max(map(len, text)) <= 100
+    assert any("differs by" in line for line in text) and max(map(len, text)) <= 100
 
 
 def test_compare_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -116,6 +126,27 @@ def test_compare_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert page.count("data:image/png;base64,") == 2 and "the cases are the same" in page
     assert json.loads(call("compare", "a", "b", "--json", "-o", "two.png")[1])["runs"][1]["name"] == "b"
     assert call("compare", "a")[0] == 2 and call("compare", "a", "b", "-o", "x.pdf")[0] == 2
+
+
+def test_many_runs_with_long_names_fit_on_the_page(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    """Runs are named by what differs, the legend is as wide as the panels, and nothing that is zero is listed."""
+    folders = [tmp_path / f"drag-{law}_inlet_velocity-{u}" for law in ("postdoc", "di_felice") for u in (0.045, 0.055)]
+    for folder in folders:
+        law, speed = folder.name.removeprefix("drag-").split("_inlet_velocity-")
+        made_up(
+            folder, BED.replace("0.05\n", f"{speed}\n") + f'[laws]\ndrag = "{law.replace("postdoc", "gidaspow")}"\n'
+        )
+    found = compare(folders)
+    names = [each["name"] for each in found["runs"]]
+    assert names[0] == "0.045, gidaspow" and len(set(names)) == 4
+    text = "\n".join(lines(found))
+    assert "  equal" in text and "contact count" in text
+    assert not any(all(row["mean"] == 0.0 for row in each["runs"]) for each in found["measures"].values())
+    figure = histories([open_run(folder) for folder in folders], names)
+    figure.canvas.draw()
+    legend, panel = figure.legends[0].get_window_extent(), figure.axes[0].get_window_extent()
+    assert legend.x0 >= 0.0 and legend.x1 <= figure.bbox.x1 and legend.y1 < figure.axes[-1].get_window_extent().y0
+    assert panel.width > 0.7 * figure.bbox.width and not [each for each in recwarn if "layout" in str(each.message)]
 
 
 def test_names_of_runs_are_told_apart() -> None:

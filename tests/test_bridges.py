@@ -179,6 +179,7 @@ def test_liquid_is_kept_and_shared() -> None:
     assert bridges.liquid == pytest.approx(total, rel=1e-15)
 
 
+@pytest.mark.slow
 def test_no_more_liquid_is_drawn_than_there_is() -> None:
     """A large wet sphere among many small dry ones, which all draw at once."""
     draw = np.random.default_rng(2)
@@ -218,7 +219,8 @@ def test_an_impossible_film_is_refused_by_name() -> None:
         coat(make_particles([[0, 0, 0]], RADIUS, 2500.0), -1.0)
 
 
-@pytest.mark.parametrize("pull", [slow("pendular"), "willett", slow("rabinovich"), slow("lambert")])
+@pytest.mark.slow
+@pytest.mark.parametrize("pull", ["pendular", "willett", "rabinovich", "lambert"])
 @pytest.mark.parametrize("gap", [0.0, FILM])
 def test_a_bridge_without_liquid_does_not_pull(pull: str, gap: float) -> None:
     """A share of a user's own may be 0."""

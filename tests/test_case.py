@@ -134,7 +134,11 @@ def test_every_renamed_key_leads_to_a_valid_one() -> None:
     [
         (b"\xff\xfe[\x00b\x00", "must be UTF-8 text; byte 0 is not UTF-8"),
         (b"a = 1\nb = \n", ":2: must be valid TOML"),
-        (b"a = 1\na = 2\n", "must be valid TOML; Cannot overwrite a value"),
+        (b"[a]\nb = 1\n[c]\nb = 3\nd = 4\nb = 2", ":6: c.b: must be given once; line 4 gives it, too"),
+        (b"[a]\nb = 1\n[a]\nc = 3", ":3: a: must be given once; line 1 gives it, too"),
+        (b"a = 1\nuntil = 1,7\n", ":2: must be valid TOML; Expected newline or end of document after a statement in"),
+        (b"until = 1,7 # s\n", "; decimals have a point: 1.7"),
+        (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each solid"),
         (b"x = '" + b"x" * LONGEST_FILE + b"'", "must be at most 500 kB"),
         (b"x = " + b"[" * 100_000, "must be a case with lists and tables nested a few levels deep"),
         (
@@ -144,7 +148,7 @@ def test_every_renamed_key_leads_to_a_valid_one() -> None:
         (b"x = " + b"9" * 5000, "must be valid TOML; Exceeds the limit"),
         (b"", "must be given"),
     ],
-    ids=range(8),
+    ids=range(12),
 )
 def test_a_file_that_is_no_case_is_refused_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "bed.toml"

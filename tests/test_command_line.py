@@ -22,7 +22,7 @@ from cfddem.cli.app import main
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("collide --stokes 30 --velocity 0.1 --diameter -0.01", ["diameter", "-0.01", "above 0"]),
+        ("collide --stokes 30 --velocity 0.1 --diameter -0.01", ["diameter", "-0.01", "between 1e-9 and 1000 m"]),
         ("collide --stokes 30 --velocity nan", ["velocity", "nan", "finite"]),
         ("collide --stokes inf --velocity 0.1", ["stokes", "inf", "finite"]),
         ("collide --stokes 30 --velocity 0.1 --material wood", ["material", "wood", "delrin"]),

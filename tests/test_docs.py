@@ -95,7 +95,7 @@ def pages_with(mark: str | None) -> list[Any]:
     return [
         pytest.param(page, id=name, marks=[pytest.mark.slow] if is_long(page) else [])
         for page, name in zip(PAGES, NAMES)
-        if any(mark is None or block.mark == mark for block in blocks(page))
+        if any(mark is None or mark in block.mark.split(", ") for block in blocks(page))
     ]
 
 

@@ -70,7 +70,7 @@ def unexplained(run: ParticleSolver, steps: int) -> tuple[float, dict[str, float
         {},
         {"gravity": 9.81, "lid": 0.5},
         {"laws": Laws(spring="rescaled")},
-        {"laws": Laws(rolling="constant_torque")},
+        pytest.param({"laws": Laws(rolling="constant_torque")}, marks=pytest.mark.slow),
         {"viscosity": 1e-3},
         {"viscosity": 1e-2, "gravity": 9.81, "lid": 0.5},
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
@@ -32,10 +33,35 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
     assert "fitted for voidage from 0.4 to 1" in done.out
     assert (tmp_path / "law.png").stat().st_size > 10_000
     assert json.loads(call("explain", "wen-yu", "--json").out)["kind"] == "drag"
+    drags = call("explain", "drag").out
+    assert (
+        "di_felice" in drags
+        and "asperities" not in drags
+        and len(json.loads(call("explain", "drag", "--json").out)) > 9
+    )
+    found = call("explain", "richardson").out
+    assert "exponent_richardson_zaki" in found and "wen_yu" not in found
+    assert call("explain", "bed.inlet_velocity").out.startswith("bed.inlet_velocity = 0.0")
+    keys = call("explain", "bed").out
+    assert "bed.diameter " in keys and "column.width" not in keys and max(map(len, keys.splitlines())) <= 100
     both = call("explain", "stokes")
     assert both.code == 2 and "drag.stokes or " in both.err and call("explain", "drag.stokes").code == 0
-    unknown = call("explain", "di_felic")
+    unknown = call("explain", "di_felcie")
     assert unknown.code == 2 and "di_felice" in unknown.err
+
+
+def test_every_argument_of_every_law_is_plotted_with_its_unit() -> None:
+    from cfddem.cli import law_page as pages
+
+    every = [law for kind in pages.laws().values() for law in kind.values()]
+    bare = [
+        f"{law.kind}.{law.name}: {name}"
+        for law in every
+        for name in [*inspect.signature(law.function).parameters, "returns"]
+        if "unit not given" in pages.unit(law, name)
+    ]
+    assert not bare, "\n".join(bare)
+    assert pages.unit(pages.find("asperities"), "roughness_j") == "m"
 
 
 def test_the_doctor_lists_versions_and_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

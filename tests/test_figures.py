@@ -5,11 +5,12 @@ from __future__ import annotations
 import itertools
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from cfddem.plotting import curves
+from cfddem.plotting import curves, sweep_figure
 from cfddem.plotting.colours import colour_map
 
 HOME = Path(__file__).parents[1]
@@ -106,3 +107,45 @@ def test_axes_have_units() -> None:
         if "[" not in text
     ]
     assert not bare, "\n".join(bare)
+
+
+def test_figures_are_no_wider_than_eleven_inches() -> None:
+    """A page shows about 900 pixels; the letters of a wider figure could not be read there at half size."""
+    wide = [
+        f"{file}: {size} inches"
+        for file, text in SOURCES.items()
+        for size in re.findall(r"(?:panels|blank)\([^\n]*?width=(\d+\.\d+)\b(?! \*)", text)
+        if float(size) > 11.0
+    ]
+    assert not wide, "\n".join(wide)
+
+
+@pytest.mark.filterwarnings("ignore:Palette images")
+def test_pictures_of_the_pages_have_no_colour_of_a_former_palette() -> None:
+    """Among them a green and a grey that readers without green cones cannot tell apart."""
+    from PIL import Image
+
+    former = {int(each[1:], 16): each for each in ("#56a6d9", "#e07b00", "#1b8a5a", "#b8323c")}
+    old = []
+    for path in sorted((HOME / "docs" / "images").glob("*.png")):
+        pixels = np.asarray(Image.open(path).convert("RGB")).astype(np.int32) @ np.array([65536, 256, 1])
+        old += [f"{path.name}: {name}" for code, name in former.items() if (pixels == code).sum() > 50]
+    assert not old, "\n".join(old)
+
+
+def test_a_sweep_joins_numbers_and_never_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The key with numbers is on the axis, wherever it stands; one curve for each word."""
+    drawn: list[Any] = []
+    monkeypatch.setattr(sweep_figure, "save", lambda figure, path: drawn.append(figure))
+    points = [
+        sweep_figure.Point({"laws.drag": law, "bed.inlet_velocity": speed}, {"bed_height": (0.04, 1e-4, "m")})
+        for law in ("di_felice", "wen_yu")
+        for speed in (0.03, 0.045)
+    ]
+    words = [sweep_figure.Point({"laws.drag": each.values["laws.drag"]}, each.measures) for each in points[::2]]
+    for each in (points, words):
+        assert sweep_figure.sweep_figure(each, tmp_path / "sweep.png")
+    (both,), (alone,) = drawn[0].axes, drawn[1].axes
+    assert both.get_xlabel() == "bed.inlet_velocity  [m/s]" and alone.get_xlabel() == "laws.drag"
+    curves_of = [each.lines[0].get_linestyle() for panel in (both, alone) for each in panel.containers]
+    assert curves_of == ["-", "-", "None"]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cfddem.backend.errors import InputError
@@ -16,6 +19,7 @@ from closures.restitution import davis_sitison, singh
 from scenarios.collisions.film_impact import FilmImpact, Liquid, impact
 from scenarios.collisions.film_impact.film_laws import laws_of
 from scenarios.collisions.film_impact.materials import LIQUIDS
+from scenarios.collisions.film_impact.statements import peaks
 
 
 @cache
@@ -118,6 +122,52 @@ def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.Captur
     assert "surface_energy" in printed(*words, "--surface-tension", "0.0192", "--contact-angle", "20")
     with pytest.raises(InputError, match="film"):
         printed("--film", "4e-3")
+
+
+def test_the_command_draws_the_moments_that_the_bead_has_reached(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A picture of an impact in which the bead sticks, and so never passes P4."""
+    from cfddem.cli.app import app
+
+    slow = ["--diameter", "2.8e-3", "--liquid", "m5", "--velocity", "0.03", "--cells", "4"]
+    app(["film-impact", *slow, "--figure", str(tmp_path / "stuck.png")], result_action="return_value")
+    assert (tmp_path / "stuck.png").read_bytes()[:4] == b"\x89PNG"
+    assert "stick" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_movie_ends_when_the_bead_has_left(tmp_path: Path) -> None:
+    """A frame for each step after contact, and 30 in the time of a fall through the film."""
+    from PIL import Image
+
+    from scenarios.collisions.film_impact.movie import AFTER_CONTACT, FRAMES, MOST, movie
+
+    result = movie(tmp_path / "rebound.gif", velocity=1.0, cells=5)
+    falls = result.p4.time * 1.0 / 0.4e-3
+    with Image.open(tmp_path / "rebound.gif") as image:
+        assert 0.5 * FRAMES * falls < image.n_frames <= FRAMES * falls + AFTER_CONTACT + 1  # type: ignore[attr-defined]
+    assert movie(tmp_path / "stuck.gif", 2.8e-3, "m5", velocity=0.03, cells=4).outcome == "stick"
+    with Image.open(tmp_path / "stuck.gif") as image:
+        assert 2 < image.n_frames <= MOST  # type: ignore[attr-defined]
+
+
+def test_a_peak_stands_out_from_what_surrounds_it() -> None:
+    """Peaks of the liquid's energy: one in oil; of two humps two; ripples of 0.5 % are none."""
+    x = np.linspace(0.0, 2.0 * math.pi, 200)
+    humps = 2.0 - np.cos(2.0 * x)
+
+    def with_energy(energy: np.ndarray) -> FilmImpact:
+        return replace(oil(5), history={"liquid_kinetic": energy})
+
+    assert peaks(oil(5)) == 1
+    assert peaks(with_energy(humps)) == 2
+    assert peaks(with_energy(1.0 - np.cos(x) + 0.01 * np.sin(20.0 * x))) == 1
+
+
+def test_the_regime_changes_where_the_branches_of_the_fit_meet() -> None:
+    """St of 171 in oil, 2293 in water; St* of 552 and 664."""
+    assert (oil(5).regime, water().regime) == (1, 2)
 
 
 # ---------------------------------------------------------------- options, and laws beside the resolved impact

@@ -290,6 +290,7 @@ def test_the_record_of_the_engine_agrees_with_the_scenario(stokes: float) -> Non
         ({"velocity": 0.1}, "two of the three"),
         ({"velocity": -0.1, "stokes": 10.0}, "velocity = -0.1"),
         ({"velocity": math.nan, "stokes": 10.0}, "velocity = nan"),
+        ({"velocity": 5e-324, "stokes": 10.0}, "between 1e-12 and 1000 m/s"),
         ({"velocity": 0.1, "viscosity": -1e-3}, "viscosity = -0.001"),
         ({"velocity": 0.1, "stokes": 0.0}, "stokes = 0.0"),
         ({"velocity": 0.1, "stokes": 10.0, "diameter": -1e-3}, "diameter = -0.001"),

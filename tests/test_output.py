@@ -19,7 +19,8 @@ from toy_run import series
 
 from cfddem.backend.errors import CfddemError, InputError, RunFailed
 from cfddem.io import writer
-from cfddem.io.folder import FORMAT
+from cfddem.io.files import PARTIAL
+from cfddem.io.folder import FORMAT, require_no_foreign_files
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import TIME, Quantity, of_fields
 from cfddem.io.reading import open_run
@@ -279,6 +280,18 @@ def test_a_folder_that_holds_a_run_is_not_overwritten(tmp_path):
         RunFolder.create(tmp_path / "run", "other = true\n", {})
     one_line(failure.value)
     assert before == {path: path.read_bytes() for path in run.folder.rglob("*") if path.is_file()}
+
+
+def test_a_run_does_not_begin_among_other_files_and_a_folder_of_runs_names_them(tmp_path):
+    short_run(tmp_path / "sweep" / "seed-1").finish("finished")
+    with pytest.raises(InputError, match=r"it contains no run.json, but the runs seed-1"):
+        open_run(tmp_path / "sweep")
+    with pytest.raises(InputError, match=r"a new or empty folder \(seed-1 found\)"):
+        require_no_foreign_files(tmp_path / "sweep")
+    require_no_foreign_files(tmp_path / "new")
+    (tmp_path / "killed" / "data").mkdir(parents=True)
+    (tmp_path / "killed" / f".run.json.1{PARTIAL}").touch()
+    require_no_foreign_files(tmp_path / "killed")
 
 
 def test_a_case_file_of_the_user_is_not_overwritten(tmp_path):

@@ -13,6 +13,7 @@ from example_case import TEXT
 
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
+from cfddem.preflight.issue import percent
 from cfddem.preflight.summary import Preflight, PreflightError, preflight, refuse_errors
 from closures import bed, numbers
 
@@ -63,6 +64,30 @@ def test_a_sphere_larger_than_the_column_is_the_only_error() -> None:
     assert [each.key for each in made(bed__diameter=3.087).issues] == ["bed.diameter"]
 
 
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"bed.count": 200}, "bed.count", "expected bed is 1.1 cells high"),
+        ({"column.width": 0.005, "bed.count": 400}, "column.width", "is 2 cells wide"),
+        ({"bed.diameter": 1.0}, "bed.diameter", "did you mean 0.001 m (1 mm)?"),
+        (
+            {"bed.diameter": 1.0, "column.width": 10.0, "column.height": 35.0, "column.cell": 2.5},
+            "bed.diameter", "did you mean 0.001 m (1 mm)?",
+        ),
+        ({"fluid.viscosity": 1.0}, "bed.inlet_velocity", "1000 times that of water; is it in mPa s?"),
+        ({"bed.inlet_velocity": 37.0}, "bed.inlet_velocity", "is it in mm/s? 0.037 m/s"),
+        ({"bed.inlet_velocity": 0.3}, "bed.inlet_velocity", "use less; fluidisation begins at"),
+    ],
+)  # fmt: skip
+def test_the_first_issue_of_a_bed_in_wrong_units_or_of_few_cells(changes: dict[str, Any], key: str, words: str) -> None:
+    first = preflight(Case.from_toml(gallery()["liquid-bed"], changes)).issues[0]
+    assert first.key == key and words in str(first)
+
+
+def test_shares_are_shown_without_powers_of_ten() -> None:
+    assert [percent(each) for each in (0.0204, 0.999, 1.4, 14.0)] == ["2.04 %", "99.9 %", "140 %", "1400 %"]
+
+
 def test_the_numbers_are_those_of_the_laws() -> None:
     """Ferreira et al. (2023): alumina of 3.087 mm in water at 0.157 m/s."""
     result = made()
@@ -83,6 +108,21 @@ def test_minimum_fluidisation_with_ergun_drag_equals_the_ergun_correlation() -> 
     result = made(laws__drag="ergun")
     reynolds = bed.fluidisation_reynolds_ergun(number(result, "Ar"), 0.42)
     assert number(result, "u_mf") == pytest.approx(reynolds * 8.354e-4 / (997.0 * 3.087e-3), rel=1e-9)
+
+
+def test_the_terminal_velocity_by_the_drag_law_stands_beside_the_measured_one() -> None:
+    """Stokes' law is far above Brown and Lawler at Re = 1000; Ergun's is not for a sphere alone."""
+    assert number(made(laws__drag="brown_lawler"), "u_t, drag law") == pytest.approx(number(made(), "u_t"), rel=1e-9)
+    assert number(made(laws__drag="stokes"), "u_t, drag law") > 5.0 * number(made(), "u_t")
+    assert not any(row.name == "u_t, drag law" for row in made(laws__drag="ergun").rows)
+
+
+def test_a_fixed_bed_has_the_pressure_drop_of_its_law_and_is_not_fluidised() -> None:
+    gas = {"fluid__density": 1.2, "fluid__viscosity": 1.8e-5, "bed__inlet_velocity": 3.0, "bed__fixed": True}
+    tang, ergun = (made(**gas, laws__drag=law) for law in ("tang", "ergun"))
+    assert not any("u_mf" in row.name or "bubble" in row.note or "fluidis" in row.note for row in tang.rows)
+    assert number(tang, "pressure drop, Ergun") == pytest.approx(number(ergun, "pressure drop"), rel=1e-12)
+    assert number(tang, "pressure drop") != pytest.approx(number(ergun, "pressure drop"), rel=0.02)
 
 
 def test_a_gas_bed_that_bubbles_is_at_least_as_high_as_poured() -> None:

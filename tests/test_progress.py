@@ -13,7 +13,8 @@ import pytest
 from numba import njit
 from rich.progress import Progress
 
-from cfddem.backend.compile import announce_compilation
+from cfddem.backend import stopwatch
+from cfddem.backend.compile import _compilation, announce_compilation, announced, seconds_of_compilation
 from cfddem.backend.errors import InputError
 from cfddem.run.progress import ProgressLine, Status, live_line
 
@@ -54,13 +55,39 @@ def test_the_live_line_shows_preparation_and_compilation(monkeypatch: pytest.Mon
 
     line.progress("pouring 10 particles")
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    announce_compilation(compiling)
+    spent = seconds_of_compilation()
+    before = announce_compilation(compiling)
     try:
         helper = njit(lambda x: 2.0 * x)
         njit(lambda x: helper(x) + 1.0)(1.0)
     finally:
-        announce_compilation()
+        announce_compilation(before)
+    assert seconds_of_compilation() > spent
     assert looking == [False, True] and gc.isenabled()  # Python looks for no garbage within a compilation
     (before, told), (after, nothing) = seen
     assert before == after == "pouring 10 particles"
     assert re.fullmatch(r"compiling loop \d+ \(kept for next time\) \.\.\.", told) and nothing == ""
+
+
+def test_where_there_is_no_terminal_one_line_says_that_loops_are_compiled(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(_compilation, "compiled", 0)
+    before = announce_compilation(announced)
+    try:
+        for factor in (2.0, 3.0):
+            njit(lambda x, factor=factor: factor * x)(1.0)
+    finally:
+        announce_compilation(before)
+    assert capfd.readouterr().err == "cfddem: compiling loops, about a minute the first time\n"
+
+
+def test_compilation_is_counted_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    spent = iter((0.0, 4.0, 4.0))
+    times = iter((10.0, 15.0, 17.0))
+    monkeypatch.setattr(stopwatch, "seconds_of_compilation", lambda: next(spent))
+    monkeypatch.setattr(stopwatch.clock, "perf_counter", lambda: next(times))
+    watch = stopwatch.Stopwatch()
+    watch.lap("fluid")
+    watch.lap("fluid")
+    assert watch.seconds == {"compilation": 4.0, "first calls": 1.0, "fluid": 2.0}

@@ -23,6 +23,7 @@ from cfddem.cli import app as cli
 from cfddem.io.writer import RunFolder
 from cfddem.plotting.report_page import page
 from closures import bed as laws_of_beds
+from closures.drag import di_felice, ergun
 from closures.registry import REGISTRY, Law
 
 
@@ -66,8 +67,17 @@ def test_no_slip_walls_increase_the_expected_voidage(tmp_path: Path) -> None:
 def test_a_packed_bed_is_compared_with_ergun(tmp_path: Path) -> None:
     fixed = report(made_up(tmp_path / "run", BED.replace("[run]", "fixed = true\n[run]")))["laws"]
     slope = laws_of_beds.ergun_gradient(0.05, 2e-3, 1000.0, 1e-3, 0.6)
-    assert [row["law"] for row in fixed] == ["pressure drop by Ergun"]
-    assert fixed[0]["expected"] == pytest.approx(slope * 0.04, rel=0.01)
+    assert [row["law"] for row in fixed] == ["pressure drop by di_felice", "pressure drop by Ergun"]
+    assert fixed[1]["expected"] == pytest.approx(slope * 0.04 / 0.99, rel=0.003)
+    factor = di_felice(100.0, 0.6) / ergun(100.0, 0.6)
+    assert fixed[0]["expected"] == pytest.approx(factor * fixed[1]["expected"], rel=0.01)
+
+
+def test_a_page_names_the_sources_of_the_laws_of_its_case(tmp_path: Path) -> None:
+    cited = {each["name"]: each["reference"] for each in report(made_up(tmp_path / "run"))["references"]}
+    assert {"di_felice", "film_strength", "elastohydrodynamic", "hertz"} <= cited.keys() and "ergun" not in cited
+    text = page(tmp_path / "run", tmp_path / "run.html").read_text()
+    assert "Di Felice, Int. J. Multiphase Flow 20 (1994) 153" in text
 
 
 def test_a_run_without_a_fluid_has_a_report(tmp_path: Path) -> None:
@@ -80,7 +90,10 @@ def test_a_run_without_a_fluid_has_a_report(tmp_path: Path) -> None:
 
 def test_warnings_of_ranges_drifts_and_short_windows(tmp_path: Path) -> None:
     said = "\n".join(report(made_up(tmp_path / "steady"))["warnings"])
-    assert "the drag law di_felice was evaluated outside of its fitted range in 10 % of its uses: voidage" in said
+    assert (
+        "the drag law di_felice was evaluated outside of its fitted range in 10 % of its uses (800000 times): voidage"
+        in said
+    )
     assert "not stationary" not in said
     drifting = report(made_up(tmp_path / "drifts", trend=5e-3))
     assert drifting["measures"]["bed_height"]["stationary"] is False

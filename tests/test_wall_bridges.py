@@ -140,6 +140,7 @@ def test_a_wall_that_is_wetted_worse_leaves_more_liquid_on_the_particle() -> Non
     assert share < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["belt", "drum"])
 def test_liquid_of_a_wall_moves_with_its_surface(kind: str) -> None:
     """A belt and a drum stay in place while their surfaces move: a bridge returns liquid where the wall is then."""

@@ -86,6 +86,13 @@ def test_a_faster_liquid_glass_keeps_the_solids_farther_apart() -> None:
     assert len(stiff.warnings) == 1
 
 
+def test_a_thin_liquid_without_its_own_pressure_and_a_radius_in_mm_are_warned_of() -> None:
+    with pytest.warns(UserWarning) as caught:
+        found = collide_wet(1.2, viscosity=1e-3, radius=1.0)
+    assert len(caught) == len(found.warnings) == 2
+    assert "is that of silicone oil of 10 Pa s" in found.warnings[0] and "did you mean 0.001 m?" in found.warnings[1]
+
+
 @pytest.mark.parametrize("kind", TRANSITION_PRESSURES, ids="-".join)
 def test_films_dissipate_in_the_expected_order(kind: tuple[str, str]) -> None:
     """A constant film below h_min takes more than none at the same pressure; oblique impacts never lose more."""

@@ -216,6 +216,9 @@ def test_a_toroid_that_is_nearly_singular_is_said_to_be() -> None:
         ({"spring": "cutt"}, "spring"),
         ({"smallest_gap": 0.0}, "smallest_gap"),
         ({"tolerance": 1.0}, "tolerance"),
+        ({"velocity": 1e300}, "at most 1000 m/s"),
+        ({"spin": -1e300, "friction": 0.1}, "spin"),
+        ({"gravity": 1e300}, "gravity"),
     ],
     ids=lambda value: str(value),
 )

@@ -22,14 +22,21 @@ AGREES = 2.0
 CLOSE = 5e-3
 """Relative difference up to which a mean equals a number for all practical purposes, whatever its error."""
 
+STEADY = 1e-9
+"""Standard error over the mean up to which a series does not fluctuate."""
+
 CARRIED = 0.9
 """Share of the buoyant weight that the flow carries at least in a fluidised bed."""
 
 DRIFTING = 0.02
-"""Largest drift over the mean with which a mean can be used."""
+"""Largest drift over the averaged rows, over their mean, with which a mean can be used."""
 
-STILL = 0.01
-"""Largest speed of particles at rest, over the speed after a fall of one diameter."""
+STILL, LYING = 0.01, 0.01
+"""Largest speed of particles at rest, over the speed after a fall of one diameter; and the least share of the weight
+that the floor carries under a bed at rest."""
+
+COUNTED = 1000.0
+"""Most standard errors that are written as a number."""
 
 
 class Answer(NamedTuple):
@@ -41,6 +48,7 @@ class Answer(NamedTuple):
     unit: str
     verdict: str  # in words
     holds: bool | None  # true: as expected; false: not as expected, or not to be used; None: nothing to compare with
+    error_is_lower_bound: bool = False
 
 
 def answers(
@@ -60,7 +68,7 @@ def answers(
 
 
 def agreement(computed: float, error: float, expected: float, name: str) -> tuple[str, bool | None]:
-    """Whether a mean agrees with a number, in words and as a truth value; None without an error.
+    """Whether a mean agrees with a number, in words and as a truth value; None without an error, or for a constant.
 
     computed, error, expected  same unit; the error is NaN if it is unknown
     name                       of the number, in the sentence
@@ -75,12 +83,13 @@ def agreement(computed: float, error: float, expected: float, name: str) -> tupl
     side = f"{percent:.1f} % {'below' if off < 0.0 else 'above'} it"
     if percent <= 100.0 * CLOSE:
         return f"equals {name} to {max(percent, 0.01):.2g} %", True
-    if math.isnan(error):
-        return f"{side.removesuffix(' it')} {name}; no error is known", None
-    errors = abs(off) / error if error > 0.0 else math.inf
+    if not error > STEADY * abs(computed):
+        why = "no error is known" if math.isnan(error) else "it does not fluctuate"
+        return f"{side.removesuffix(' it')} {name}; {why}", None
+    errors = abs(off) / error
     word = "agrees with" if errors <= AGREES else "differs from"
-    count = f"{errors:.1f}" if errors < 1000.0 else "over 1000"
-    return f"{word} {name}: {side}, {count} standard errors", errors <= AGREES
+    count = f", {errors:.1f} standard errors" if errors < COUNTED else ""
+    return f"{word} {name}: {side}{count}", errors <= AGREES
 
 
 def _speed(laws: list[dict[str, Any]]) -> Iterator[Answer]:
@@ -89,6 +98,12 @@ def _speed(laws: list[dict[str, Any]]) -> Iterator[Answer]:
         if row["law"].startswith("terminal velocity"):
             words, holds = agreement(row["computed"], math.nan, row["expected"], f"the {row['law']}")
             yield Answer("settling speed", row["computed"], math.nan, "m/s", words, holds)
+
+
+def _usable(measure: dict[str, Any]) -> bool:
+    """Whether a mean can be used: it is steady, or drifts little."""
+    drift = measure["drift"]  # NaN with too few rows
+    return bool(measure["stationary"]) or abs(drift) <= DRIFTING * abs(measure["mean"])
 
 
 def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) -> Answer:
@@ -100,11 +115,13 @@ def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) 
         steady = "too few rows to say whether it is steady"
     else:
         share = abs(drift) / abs(mean) if mean else math.inf
-        steady = f"still drifts by {100.0 * share:.2g} % within the window"
+        begin, end = measure["drift_times"]
+        steady = f"still drifts by {100.0 * share:.2g} % from {begin:g} to {end:g} s"
         if share > DRIFTING:
             steady, holds = f"{steady}, do not use the mean", False
     verdict = f"{steady}; {verdict}" if verdict else steady
-    return Answer(name, measure["mean"], measure["error"], measure["unit"], verdict, holds)
+    bound = measure["error_is_lower_bound"]
+    return Answer(name, measure["mean"], measure["error"], measure["unit"], verdict, holds, bound)
 
 
 def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
@@ -115,7 +132,7 @@ def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) ->
     verdict = ""
     published = _published(laws)
     if published:
-        solids = height["mean"] * (1.0 - measures[FROM_HEIGHT]["mean"])
+        solids = estimate_bed(case).solid_volume / case.column.floor_area
         low, high = (solids / (1.0 - each) for each in (min(published), max(published)))
         verdict = f"published laws give {low:.3g} to {high:.3g} m"
     yield _mean("bed height", height, verdict, None)
@@ -139,19 +156,19 @@ def _voidage(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[A
         off = max(low - mean, mean - high)
         where = "within" if off <= 0.0 else f"{off:.3f} {'below' if mean < low else 'above'}"
         verdict = f"{where} the published laws, {low:.3f} to {high:.3f}"
-    if FROM_PRESSURE in measures:
+    if FROM_PRESSURE in measures and _usable(voidage):
         verdict += f"; use this value, from the height; the pressure gives {measures[FROM_PRESSURE]['mean']:.3f}"
     yield _mean("bed voidage", voidage, verdict.removeprefix("; "), holds)
 
 
 def _drop(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
-    """Pressure drop against the weight of the bed, or against Ergun for a packed one."""
+    """Pressure drop against the weight of the bed, or against the drag law for a fixed one."""
     if "pressure_drop" not in measures:
         return
-    drop, names = measures["pressure_drop"], ("pressure drop by the buoyant weight", "pressure drop by Ergun")
+    drop, opening = measures["pressure_drop"], "pressure drop by "
     for row in laws:
-        if row["law"] in names:
-            expected = "the buoyant weight" if row["law"] == names[0] else "the law of Ergun"
+        if row["law"].startswith(opening):
+            expected = row["law"].removeprefix(opening)
             words, holds = agreement(drop["mean"], drop["error"], row["expected"], expected)
             yield _mean("pressure drop", drop, words, holds)
             return
@@ -168,7 +185,7 @@ def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, st
     fall = math.sqrt(math.hypot(*case.laws.gravity) * case.bed.largest_diameter)
     at_rest = bool(fastest <= STILL * fall)
     if case.bed.fixed:
-        return "packed bed of fixed particles", "they do not move", None
+        return "fixed bed", "the particles do not move", None
     weight = weight_over_floor(case)
     flows = case.fluid is not None and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
     if case.particle_count == 1:
@@ -176,11 +193,17 @@ def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, st
     bed, drop = estimate_bed(case), measures.get("pressure_drop")
     if not flows or drop is None or weight is None or not weight > 0.0 or not bed.onset > 0.0:
         return ("particles at rest", moving, None) if at_rest else ("particles in motion", moving, None)
-    error = "" if math.isnan(drop["error"]) else f" +- {100.0 * drop['error'] / weight:.1f}"
-    carried = f"the flow carries {100.0 * drop['mean'] / weight:.1f}{error} % of the buoyant weight"
+    share, error = drop["mean"] / weight, 100.0 * drop["error"] / weight
+    spread = f" +- {error:.1f}" if error >= 0.05 else ""
+    carried = f"the flow carries {100.0 * share:.1f}{spread} % of the buoyant weight"
     ratio = f"the inlet velocity is {bed.inlet / bed.onset:.2g} times that of minimum fluidisation"
-    share = drop["mean"] / weight
-    return _of_a_bed(case, bed, share), f"{carried}; {ratio}", (share >= CARRIED) == (bed.inlet > bed.onset)
+    lying = measures["wall_load"]["mean"] > LYING * weight if "wall_load" in measures else share < 1.0 - LYING
+    if at_rest and lying and bed.inlet > bed.onset:
+        return "at rest, not fluidised", f"{carried}, although {ratio}; {moving}", False
+    regime, reason = _of_a_bed(case, bed, share), f"{carried}; {ratio}"
+    if not _usable(drop):
+        return f"so far: {regime}", f"{reason}; the pressure drop is not known to be steady", None
+    return regime, reason, (share >= CARRIED) == (bed.inlet > bed.onset)
 
 
 def _of_a_bed(case: Case, bed: BedEstimate, carried: float) -> str:

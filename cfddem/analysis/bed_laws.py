@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
+from cfddem.analysis.measures import OF_THE_BED
 from cfddem.case.particle_properties import particle_properties
 from cfddem.case.schema import Case
+from cfddem.preflight.mixture import bed_drag
 from closures import bed as laws_of_beds
 from closures import numbers
+from closures.balance import pressure_gradient
+from closures.drag import ergun
 from closures.registry import REGISTRY
 
 FROM_HEIGHT, FROM_PRESSURE = "bed_voidage", "bed_voidage_from_pressure"
@@ -35,11 +40,7 @@ def compared_with_bed_laws(case: Case, measures: dict[str, Any]) -> list[dict[st
         return []
     drop = measures["pressure_drop"]["mean"]
     if case.bed.fixed:
-        height, voidage = measures["bed_height"]["mean"], measures["bed_voidage"]["mean"]
-        inlet, fluid = case.bed.inlet_velocity, case.fluid
-        slope = laws_of_beds.ergun_gradient(inlet, case.bed.diameter, fluid.density, fluid.viscosity, voidage)
-        outside = _outside_range("ergun_gradient", voidage=voidage)
-        return [comparison("pressure drop by Ergun", drop, slope * height, "Pa", outside)]
+        return list(_of_a_fixed_bed(case, measures, drop))
     weight = buoyant_weight(case) / case.column.floor_area
     rows = [comparison("pressure drop by the buoyant weight", drop, weight, "Pa")]
     if "wall_load" in measures:
@@ -49,6 +50,19 @@ def compared_with_bed_laws(case: Case, measures: dict[str, Any]) -> list[dict[st
         for law, voidage in expansion_laws(case).items():
             rows.append(comparison(f"voidage by {law}", measures[FROM_HEIGHT]["mean"], voidage, "1"))
     return rows
+
+
+def _of_a_fixed_bed(case: Case, measures: dict[str, Any], drop: float) -> Iterator[dict[str, Any]]:
+    """The pressure drop by the drag law of the case, and by Ergun, over the length that all particles fill."""
+    assert case.fluid is not None and isinstance(case.bed.inlet_velocity, float)
+    length, voidage = measures["bed_height"]["mean"] / OF_THE_BED, measures["bed_voidage"]["mean"]
+    flow = case.bed.inlet_velocity, case.bed.diameter, case.fluid.density, case.fluid.viscosity, voidage
+    drag = bed_drag(case)
+    if drag is not ergun:
+        expected = length * pressure_gradient(*flow, drag)
+        yield comparison(f"pressure drop by {drag.__name__}", drop, expected, "Pa")
+    outside = _outside_range("ergun_gradient", voidage=voidage)
+    yield comparison("pressure drop by Ergun", drop, length * laws_of_beds.ergun_gradient(*flow), "Pa", outside)
 
 
 def expansion_note(laws: list[dict[str, Any]], measures: dict[str, Any]) -> str:

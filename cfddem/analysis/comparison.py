@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,13 +12,16 @@ from typing import Any
 
 from cfddem.analysis.answers import AGREES
 from cfddem.analysis.report import case_of, report
-from cfddem.analysis.report_text import WIDTH, number, spelled
+from cfddem.analysis.report_text import WIDTH, spelled, with_error
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.io.reading import open_run
+from cfddem.io.reading import Run, open_run
 
 MOST = 12
 """Largest number of runs that are compared."""
+
+LONGEST_NAME = 20
+"""Most characters of the name of a folder that names a run; longer ones give way to the values that differ."""
 
 
 def compare(folders: Sequence[Path]) -> dict[str, Any]:
@@ -27,24 +32,27 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
     folders  of the runs; the first is the reference
     returns  plain values: `runs` (name, folder, case, status, window), `changed` (key -> value of each run), `answers`
              (name -> value of each run), `measures` (name -> unit, and for each run mean, error, difference, its error,
-             and z = difference over its error)
+             z = difference over its error, and a verdict in words). z is NaN where a mean still drifts, or where the
+             difference exceeds errors that are lower bounds
     errors   InputError for fewer than two or more than MOST runs
     """
     if not 2 <= len(folders) <= MOST:
         raise InputError("folders", len(folders), f"2 to {MOST} run folders")
     results = [report(folder) for folder in folders]
-    names = distinct_names(folders)
+    runs = [open_run(folder) for folder in folders]
+    keys = changed([case_of(run) for run in runs]) | _changed_laws(runs)
+    numbers = [_numbers(result) for result in results]
     measures = {}
-    for name, first in results[0]["measures"].items():
-        rows = [result["measures"].get(name) for result in results]
-        if sum(row is not None for row in rows) > 1:
+    for name, first in numbers[0].items():
+        rows = [each.get(name) for each in numbers]
+        if sum(row is not None for row in rows) > 1 and any(row and row["mean"] != 0.0 for row in rows):
             measures[name] = {"unit": first["unit"], "runs": [_difference(row, first) for row in rows]}
     return {
         "runs": [
             {"name": name, **{key: result[key] for key in ("folder", "case", "status", "window", "warnings")}}
-            for name, result in zip(names, results)
+            for name, result in zip(run_names(folders, keys), results)
         ],
-        "changed": changed([case_of(open_run(folder)) for folder in folders]),
+        "changed": keys,
         "answers": _answers(results),
         "measures": measures,
     }
@@ -64,6 +72,31 @@ def distinct_names(folders: Sequence[Path]) -> list[str]:
     return [f"{Path(*each).name} ({place})" for place, each in enumerate(parts, 1)]
 
 
+def run_names(folders: Sequence[Path], keys: Mapping[str, Sequence[Any]]) -> list[str]:
+    """Names of runs: those of their folders, or of long ones the values of the keys that differ.
+
+    keys  that differ, with the value of each run
+
+    >>> long = [Path("drag-postdoc_inlet_velocity-0.045"), Path("drag-postdoc_inlet_velocity-0.055")]
+    >>> run_names(long, {"laws.drag": ["postdoc", "di_felice"], "bed.inlet_velocity": [0.045, 0.045]})
+    ['postdoc, 0.045', 'di_felice, 0.045']
+    >>> run_names(long, {"bed.inlet_velocity": [0.045, 0.055]})
+    ['inlet_velocity 0.045', 'inlet_velocity 0.055']
+    >>> run_names(long, {})
+    ['0.045', '0.055']
+    """
+    names = distinct_names(folders)
+    if max(map(len, names)) <= LONGEST_NAME:
+        return names
+    values = [", ".join("-" if each is None else f"{each}" for each in row) for row in zip(*keys.values())]
+    if len(keys) == 1:
+        values = [f"{next(iter(keys)).split('.')[-1]} {each}" for each in values]
+    if len(set(values)) == len(names) and max(map(len, values)) <= max(map(len, names)):
+        return values
+    common = re.match(r"(.*[-_/])?", os.path.commonprefix(names))  # noqa: RUF071  character by character
+    return [name[common.end() :] or name for name in names] if common else names
+
+
 def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
     """Keys whose values differ, with the value of each case; None where a case lacks the key."""
     flat = [dict(_values(case.model_dump(mode="json", fallback=_law_name), "")) for case in cases]
@@ -72,21 +105,17 @@ def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
     return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
 
 
+def _changed_laws(runs: Sequence[Run]) -> dict[str, list[Any]]:
+    """Fingerprints of users' laws that differ, with that of each run; None where a run has no such law."""
+    used: list[dict[str, Any]] = [run.provenance.get("laws", {}) for run in runs]
+    kinds = dict.fromkeys(kind for each in used for kind in each)
+    rows = {f"laws.{kind}, source": [each.get(kind, {}).get("fingerprint") for each in used] for kind in kinds}
+    return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
+
+
 def lines(result: dict[str, Any]) -> list[str]:
     """The comparison as text, at most 100 columns wide."""
     return [*_runs(result), *_changes(result["changed"]), *_means(result)]
-
-
-def verdict(row: Mapping[str, Any]) -> str:
-    """Whether a run differs from the first one, in words.
-
-    row  of one run in `measures`
-    """
-    if row["mean"] is None:
-        return "not recorded"
-    if math.isnan(row["z"]):
-        return "no error is known"
-    return "same within errors" if abs(row["z"]) <= AGREES else f"differs by {min(abs(row['z']), 999.0):.1f} errors"
 
 
 def relative(row: Mapping[str, Any]) -> str:
@@ -96,14 +125,40 @@ def relative(row: Mapping[str, Any]) -> str:
 
 
 def _difference(row: dict[str, Any] | None, first: dict[str, Any]) -> dict[str, Any]:
+    """A mean beside that of the first run."""
     if row is None:
-        return {"mean": None, "error": None, "difference": None, "difference_error": None, "z": math.nan}
+        missing = dict.fromkeys(("mean", "error", "difference", "difference_error", "stationary"))
+        return {**missing, "error_is_lower_bound": False, "z": math.nan, "verdict": "not recorded"}
     difference, error = row["mean"] - first["mean"], math.hypot(row["error"], first["error"])
     z = 0.0 if difference == 0.0 else difference / error if error > 0.0 else math.nan
-    return {
-        "mean": row["mean"], "error": row["error"], "difference": difference, "difference_error": error, "z": z,
-        "stationary": row["stationary"],
-    }  # fmt: skip
+    z, verdict = _judged(z, (row, first))
+    kept = {key: row[key] for key in ("mean", "error", "error_is_lower_bound", "stationary")}
+    return {**kept, "difference": difference, "difference_error": error, "z": z, "verdict": verdict}
+
+
+def _judged(z: float, rows: Sequence[dict[str, Any]]) -> tuple[float, str]:
+    """Difference over its error, NaN where that number says nothing, and whether two means differ, in words."""
+    if z == 0.0:
+        return z, "equal"
+    if any(row["stationary"] is False for row in rows):
+        return math.nan, "not judged: a mean drifts"
+    if math.isnan(z):
+        return z, "no error is known"
+    if abs(z) <= AGREES:
+        return z, "same within errors"
+    if any(row["error_is_lower_bound"] for row in rows):
+        return math.nan, "not judged: errors are lower bounds"
+    return z, f"differs by {min(abs(z), 999.0):.1f} errors"
+
+
+def _numbers(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The answers of a report that are numbers, and then all other means, by their names."""
+    first = {
+        each["name"].replace(" ", "_"): {**each, "mean": each["value"], "stationary": None}
+        for each in result["answers"]
+        if not isinstance(each["value"], str)
+    }
+    return first | result["measures"]
 
 
 def _answers(results: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any] | None]]:
@@ -138,7 +193,8 @@ def _runs(result: dict[str, Any]) -> Iterator[str]:
     for place, each in enumerate(result["runs"]):
         begin, end = each["window"]
         head = "reference" if place == 0 else ""
-        yield f"{head:<10} {each['name']}: {each['status']}; means from {begin:g} to {end:g} s"
+        name = each["name"] if each["folder"].endswith(each["name"]) else f"{each['name']} ({each['folder']})"
+        yield f"{head:<10} {name}: {each['status']}; means from {begin:g} to {end:g} s"
     for name, answers in result["answers"].items():
         if any(each is not None and isinstance(each["value"], str) for each in answers):
             words = "; ".join(each["value"] if each else "-" for each in answers)
@@ -160,10 +216,10 @@ def _means(result: dict[str, Any]) -> Iterator[str]:
         yield ""
         yield spelled(name)
         for place, (run, row) in enumerate(zip(names, measure["runs"])):
-            value = "-" if row["mean"] is None else number(row["mean"], row["error"], measure["unit"])
+            value = "-" if row["mean"] is None else with_error(row, measure["unit"])
             opening = f"  {run[:wide]:<{wide}} {value:<30}"
             yield (
                 opening.rstrip()
                 if place == 0 or row["mean"] is None
-                else (f"{opening} {relative(row):>10}  {verdict(row)}")
+                else (f"{opening} {relative(row):>10}  {row['verdict']}")
             )

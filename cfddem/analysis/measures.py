@@ -25,7 +25,11 @@ Mask = NDArray[np.bool_]
 ALONG = {"x": 0, "y": 1, "z": 2}
 
 
-def bed_height(position: Array, radius: Array, share: float = 0.99) -> float:
+OF_THE_BED = 0.99
+"""Share of the particle volume that lies below the height of a bed."""
+
+
+def bed_height(position: Array, radius: Array, share: float = OF_THE_BED) -> float:
     """Height below which a share of the particle volume lies. Spheres are cut at the height, not counted by centre.
 
     position  (N, 3) [m]

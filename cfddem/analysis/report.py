@@ -9,19 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.answers import answers
+from cfddem.analysis.answers import DRIFTING, answers
 from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison, expansion_note
 from cfddem.analysis.fluctuations import impacts
+from cfddem.analysis.law_references import references_of
 from cfddem.analysis.measured import compared_with_measured, with_files
 from cfddem.analysis.regimes import RegimeMap, regime_map
 from cfddem.analysis.run_warnings import STATE, last_value, warnings_of
-from cfddem.analysis.series import block_average, stationarity
+from cfddem.analysis.series import block_average, drift_of, stationarity
 from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
 from cfddem.case.compare import with_files_of
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run, open_run
 from cfddem.preflight.summary import preflight
+
+NO_DRIFT = 1e-3
+"""Drift over the mean up to which a mean is steady, whatever its error."""
 
 ENERGY = "energy_"
 """Prefix of the columns of the energy budget in the history."""
@@ -33,11 +37,13 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
     folder   of the run
     data     files of measured points beside those of the case
     returns  plain values: `case`, `status`, `window`, `answers` (name, value, error, unit, verdict), `measures`
-             (mean, error, unit, drift, stationary), `laws`
+             (mean, error, unit, drift over the averaged rows and
+             their times, stationary), `laws`
              (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
              and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
              the window, if recorded), `warnings`, `advice` (the warnings by what to do), `wall_time`, `preflight`,
-             `provenance`, `measured` (scores against measured data)
+             `provenance`, `references` (kind, name and reference of each law), `measured` (scores against measured
+             data)
     errors   InputError if the run has no history, or for data that cannot be read
     """
     run = open_run(folder)
@@ -45,7 +51,7 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
     case = with_files(case_of(run), data)
     begin, end = window_of(run, case)
-    measures = _measures(run, run.history["time"] >= begin)
+    measures = _measures(run, begin)
     drag_law = (comparison(*row) for row in compared_with_drag_law(run, case))
     laws = [*compared_with_bed_laws(case, measures), *drag_law]
     energy = _energy(run)
@@ -72,12 +78,13 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
         "preflight": preflight(case).summary(),
         "provenance": run.provenance,
+        "references": references_of(case),
     }
 
 
 def case_of(run: Run) -> Case:
     """The case of a run."""
-    return with_files_of(Case.from_text(run.case_text, str(run.folder / "case.toml")), run.folder)
+    return with_files_of(Case.from_text(run.case_text, str(run.folder / "case.toml"), finished=True), run.folder)
 
 
 def window_of(run: Run, case: Case) -> tuple[float, float]:
@@ -106,24 +113,31 @@ def _in_group(run: Run, group: str) -> list[str]:
     return [name for name in run.history if name in declared and declared[name].group.startswith(group)]
 
 
-def _measures(run: Run, inside: np.ndarray) -> dict[str, Any]:
-    """Every measure with a value in at least half of the rows of the window: its mean and error, and its drift."""
-    measures = {}
+def _measures(run: Run, begin: float) -> dict[str, Any]:
+    """Every measure with a value in at least half of the rows of the window: its mean and error, and its drift.
+
+    Mean and drift are of the same rows. A start-up within them counts where it moves the mean.
+    """
+    inside, measures = run.history["time"] >= begin, {}
     for name in _in_group(run, "measure"):
         column, quantity = run.history[name][inside], run.quantity(name)
-        values = column[np.isfinite(column)]
-        if len(values) <= 0.5 * len(column):
+        known = np.isfinite(column)
+        if known.sum() <= 0.5 * len(column):
             continue
-        average, steady = block_average(values), stationarity(values)
+        values, time = column[known], run.history["time"][inside][known]
+        average, (drift, drift_error) = block_average(values), drift_of(time, values)
+        steady = stationarity(values).stationary or abs(drift) <= NO_DRIFT * abs(average.mean)
+        start_up = abs(drift) > max(3.0 * drift_error, DRIFTING * abs(average.mean))
         measures[name] = {
             "mean": average.mean,
             "error": average.error,
             "error_is_lower_bound": not average.enough,
             "unit": quantity.unit,
             "meaning": quantity.meaning,
-            "drift": steady.drift,
-            "drift_error": steady.error,
-            "stationary": None if math.isnan(steady.drift) else steady.stationary,
+            "drift": drift,
+            "drift_error": drift_error,
+            "drift_times": [float(time[0]), float(time[-1])],
+            "stationary": None if math.isnan(drift) else steady and not start_up,
         }
     return measures
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from cfddem.analysis.report_text import number, spelled, steadiness
+from cfddem.analysis.report_text import spelled, steadiness, with_error
 from cfddem.io.quantities import shown_unit
 
 
@@ -33,12 +33,14 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
         *([result["laws_note"]] if result["laws_note"] else ()),
         "## Conservation",
         *_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result["ledger"].items())),
+        "## References of the laws",
+        "\n".join(f"- {_plain(' '.join(law.values()))}" for law in result["references"]),
     ]
     return "\n\n".join(parts) + "\n"
 
 
 def _answer(each: dict[str, Any]) -> tuple[str, ...]:
-    return f"**{each['name']}**", number(each["value"], each["error"], each["unit"]), each["verdict"]
+    return f"**{each['name']}**", with_error(each), each["verdict"]
 
 
 def _measured(found: list[dict[str, Any]]) -> list[str]:
@@ -48,7 +50,7 @@ def _measured(found: list[dict[str, Any]]) -> list[str]:
 
 def _measure(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     name, each = item
-    return spelled(name), number(each["mean"], each["error"], each["unit"]), steadiness(each)
+    return spelled(name), with_error(each), steadiness(each)
 
 
 def _advice(grouped: dict[str, list[str]]) -> Iterator[str]:

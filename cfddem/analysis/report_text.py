@@ -68,16 +68,26 @@ def spelled(name: str) -> str:
     return name.replace("_", " ")
 
 
-def number(value: float | str, error: float = math.nan, unit: str = "") -> str:
+def number(value: float | str, error: float = math.nan, unit: str = "", at_least: bool = False) -> str:
     """A value with its error and unit; a text as it is.
+
+    at_least  the error is a lower bound
 
     >>> number(0.04321, 0.0002, "m"), number(0.6, unit="1"), number("packed")
     ('0.04321 +- 0.0002 m', '0.6', 'packed')
+    >>> number(0.04321, 0.0002, "m", at_least=True)
+    '0.04321 +- at least 0.0002 m'
     """
     if isinstance(value, str):
         return value
-    shown = "" if math.isnan(error) else f" +- {error:.2g}"
+    shown = "" if math.isnan(error) else f" +- {'at least ' if at_least else ''}{error:.2g}"
     return f"{value:.4g}{shown} {'' if unit == '1' else unit}".rstrip()
+
+
+def with_error(row: dict[str, Any], unit: str | None = None) -> str:
+    """The value of an answer or the mean of a measure, with its error and unit."""
+    value = row["mean"] if "mean" in row else row["value"]
+    return number(value, row["error"], row["unit"] if unit is None else unit, row["error_is_lower_bound"])
 
 
 def _headline(result: dict[str, Any]) -> Iterator[str]:
@@ -90,8 +100,7 @@ def _headline(result: dict[str, Any]) -> Iterator[str]:
 def _answers(found: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
     for each in found:
-        value = number(each["value"], each["error"], each["unit"])
-        opening = f"  {each['name']:<16} {value:<26} "
+        opening = f"  {each['name']:<16} {with_error(each):<26} "
         yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 46) or [opening]
 
 
@@ -110,8 +119,7 @@ def _measures(result: dict[str, Any]) -> Iterator[str]:
     yield "  all other means"
     for name, each in result["measures"].items():
         if spelled(name) not in answered:
-            value = number(each["mean"], each["error"], each["unit"])
-            yield f"  {spelled(name):<28} {value:<28} {steadiness(each)}{REMARKS.get(name, '')}"
+            yield f"  {spelled(name):<28} {with_error(each):<28} {steadiness(each)}{REMARKS.get(name, '')}"
 
 
 def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:

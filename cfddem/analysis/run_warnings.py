@@ -13,10 +13,12 @@ from cfddem.case.schema import Case
 from cfddem.io.reading import Run
 from cfddem.preflight import law_ranges
 from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.issue import percent
 from closures.registry import Law
 
 REMEDY = "choose a law with a wider range (cfddem explain)"
 
+INSTALL = "install what the run has used, or keep to what was measured in it"
 FINISH = "finish the run before you use its means"
 LONGER = "run longer, or average over another window"
 LAWS = "check the laws: they were used outside of their fitted ranges"
@@ -30,9 +32,9 @@ Grouped = dict[str, list[str]]
 Found = Iterator[tuple[str, str]]
 """What to do, and the warning."""
 
-LEAST_SHARE, AGITATION_SHARE = 0.01, 0.25
-"""Share of the uses of a law outside of its range from which a warning is given; more for agitation, because surface
-and floor of every bed are outside."""
+AGITATION_SHARE, ALL = 0.25, 0.995
+"""Share of the uses of a law of agitation outside of its range above which a warning is given, because surface and
+floor of every bed are outside; and the share from which the words say `all`."""
 
 
 def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Grouped:
@@ -46,7 +48,8 @@ def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], la
         *_status_warnings(run),
         *_defluidised(run, case),
         *_series_warnings(measures),
-        *_range_warnings(run, case, begin),
+        *_missing_laws(case),
+        *_range_warnings(run, case),
         *((COMPARE, f"{row['law']}: {row['outside_range']}") for row in laws if row["outside_range"]),
     ):
         grouped.setdefault(action, []).append(text)
@@ -78,39 +81,39 @@ def last_value(run: Run, name: str) -> int:
 def _status_warnings(run: Run) -> Found:
     """A run that did not finish, and missing snapshots."""
     if run.status == "stopped":
-        yield FINISH, f"the run was stopped: {run.message}"
+        yield FINISH, f"the run was stopped: {run.message}; continue it with cfddem resume {run.folder}"
     elif run.status == "failed":
         yield FINISH, f"the run failed: {run.message}"
     elif run.status == "running":
-        yield FINISH, "the run has not finished; if it was killed, continue it with cfddem resume"
+        yield FINISH, f"the run has not finished; if it was killed, continue it with cfddem resume {run.folder}"
     if run.missing:
         yield FINISH, f"{len(run.missing)} snapshots are missing"
 
 
-def _range_warnings(run: Run, case: Case, begin: float) -> Found:
-    """How often laws were evaluated outside of their fitted ranges after a time [s], if it is more than LEAST_SHARE."""
-    steps = _gained(run, "fluid_steps", begin)
-    evaluations = steps * float(run.history.get("particle_count", np.zeros(1)).mean())
+def _missing_laws(case: Case) -> Found:
+    """Laws of the run that this machine does not have."""
+    for kind, name in case.laws.missing.items():
+        onset = "; minimum fluidisation is that of Ergun's law" if kind == "drag" else ""
+        yield INSTALL, f"law {name} (laws.{kind}) is not installed here: no prediction{onset}"
+
+
+def _range_warnings(run: Run, case: Case) -> Found:
+    """How often laws were evaluated outside of their fitted ranges in the whole run."""
+    evaluations = last_value(run, "fluid_steps") * float(run.history.get("particle_count", np.zeros(1)).mean())
     drag, agitation, pair_laws = case.laws.drag_law, case.agitation, list(case.laws.pair_laws.values())
     if pair_laws:
-        if outside := _gained(run, "out_of_range_count", begin):
+        if outside := last_value(run, "out_of_range_count"):
             laws = [law for law in (drag, *pair_laws) if law is not None and law.ranges]
             ranges = "; ".join(f"{law.name} {law.fitted_for}" for law in laws)
             text = f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}"
             yield LAWS, f"{text}{_effect(case)}; {REMEDY}"
     elif drag is not None:
-        outside = _gained(run, "out_of_range_count", begin)
+        outside = last_value(run, "out_of_range_count")
         yield from _beyond("drag law", drag, outside, evaluations, effect=_effect(case))
     if isinstance(agitation, Law):
-        outside = _gained(run, "agitation_out_of_range_count", begin)
-        effect = f"; {law_ranges.AGITATED}"
+        outside = last_value(run, "agitation_out_of_range_count")
+        effect = "; ".join(["", law_ranges.AGITATED, *law_ranges.by_default(case)])
         yield from _beyond("law of agitation", agitation, outside, evaluations, AGITATION_SHARE, effect)
-
-
-def _gained(run: Run, name: str, begin: float) -> int:
-    """Increase of a counting column of the history after a time [s]; 0 if there is none."""
-    column = run.history.get(name, np.zeros(0))
-    return int(column[-1] - column[np.searchsorted(run.history["time"], begin)]) if len(column) else 0
 
 
 def _effect(case: Case) -> str:
@@ -128,13 +131,15 @@ def _effect(case: Case) -> str:
     return f"; {found}" if found else ""
 
 
-def _beyond(
-    kind: str, law: Law, outside: int, evaluations: float, share: float = LEAST_SHARE, effect: str = ""
-) -> Found:
+def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float = 0.0, effect: str = "") -> Found:
     """Warning that a law was used outside of its range in more than a share of its uses."""
     if evaluations and outside > share * evaluations:
-        share_outside = f"{100.0 * outside / evaluations:.2g} % of its uses: {law.fitted_for}{effect}; {REMEDY}"
-        yield LAWS, f"the {kind} {law.name} was evaluated outside of its fitted range in {share_outside}"
+        part = outside / evaluations
+        uses = f"{percent(part)} of its uses" if part < ALL else "all of its uses"
+        what = (
+            f"was evaluated outside of its fitted range in {uses} ({outside} times): {law.fitted_for}{effect}; {REMEDY}"
+        )
+        yield LAWS, f"the {kind} {law.name} {what}"
 
 
 def _series_warnings(measures: dict[str, Any]) -> Found:

@@ -124,6 +124,25 @@ def stationarity(values: Array, limit: float = 3.0) -> Stationarity:
     return Stationarity(stationary, start, float(drift), error)
 
 
+def drift_of(time: Array, values: Array) -> tuple[float, float]:
+    r"""How far a series drifts over its whole duration, and the standard error of that.
+
+    .. math:: \mathrm{drift} = b\,T,\qquad s = \sqrt{12}\,s_{\bar r}
+
+    time     (n,) ascending [s]
+    values   (n,), any unit
+    returns  drift and error, same unit; NaN with fewer than 16 values
+
+    b is the slope of the straight line through all values, T their duration, and s_r the standard error of the mean of
+    the values less the line.
+    """
+    if len(values) < FEWEST:
+        return float("nan"), float("nan")
+    since = (time - time.mean()) / (time[-1] - time[0])
+    drift = float(since @ (values - values.mean()) / (since @ since))
+    return drift, float(np.sqrt(12.0)) * block_average(values - drift * since).error
+
+
 class Spectrum(NamedTuple):
     """Power spectrum of a fluctuation."""
 

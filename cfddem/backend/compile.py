@@ -7,9 +7,10 @@
     threaded_part  the same, on all threads
     vector_part    as `part`, over arrays that do not overlap: on several rows at once where the processor can
     inline         a helper, compiled into the loops that call it
+    fused          the same; a product that is added to something may be rounded with the sum, where the processor can
 
 None of them lets the compiler reorder arithmetic: results are the same bits on any number of threads, and a NaN stays a
-NaN.
+NaN. In a `fused` helper no sum may be of two products, because the compiler could round either of them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+import time as clock
 from collections.abc import Callable
 from typing import Any
 
@@ -32,10 +34,13 @@ from cfddem.backend.shared_cache import kept_on_disk
 __all__ = [
     "CHUNKS",
     "announce_compilation",
+    "announced",
     "either",
+    "fused",
     "inline",
     "part",
     "prange",
+    "seconds_of_compilation",
     "serial",
     "threaded",
     "threaded_part",
@@ -105,6 +110,11 @@ def inline(function: Callable[..., Any]) -> Any:
     return _marked(njit(**_INLINE)(function), inline)
 
 
+def fused(function: Callable[..., Any]) -> Any:
+    """Compile a small helper as `inline` does, where a product and a sum may be one instruction."""
+    return _marked(njit(**_INLINE, fastmath={"contract"})(function), fused)
+
+
 def _marked(compiled: Any, how: Callable[..., Any]) -> Any:
     """Note how a function is compiled, so that a copy of it can be compiled the same way."""
     compiled.compiled_as = how
@@ -127,8 +137,12 @@ def _most_threads() -> int:
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
 
 
-def _on_its_own_line(what: str) -> None:
-    print(f"\r{what:<60}\r", end="", file=sys.stderr, flush=True)
+def announced(what: str) -> None:
+    """Show which loop is being compiled on a terminal; elsewhere say once that loops are compiled."""
+    if sys.stderr.isatty():
+        print(f"\r{what:<60}\r", end="", file=sys.stderr, flush=True)
+    elif what and _compilation.compiled == 1:
+        print("cfddem: compiling loops, about a minute the first time", file=sys.stderr, flush=True)
 
 
 class _Compilation(event.Listener):
@@ -139,6 +153,7 @@ class _Compilation(event.Listener):
 
     def __init__(self) -> None:
         self.compiled, self.depth, self.collected = 0, 0, False
+        self.seconds, self.begun = 0.0, 0.0
         self.progress: Callable[[str], None] | None = None
 
     def on_start(self, seen: event.Event) -> None:
@@ -146,6 +161,7 @@ class _Compilation(event.Listener):
         self.depth += 1
         if self.depth > 1:
             return
+        self.begun = clock.perf_counter()
         self.collected = gc.isenabled()
         gc.disable()
         if self.progress is not None:
@@ -157,6 +173,7 @@ class _Compilation(event.Listener):
         self.depth -= 1
         if self.depth > 0:
             return
+        self.seconds += clock.perf_counter() - self.begun
         if self.collected:
             gc.enable()
         if self.progress is not None:
@@ -167,11 +184,16 @@ _compilation = _Compilation()
 event.register("numba:compile", _compilation)
 
 
-def announce_compilation(progress: Callable[[str], None] = _on_its_own_line) -> None:
-    """Show a message at the terminal while loops are compiled.
+def announce_compilation(progress: Callable[[str], None] | None = announced) -> Callable[[str], None] | None:
+    """Show a message while loops are compiled.
 
-    progress  called with the message, and with an empty text at the end; prints to the terminal if not given
+    progress  called with the message, and with an empty text at the end; None for silence
+    returns   what was called until now
     """
-    if not sys.stderr.isatty():
-        return
-    _compilation.progress = progress
+    before, _compilation.progress = _compilation.progress, progress
+    return before
+
+
+def seconds_of_compilation() -> float:
+    """Wall time for which this process has compiled loops [s]; those loaded from the disk are not counted."""
+    return _compilation.seconds

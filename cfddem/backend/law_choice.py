@@ -3,36 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Sequence
+from functools import wraps
 
 from cfddem.backend.errors import InputError, nearest, shown
 from closures import registry
-from closures.registry import Law, law_of
-
-GAP_ARGUMENTS = ("roughness", "approach_speed", "viscosity", "reduced_modulus", "reduced_radius")
-"""Arguments that a law of the minimum gap may take, by name: [m], [m/s], [Pa s], [Pa], [m]."""
-
-FILM_ARGUMENTS = ("gap", "viscosity", "reduced_radius", "minimum_gap", "cutoff_gap")
-"""Arguments that a film law may take, by name: [m], [Pa s], [m], [m], [m]; it must take the first three."""
-
-AGITATION_ARGUMENTS = ("solid_fraction", "reynolds", "along", "density_ratio")
-"""Arguments that a law of agitation may take, by name: of the mean slip, in the direction with this squared cosine."""
-
-BUILT_IN: dict[str, tuple[str, ...]] = {
-    "drag": ("none",),
-    "minimum_gap": ("elastohydrodynamic",),
-    "lubrication": ("nijssen", "nijssen_full", "nijssen_full_twist", "none"),
-    "added_mass": (),
-    "agitation": ("auto", "none", "lattanzi"),
-}
-"""Names that a case may use besides those of registered laws: no law, or the built-in one."""
-
-ARGUMENTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "minimum_gap": (GAP_ARGUMENTS, ()),
-    "lubrication": (FILM_ARGUMENTS, FILM_ARGUMENTS[:3]),
-    "agitation": (AGITATION_ARGUMENTS, AGITATION_ARGUMENTS[:1]),
-}
-"""Arguments that a law of a kind may take, and those that it must take."""
+from closures.kinds import ARGUMENTS, BUILT_IN, DRAG_ARGUMENTS, arguments_of
+from closures.registry import Law, is_built_in, law_of
 
 OF_THE_PAIR_LOOP = ("minimum_gap", "lubrication")
 """Kinds of law that the pair loop calls."""
@@ -45,10 +23,8 @@ def chosen(kind: str, law: str | Callable[..., float]) -> Law:
     """
     entry = _named(kind, law) if isinstance(law, str) else _user_defined(kind, law)
     if not _can_be_called(kind, entry):
-        may, must = ARGUMENTS[kind]
-        asked = f"it may take {', '.join(may)}" + (f", and must take {', '.join(must)}" if must else "")
         loop = "pair loop" if kind in OF_THE_PAIR_LOOP else "coupling"
-        raise InputError(kind, entry.name, f"a law of kind {kind!r} that the {loop} can call", asked)
+        raise InputError(kind, entry.name, f"a law of kind {kind!r} that the {loop} can call", arguments_of(kind))
     return entry
 
 
@@ -66,14 +42,48 @@ def called_by_name(law: Callable[..., float], names: Sequence[str], numbers: Seq
     return law(**{name: known[name] for name in inspect.signature(law).parameters})
 
 
+class NotInstalled(str):
+    """Name of a law in the case of a finished run that this machine does not have."""
+
+
+def drag_by_name(law: Law, diameter_ratio: float = 1.0) -> Callable[[float, float], float]:
+    """A drag law as a function of Reynolds number and voidage, whatever the order of its arguments.
+
+    diameter_ratio  diameter over the Sauter mean diameter, for laws that use it [-]
+    returns         function; it raises InputError where a user's law fails or is not finite
+    """
+    if is_built_in(law.function) and law.arguments == DRAG_ARGUMENTS[:2]:
+        return law.function
+
+    @wraps(law.function)
+    def factor(reynolds: float, voidage: float) -> float:
+        try:
+            value = called_by_name(law.function, DRAG_ARGUMENTS, (reynolds, voidage, diameter_ratio))
+        except (ArithmeticError, ValueError, TypeError) as failure:
+            if is_built_in(law.function):
+                raise
+            raise _not_finite(law, f"it fails ({failure})", reynolds, voidage) from None
+        if math.isfinite(reynolds) and not math.isfinite(value) and not is_built_in(law.function):
+            raise _not_finite(law, f"it is {value:g}", reynolds, voidage)
+        return value
+
+    return factor
+
+
+def _not_finite(law: Law, what: str, reynolds: float, voidage: float) -> InputError:
+    remedy = f"{what} at Re = {reynolds:.3g}, voidage = {voidage:.3g}"
+    return InputError("laws.drag", law.name, "a law that is finite in the bed and beside it", remedy)
+
+
 def _named(kind: str, name: str) -> Law:
     registry.load_built_in_laws()
     laws = registry.REGISTRY[kind]
-    if name not in laws:
-        registry.load_package_laws()
+    failures = {} if name in laws else registry.load_package_laws()
     if name not in laws:
         known = [*BUILT_IN[kind], *(each.name for each in laws.values() if _can_be_called(kind, each))]
         remedy = "cfddem explain lists all laws; for one of your own see docs/how-to/user-law.md"
+        lost = [f"the package {package} could not be loaded: {reason}" for package, reason in failures.items()]
+        remedy = "; ".join([remedy, *lost])
         raise InputError(kind, shown(name), nearest(name, dict.fromkeys(known)), remedy)
     return laws[name]
 

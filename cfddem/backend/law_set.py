@@ -37,6 +37,7 @@ from numba import float64
 
 from cfddem.backend.compile import either, inline, part, threaded, threaded_part, vector_part
 from cfddem.backend.errors import InputError
+from closures.check import first_cause
 from closures.compiled import is_exposed
 
 
@@ -173,8 +174,7 @@ def check_compiles(what: str, law: Callable[..., Any]) -> None:
     try:
         loop.compile((float64,) * len(inspect.signature(law).parameters))
     except Exception as refusal:
-        reason = " ".join(str(refusal).split())[:200]
-        raise InputError(what, law.__name__, "numbers, math and if, which can be compiled", reason) from None
+        raise InputError(what, law.__name__, "a law that can be compiled", first_cause(refusal)) from None
 
 
 def fingerprint(value: Any) -> str:

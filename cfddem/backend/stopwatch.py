@@ -6,8 +6,13 @@ import time as clock
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
+from cfddem.backend.compile import seconds_of_compilation
+
 FIRST_CALLS = "first calls"
-"""Name under which the first lap of every part is counted: loops are compiled or loaded in it."""
+"""Name under which the first lap of every part is counted: compiled loops are loaded in it."""
+
+COMPILATION = "compilation"
+"""Name under which the compilation of loops is counted, in whatever part it happens."""
 
 
 class Stopwatch:
@@ -25,11 +30,11 @@ class Stopwatch:
     def __init__(self, seconds: Mapping[str, float] | None = None) -> None:
         self.seconds: dict[str, float] = dict(seconds or {})
         self._known: set[str] = set()
-        self._since = clock.perf_counter()
+        self.start()
 
     def start(self) -> None:
         """Begin a lap; the time before it is not counted."""
-        self._since = clock.perf_counter()
+        self._since, self._compiled = clock.perf_counter(), seconds_of_compilation()
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
@@ -40,8 +45,14 @@ class Stopwatch:
 
     def lap(self, part: str) -> None:
         """Count the time since the last call for a part."""
-        now = clock.perf_counter()
-        name = part if part in self._known else FIRST_CALLS
+        self.count(part if part in self._known else FIRST_CALLS)
         self._known.add(part)
-        self.seconds[name] = self.seconds.get(name, 0.0) + now - self._since
-        self._since = now
+
+    def count(self, part: str) -> None:
+        """Count the time since the last call for a part, its first lap too."""
+        now, compiled = clock.perf_counter(), seconds_of_compilation()
+        compiling, seconds = compiled - self._compiled, self.seconds
+        if compiling > 0.0:
+            seconds[COMPILATION] = seconds.get(COMPILATION, 0.0) + compiling
+        seconds[part] = seconds.get(part, 0.0) + now - self._since - compiling
+        self._since, self._compiled = now, compiled

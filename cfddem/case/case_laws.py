@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import wraps
-from inspect import signature
 from typing import Any, Literal, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.backend.law_choice import BUILT_IN, chosen
+from cfddem.backend.law_choice import NotInstalled, chosen, drag_by_name
 from cfddem.case.bed import NonNegative, Point
 from cfddem.case.materials import Checked
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from closures.agitation import INERTIA_SHARE
-from closures.registry import Law
+from closures.kinds import BUILT_IN
+from closures.registry import Law, is_built_in
 
 
 class AgitationFactors(NamedTuple):
@@ -110,26 +109,38 @@ class CaseLaws(Checked):
     def _laws_exist(cls, value: Any, about: ValidationInfo) -> Any:
         kind = about.field_name or ""
         if value not in BUILT_IN.get(kind, ()) and (isinstance(value, str) or kind != "drag"):
-            chosen(kind, value)
+            return _installed(kind, value, about)
         return value
 
     @field_validator("added_mass")
     @classmethod
-    def _added_mass_is_a_number_or_a_law(cls, value: Any) -> Any:
+    def _added_mass_is_a_number_or_a_law(cls, value: Any, about: ValidationInfo) -> Any:
         if isinstance(value, str) or callable(value):
-            chosen("added_mass", value)
-        elif not (value >= 0.0 and math.isfinite(value)):
+            return _installed("added_mass", value, about)
+        if not (value >= 0.0 and math.isfinite(value)):
             raise InputError("added_mass", value, "zero or positive, or the name of a law")
         return value
 
+    @field_validator("contact")
+    @classmethod
+    def _contact_is_installed(cls, value: str, about: ValidationInfo) -> str:
+        return _installed("contact", value, about)
+
     @model_validator(mode="after")
     def _contact_exists(self) -> CaseLaws:
+        if "contact" in self.missing:
+            return self
         known = contact_named(self.contact).parameters
         for name, value in self.contact_parameters.items():
             if name not in known:
                 limit = nearest(name, known) if known else f"left out; {self.contact} has no parameters"
                 raise InputError(f"contact_parameters.{name}", value, limit)
         return self
+
+    @property
+    def missing(self) -> dict[str, str]:
+        """Names of laws, by their keys, that a finished run has used and this machine does not have."""
+        return {kind: name for kind in (*BUILT_IN, "contact") if isinstance(name := getattr(self, kind), NotInstalled)}
 
     @property
     def contact_law(self) -> ContactLaw:
@@ -139,7 +150,7 @@ class CaseLaws(Checked):
     @property
     def added_mass_law(self) -> float | Law:
         """Added-mass coefficient, or the law that gives it."""
-        given = self.added_mass
+        given = 0.0 if "added_mass" in self.missing else self.added_mass
         return chosen("added_mass", given) if isinstance(given, str) or callable(given) else given
 
     def added_mass_at(self, voidage: float) -> float:
@@ -150,13 +161,27 @@ class CaseLaws(Checked):
     @property
     def drag_law(self) -> Law | None:
         """Drag law with its range and reference; None without drag."""
-        return None if self.drag is None or self.drag in BUILT_IN["drag"] else chosen("drag", self.drag)
+        drag = self.drag
+        return None if drag is None or drag in (*BUILT_IN["drag"], *self.missing.values()) else chosen("drag", drag)
 
     @property
     def pair_laws(self) -> dict[str, Law]:
         """Laws that replace the built-in laws of the pair loop, by kind."""
-        given = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication")}
+        given = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication") if kind not in self.missing}
         return {kind: chosen(kind, law) for kind, law in given.items() if law not in BUILT_IN[kind]}
+
+    @property
+    def own_laws(self) -> dict[str, Law]:
+        """Laws of the case that are not built in, by their keys."""
+        agitation = self.agitation
+        named = isinstance(agitation, str) and agitation in (*BUILT_IN["agitation"], *self.missing.values())
+        found = {
+            "drag": self.drag_law,
+            "added_mass": self.added_mass_law,
+            **self.pair_laws,
+            "agitation": None if named else chosen("agitation", agitation),
+        }
+        return {kind: law for kind, law in found.items() if isinstance(law, Law) and not is_built_in(law.function)}
 
     def drag_function(self, diameter_ratio: float = 1.0) -> Callable[[float, float], float] | None:
         """Drag factor as a function of Reynolds number and voidage; None without drag.
@@ -164,12 +189,15 @@ class CaseLaws(Checked):
         diameter_ratio  diameter over the Sauter mean diameter, for laws that use it [-]
         """
         law = self.drag_law
-        if law is None or "diameter_ratio" not in signature(law.function).parameters:
-            return None if law is None else law.function
-        function = law.function
+        return None if law is None else drag_by_name(law, diameter_ratio)
 
-        @wraps(function)
-        def at_this_ratio(reynolds: float, voidage: float) -> float:
-            return function(reynolds, voidage, diameter_ratio)
 
-        return at_this_ratio
+def _installed(kind: str, law: Any, about: ValidationInfo) -> Any:
+    """A law that this machine has; in the case of a finished run, else its name alone."""
+    try:
+        contact_named(law) if kind == "contact" else chosen(kind, law)
+    except InputError:
+        if not (isinstance(law, str) and (about.context or {}).get("finished")):
+            raise
+        return NotInstalled(law)
+    return law

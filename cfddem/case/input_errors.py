@@ -188,7 +188,12 @@ def _right_table(word: str, owner: type[BaseModel], model: type[BaseModel]) -> s
         for part in sections_of(field):
             if part is not owner and word in part.model_fields:
                 return f"{word} belongs to {name}"
-    return ""
+    return f"cfddem explain {table} lists them" if (table := next(iter(_tables(owner, model)), "")) else ""
+
+
+def _tables(owner: type[BaseModel], model: type[BaseModel]) -> Iterator[str]:
+    """The tables whose keys are those of a section."""
+    yield from (name for name, field in model.model_fields.items() if owner in sections_of(field))
 
 
 # ---------------------------------------------------------------- line of a key in a file

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.input_errors import dotted, input_error
@@ -101,6 +110,16 @@ class MaterialPair(Checked):
             given.setdefault("friction_lubricated", self.friction)
         return given
 
+
+def _named(values: Any) -> Any:
+    """Materials by name, as given; refused if the properties of a material stand in place of names."""
+    given = values.values() if isinstance(values, Mapping) else ()
+    if given and not any(isinstance(each, Mapping | Material) for each in given):
+        raise InputError("material", None, "a table [material.NAME] for each solid", "for example [material.glass]")
+    return values
+
+
+Materials = Annotated[dict[str, Material], BeforeValidator(_named)]
 
 Pairs = dict[str, dict[str, MaterialPair]]
 

@@ -14,17 +14,18 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from cfddem.backend.errors import InputError, nearest, shown
-from cfddem.backend.law_choice import BUILT_IN, chosen
+from cfddem.backend.law_choice import chosen
 from cfddem.case.bed import AT_RANDOM, POURED_SOLID_FRACTION, Bed, Name, Point, Positive, Species
 from cfddem.case.case_laws import AgitationFactors, CaseLaws
 from cfddem.case.compare import CaseData, with_files_of
 from cfddem.case.feeds import CaseFeed, CaseOutlet, refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
 from cfddem.case.liquid import Liquid, Spray, check_wet
-from cfddem.case.materials import Checked, Fluid, Material, Pairs, check_pairs
+from cfddem.case.materials import Checked, Fluid, Material, Materials, Pairs, check_pairs
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.walls import CaseWall
 from closures.agitation import SHARES, TIMES, free_spheres
+from closures.kinds import BUILT_IN
 from closures.registry import Law, law_of
 
 
@@ -121,7 +122,7 @@ class Case(Checked):
 
     title: str = Field("", description="title, one line")
     fluid: Fluid | None = Field(None, description="the fluid; without this table, dry particles only")
-    material: dict[str, Material] = Field(min_length=1, description="solids by name")
+    material: Materials = Field(min_length=1, description="solids by name")
     pair: Pairs = Field({}, description="contact of two unlike materials, by their names")
     column: Column
     bed: Bed
@@ -223,8 +224,8 @@ class Case(Checked):
         compared with the range during the run.
         """
         given = self.laws.agitation
-        if given == "auto":
-            return law_of(free_spheres) if self._agitation_is_measured else "none"
+        if given == "auto" or "agitation" in self.laws.missing:
+            return law_of(free_spheres) if given == "auto" and self._agitation_is_measured else "none"
         return given if isinstance(given, str) and given in BUILT_IN["agitation"] else chosen("agitation", given)
 
     @property
@@ -289,13 +290,16 @@ class Case(Checked):
         return with_files_of(cls.from_text(read_text(Path(path)), str(path), overrides), Path(path).parent)
 
     @classmethod
-    def from_text(cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None) -> Case:
-        """Read a case from the text of a TOML file; errors call it `name`, and surface files stay as they are given."""
+    def from_text(
+        cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None, *, finished: bool = False
+    ) -> Case:
+        """Read a case from the text of a TOML file; errors call it `name`, and surface files stay as they are given. In
+        that of a finished run, laws that this machine does not have are names only."""
         values = parse(text, name)
         for key, value in (overrides or {}).items():
             set_value(values, key.split("."), value, key)
         try:
-            return cls.model_validate(values)
+            return cls.model_validate(values, context={"finished": finished})
         except ValidationError as failure:
             lines, given = key_lines(text), {tuple(key.split(".")) for key in overrides or {}}
 
@@ -341,7 +345,9 @@ def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -
     if any(each["loc"] == () for each in failure.errors()):
         return []
     known, bed, column = (values.get(name) for name in ("material", "bed", "column"))
-    if not (isinstance(known, dict) and known and isinstance(bed, dict) and isinstance(column, dict)):
+    if not (isinstance(known, dict) and isinstance(bed, dict) and isinstance(column, dict)):
+        return []
+    if dict not in map(type, known.values()):
         return []
     species = bed.get("species") or {"": bed}
     if not isinstance(species, dict):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError, shown
+from cfddem.case.input_errors import dotted, key_lines
 
 LONGEST_FILE = 500_000
 """Largest case file; very many particle positions are given from Python instead [characters]."""
@@ -52,8 +53,23 @@ def parse(text: str, name: str) -> dict[str, Any]:
         found = re.match(r"line (\d+), column (\d+)", where)
         place = f"{name}:{found[1]}" if found else name
         where = f" in column {found[2]}" if found else ""
-        remedy = "; strings need quotation marks" if reason == "Invalid value" else ""
+        line = int(found[1]) if found else text.rstrip().count("\n") + 1
+        if reason.startswith("Cannot overwrite a value") or reason.endswith(" twice"):
+            raise _given_twice(text, line, name) from None
+        comma = re.fullmatch(r"[^=]*=\s*(-?\d+),(\d+)\s*(#.*)?", text.split("\n")[line - 1])
+        remedy = f"; decimals have a point: {comma[1]}.{comma[2]}" if comma else ""
+        remedy += "; strings need quotation marks" if reason == "Invalid value" else ""
         raise InputError(place, None, "valid TOML", reason + where + remedy) from None
+
+
+def _given_twice(text: str, line: int, name: str) -> InputError:
+    """The error for a key in a line that an earlier line has given."""
+    lines = text.split("\n")
+    heads = not lines[line - 1].lstrip().startswith("[")
+    only = [each if k == line or (heads and each.lstrip().startswith("[")) else "" for k, each in enumerate(lines, 1)]
+    key = next((key for key, at in key_lines("\n".join(only)).items() if at == line), ())
+    first = key_lines(text).get(key)
+    return InputError(f"{name}:{line}: {dotted(key)}", None, "given once", f"line {first} gives it, too")
 
 
 def _too_long(name: str) -> InputError:

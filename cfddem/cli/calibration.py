@@ -49,7 +49,7 @@ def calibrate(
         result = f"mean square difference {trial.chi2:.4g}" if trial.computed else trial.status[:60]
         print(f"{trial.number:>4}  {values:<40}  {result}", file=sys.stderr if json else sys.stdout, flush=True)
 
-    if jobs == 1:
+    if jobs == 1 and not json:
         announce_compilation()
     found = search(
         path, match or (), variables(vary), folder, trials=trials, jobs=jobs, overrides=overrides(set or []),

@@ -120,7 +120,7 @@ def run(
 
     The case is checked first. With errors it is not run.
 
-    Example: cfddem run liquid-bed -o bed --set start=suspended --set run.until=0.02
+    Example: cfddem run liquid-bed -o bed --set run.until=0.02 --set average_from=0.01
     """
     from cfddem.case.gallery import find_case, overrides
 
@@ -151,7 +151,6 @@ def run(
         prepared.go()
     if communicator.rank == 0:
         _print_report(folder)
-        print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
 
 
 def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
@@ -167,11 +166,12 @@ def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
 
 
 def _print_report(folder: Path) -> None:
-    """Print the report of a run."""
+    """Print the report of a run, and where the run is."""
     from cfddem.analysis.report import report as summary
     from cfddem.analysis.report_text import lines
 
     print("\n".join(lines(summary(folder))))
+    print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
 
 
 def resume(
@@ -182,24 +182,28 @@ def resume(
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
 ) -> None:
-    """Continue a run that was stopped or killed, or extend one that has finished.
+    """Continue a run that was stopped or killed, or extend one that has finished, and print a report.
 
     The result is the same to the last bit as that of an uninterrupted run.
 
     Example: cfddem resume bed --until 0.03
     """
     from cfddem.backend.compile import use_threads
-    from cfddem.io.reading import newest_run
+    from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
     from cfddem.run.runner import Run
 
     folder, communicator = folder or newest_run(Path()), on_ranks(ranks, threads)
+    if until is None and (before := open_run(folder)).status == "finished":
+        if communicator.rank == 0:
+            print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
+        return
     if communicator.size == 1:
         use_threads(threads)
     with live_line(log, communicator.rank == 0) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
-        print(f"written to {folder}")
+        _print_report(folder)
 
 
 def sweep(
@@ -254,7 +258,7 @@ def sweep(
         status = "already finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
         print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
 
-    if jobs == 1 and scheduler is None:
+    if jobs == 1 and scheduler is None and not json:
         announce_compilation()
     outcomes = run_all(
         path, values, folder, overrides=overrides(set or []), jobs=jobs, scheduler=scheduler, progress=progress

@@ -9,6 +9,8 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.printing import show
 from cfddem.cli.scenario_commands import command
 from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_pair, wet_wall
+from scenarios.collisions.film_impact.figures import draw_moments
+from scenarios.collisions.film_impact.movie import movie as write_movie
 from scenarios.collisions.immersed_pair.measured import MeasuredCollisions, compare_points
 from scenarios.collisions.three_spheres.figures import draw_map
 
@@ -117,6 +119,14 @@ collide_wet = command(
 )
 
 
+def _strike_film(*, figure: Path | None, movie: Path | None, **given: Any) -> film_impact.FilmImpact:
+    """Let the bead fall, and draw the impact if asked for."""
+    result = film_impact.impact(**given) if movie is None else write_movie(movie, **given)
+    if figure is not None:
+        draw_moments(figure, result, given["diameter"])
+    return result
+
+
 def _show_film_impact(result: film_impact.FilmImpact, json: bool) -> None:
     values = result.summary()
     if json:
@@ -132,4 +142,12 @@ def _show_film_impact(result: film_impact.FilmImpact, json: bool) -> None:
     show(values, units, json)
 
 
-strike_film = command(film_impact.impact, show_result=_show_film_impact)
+strike_film = command(
+    film_impact.impact,
+    options={
+        "figure": (Path | None, None, "PNG file of the bead in the film at P1 to P4"),
+        "movie": (Path | None, None, "GIF file of the impact"),
+    },
+    call=_strike_film,
+    show_result=_show_film_impact,
+)

@@ -15,22 +15,29 @@ from cfddem.cli.printing import announce_compilation
 
 
 def explain(
-    law: Annotated[str | None, Parameter(help="name of a law; without it, all laws are listed")] = None,
+    law: Annotated[str | None, Parameter(help="a law, kind, key, table of a case, or word; default: all laws")] = None,
     *,
     plot: Annotated[Path | None, Parameter(help="PNG file for a plot of the law")] = None,
     json: Annotated[bool, Parameter(help="print the documentation as JSON", negative="")] = False,
 ) -> None:
-    """Show the documentation of a law: equation, arguments, range, reference. Or list all laws.
+    """Show the documentation of a law: equation, arguments, range, reference. Or list laws: all, or those with a word.
+
+    Keys of a case file are shown with unit and default: cfddem explain bed, cfddem explain bed.diameter
 
     Example: cfddem explain di_felice --plot di_felice.png
     """
+    from cfddem.cli import key_page
     from cfddem.cli import law_page as pages
     from cfddem.io.files import require_folder
 
-    if law is None:
-        every = [pages.summary(each) for kind in pages.laws().values() for each in kind.values()]
-        print(_json.dumps(every) if json else "\n".join(pages.listing()))
+    known, keys = pages.laws() if law is None else pages.of_kind(law), list[str]()
+    if law is not None and not pages.is_law(law):
+        known, keys = known or pages.containing(law), key_page.matching(law)
+    if known or (keys and not json):
+        every = [pages.summary(each) for kind in known.values() for each in kind.values()]
+        print(_json.dumps(every) if json else "\n".join([*pages.listing(known), *keys]))
         return
+    assert law is not None
     found = pages.find(law)
     require_folder(plot)
     print(_json.dumps(pages.summary(found)) if json else "\n".join(pages.page(found)))

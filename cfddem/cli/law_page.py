@@ -6,6 +6,7 @@ import inspect
 import math
 import re
 import textwrap
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,35 @@ def laws() -> dict[str, dict[str, Law]]:
         each.name: Law(each.name, CONTACT_LAW, each.reference, function=each.force) for each in all_contact_laws()
     }
     return {**registry.REGISTRY, CONTACT_LAW: contacts}
+
+
+def of_kind(name: str) -> dict[str, dict[str, Law]]:
+    """The laws of a kind; empty if there is no such kind.
+
+    >>> "di_felice" in of_kind("drag")["drag"], of_kind("di_felice")
+    (True, {})
+    """
+    kind = name.replace("-", "_")
+    return {kind: found} if (found := laws().get(kind)) else {}
+
+
+def is_law(name: str) -> bool:
+    """Whether a law has a name, which may begin with its kind."""
+    name = name.replace("-", "_")
+    return any(name in (law.name, f"{law.kind}.{law.name}") for those in laws().values() for law in those.values())
+
+
+def containing(word: str) -> dict[str, dict[str, Law]]:
+    """The laws whose name, first sentence or reference contains a word, by kind.
+
+    >>> "exponent_richardson_zaki" in containing("richardson")["bed"]
+    True
+    """
+    found: dict[str, dict[str, Law]] = {}
+    for law in (law for those in laws().values() for law in those.values()):
+        if word.lower() in f"{law.name} {summary(law)['sentence']} {law.reference}".lower():
+            found.setdefault(law.kind, {})[law.name] = law
+    return found
 
 
 def find(name: str) -> Law:
@@ -128,10 +158,10 @@ def _solid_brackets(equation: str) -> str:
     return out
 
 
-def listing() -> list[str]:
-    """All laws by kind: one line each, and one for the range if there is one, at most 100 columns wide."""
+def listing(known: Mapping[str, Mapping[str, Law]]) -> list[str]:
+    """Laws by kind: one line each, and one for the range if there is one, at most 100 columns wide."""
     out: list[str] = []
-    for kind, those in sorted(laws().items()):
+    for kind, those in sorted(known.items()):
         out += ["", kind.replace("_", " ")]
         for law in those.values():
             sentence = plain_words(summary(law)["sentence"])
@@ -170,26 +200,35 @@ def plot(law: Law, output: Path) -> Path:
     for value, colour in zip(chosen, plots.shades(len(chosen))):
         fixed = middle | ({names[1]: value} if len(names) > 1 else {})
         curve = [_value(law, fixed | {names[0]: x}) for x in spans[names[0]]]
-        axes.plot(spans[names[0]], curve, color=colour, label=f"{names[1]} = {value:.3g}" if len(names) > 1 else None)
+        named = _setting(law, names[1], value) if len(names) > 1 else None
+        axes.plot(spans[names[0]], curve, color=colour, label=named)
     if spans[names[0]][-1] > 100.0 * spans[names[0]][0] > 0.0:
         axes.set_xscale("log")
     low, high = axes.dataLim.intervaly
     if high > 100.0 * low > 0.0:
         axes.set_yscale("log")
-    units = {name: re.findall(r"\[([^\]]*)\]", text) for name, text in descriptions(law.function).items()}
-    plots.label(axes, names[0].replace("_", " "), _unit(units.get(names[0])), law.name.replace("_", " "),
-                _unit(units.get("returns")))  # fmt: skip
+    plots.label(axes, names[0].replace("_", " "), unit(law, names[0]), law.name.replace("_", " "), unit(law, "returns"))
     if len(names) > 1:
         plots.legend(axes)
-    rest = [f"{name} = {middle[name]:.3g}" for name in names[2:]]
+    rest = [_setting(law, name, middle[name]) for name in names[2:]]
     axes.set_title("\n".join(textwrap.wrap(", ".join(rest), 70)) or law.kind, loc="left", fontsize=9)
     plots.save(figure, output)
     return output
 
 
-def _unit(found: list[str] | None) -> str:
-    """The unit that a docstring gives; `SI` where it gives none, or several."""
-    return found[0] if found and len(found) == 1 else "SI"
+def unit(law: Law, name: str) -> str:
+    """Unit of an argument, or of what a law returns, from the docstring of the law.
+
+    >>> unit(find("reduced_modulus"), "modulus_j"), unit(find("reduced_modulus"), "returns")
+    ('Pa', 'Pa')
+    """
+    return " or ".join(re.findall(r"\[([^\]]*)\]", descriptions(law.function).get(name, ""))) or "unit not given"
+
+
+def _setting(law: Law, name: str, value: float) -> str:
+    """An argument that is held at a value, as in `viscosity = 0.001 Pa s`."""
+    of = unit(law, name)
+    return f"{name.replace('_', ' ')} = {value:.3g}" + f" {of}" * (of not in ("-", "unit not given"))
 
 
 def _span(law: Law, name: str) -> list[float]:

@@ -78,7 +78,8 @@ def compare(
     from cfddem.plotting.comparison_page import comparison_page
 
     written = comparison_page(folders, output, result)
-    print(as_json(result) if json else "\n".join([*lines(result), "", f"page with figures: {written}"]))
+    kind = "figure" if output.suffix.lower() == ".png" else "page with figures"
+    print(as_json(result) if json else "\n".join([*lines(result), "", f"{kind}: {written}"]))
 
 
 def view(
@@ -95,7 +96,7 @@ def view(
             help="quantity that colours the spheres: speed, collisions, or a recorded field (liquid, agglomerate)"
         ),
     ] = "speed",
-    movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .mp4 or .gif")] = None,
+    movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .gif, or .mp4 with cfddem[movie]")] = None,
     history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
     collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,
     waves: Annotated[bool, Parameter(help="solid fraction over height and time instead", negative="")] = False,

@@ -55,7 +55,8 @@ def command(
 
     def run(**given: Any) -> None:
         as_json = given.pop("json", False)
-        announce_compilation()
+        if not as_json:
+            announce_compilation()
         result = (call or function)(**defaults | given)
         if show_result is None:
             show(result.summary(), dict(units or {}), as_json)
@@ -67,27 +68,28 @@ def command(
 
 
 def descriptions(function: Callable[..., Any]) -> dict[str, str]:
-    """Description of each argument, from the docstring.
+    """Description of each argument, from the docstring; arguments on one line share it.
 
-    >>> def area(width: float) -> float:
-    ...     '''Area of a square.
+    >>> def area(width: float, height: float) -> float:
+    ...     '''Area of a rectangle.
     ...
-    ...     width    of one side,
-    ...              without the rim [m]
-    ...     returns  [m2]
+    ...     width, height  of one side,
+    ...                    without the rim [m]
+    ...     returns        [m2]
     ...     '''
-    >>> descriptions(area)["width"]
+    >>> descriptions(area)["height"]
     'of one side, without the rim [m]'
     """
     found: dict[str, str] = {}
-    name = ""
+    names: list[str] = []
     for line in (inspect.getdoc(function) or "").splitlines():
-        if match := re.fullmatch(r"(\w+) {2,}(\S.*)", line):
-            name, found[match[1]] = match[1], match[2]
-        elif name and line.startswith("  "):
-            found[name] += " " + line.strip()
+        if match := re.fullmatch(r"(\w+(?:, \w+)*) {2,}(\S.*)", line):
+            names = match[1].split(", ")
+            found |= dict.fromkeys(names, match[2])
+        elif names and line.startswith("  "):
+            found |= dict.fromkeys(names, f"{found[names[0]]} {line.strip()}")
         else:
-            name = ""
+            names = []
     return found
 
 

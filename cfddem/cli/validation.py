@@ -36,7 +36,8 @@ def validate(
 
     Example: cfddem validate binary-collision
     """
-    announce_compilation()
+    if not json:
+        announce_compilation()
     from scenarios.validation.table import validate as run
 
     if target != "all" and target not in TARGETS:
@@ -75,7 +76,8 @@ def bench(
 
     Example: cfddem bench dem --particles 10000
     """
-    announce_compilation()
+    if not json:
+        announce_compilation()
     from scenarios.beds.gas_bed import study as gas_bed
     from scenarios.beds.wet_bed import study as wet_bed
     from scenarios.benchmarks import dense_bed, fluid_box, scaling, table

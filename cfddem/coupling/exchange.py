@@ -130,8 +130,7 @@ class Exchange:
         cell_map = kernel.map_particles(self._mapped_position(particles, step), particles.radius)
         solid = kernel.solid_fraction(cell_map)
         flow = self.flow.sample(particles, cell_map, solid)
-        deferred = self._deferred_force(particles, step)
-        heavier = self.added_mass.update(particles, flow.voidage)
+        heavier, deferred, added = self._added_mass(particles, cell_map, flow, step)
         transverse = self._transverse_force(particles, cell_map, flow.slip)
         around = agitation = history = None
         if self.agitation is not None:
@@ -146,9 +145,6 @@ class Exchange:
         not_seen = _not_seen(flow, drag, agitation, history)
         conductance = drag if history is None else drag + history.conductance
         implicit = self.momentum.prepare(particles, cell_map, flow, step, not_seen, conductance)
-        added = np.zeros_like(transverse)
-        if self.added_mass and last_step > 0.0:
-            added = self.added_mass.force(particles, flow, change_along(fluid, kernel, cell_map, flow.slip), last_step)
         lost = deferred - added - transverse
         for each in (agitation, history):
             if each is not None and each.force is not None:
@@ -267,14 +263,24 @@ class Exchange:
             force += lift_force(slip, curl, particles.spin, particles.radius, fluid.density, particles.viscosity)
         return force
 
-    def _deferred_force(self, particles: Particles, step: float) -> Array:
-        """Momentum that the particles lost to their added mass over the last step, per time of this one (N, 3) [N].
+    def _added_mass(
+        self, particles: Particles, cell_map: ParticleCellMap, flow: SampledFlow, step: float
+    ) -> tuple[Array, Array, Array]:
+        """Change of the added mass (N,) [kg], and two forces (N, 3) [N].
 
-        The fluid gets it in this step, less the force that its own acceleration exerts on the particles now.
+        On the fluid acts, one step late, what the particles lost to their added mass; on the particles the acceleration
+        of the fluid, and its opposite on the fluid.
         """
-        if not self.added_mass or self.momentum.last_step == 0.0:
-            return np.zeros((particles.count, 3))
-        return self.added_mass.deferred_momentum(particles) / step
+        added_mass, last_step = self.added_mass, self.momentum.last_step
+        if not added_mass or last_step == 0.0:
+            none = np.zeros((particles.count, 3))
+            return added_mass.update(particles, flow.voidage), none, none
+        deferred = added_mass.deferred_momentum(particles)
+        heavier = added_mass.update(particles, flow.voidage)
+        weight = added_mass.newest_weight(particles, flow.voidage)
+        passing = change_along(self.fluid, self.kernel, cell_map, flow.slip)
+        force = added_mass.force(particles, flow, passing, weight, last_step)
+        return heavier, added_mass.hand_over(particles, deferred, weight) / step, force
 
     def _drag_and_history(self, particles: Particles, terms: CouplingTerms, received: Array) -> tuple[Array, Array]:
         """Drag and history force on every particle (N, 3), (N, 3) [N].

@@ -20,6 +20,12 @@ FORMAT = 2
 RUN_FILES = ("run.json", "run.vtkhdf", "history.h5", "checkpoint")
 """A folder that holds one of these files holds a run."""
 
+OWN_FILES = ("case.toml", "data", "surfaces", "measured")
+"""What a run that was killed before it wrote any data leaves in its folder, beside hidden files."""
+
+MOST_NAMED = 6
+"""Most files or runs that an error names."""
+
 AVERAGES_FROM = "averages_from"
 """Entry of `run.json`: start of averages in a run that ended because its means were known [s]."""
 
@@ -34,7 +40,11 @@ def read_about(folder: Path) -> dict[str, Any]:
         about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         found = int(about["format"])
     except FileNotFoundError:
-        raise InputError("folder", str(folder), "a run folder", "it contains no run.json") from None
+        inside = sorted(each.parent.name for each in folder.glob("*/run.json"))
+        why = "it contains no run.json"
+        if inside:
+            why += f", but the runs {', '.join(inside[:MOST_NAMED])}" + " ..." * (len(inside) > MOST_NAMED)
+        raise InputError("folder", str(folder), "a run folder", why) from None
     except OSError as failure:
         raise disk_error("read", path, failure) from failure
     except (ValueError, KeyError, TypeError, OverflowError) as damage:
@@ -107,6 +117,18 @@ def require_free(folder: Path, case_text: str) -> None:
             f"a folder without a run ({', '.join(taken)} found)",
             f"continue that run with `cfddem resume {folder}`, or choose another folder",
         )
+
+
+def require_no_foreign_files(folder: Path) -> None:
+    """Refuse a folder for a new run that holds files of something else.
+
+    errors  InputError
+    """
+    inside = [each.name for each in folder.iterdir()] if folder.is_dir() else []
+    found = sorted(name for name in inside if name not in OWN_FILES and not name.startswith("."))
+    if found:
+        names = ", ".join(found[:MOST_NAMED]) + " ..." * (len(found) > MOST_NAMED)
+        raise InputError("output", str(folder), f"a new or empty folder ({names} found)", "choose another folder")
 
 
 def make_folder(folder: Path) -> None:

@@ -70,7 +70,7 @@ from cfddem.particles.walls.nearest_point import advance_walls, portion, touched
 @inline
 def find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
     """Impulses of all films over the coming step."""
-    film_impulses(0, edges.between_particles, particles, edges, memory, shift, cutoff_ratio, step)
+    film_impulses(0, edges.between_particles, particles, edges, memory, cutoff_ratio, step)
     find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import inline, serial
-from cfddem.backend.law_choice import FILM_ARGUMENTS, called_by_name
+from cfddem.backend.law_choice import called_by_name
 from cfddem.backend.law_set import specialise
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
@@ -28,6 +28,7 @@ from cfddem.particles.state import Particles
 from cfddem.particles.step_criteria import STABLE, TimeScales, check_step, crossing_step
 from cfddem.particles.walls.nearest_point import Walls
 from closures import lubrication, timescales
+from closures.kinds import FILM_ARGUMENTS
 
 __all__ = ["TimeScales", "check_step", "time_scales"]
 

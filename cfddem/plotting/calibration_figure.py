@@ -36,7 +36,7 @@ def calibration_figure(found: Found, path: Path) -> None:
     """Write the figure."""
     columns = len(found.variables) + len(found.data)
     rows = -(-columns // 3)
-    figure, axes = blank(rows, min(columns, 3), width=4.4 * min(columns, 3), height=3.8 * rows)
+    figure, axes = blank(rows, min(columns, 3), width=3.7 * min(columns, 3), height=3.6 * rows)
     estimates = {each["key"]: each for each in found.estimates()}
     for each, panel in zip(found.variables, axes):
         values = [trial.values[each.key] for trial in found.finished]
@@ -56,6 +56,10 @@ def calibration_figure(found: Found, path: Path) -> None:
             _mean(panel, found, each, slice(begin, end))
         legend(panel)
         begin = end
+    for panel in axes[:columns]:
+        if panel.get_xscale() == "linear":
+            panel.locator_params(axis="x", nbins=4)
+            panel.ticklabel_format(axis="x", scilimits=(-2, 4), useMathText=True)
     for panel in axes[columns:]:
         panel.remove()
     axes[0].axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")

@@ -47,7 +47,8 @@ def values(run: Run, snapshot: int, colour: str) -> tuple[dict[str, np.ndarray],
     if name == COLLISIONS and name not in particles and (recorded := run.collisions_of(snapshot)):
         return particles, _collision_counts(particles["id"], recorded)
     if name not in particles:
-        raise InputError("colour", colour, nearest(colour, [SPEED, *sorted(particles)]))
+        remedy = "run.record_collisions = true records the collisions" if name == COLLISIONS else ""
+        raise InputError("colour", colour, nearest(colour, [SPEED, *sorted(particles)]), remedy)
     found = particles[name]
     if name == AGGLOMERATE:
         return particles, scattered(found)

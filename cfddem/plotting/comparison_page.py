@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.comparison import compare, relative, verdict
+from cfddem.analysis.comparison import compare, relative
 from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.report import case_of
-from cfddem.analysis.report_text import number, spelled
+from cfddem.analysis.report_text import spelled, with_error
 from cfddem.backend.errors import RunFailed
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
-from cfddem.plotting.curves import blank, encoded, label, legend, line_styles, save
+from cfddem.plotting.curves import blank, encoded, label, legend_below, line_styles, plain_ticks, save
 
 SHOWN = ("bed_height", "bed_voidage", "pressure_drop", "granular_temperature", "largest_speed")
 """Columns of the history that are drawn, as far as all runs have them."""
@@ -56,8 +56,9 @@ def histories(runs: Sequence[Run], names: Sequence[str]) -> Any:
         for run, title, style in zip(runs, names, line_styles(len(runs))):
             panel.plot(run.history["time"], run.history[name], label=title, **style)
         panel.set_ylabel(f"{textwrap.fill(spelled(name), 14)}\n[{shown_unit(runs[0].unit(name))}]")
+        plain_ticks(panel.yaxis)
     axes[-1].set_xlabel("time  [s]")
-    legend(axes[0], ncols=min(len(runs), 4), loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    legend_below(figure, axes[0])
     figure.align_ylabels()
     return figure
 
@@ -83,8 +84,10 @@ def profiles(runs: Sequence[Run], names: Sequence[str], result: dict[str, Any]) 
             panel.plot(getattr(each, kind), each.height, label=title, **style)
         label(panel, *titles[kind], "", "")
         panel.set_ylabel("")
+        panel.locator_params(axis="x", nbins=5)
+        plain_ticks(panel.xaxis)
     axes[0].set_ylabel("height  [m]")
-    legend(axes[0], ncols=min(len(runs), 4), loc="lower left", bbox_to_anchor=(0.0, 1.0))
+    legend_below(figure, axes[0])
     return figure
 
 
@@ -97,7 +100,7 @@ def _template() -> Any:
 
 def _answers(result: dict[str, Any]) -> list[tuple[str, list[str]]]:
     def words(each: dict[str, Any] | None) -> str:
-        return "-" if each is None else number(each["value"], each["error"], each["unit"])
+        return "-" if each is None else with_error(each)
 
     return [(name, [words(each) for each in row]) for name, row in result["answers"].items()]
 
@@ -108,8 +111,8 @@ def _measures(result: dict[str, Any]) -> list[tuple[str, str, list[tuple[str, st
     for name, measure in result["measures"].items():
         cells = []
         for place, row in enumerate(measure["runs"]):
-            value = "-" if row["mean"] is None else number(row["mean"], row["error"])
+            value = "-" if row["mean"] is None else with_error(row, "")
             apart = "" if place == 0 or row["mean"] is None else relative(row)
-            cells.append((value, apart, "" if place == 0 else verdict(row)))
+            cells.append((value, apart, "" if place == 0 else row["verdict"]))
         rows.append((spelled(name), shown_unit(measure["unit"]), cells))
     return rows

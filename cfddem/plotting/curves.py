@@ -169,6 +169,20 @@ def legend(axes: Axes, **options: Any) -> None:
     axes.legend(**{"frameon": False, "fontsize": 9.5} | options)
 
 
+def legend_below(figure: Figure, axes: Axes) -> None:
+    """The legend of a panel below all panels, in as many columns as fit; the figure grows by its rows."""
+    handles, names = axes.get_legend_handles_labels()
+    wide = 0.6 + 0.09 * max(map(len, names))  # [inch]
+    columns = max(1, min(len(names), int(figure.get_figwidth() / wide)))
+    figure.set_figheight(figure.get_figheight() + 0.2 + 0.2 * -(-len(names) // columns))
+    figure.legend(handles, names, loc="outside lower center", ncols=columns, frameon=False, fontsize=9.5)
+
+
+def plain_ticks(axis: Any) -> None:
+    """Whole numbers at the ticks of an axis, without a factor or offset beside it."""
+    axis.set_major_formatter(lambda value, _: f"{value:.6g}")
+
+
 def decades(axes: Axes, *ticks: float) -> None:
     """A logarithmic x axis with plain numbers at given ticks."""
     axes.set_xscale("log")
@@ -177,11 +191,11 @@ def decades(axes: Axes, *ticks: float) -> None:
 
 
 def shades(count: int, name: str = "viridis") -> Sequence[Any]:
-    """Colours from dark to light for an increasing parameter."""
+    """Colours from dark to light for an increasing parameter; the lightest can still be seen on white."""
     import matplotlib as mpl
 
     scale = mpl.colormaps[name]
-    return [scale(0.9 * place / max(count - 1, 1)) for place in range(count)]
+    return [scale(0.8 * place / max(count - 1, 1)) for place in range(count)]
 
 
 def line_styles(count: int) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from cfddem.analysis.measured import with_files
 from cfddem.analysis.report import case_of
 from cfddem.analysis.report import report as summary
 from cfddem.analysis.report_markdown import markdown
-from cfddem.analysis.report_text import number, spelled, steadiness
+from cfddem.analysis.report_text import spelled, steadiness, with_error
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
@@ -94,7 +94,7 @@ def _answers(found: list[dict[str, Any]]) -> list[dict[str, str]]:
     return [
         {
             "name": each["name"],
-            "value": number(each["value"], each["error"], each["unit"]).replace("+-", "±"),
+            "value": with_error(each).replace("+-", "±"),
             "verdict": each["verdict"].replace("+-", "±"),
             "mark": marks[each["holds"]],
         }
@@ -153,7 +153,13 @@ def _provenance(values: dict[str, Any]) -> Rows:
     rows: Rows = []
     for name, each in values.items():
         if isinstance(each, dict):
-            rows += [(f"{name}: {inner}", str(value)) for inner, value in each.items()]
+            rows += [(f"{name}: {inner}", _words(value)) for inner, value in each.items()]
         else:
             rows.append((name, " ".join(map(str, each)) if isinstance(each, list) else str(each)))
     return rows
+
+
+def _words(value: Any) -> str:
+    return (
+        ", ".join(f"{name} {each}" for name, each in value.items() if each) if isinstance(value, dict) else str(value)
+    )

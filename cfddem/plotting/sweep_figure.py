@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from cfddem.case.input_errors import field_of
 from cfddem.case.schema import Case
 from cfddem.io.quantities import shown_unit
-from cfddem.plotting.curves import BLUE, blank, label, legend, save, shades
+from cfddem.plotting.curves import BLUE, blank, label, legend, legend_below, save, shades
 
 SHOWN = ("bed_height", "bed_voidage", "pressure_drop")
 """Measures in the figure."""
@@ -28,19 +28,22 @@ class Point(NamedTuple):
 
 
 def sweep_figure(points: Sequence[Point], path: Path) -> bool:
-    """Draw the means against the first key, one curve for each combination of the other keys.
+    """Draw the means against the first key with numbers, one curve for each combination of the other keys.
+
+    Where all keys have words, each word of the first key has its place, and its points are not joined.
 
     returns  whether there was anything to draw
     """
     names = [name for name in SHOWN if points and all(name in each.measures for each in points)]
     if not names:
         return False
-    first, *others = points[0].values
+    keys = list(points[0].values)
+    first = next((key for key in keys if _is_numeric(points, key)), keys[0])
+    numeric, others = _is_numeric(points, first), [key for key in keys if key != first]
     groups: dict[str, list[Point]] = {}
     for each in points:
         group = ", ".join(f"{key.split('.')[-1]} = {each.values[key]}" for key in others)
         groups.setdefault(group, []).append(each)
-    numeric = all(isinstance(each.values[first], int | float) for each in points)
     ticks = {value: k for k, value in enumerate(dict.fromkeys(str(each.values[first]) for each in points))}
     figure, panels = blank(1, len(names), width=4.2 * len(names), height=4.0)
     for name, panel in zip(names, panels):
@@ -48,15 +51,35 @@ def sweep_figure(points: Sequence[Point], path: Path) -> bool:
             x = [each.values[first] if numeric else ticks[str(each.values[first])] for each in members]
             mean, error = zip(*(each.measures[name][:2] for each in members))
             bars = [0.0 if math.isnan(each) else each for each in error]
-            panel.errorbar(x, mean, yerr=bars, fmt="o-", color=colour, capsize=2.0, label=group or None)
+            style = "o-" if numeric else "o"
+            panel.errorbar(x, mean, yerr=bars, fmt=style, color=colour, capsize=2.0, label=group or None)
+            if name == "bed_voidage" and numeric and not others:
+                _draw_laws(panel, x, members)
+        unit = shown_unit(points[0].measures[name][2])
+        label(panel, first, unit_of(first), name.replace("_", " "), unit)
         if not numeric:
             panel.set_xticks(range(len(ticks)), list(ticks))
-        unit = shown_unit(points[0].measures[name][2])
-        label(panel, first, unit_of(first) if numeric else "-", name.replace("_", " "), unit)
+            panel.set_xlabel(first)
+            panel.margins(x=0.2)
     if others and len(groups) <= MOST_LABELLED:
-        legend(panels[0])
+        legend_below(figure, panels[0])
     save(figure, path)
     return True
+
+
+def _is_numeric(points: Sequence[Point], key: str) -> bool:
+    """Whether all values of a key are numbers."""
+    return all(isinstance(each.values[key], int | float) for each in points)
+
+
+def _draw_laws(panel: Any, x: Sequence[Any], points: Sequence[Point]) -> None:
+    """Draw the voidages by published laws that all points have."""
+    laws = [name for name in points[0].measures if name.startswith("voidage by ")]
+    for name, style in zip(laws, ("--", ":", "-.")):
+        if all(name in each.measures for each in points):
+            panel.plot(x, [each.measures[name][0] for each in points], style, color="0.4", label=name[11:])
+    if laws:
+        legend(panel)
 
 
 def sample_figure(points: Sequence[Point], path: Path) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
 from cfddem.preflight.mixture import bed_drag
-from closures import balance, bed, drag_single, numbers
+from closures import balance, drag_single, numbers
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,7 @@ class BedEstimate:
     reynolds: float  # with the superficial velocity; without inflow, with the terminal velocity
     onset: float  # minimum fluidisation velocity u_mf by the drag law, at the voidage of a poured bed [m/s]
     terminal: float  # terminal velocity u_t of a single particle of the slowest species [m/s]
+    terminal_by_law: float  # the same by the drag law of the case; NaN where the law is not for single particles [m/s]
     voidage: float  # in the flow
     height: float  # in the flow [m]
     pressure_drop: float  # [Pa]
@@ -47,11 +49,11 @@ def estimate_bed(case: Case) -> BedEstimate:
     gravity, fluid = math.hypot(*case.laws.gravity), case.fluid
     if fluid is None:
         weight = solids * density * gravity / floor
-        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, packed, poured, nan, nan)
+        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, nan, packed, poured, nan, nan)
     weight = solids * abs(density - fluid.density) * gravity / floor
     inlet = mean_inlet_velocity(case)
     if fluid.viscosity == 0.0:
-        return BedEstimate(count, solids, weight, nan, inlet, nan, nan, nan, packed, poured, nan, nan)
+        return BedEstimate(count, solids, weight, nan, inlet, nan, nan, nan, nan, packed, poured, nan, nan)
     number = abs(numbers.archimedes(diameter, density, fluid.density, fluid.viscosity, gravity))
     scale = fluid.viscosity / (fluid.density * diameter)
     drag = bed_drag(case)
@@ -74,16 +76,32 @@ def estimate_bed(case: Case) -> BedEstimate:
     height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
     drop = weight
     if case.bed.fixed or inlet < onset:
-        drop = bed.ergun_gradient(inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)) * height
+        flow = inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)
+        drop = balance.pressure_gradient(*flow, drag) * height
     factor = drag(reynolds, voidage) if 0.0 < voidage <= 1.0 else nan  # negative where the particles do not fit
     return BedEstimate(
-        count, solids, weight, number, inlet, reynolds, onset, terminal, voidage, height, drop, factor
+        count, solids, weight, number, inlet, reynolds, onset, terminal, _terminal_by_law(case, gravity),
+        voidage, height, drop, factor,
     )  # fmt: skip
 
 
 def bubbles(case: Case, bed: BedEstimate) -> bool:
     """Whether the bed bubbles: a gas bed above minimum fluidisation. Correlations for homogeneous beds then fail."""
-    return case.fluid is not None and not case.fluid.is_liquid and bed.inlet > bed.onset
+    return case.fluid is not None and not case.fluid.is_liquid and not case.bed.fixed and bed.inlet > bed.onset
+
+
+def _terminal_by_law(case: Case, gravity: float) -> float:
+    """Terminal velocity of the slowest species alone by the drag law of the case; NaN if it has none for voidage 1."""
+    law, fluid, found = case.laws.drag_law, case.fluid, []
+    if law is None or fluid is None or law.ranges.get("voidage", (0.0, 1.0))[1] < 1.0:
+        return math.nan
+    for each in case.species.values():
+        drag = case.laws.drag_function(each.sauter_diameter / case.bed.diameter)
+        assert drag is not None
+        flow = each.diameter, case.material_of(each).density, fluid.density, fluid.viscosity
+        with suppress(ArithmeticError, ValueError):  # a law of a user may have no value at voidage 1
+            found.append(balance.terminal_velocity(*flow, drag, gravity))
+    return min(found, default=math.nan)
 
 
 def mean_inlet_velocity(case: Case) -> float:

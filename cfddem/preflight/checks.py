@@ -11,23 +11,17 @@ from cfddem.preflight.bed_waves import check_waves
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.cost_estimate import CostEstimate, available_memory
 from cfddem.preflight.data_checks import check_data
-from cfddem.preflight.flow_checks import check_drag, check_flow, check_kernel, check_wall_drag
+from cfddem.preflight.flow_checks import check_cells, check_drag, check_flow, check_kernel, check_wall_drag
 from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
-from cfddem.preflight.issue import Issue
+from cfddem.preflight.issue import Issue, percent
 from cfddem.preflight.law_ranges import check_ranges
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.unit_checks import check_length, check_units
 from cfddem.preflight.wall_checks import check_walls_and_feeds
 from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 
 SOFT_OVERLAP, LARGEST_OVERLAP = 0.02, 0.1
 """Overlap over the diameter: above the first a warning, above the second an error [-]."""
-
-LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID, SOFT_SOLID = 5.0, 1e-4, 5e-5, 10.0, 1e4
-"""Plausible values in SI units; others suggest a wrong unit.
-
-Fluids lighter than the first [kg/m3] are less viscous than the second [Pa s]; liquids are more viscous than the third;
-solids are denser than the fourth [kg/m3] and stiffer than the last [Pa].
-"""
 
 DAY, YEAR = 86_400.0, 365.0 * 86_400.0
 """Estimated computing time above which a run gets a warning or an error [s]."""
@@ -44,7 +38,7 @@ def find_issues(
     """All errors and warnings of a case, errors first; a particle larger than the column hides all others."""
     too_large = list(check_particle_size(case))
     if too_large:
-        return too_large
+        return check_length(case, refused=True) or too_large
     found = [
         *check_units(case),
         *check_bed_size(case, bed),
@@ -59,38 +53,10 @@ def find_issues(
         *check_data(case),
     ]
     if case.fluid is not None:
-        found += [*check_kernel(case, steps), *check_flow(case, bed), *check_drag(case), *check_ranges(case, bed)]
-        found += check_waves(case, bed)
-    return sorted(found, key=lambda each: each.severity != "error")
-
-
-def check_units(case: Case) -> Iterator[Issue]:
-    """Check that densities, viscosities and moduli are plausible in SI units."""
-    fluid = case.fluid
-    if fluid is not None and fluid.density < LIGHT_GAS and fluid.viscosity > VISCOUS_GAS:
-        yield Issue(
-            "warning", "fluid.density",
-            f"{fluid.density:.3g} kg/m3 is that of a gas, but {fluid.viscosity:.3g} Pa s is not",
-            "water has 1000 kg/m3 and 1e-3 Pa s, air 1.2 kg/m3 and 1.8e-5 Pa s",
-        )  # fmt: skip
-    if fluid is not None and fluid.is_liquid and 0.0 < fluid.viscosity < THIN_LIQUID:
-        yield Issue(
-            "warning", "fluid.viscosity", f"{fluid.viscosity:.3g} Pa s is below that of any common liquid",
-            "give the dynamic viscosity, the kinematic one times the density; water has 1e-3 Pa s",
-        )  # fmt: skip
-    for name, solid in case.material.items():
-        if solid.density < LIGHT_SOLID:
-            yield Issue(
-                "warning", f"material.{name}.density",
-                f"{solid.density:.3g} kg/m3 is below that of any common solid",
-                "densities are in kg/m3; glass has 2500",
-            )  # fmt: skip
-        if solid.youngs_modulus < SOFT_SOLID:
-            yield Issue(
-                "warning", f"material.{name}.youngs_modulus",
-                f"{solid.youngs_modulus:.3g} Pa is below that of any common solid",
-                "moduli are in Pa, glass has 6e10; to soften contacts only, set contact_modulus",
-            )  # fmt: skip
+        found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
+        found += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
+    found.sort(key=lambda each: each.severity != "error")
+    return [*check_length(case, refused=any(each.severity == "error" for each in found)), *found]
 
 
 def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
@@ -113,7 +79,7 @@ def check_overlap(case: Case, collision: CollisionEstimate) -> Iterator[Issue]:
         softer = solid.contact_modulus or solid.youngs_modulus
         needed = softer * (part / (0.5 * SOFT_OVERLAP)) ** power if math.isfinite(part) else math.inf
         remedy = f"use {needed:.1g} Pa" if math.isfinite(needed) else "give all values in SI units: m, kg, s, Pa"
-    limit = f"overlap of {100.0 * part:.2g} % of a diameter under {cause}; the limit is {100.0 * SOFT_OVERLAP:g} %"
+    limit = f"overlap of {percent(part)} of a diameter under {cause}; the limit is {100.0 * SOFT_OVERLAP:g} %"
     if math.isinf(part):
         limit = "the contacts are too soft: particles pass through each other"
     yield Issue("error" if part > LARGEST_OVERLAP else "warning", key, limit, remedy)

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfddem.backend.law_choice import GAP_ARGUMENTS, called_by_name
+from cfddem.backend.law_choice import called_by_name
 from cfddem.case.bed import Species
 from cfddem.case.schema import Case
 from cfddem.particles.material_pairs import pair_table
 from cfddem.preflight.bed_estimate import BedEstimate
 from closures import minimum_gap, numbers
+from closures.kinds import GAP_ARGUMENTS
 
 
 @dataclass(frozen=True)

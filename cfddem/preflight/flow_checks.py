@@ -9,8 +9,10 @@ import numpy as np
 
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.geometry_checks import bed_key
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.unit_checks import unit_of_velocity
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.
@@ -23,6 +25,9 @@ FINEST = 6.0
 
 UNEQUAL = 1.2
 """Ratio of species diameters from which a drag law should depend on the diameter ratio [-]."""
+
+FEWEST_CELLS = 4.0
+"""Fewest cells over the height of a fluidised bed and over the wider side of its column [-]."""
 
 PROFILE_RANGE = 2.0
 """Ratio of `viscosity_profile` to `viscosity` inside the bed from which estimates mislead [-]."""
@@ -49,6 +54,27 @@ def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
             "warning", "column.cell",
             f"{smallest:.3g} m is less than 1/{FINEST:g} of the kernel width {kernel:.3g} m, which costs time",
             f"use cells of {2.0 * diameter:.2g} m or more",
+        )  # fmt: skip
+
+
+def check_cells(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Issue]:
+    """Check that a fluidised bed is several cells high, and its column several cells wide."""
+    if case.particle_count == 1 or case.bed.positions or case.wall or not bed.inlet > bed.onset:
+        return
+    assert steps.cells is not None
+    cells, high = max(steps.cells[:2]), bed.height / case.column.height * steps.cells[2]
+    if high < FEWEST_CELLS:
+        needed = math.ceil(bed.count * FEWEST_CELLS / high)
+        yield Issue(
+            "warning", bed_key(case, "count"),
+            f"the expected bed is {high:.2g} cells high, {bed.height:.3g} m; its flow needs at least {FEWEST_CELLS:g}",
+            f"use at least {needed} particles, or a narrower column",
+        )  # fmt: skip
+    if cells < FEWEST_CELLS:
+        yield Issue(
+            "warning", "column.width",
+            f"{case.column.width:.3g} m is {cells} cells wide; the flow needs at least {FEWEST_CELLS:g}",
+            "use a wider column",
         )  # fmt: skip
 
 
@@ -124,7 +150,8 @@ def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             "error" if isinstance(inlet, float) else "warning", "bed.inlet_velocity",
             f"{bed.inlet:.3g} m/s is above the terminal velocity {bed.terminal:.3g} m/s: the flow carries the "
             "particles to the lid",
-            f"use less; fluidisation begins at {bed.onset:.2g} m/s. Or set bed.fixed = true",
+            unit_of_velocity(case, bed)
+            or f"use less; fluidisation begins at {bed.onset:.2g} m/s. Or set bed.fixed = true",
         )  # fmt: skip
     elif bed.inlet < bed.onset and case.bed.start in ("poured", "expanded"):
         yield Issue(
@@ -140,7 +167,7 @@ def check_drag(case: Case) -> Iterator[Issue]:
     if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
         return
     ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
-    if max(ratios) > UNEQUAL * min(ratios) and case.laws.drag_function(2.0) is law.function:
+    if max(ratios) > UNEQUAL * min(ratios) and "diameter_ratio" not in law.arguments:
         yield Issue(
             "warning", "laws.drag",
             f"{law.name} is for equal spheres, but species diameters differ by a factor of "

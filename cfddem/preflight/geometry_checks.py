@@ -22,14 +22,19 @@ LARGEST_INITIAL_OVERLAP = 0.02
 """Largest overlap of particles at given positions, over the diameter [-]."""
 
 
+def fits(case: Case) -> bool:
+    """Whether the largest particle fits into the column."""
+    return case.bed.largest_diameter <= min(case.column.size) * (1.0 + 1e-9)
+
+
 def check_particle_size(case: Case) -> Iterator[Issue]:
     """Check that one particle fits into the column."""
     diameter, narrowest = case.bed.largest_diameter, min(case.column.size)
-    if diameter > narrowest * (1.0 + 1e-9):
+    if not fits(case):
         yield Issue(
             "error", bed_key(case, "diameter"),
             f"{diameter:.3g} m is larger than the smallest edge of the column, {narrowest:.3g} m",
-            "widen the column; all lengths are in m",
+            "give both in m, or widen the column",
         )  # fmt: skip
 
 

@@ -27,3 +27,12 @@ class Issue:
 
     def __str__(self) -> str:
         return f"{self.key}: {self.reason}; {self.remedy}"
+
+
+def percent(part: float) -> str:
+    """A part as per cent, without a power of ten.
+
+    >>> percent(0.0204), percent(1.44)
+    ('2.04 %', '144 %')
+    """
+    return f"{100.0 * part:.3g} %" if part < 1.0 else f"{100.0 * part:.0f} %"

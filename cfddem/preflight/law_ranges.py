@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from inspect import signature
 from statistics import median
 
+from cfddem.backend.law_choice import drag_by_name
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
@@ -18,12 +19,15 @@ from cfddem.preflight.issue import Issue
 from closures import balance
 from closures.capillary_pull import lambert_energy, rabinovich_energy, willett_energy
 from closures.lift import saffman_mei
-from closures.registry import REGISTRY, Law, law_of, load_built_in_laws
+from closures.registry import REGISTRY, Law, is_built_in, law_of, load_built_in_laws
 
 DILUTE = 0.95
 """Voidage above which a law for single spheres may be used [-]."""
 
 REMEDY = "choose another law; cfddem explain lists all with their ranges"
+
+ON_BY_DEFAULT = 'on by default; laws.agitation = "none" leaves it out'
+"""What a user should know who has chosen no law of agitation."""
 
 AGITATED = "inside, agitation changes bed heights by up to 2 % and granular temperatures by a factor of up to 9"
 """Effect on the beds of the lubrication study with and without agitation."""
@@ -42,11 +46,15 @@ def check_ranges(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     if isinstance(added, Law) and (found := outside(added, state, ratios)):
         yield Issue("warning", "laws.added_mass", found + _and(_effect_of_added_mass(case, state)), REMEDY)
     if isinstance(agitation, Law) and (found := outside(agitation, state)):
-        yield Issue(
-            "warning", "laws.agitation", found + _and(AGITATED), "trust heights more than granular temperatures"
-        )
+        remedy = "; ".join(["trust heights more than granular temperatures", *by_default(case)])
+        yield Issue("warning", "laws.agitation", found + _and(AGITATED), remedy)
     if case.laws.lift and (found := outside(law_of(saffman_mei), state)):
         yield Issue("warning", "laws.lift", found + _and(_effect_of_lift(case, bed)), "set it to false")
+
+
+def by_default(case: Case) -> list[str]:
+    """That the case has a law of agitation without asking for it, in words; empty if it asks."""
+    return [ON_BY_DEFAULT] if case.laws.agitation == "auto" else []
 
 
 def state_of(case: Case, bed: BedEstimate) -> dict[str, float]:
@@ -76,7 +84,10 @@ def outside(law: Law, state: Mapping[str, float], diameter_ratios: Sequence[floa
 
 def ignores_voidage(law: Law) -> bool:
     """Whether a law of drag is one for single spheres."""
-    return law.kind == "drag" and law.function(1.0, 0.42) == law.function(1.0, 1.0) if _is_plain(law) else False
+    if law.kind != "drag" or not _is_plain(law):
+        return False
+    factor = drag_by_name(law)
+    return factor(1.0, 0.42) == factor(1.0, 1.0)
 
 
 def effect_of_drag(case: Case, law: Law, bed: BedEstimate) -> str:
@@ -91,8 +102,12 @@ def effect_of_drag(case: Case, law: Law, bed: BedEstimate) -> str:
     if not others:
         return "no other law was fitted here, so that the error is not known"
     at = (state["reynolds"], state["voidage"])
-    drag = _spread([law.function(*at) / each.function(*at) for each in others])
-    count = f"the median of the {len(others)} laws" if len(others) > 1 else f"that of {others[0].name}, the one law"
+    drag = _spread([drag_by_name(law)(*at) / each.function(*at) for each in others])
+    count = (
+        f"the median of the {len(others)} built-in laws"
+        if len(others) > 1
+        else f"that of {others[0].name}, the one law"
+    )
     if case.bed.fixed:
         return f"its drag and the pressure drop differ by {drag} from {count} fitted here"
     text = f"its drag differs by {drag} from {count} fitted here"
@@ -125,22 +140,26 @@ def _is_plain(law: Law) -> bool:
 
 
 def _fitted_here(law: Law, state: Mapping[str, float]) -> list[Law]:
-    """Other laws of drag whose ranges hold the state."""
+    """Other built-in laws of drag whose ranges hold the state."""
     load_built_in_laws()
     return [
-        each for each in REGISTRY["drag"].values() if each is not law and _is_plain(each) and not outside(each, state)
+        each
+        for each in REGISTRY["drag"].values()
+        if each is not law and is_built_in(each.function) and _is_plain(each) and not outside(each, state)
     ]
 
 
 def _result(case: Case, bed: BedEstimate, law: Law, state: Mapping[str, float]) -> tuple[str, float]:
     """The number of interest that follows from a law of drag: its name and value; NaN if there is none."""
     assert case.fluid is not None
+    if case.bed.fixed:
+        return "pressure drop", law.function(bed.reynolds, state["voidage"])
     if bed.inlet > bed.onset and case.fluid.is_liquid:
         packed = 1.0 - POURED_SOLID_FRACTION
-        voidage = balance.voidage_in_balance(bed.archimedes, bed.reynolds, law.function, packed)
+        voidage = balance.voidage_in_balance(bed.archimedes, bed.reynolds, drag_by_name(law), packed)
         return "bed height", 1.0 / max(1.0 - voidage, 1e-9)
     name = "velocity of minimum fluidisation" if state["voidage"] < DILUTE and bed.inlet > 0.0 else "settling velocity"
-    return name, balance.reynolds_in_balance(bed.archimedes, state["voidage"], law.function)
+    return name, balance.reynolds_in_balance(bed.archimedes, state["voidage"], drag_by_name(law))
 
 
 def _effect_of_added_mass(case: Case, state: Mapping[str, float]) -> str:

@@ -17,6 +17,7 @@ from cfddem.preflight.step_estimate import StepEstimate
 from cfddem.preflight.wall_checks import closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
+from closures.bed import ergun_gradient
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,14 @@ def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"Reynolds number at {'inlet' if bed.inlet else 'terminal'} velocity")
     yield Row(group, "Ar", bed.archimedes, "", "Archimedes number")
-    yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {bed_drag(case).__name__}")
+    if case.bed.fixed:
+        return
+    law = bed_drag(case).__name__
+    yield Row(group, "u_mf", bed.onset, "m/s", f"minimum fluidisation by {law}")
     single = "slowest species alone" if several else "single particle"
     yield Row(group, "u_t", bed.terminal, "m/s", f"{single}, Brown and Lawler")
+    if math.isfinite(bed.terminal_by_law):
+        yield Row(group, "u_t, drag law", bed.terminal_by_law, "m/s", f"{single}, {law}")
     if bed.inlet and bed.onset and bed.terminal:
         yield Row(group, "u / u_mf", bed.inlet / bed.onset)
         yield Row(group, "u / u_t", bed.inlet / bed.terminal)
@@ -179,15 +185,22 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
     group = "expected result"
     if case.fluid is not None and not math.isnan(bed.archimedes) and (case.bed.start == "poured" or bed.inlet):
         note = ""
-        if bubbles(case, bed):
+        if case.bed.fixed:
+            note = "fixed bed"
+        elif bubbles(case, bed):
             note = "at least; the bed bubbles"
         elif bed.inlet > bed.onset:
             note = "by the balance of weight and drag"
         yield Row(group, "bed height", bed.height, "m", note)
         yield Row(group, "bed voidage", bed.voidage)
         if bed.inlet:
-            note = "Ergun" if case.bed.fixed or bed.inlet < bed.onset else "buoyant weight over the floor area"
-            yield Row(group, "pressure drop", bed.pressure_drop, "Pa", note)
+            packed, law = case.bed.fixed or bed.inlet < bed.onset, bed_drag(case).__name__
+            yield Row(
+                group, "pressure drop", bed.pressure_drop, "Pa", law if packed else "buoyant weight over the floor area"
+            )
+            if packed and law != "ergun" and case.fluid is not None:
+                flow = bed.inlet, case.bed.diameter, case.fluid.density, case.fluid.viscosity, bed.voidage
+                yield Row(group, "pressure drop, Ergun", ergun_gradient(*flow) * bed.height, "Pa")
     elif case.bed.start == "poured" and not case.wall:
         yield Row(group, "bed height", bed.height, "m", "poured")
 

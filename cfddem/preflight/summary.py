@@ -21,8 +21,10 @@ from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
 from cfddem.preflight.cost_estimate import estimate_cost
+from cfddem.preflight.geometry_checks import fits
 from cfddem.preflight.issue import WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
+from cfddem.preflight.own_laws import check_own_laws
 from cfddem.preflight.step_estimate import estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
 
@@ -103,6 +105,12 @@ def preflight(case: Case) -> Preflight:
 
 
 def _preflight(case: Case, title: str) -> Preflight:
+    if case.laws.missing:
+        words = "; ".join(f"law {name} is not installed here: no prediction" for name in case.laws.missing.values())
+        return Preflight(title, (), (Issue("warning", "laws", words, "install the package that provides it"),))
+    own = list(check_own_laws(case))
+    if any(each.severity == "error" for each in own):
+        return Preflight(title, (), tuple(own))
     try:
         bed = estimate_bed(case)
         collision = estimate_collision(case, bed)
@@ -110,7 +118,9 @@ def _preflight(case: Case, title: str) -> Preflight:
         steps = estimate_steps(case, bed)
         cost = estimate_cost(case, bed, steps)
         issues = find_issues(case, bed, collision, wet, steps, cost)
-        return Preflight(title, overview(case, bed, collision, wet, steps, cost), tuple(issues))
+        issues = sorted([*issues, *own], key=lambda each: each.severity != "error")
+        rows = overview(case, bed, collision, wet, steps, cost) if fits(case) else ()  # else they mean nothing
+        return Preflight(title, rows, tuple(issues))
     except InputError as failure:
         reason = f"{'' if failure.value is None else f'{failure.value!r} '}must be {failure.limit}"
         key = failure.field.replace("grid.", "column.")

@@ -186,7 +186,7 @@ def bed_height(simulation: Simulation) -> float:
 @measure("1", when=_is_fluid_bed)
 def bed_voidage(simulation: Simulation) -> float:
     """Mean voidage of the bed, from its height."""
-    solids = 0.99 * simulation.communicator.sum(simulation.owned.volume)
+    solids = measures.OF_THE_BED * simulation.communicator.sum(simulation.owned.volume)
     return 1.0 - solids / open_volume(simulation.case, 0.0, bed_height(simulation))
 
 

@@ -77,11 +77,11 @@ def in_notebook() -> bool:
 def notebook_line() -> Iterator[NotebookLine]:
     """Show a progress bar below the cell inside a `with` block."""
     line = NotebookLine()
-    announce_compilation(line.compiling)
+    before = announce_compilation(line.compiling)
     try:
         yield line
     finally:
-        announce_compilation()
+        announce_compilation(before)
         line.end()
 
 

@@ -1,7 +1,7 @@
 """Progress of a run: a live line on the terminal, and a log file if one is given.
 
-Both show the time, the remaining wall time, the criterion that limits the step, and a few measures. Nothing is printed
-if standard error is not a terminal.
+Both show the time, the remaining wall time, the criterion that limits the step, and a few measures. If standard error
+is not a terminal, one line says that loops are compiled, and nothing else is printed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from cfddem.backend.compile import announce_compilation
+from cfddem.backend.compile import announce_compilation, announced
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.backend.launch import TERMINAL
 
@@ -91,11 +91,11 @@ def live_line(log: Path | None = None, shown: bool = True) -> Iterator[ProgressL
     )
     with _logged(log if shown else None), bar:
         line = ProgressLine(bar)
-        announce_compilation(line.compiling)
+        before = announce_compilation(None if not shown else line.compiling if terminal else announced)
         try:
             yield line
         finally:
-            announce_compilation()
+            announce_compilation(before)
 
 
 @contextmanager

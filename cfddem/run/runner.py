@@ -13,12 +13,13 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed, RunStopped, UnstableStep
+from cfddem.backend.stopwatch import Stopwatch
 from cfddem.case.compare import require_measured_units
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
-from cfddem.io.folder import AVERAGES_FROM, make_folder, read_about, require_free
+from cfddem.io.folder import AVERAGES_FROM, make_folder, read_about, require_free, require_no_foreign_files
 from cfddem.io.kept_files import keep_files, with_kept_files
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, of_fields
@@ -28,6 +29,7 @@ from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FI
 from cfddem.particles.guard import guard
 from cfddem.run import history
 from cfddem.run.known_means import averages_from, require_measures_of
+from cfddem.run.own_laws import record_of, require_compiled, warn_of_changes
 from cfddem.run.progress import Status
 from cfddem.run.resuming import (
     case_to_continue,
@@ -105,13 +107,19 @@ class Run:
         history.require_shared(case, communicator.size)
         require_measures_of(case)
         require_measured_units(case, history.units_of(case))
+        require_compiled(case)
         communicator.by_first(lambda: _prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
-        begun = clock.monotonic()
+        wall = Stopwatch()
         simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
-        simulation.wall.seconds["preparation"] = clock.monotonic() - begun  # initial packing, compilation for it
+        wall.count("preparation")  # initial packing, loading of compiled loops
+        simulation.wall.seconds |= wall.seconds
         grid = None if simulation.fluid is None else simulation.fluid.grid.whole
-        about = provenance(case.bed.seed) | ({"ranks": communicator.size} if communicator.size > 1 else {})
+        about = (
+            provenance(case.bed.seed)
+            | record_of(case)
+            | ({"ranks": communicator.size} if communicator.size > 1 else {})
+        )
         written = folder_of_ranks(
             communicator, lambda: RunFolder.create(folder, text, about, grid, quantities_of(simulation))
         )
@@ -153,6 +161,7 @@ class Run:
                 communicator.by_first(lambda: require_measures(written, case))
                 simulation = restored(case, state, folder, fields, callbacks, communicator)
                 simulation.wall.seconds.update(written.about.get("wall_time", {}))
+        warn_of_changes(written, case)
         written.drop_after(-1.0 if state is None else simulation.time)
         if until is not None:
             written.note(AVERAGES_FROM, None)
@@ -324,6 +333,7 @@ class Run:
 def _prepare_folder(folder: Path, text: str, case: Case) -> None:
     """Make the folder of a new run, before its preparation, which may take long."""
     require_free(folder, text)
+    require_no_foreign_files(folder)
     make_folder(folder)
     keep_files(case, folder)
 

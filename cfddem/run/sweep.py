@@ -26,6 +26,9 @@ from cfddem.preflight.summary import preflight
 Over = Mapping[str, Sequence[Any]] | Sequence[Mapping[str, Any]]
 """Values by key, of which all combinations are run; or sets of values."""
 
+PUBLISHED = "voidage by "
+"""Beginning of the names of voidages by published laws, which stand beside the measures of a run."""
+
 MOST = 10_000
 """Largest number of runs."""
 
@@ -230,8 +233,10 @@ def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
 
     values = asdict(outcome) | {"seconds": seconds, "kept": kept}
     if outcome.status == "finished":
-        found = report(Path(outcome.folder))["measures"]
-        values["measures"] = {name: (each["mean"], each["error"], each["unit"]) for name, each in found.items()}
+        found = report(Path(outcome.folder))
+        means = {name: (each["mean"], each["error"], each["unit"]) for name, each in found["measures"].items()}
+        laws = {row["law"]: (row["expected"], math.nan, row["unit"]) for row in found["laws"]}
+        values["measures"] = means | {name: law for name, law in laws.items() if name.startswith(PUBLISHED)}
     return Outcome(**values)
 
 
@@ -241,13 +246,18 @@ def write_table(outcomes: Sequence[Outcome], path: Path) -> None:
     fresh = path.with_name(f".{path.name}")
     with fresh.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        measures = [(f"{name} [{shown_unit(unit)}]", f"{name} error") for name, unit in units.items()]
+        measures = [(f"{name} [{shown_unit(unit)}]", f"{name} error")[: _width(name)] for name, unit in units.items()]
         table.writerow(["run", *outcomes[0].values, "status", *itertools.chain(*measures), "message"])
         for each in outcomes:
-            pairs = [each.measures.get(name, ("", "", ""))[:2] for name in units]
+            pairs = [each.measures.get(name, ("", "", ""))[: _width(name)] for name in units]
             row = [each.name, *each.values.values(), each.status, *itertools.chain(*pairs), each.message]
             table.writerow(row)
     fresh.replace(path)
+
+
+def _width(name: str) -> int:
+    """Columns of a measure in the table: its mean and error, or the value of a law."""
+    return 1 if name.startswith(PUBLISHED) else 2
 
 
 def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool) -> None:

@@ -23,7 +23,7 @@ case = cfddem.Case(
 case
 
 # %% [markdown]
-# All numbers are in SI units. The check tells what the run will be, before it runs:
+# All numbers are in SI units. The check shows what to expect, before anything is run:
 
 # %%
 preflight(case)
@@ -59,7 +59,7 @@ late = run.history["time"] > 0.15
 print(f"pressure drop {run.history['pressure_drop'][late].mean():.1f} Pa, weight over floor {weight:.1f} Pa")
 
 # %% [markdown]
-# To look at the simulation step by step, make it without a folder:
+# To advance a simulation step by step, create it without a folder:
 
 # %%
 simulation = cfddem.Simulation(case)

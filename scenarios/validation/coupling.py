@@ -201,7 +201,7 @@ PARTS = (terminal_velocities, released, landings, dem06, packed, conserved, liqu
 
 def _draw(folder: Path, curves: Curves) -> None:
     """Terminal velocities with and without self-disturbance correction; a release; bed expansion."""
-    figure, axes = panels(3, width=13.0)
+    figure, axes = panels(3, width=11.0)
     terminal = curves["terminal"]
     axes[0].semilogx(
         terminal["reynolds"][0],

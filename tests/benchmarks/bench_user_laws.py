@@ -37,7 +37,7 @@ def potential(gap: float, end_gap: float, viscosity: float, reduced_radius: floa
 
 def short_potential(gap: float, end_gap: float, viscosity: float, reduced_radius: float) -> float:
     """The same for near gaps, by a series [N s]."""
-    return strength(viscosity, reduced_radius) * short_film_potential(gap, end_gap, 0.0)
+    return strength(viscosity, reduced_radius) * short_film_potential(gap, end_gap - gap, 0.0)
 
 
 def bed(count: int, **laws: Any) -> ParticleSolver:

@@ -103,7 +103,7 @@ def settling_sphere() -> State:
 
 @golden
 def packed_bed() -> State:
-    small = {"column__width": 0.006, "column__height": 0.012, "bed__count": 450}
+    small = {"column__width": 0.006, "column__height": 0.012, "bed__count": 450, "run__fluid_step": 0.002}
     return state_of(coupled(SCENARIOS / "beds" / "packed_bed" / "case.toml", **small))
 
 

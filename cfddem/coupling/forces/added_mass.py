@@ -11,6 +11,18 @@ Mech. 197 (1988) 241).
 
 C is a number, or a law of the voidage around the particle. A law is evaluated in every fluid step and C is constant
 within it: a change of C changes the inertia of a particle and not its velocity.
+
+**Smoothing.** The fluid and the particles learn of each other's acceleration one step late. Where the added mass
+exceeds the mass of the fluid around, each overcorrects the motion of the other, and an oscillation grows that changes
+its sign in every step. Where particles and fluid move as a whole, its factor per step is -Q with
+
+.. math:: Q = \frac12\left(\gamma + \sqrt{\gamma^2 + 4\gamma\kappa}\right),\qquad
+          \gamma = \frac{\phi}{\varepsilon}\,C,\quad \kappa = \frac{C\rho}{\rho_p + C\rho}
+
+so that with Zuber's C it would grow above :math:`\phi` = 0.36 for glass in water. Both accelerations are therefore
+running means, with the weight :math:`\min(1, \tfrac32/(1+Q))` for the newest: the factor is at least -1/2. The mean is
+that of the newest value alone in less dense suspensions: C = 1/2 and glass in water below :math:`\phi` = 0.43. What the
+fluid has not received yet is kept, so that no momentum is lost.
 """
 
 from __future__ import annotations
@@ -31,6 +43,13 @@ SAMPLED = Field(
 )
 """NaN in inserted particles: the acceleration of the fluid is not known there."""
 
+ACCELERATION = Field("fluid_acceleration", "m/s2", 3, "memory", meaning="Du/Dt at the particle, smoothed")
+
+OWED = Field("added_momentum", "N s", 3, "memory", meaning="lost to the added mass, and not received by the fluid yet")
+
+DAMPED = 1.5
+"""Sum of 1 and the share of an oscillation between particles and fluid that may be left after a step; below 2."""
+
 coefficient = Slot("coefficient")
 
 
@@ -44,7 +63,7 @@ class AddedMass:
     def __init__(self, given: float | Law, density: float) -> None:
         self.law = given if isinstance(given, Law) else None
         self.constant, self.density = 0.0 if isinstance(given, Law) else float(given), density
-        self.fields = (SAMPLED,) if self else ()
+        self.fields = (SAMPLED, ACCELERATION, OWED) if self else ()
         self._loop = None
         if self.law is not None:
             law = adapted(self.law.function, "voidage", {"voidage": "voidage"})
@@ -82,24 +101,50 @@ class AddedMass:
             change[rows] = 1.0 / after - 1.0 / before
         return change
 
-    def force(self, particles: Particles, flow: SampledFlow, passing: Array, last_step: float) -> Array:
+    def newest_weight(self, particles: Particles, voidage: Array) -> Array:
+        """Weight of the newest acceleration of particles and fluid in their running means (N,) [-].
+
+        voidage  around every particle (N,) [-]
+        """
+        added = self.mass(particles)
+        around = added * (1.0 - voidage) / (voidage * self.density * particles.volume)  # over the mass of fluid there
+        growth = 0.5 * (around + np.sqrt(around * (around + 4.0 * added / (particles.mass + added))))
+        weight: Array = np.minimum(1.0, DAMPED / (1.0 + growth))
+        return weight
+
+    def force(self, particles: Particles, flow: SampledFlow, passing: Array, weight: Array, last_step: float) -> Array:
         r"""C rho V Du/Dt on every particle (N, 3) [N].
 
         passing    :math:`((u-v)\cdot\nabla)u` at every particle (N, 3) [m/s2]
+        weight     of `newest_weight` (N,) [-]
         last_step  over which the change of u at the particle is taken [s]
         """
-        before = particles.sampled_velocity
-        acceleration = (flow.slip + particles.velocity - before) / last_step + passing
-        force: Array = self.mass(particles)[:, None] * np.where(np.isnan(before), 0.0, acceleration)
+        before, mean = particles.sampled_velocity, particles.fluid_acceleration
+        newest = (flow.slip + particles.velocity - before) / last_step + passing
+        mean[:] = np.where(np.isnan(before), 0.0, weight[:, None] * newest + (1.0 - weight[:, None]) * mean)
+        force: Array = self.mass(particles)[:, None] * mean
         return force
 
     def deferred_momentum(self, particles: Particles) -> Array:
-        r""":math:`C\rho V\,\Delta v` over the last fluid step (N, 3) [N s]; the fluid loses or gains it one step late.
+        r"""Momentum that particles have lost to their added mass, and the fluid has not received yet (N, 3) [N s].
 
-        C is still that of the step in which the particles have moved.
+        :math:`C\rho V\,\Delta v` of the last fluid step, with C still that of this step, and what earlier steps left.
         """
-        moved: Array = self.mass(particles)[:, None] * (particles.velocity - particles.velocity_before)
-        return moved
+        if not self:
+            return np.zeros((particles.count, 3))
+        moved = self.mass(particles)[:, None] * (particles.velocity - particles.velocity_before)
+        owed: Array = moved + particles.added_momentum
+        return owed
+
+    def hand_over(self, particles: Particles, deferred: Array, weight: Array) -> Array:
+        """Part of the deferred momentum that the fluid receives in the coming step (N, 3) [N s]; the rest is stored.
+
+        deferred  of `deferred_momentum`, before C has changed (N, 3) [N s]
+        weight    of `newest_weight` (N,) [-]
+        """
+        given: Array = weight[:, None] * deferred
+        particles.added_momentum[:] = deferred - given
+        return given
 
     def store(self, particles: Particles, slip: Array) -> None:
         """Store the sampled velocity of this step for the next."""

@@ -30,7 +30,6 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.counter_random import normal_numbers
-from cfddem.backend.law_choice import AGITATION_ARGUMENTS
 from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
@@ -41,6 +40,7 @@ from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
 from closures.added_mass import zuber
 from closures.agitation import SHORT, force_deviation, force_rate, isolated_drag_factor
+from closures.kinds import AGITATION_ARGUMENTS
 from closures.registry import Law, law_of
 
 PROCESS = Field(

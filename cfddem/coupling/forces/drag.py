@@ -9,15 +9,13 @@ import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
+from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
+from closures.kinds import DRAG_ARGUMENTS
 from closures.registry import Law
-
-ARGUMENTS = ("reynolds", "voidage", "diameter_ratio")
-"""Arguments that a drag law may take, by these names: Reynolds number of the superficial slip, voidage, diameter over
-the Sauter mean of the particles around."""
 
 drag_factor = Slot("drag_factor")
 
@@ -34,19 +32,30 @@ class Drag:
     def __init__(self, law: Law | None, model: str) -> None:
         self.needs_sizes = law is not None and "diameter_ratio" in signature(law.function).parameters
         self.model, self.outside, self._loop = model, 0, None
+        self.name = "" if law is None else law.name
         if law is not None:
-            factor = adapted(law.function, ", ".join(ARGUMENTS), {name: name for name in ARGUMENTS})
+            factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
             self._loop = specialise(_factors, {"drag_factor": factor})
         ranges = {} if law is None else law.ranges
-        self._ranges = tuple(ranges.get(name, (0.0, math.inf)) for name in ARGUMENTS)
+        self._ranges = tuple(ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
         factor = np.zeros(particles.count)
         if self._loop is not None:
             self.outside += int(self._loop(flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges, factor))
+            self._require_drag(flow, factor)
         conductance: Array = 6.0 * math.pi * particles.viscosity * particles.radius * flow.voidage * factor
         return conductance / flow.voidage if self.model == "B" else conductance
+
+    def _require_drag(self, flow: SampledFlow, factor: Array) -> None:
+        """Refuse a law that pushes a particle against the flow or is not finite; a flow that is not finite is no fault
+        of the law."""
+        wrong = ~((factor >= 0.0) & (factor < np.inf)) & np.isfinite(flow.reynolds) & np.isfinite(flow.voidage)
+        if wrong.any():  # local: every rank has its own particles
+            n = int(np.argmax(wrong))  # local: the first on this rank
+            at = f"it is {factor[n]:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
+            raise InputError("laws.drag", self.name, "a law that is finite and not negative", at)
 
 
 @threaded

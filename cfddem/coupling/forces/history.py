@@ -31,7 +31,7 @@ import closures.compiled  # noqa: F401  lets compiled loops call laws by their n
 from cfddem.backend.compile import inline
 from cfddem.backend.law_set import specialise
 from cfddem.coupling.forces import history_modes
-from cfddem.coupling.forces.history_modes import Memory, Scales, columns, exponentials
+from cfddem.coupling.forces.history_modes import Memory, columns, exponentials
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -62,11 +62,9 @@ class HistoryTerms(NamedTuple):
     factor: Array  # of the impulse of the implicit part (N,) [-]
 
 
-def _room(count: int) -> tuple[HistoryTerms, Scales]:
-    """Arrays for the terms and scales of so many particles."""
-    time, stokes, part, growth = np.empty((4, count))
-    terms = HistoryTerms(np.empty(count), np.empty((count, 3)), np.empty(count))
-    return terms, Scales(time, stokes, np.empty(count, np.int64), part, growth)
+def _room(count: int) -> HistoryTerms:
+    """Arrays for the terms of so many particles."""
+    return HistoryTerms(np.empty(count), np.empty((count, 3)), np.empty(count))
 
 
 @inline
@@ -103,8 +101,8 @@ class History:
             "history_modes", "m/s", columns(self._kernel), "memory", meaning="changes of the slip, as they fade"
         )
         self.fields = (SLIP, NEWEST, self._modes)
-        self._terms, self._found = _room(0)
-        self._scales = specialise(history_modes.scales, {"memory_time": scale})
+        self._terms = _room(0)
+        self._advance = specialise(history_modes.advance, {"memory_time": scale})
 
     def terms(
         self, particles: Particles, flow: SampledFlow, drag: Array, inertia: Array, step: float, last_step: float
@@ -117,15 +115,14 @@ class History:
         returns    arrays that the next step overwrites
         """
         if len(self._terms.factor) != particles.count:
-            self._terms, self._found = _room(particles.count)
-        terms, found = self._terms, self._found
-        memory = Memory(particles[SLIP.name], particles[NEWEST.name], particles[self._modes.name], *terms)
-        self._scales(
+            self._terms = _room(particles.count)
+        terms = self._terms
+        self._advance(
             flow.slip, drag, inertia, particles.radius, particles.viscosity,
-            flow.voidage if self.model == "B" else flow.voidage[:0], float(self.density), self._kernel, float(step),
-            *found, terms.conductance, terms.factor,
+            flow.voidage if self.model == "B" else flow.voidage[:0], float(self.density), self._kernel,
+            float(step), float(last_step),
+            Memory(particles[SLIP.name], particles[NEWEST.name], particles[self._modes.name], *terms),
         )  # fmt: skip
-        history_modes.remember(memory, flow.slip, found, self._kernel, float(step), float(last_step))
         return terms
 
     def store(self, particles: Particles, implicit: Array, terms: HistoryTerms, step: float) -> None:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
-from cfddem.backend.compile import inline, prange, threaded
+from cfddem.backend.compile import fused, inline, prange, threaded, vector_part
 from cfddem.backend.law_set import Slot
 from cfddem.fluid.grid import Array
-from cfddem.particles.vectors import NOTHING, minus, of_row, times
+from cfddem.particles.vectors import NOTHING, minus, of_row, plus, times
 from closures.history import RATE_RATIO, basset
 
 FIRST, LAST = -20, 11
@@ -79,13 +79,13 @@ class Memory(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """Scales of the memory of every particle, and its place in the table of the coming step."""
+    """Scales of the memory of some particles, and their places in the table of the coming step."""
 
-    time: Array  # t_c (N,) [s]
-    stokes: Array  # force of the memory per slip, with the kernel at t_c (N,) [kg/s]
-    row: np.ndarray  # of the table (N,)
-    part: Array  # of the way to the next row (N,)
-    growth: Array  # B, force per change of the slip in the step (N,) [kg/s]
+    time: Array  # t_c (n,) [s]
+    stokes: Array  # force of the memory per slip, with the kernel at t_c (n,) [kg/s]
+    row: np.ndarray  # of the table (n,)
+    part: Array  # of the way to the next row (n,)
+    growth: Array  # B, force per change of the slip in the step (n,) [kg/s]
 
 
 @inline
@@ -106,9 +106,9 @@ def implicit_part(drag, growth, time):
     force = drag * (1.0 + stiffness) / (2.0 + stiffness) + growth
     rest = 1.0 - time * force
     both = 4.0 * force / (rest + math.sqrt(rest * rest + 8.0 * time * force))
-    conductance, stiffness = max(both - drag, 0.0), time * both
-    given = conductance * (1.0 + stiffness) / (2.0 + stiffness)
-    return conductance, growth / given if given > 0.0 else 1.0
+    conductance = max(both - drag, 0.0)
+    given = conductance * force  # over both: theta of the transfer is force/both
+    return conductance, growth * both / given if given > 0.0 else 1.0
 
 
 _MANTISSA, _UNIT = np.int64(52 - ROW_BITS), 2.0 ** (ROW_BITS - 52)
@@ -126,26 +126,23 @@ def _row(time):
     bits = np.float64(time).view(np.int64)
     row = (bits >> _MANTISSA) - _FIRST_ROW
     part = np.float64(bits & _REST) * _UNIT
-    if row < 0:
-        return np.int64(0), 0.0
-    if row > _LAST_ROW:
-        return _LAST_ROW, 1.0
-    return row, part
+    inside = 0.0 if row < 0 else part  # no branches: the compiler works on several particles at once
+    return min(max(row, np.int64(0)), _LAST_ROW), 1.0 if row > _LAST_ROW else inside
 
 
 @inline
-def _second(kernel, place):
-    """Second integral of the kernel over a step, over the square of the step."""
-    row, part = place
-    return kernel.second[row] + part * (kernel.second[row + 1] - kernel.second[row])
+def _between(table, row, part):
+    """Value of a table at a part of the way from a row to the next."""
+    return table[row] + part * (table[row + 1] - table[row])
 
 
-@inline
-def _advance(kernel, modes, gain, last, now):
+@fused
+def _advance(kernel, modes, gain, last, now, steady):
     """Advance the modes of a particle over the last step; returns their sum in the coming one.
 
     gain       change of the slip in a time t_c, as in the last step
     last, now  row of the table and part of the way to the next, of the last and of the coming step
+    steady     whether both are equal
     """
     before, until = int(modes[0]), max(kernel.kept[last[0]], kernel.kept[now[0]])
     for k in range(before, until):  # the particle slows down or the step is shorter: more modes than before
@@ -153,10 +150,10 @@ def _advance(kernel, modes, gain, last, now):
             modes[4 + 3 * k + d] = modes[1 + 3 * before + d]
     low, high, part, share = kernel.fading[now[0]], kernel.fading[now[0] + 1], now[1], kernel.share
     low_last, high_last, part_last = kernel.fading[last[0]], kernel.fading[last[0] + 1], last[1]
-    x, y, z = times(kernel.rest[until], gain)
+    x, y, z = NOTHING
     for k in range(until):
         fading, here = low[k] + part * (high[k] - low[k]), 1 + 3 * k
-        faded = low_last[k] + part_last * (high_last[k] - low_last[k])
+        faded = fading if steady else low_last[k] + part_last * (high_last[k] - low_last[k])
         along = modes[here] + faded * (gain[0] - modes[here])
         across = modes[here + 1] + faded * (gain[1] - modes[here + 1])
         up = modes[here + 2] + faded * (gain[2] - modes[here + 2])
@@ -165,59 +162,84 @@ def _advance(kernel, modes, gain, last, now):
         x, y, z = x + left * along, y + left * across, z + left * up
     modes[0] = until
     modes[1 + 3 * until], modes[2 + 3 * until], modes[3 + 3 * until] = gain
-    return x, y, z
+    return plus(times(kernel.rest[until], gain), (x, y, z))
+
+
+PIECE = 512
+"""Particles whose scales are found before their memory advances: few enough for the cache."""
 
 
 @threaded
-def scales(
-    slip, drag, inertia, radius, viscosity, voidage, density, kernel, step, time_of, stokes_of, row_of_table,
-    part_of_row, growth_of, conductance, factor,
-):  # fmt: skip
-    """Time scale of every particle, and the implicit part of its history force in the coming step.
+def advance(slip, drag, inertia, radius, viscosity, voidage, density, kernel, step, last_step, memory):
+    """Advance the memory of every particle over the last step, and find its force in the coming one.
 
     drag     conductance (N,) [kg/s]
     inertia  (N,) [kg]
     voidage  by whose inverse the force is larger; empty for 1
-    time_of, ...  filled, see `Scales` and `Memory`
+    memory   `Memory`, all of it filled but `newest`
     """
+    count = len(radius)
+    for piece in prange((count + PIECE - 1) // PIECE):
+        begin, end = piece * PIECE, min((piece + 1) * PIECE, count)
+        here = slice(begin, end)
+        room = np.empty((4, end - begin))
+        found = Scales(room[0], room[1], np.empty(end - begin, np.int64), room[2], room[3])
+        _times(slip[here], radius[here], viscosity[here], voidage[here], density, step, found.time, found.stokes)
+        _growths(found.time, found.stokes, kernel.second, step, found.row, found.part, found.growth)
+        _implicit_parts(drag[here], inertia[here], found.growth, step, memory.conductance[here], memory.factor[here])
+        for n in range(begin, end):
+            # in a function: the compiler drops what a parallel loop itself writes through the members of a tuple
+            _remember_one(memory, slip, found, kernel, step, last_step, n, n - begin)
+
+
+@vector_part
+def _times(slip, radius, viscosity, voidage, density, step, time, stokes):
+    """Time scale of the memory, and the force of the memory per slip."""
     longest, shortest = step * SLOWEST, step * FASTEST
-    for n in prange(len(radius)):
+    for n in range(len(radius)):
         diameter, kinematic = 2.0 * radius[n], max(viscosity[n], 1e-300) / density
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
-        time = max(min(memory_time(speed, diameter, kinematic), longest), shortest)
         scale = 1.0 / voidage[n] if len(voidage) else 1.0
-        stokes = scale * 3.0 * math.pi * viscosity[n] * diameter * basset(time, speed, diameter, kinematic)
-        place = _row(step / time)
-        growth = stokes * _second(kernel, place)
-        conductance[n], factor[n] = implicit_part(drag[n], growth, step / inertia[n])
-        time_of[n], stokes_of[n], growth_of[n] = time, stokes, growth
-        row_of_table[n], part_of_row[n] = place
+        time[n] = max(min(memory_time(speed, diameter, kinematic), longest), shortest)
+        stokes[n] = scale * 3.0 * math.pi * viscosity[n] * diameter * basset(time[n], speed, diameter, kinematic)
+
+
+@vector_part
+def _growths(time, stokes, second, step, row, part, growth):
+    """Place in the table, and the force per change of the slip in the step."""
+    for n in range(len(time)):
+        row[n], part[n] = _row(step / time[n])
+        growth[n] = stokes[n] * _between(second, row[n], part[n])
+
+
+@vector_part
+def _implicit_parts(drag, inertia, growth, step, conductance, factor):
+    """`implicit_part` of every particle."""
+    for n in range(len(drag)):
+        conductance[n], factor[n] = implicit_part(drag[n], growth[n], step / inertia[n])
 
 
 @inline
-def _remember_one(memory, slips, found, kernel, step, last_step, n):
+def _remember_one(memory, slips, found, kernel, step, last_step, n, place):
+    """Advance the modes of one particle, and find its explicit force.
+
+    place  of the particle in `found`
+    """
     slip, before = of_row(slips, n), of_row(memory.before, n)
     past, missing = NOTHING, NOTHING
     if last_step > 0.0 and not math.isnan(before[0]):
-        time, stokes, now, growth_last = found.time[n], found.stokes[n], (found.row[n], found.part[n]), found.growth[n]
-        change, last = minus(slip, before), now
+        time, stokes, growth_last = found.time[place], found.stokes[place], found.growth[place]
+        change, now = minus(slip, before), (found.row[place], found.part[place])
+        last = now
         if last_step != step:
             last = _row(last_step / time)
-            growth_last = stokes * _second(kernel, last)
-        sum_of_modes = _advance(kernel, memory.modes[n], times(time / last_step, change), last, now)
-        past = times(stokes * time / step, sum_of_modes)
+            growth_last = stokes * _between(kernel.second, last[0], last[1])
+        gain = times(time / last_step, change)
+        past = times(stokes * time / step, _advance(kernel, memory.modes[n], gain, last, now, last_step == step))
         missing = minus(times(last_step * growth_last, change), of_row(memory.newest, n))
     for d in range(3):
         memory.force[n, d] = past[d] + missing[d] / step - memory.conductance[n] * slip[d]
         memory.before[n, d] = slip[d]
-
-
-@threaded
-def remember(memory, slip, found, kernel, step, last_step):
-    """Advance the memory of every particle over the last step, and find the force of the coming one."""
-    for n in prange(len(slip)):
-        # in a function: the compiler drops what a parallel loop itself writes through the members of a tuple
-        _remember_one(memory, slip, found, kernel, step, last_step, n)
 
 
 @threaded

@@ -177,10 +177,16 @@ class ContactLaw:
 
 def _asked(function: Callable[..., Any], known: Mapping[str, Any]) -> Any:
     """Value of a function that takes some of the known values by name."""
-    taken = signature(function).parameters
+    taken = _arguments(function)
     if unknown := [name for name in taken if name not in known]:
         raise InputError(f"argument of {function.__name__}", unknown[0], f"one of {', '.join(known)}")
     return function(**{name: known[name] for name in taken})
+
+
+@cache
+def _arguments(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Names of the arguments of a function of a law; looked up once, because a check asks thousands of times."""
+    return tuple(signature(function).parameters)
 
 
 def _first(reached: Callable[[float], bool], radius: float) -> float:

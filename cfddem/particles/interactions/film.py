@@ -42,6 +42,8 @@ FIELDS = (
     Field("resistance", "kg/s", role="memory", meaning="resistance of the film without lever; 0 out of its reach"),
     Field("approach_speed", "m/s", role="memory", meaning="largest approach speed since the film began"),
     Field("accounted_gap", "m", role="memory", initial=np.inf, meaning="gap up to which the impulse has been given"),
+    Field("film_gap", "m", role="memory", meaning="gap of two particles at the present positions"),
+    Field("film_normal", "1", 3, "memory", meaning="direction from the second particle to the first"),
     Field("impulse", "N s", 3, "scratch", meaning="impulse of the film in this step, on the first body"),
     Field("hard", role="scratch", dtype=bool, meaning="the film changes too much in this step for the short solution"),
 )

@@ -40,7 +40,7 @@ from cfddem.particles.vectors import NOTHING, at, dot, minus, put, times
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
 """Arrays of the particles that loops over pairs read."""
 
-ShearParticles = namedtuple("ShearParticles", "position velocity spin radius viscosity slip_rate turn_rate")
+ShearParticles = namedtuple("ShearParticles", "velocity spin radius viscosity slip_rate turn_rate")
 """The same of the loop over films that resist sliding."""
 
 PairEnds = namedtuple("PairEnds", "first second image")
@@ -80,6 +80,7 @@ def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p,
     if FILM:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
         renew_film(k, kinematics.gap, viscosity, kinematics.reduced_radius, 1.0, memory, row, cutoff_ratio)
+        keep_geometry(k, kinematics.separation, kinematics.distance, kinematics.gap, memory)
         if SHEAR:
             asymmetry = (particles.radius[i] - particles.radius[j]) * kinematics.inverse_sum
             renew_shear(k, kinematics.gap, viscosity, kinematics.reduced_radius, asymmetry, 1.0, memory)
@@ -91,25 +92,32 @@ def pair_film(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio):
     """Film of one pair of particles that cannot touch."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    _, distance, radii = of_two_spheres(k, particles, edges, shift)
+    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
     gap = distance - radii
     reduced_radius = particles.radius[i] * particles.radius[j] / radii
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     renew_film(k, gap, viscosity, reduced_radius, 1.0, memory, row, cutoff_ratio)
+    keep_geometry(k, separation, distance, gap, memory)
     if SHEAR:
         asymmetry = (particles.radius[i] - particles.radius[j]) / radii
         renew_shear(k, gap, viscosity, reduced_radius, asymmetry, 1.0, memory)
 
 
 @inline
-def pair_impulse(n, particles, edges, memory, shift, cutoff_ratio, step):
+def keep_geometry(k, separation, distance, gap, memory):
+    """Keep gap and direction of a pair for the impulse of its film, which acts at the same positions."""
+    memory.film_gap[k] = gap
+    put(memory.film_normal, k, times(1.0 / distance, separation))
+
+
+@inline
+def pair_impulse(n, particles, edges, memory, cutoff_ratio, step):
     """Impulse of the film of one pair of particles."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
-    normal, gap = times(1.0 / distance, separation), distance - radii
-    reduced_radius = particles.radius[i] * particles.radius[j] / radii
+    normal, gap = at(memory.film_normal, k), memory.film_gap[k]
+    reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
     speed = dot(minus(at(particles.velocity, i), at(particles.velocity, j)), normal)
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
@@ -135,8 +143,8 @@ class PairLoop(NamedTuple):
 LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force, "shift, rows, kinds, cutoff_ratio, p, free, step"),
     "update_films": PairLoop(pair_film, "shift, rows, kinds, cutoff_ratio", needed_by="FILM"),
-    "film_impulses": PairLoop(pair_impulse, "shift, cutoff_ratio, step", needed_by="FILM"),
-    "shear_impulses": PairLoop(pair_shear, "shift, step", ShearParticles, "SHEAR"),
+    "film_impulses": PairLoop(pair_impulse, "cutoff_ratio, step", needed_by="FILM"),
+    "shear_impulses": PairLoop(pair_shear, "step", ShearParticles, "SHEAR"),
     "pair_bridges": PairLoop(pair_bridge, "shift, p", WetParticles, "BRIDGE"),
     "bridge_impulses": PairLoop(pair_bridge_impulse, "shift, step", WetParticles, "BRIDGE"),
 }

@@ -17,7 +17,7 @@ from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.kinematics import relative_velocity
 from cfddem.particles.interactions.slots import TWIST, shear_impulses
-from cfddem.particles.pair_graph import edge_role, geometry, of_two_spheres
+from cfddem.particles.pair_graph import edge_role, geometry
 from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.tangential_lubrication import (
@@ -157,14 +157,13 @@ def impulses_of(k, memory):
 
 
 @inline
-def pair_shear(n, particles, edges, memory, shift, step):
+def pair_shear(n, particles, edges, memory, step):
     """Impulses of the film of one pair of particles that slides and rolls; zero out of its reach."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     radius, spin, resistance = particles.radius, at(particles.spin, i), memory.shear_resistance[k]
-    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
-    normal = times(1.0 / distance, separation)
-    inverse_sum = 1.0 / radii
+    normal, gap, radii = at(memory.film_normal, k), memory.film_gap[k], radius[i] + radius[j]
+    distance, inverse_sum = radii + gap, 1.0 / radii
     lever = distance * inverse_sum
     reduced_radius = radius[i] * radius[j] * inverse_sum
     asymmetry = (radius[i] - radius[j]) * inverse_sum
@@ -189,8 +188,8 @@ def pair_shear(n, particles, edges, memory, shift, step):
     if TWIST:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
         size = twisted(
-            dot(spin, normal), distance - radii, memory.minimum_gap[k], resistance, viscosity, turn_i + turn_j,
-            reduced_radius, asymmetry, 1.0, step,
+            dot(spin, normal), gap, memory.minimum_gap[k], resistance, viscosity, turn_i + turn_j, reduced_radius,
+            asymmetry, 1.0, step,
         )  # fmt: skip
         moment = plus(moment, times(size, normal))
     write_impulse(k, memory, impulse, times(lever, cross(impulse, normal)), moment)
@@ -249,6 +248,6 @@ def apply_shear_impulses(particles, edges, memory):
 @serial
 def shear_kick(particles, edges, memory, walls, shift, step):
     """Give the particles the impulses of their films against sliding, rolling and twisting."""
-    shear_impulses(0, edges.between_particles, particles, edges, memory, shift, step)
+    shear_impulses(0, edges.between_particles, particles, edges, memory, step)
     find_wall_shear(particles, edges, memory, walls, shift, step)
     apply_shear_impulses(particles, edges, memory)

@@ -13,6 +13,7 @@ from cfddem.analysis.measures import pressure_drop, profile
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.run.simulation import Simulation
+from closures.balance import pressure_gradient
 
 STEADY, MOST_STEPS = 1e-6, 400
 
@@ -62,6 +63,6 @@ def flow_through(described: Case, velocity: float, slab: tuple[float, float] = (
     centres = (np.arange(len(layers)) + 0.5) * fluid.grid.spacing[2]
     voidage = float(layers[(centres > low) & (centres < high)].mean())
     reynolds = fluid_of.density * velocity * diameter / fluid_of.viscosity
-    factor = law.function(reynolds, voidage)
-    formula = 18.0 * fluid_of.viscosity * (1.0 - voidage) * factor * velocity / (voidage * diameter**2)
+    flow = velocity, diameter, fluid_of.density, fluid_of.viscosity, voidage
+    formula = pressure_gradient(*flow, law.function)
     return Drop(reynolds, voidage, now / (high - low), formula)

@@ -31,13 +31,16 @@ Case = tuple[float, str, float]
 
 
 def draw_moments(path: Path, result: FilmImpact, diameter: float) -> None:
-    """The bead in the film at P1 to P4, with the pressure of the liquid."""
-    figure, axes = blank(4, 1, width=9.0, height=9.5, sharex=True, sharey=True)
+    """The bead in the film at the moments P1 to P4 that it has reached, with the pressure of the liquid."""
+    count, (radial, vertical) = len(result.frames), result.frames["P1"].liquid.shape
+    high = 0.5 + count * (0.5 + 1.75 * vertical / radial)
+    figure, axes = blank(count, 1, width=9.0, height=high, layout="compressed", sharex=True, sharey=True)
     for axis, (name, frame) in zip(axes, sorted(result.frames.items())):
         _draw_frame(figure, axis, frame, 0.5 * diameter)
         axis.set_title(f"{TITLES[name]}, {frame.time * 1e3:.3f} ms", loc="left", fontweight="bold", fontsize=11)
         axis.set_ylabel("height  [mm]")
     axes[-1].set_xlabel("radius  [mm]")
+    figure.draw_without_rendering()  # ticks depend on the layout, and the layout on the ticks
     save(figure, path, 130)
 
 
@@ -63,7 +66,7 @@ def _draw_frame(figure: Any, axis: Any, frame: Frame, radius: float) -> None:
 
 def draw_motion(path: Path, slow: FilmImpact, fast: FilmImpact) -> None:
     """Speed of the bead against its height, and the energy of the liquid, of a slow and a fast impact."""
-    figure, (left, middle, right) = panels(3, width=15.0, height=4.4)
+    figure, (left, middle, right) = panels(3, width=11.0, height=4.4)
     for result, colour in ((slow, BLUE), (fast, ORANGE)):
         history, speed = result.history, -result.p1.velocity
         name = f"{speed:g} m/s"
@@ -81,6 +84,25 @@ def draw_motion(path: Path, slow: FilmImpact, fast: FilmImpact) -> None:
     label(right, "time", "ms", "energy over that of the bead", "-", f"Where it goes, {-fast.p1.velocity:g} m/s")
     for axis in (left, middle, right):
         legend(axis)
+    save(figure, path)
+
+
+def draw_energies(path: Path, pairs: dict[str, tuple[FilmImpact, FilmImpact]]) -> None:
+    """Kinetic energy of the liquid over time from its highest value, with smoothed particles and on the grid."""
+    figure, axes = panels(2, width=11.0, height=4.6, sharey=True)
+    for regime, axis in enumerate(axes, 1):
+        chosen = {name: each for name, each in pairs.items() if each[1].regime == regime}
+        for (name, (smoothed, on_grid)), colour in zip(chosen.items(), (BLUE, ORANGE, GREEN)):
+            for result, line, shown in ((on_grid, "-", name), (smoothed, "--", None)):
+                time, energy = result.history["time"], result.history["liquid_kinetic"]
+                since = (time - time[energy.argmax()]) / (result.p4.time - result.p2.time)
+                axis.plot(since, energy / energy.max(), line, color=colour, label=shown)
+        axis.plot([], [], "--", color=GREY, label="with smoothed particles")
+        time_axis = "time since the highest energy, over that from P2 to P4"
+        label(axis, time_axis, "-", "kinetic energy of the liquid, over its highest", "-", f"Regime {regime}")
+        axis.set_xlim(-0.5, 1.0)
+        legend(axis, loc="upper right")
+    axes[1].set_ylabel("")
     save(figure, path)
 
 
@@ -102,7 +124,7 @@ def draw_restitution(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
 
 def draw_tension(path: Path, cases: dict[Case, dict[float | None, list[FilmImpact]]]) -> None:
     """Restitution without surface tension and with it, at each contact angle."""
-    figure, axes = panels(len(cases), width=15.0, height=4.4, sharey=True)
+    figure, axes = panels(len(cases), width=11.0, height=4.4, sharey=True)
     for axis, ((diameter, liquid, _), results) in zip(axes, cases.items()):
         for (angle, each), (colour, mark) in zip(results.items(), ((GREY, "o-"), (BLUE, "s--"), (ORANGE, "^--"))):
             name = "no surface tension" if angle is None else f"surface tension, {angle:g} degrees"
@@ -117,7 +139,7 @@ def draw_tension(path: Path, cases: dict[Case, dict[float | None, list[FilmImpac
 def draw_laws(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
     """The same impacts by laws of thin films."""
     chosen = [case for case in cases if case[0] in (8e-3, 2.8e-3) or case[1] == "m5"]
-    figure, axes = panels(len(chosen), width=15.0, height=4.6, sharey=True)
+    figure, axes = panels(len(chosen), width=11.0, height=4.6, sharey=True)
     for axis, case in zip(axes, chosen):
         diameter, liquid, film = case
         speeds = np.array([-each.p1.velocity for each in cases[case]])
@@ -129,5 +151,5 @@ def draw_laws(path: Path, cases: dict[Case, list[FilmImpact]]) -> None:
         axis.set_ylim(0.4, 1.0)
     for axis in axes[1:]:
         axis.set_ylabel("")
-    legend(axes[-1], loc="lower right")
+    legend(axes[0], loc="lower right")
     save(figure, path)

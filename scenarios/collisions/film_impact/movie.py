@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import SymLogNorm
 
+from cfddem.plotting.curves import blank
 from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.record import Record
-from scenarios.collisions.film_impact.result import Frame
+from scenarios.collisions.film_impact.result import FilmImpact, Frame
 from scenarios.collisions.film_impact.solver import Impact
 from scenarios.collisions.film_impact.study import impact
 
-FRAMES, FRAMES_PER_SECOND = 60, 12
-"""Frames at equal intervals of time, and how fast they are shown."""
+FRAMES, FRAMES_PER_SECOND = 30, 12
+"""Frames in the time in which the bead would fall through the film at constant speed, and how fast they are shown."""
+
+MOST = 150
+"""Frames after which the movie ends, of a bead that sticks."""
 
 AFTER_CONTACT = 8
 """Steps after contact that have a frame each: the suction lasts for microseconds."""
@@ -28,25 +28,41 @@ LINEAR, HIGHEST = 1.0, 1e4
 
 
 def movie(
-    path: Path, diameter: float = 8e-3, liquid: str = "water", film: float = 0.4e-3, velocity: float = 1.0
-) -> None:
-    """Compute an impact on the grid, and write its movie.
+    path: Path,
+    diameter: float = 8e-3,
+    liquid: str = "water",
+    film: float = 0.4e-3,
+    velocity: float = 1.0,
+    **options: Any,
+) -> FilmImpact:
+    """Compute an impact, and write its movie.
 
-    path  of the movie, a GIF
+    path     of the movie, a GIF
+    options  of :func:`~scenarios.collisions.film_impact.impact`, as the other arguments
+    returns  the result of the impact
     """
     frames: list[Frame] = []
     turning: list[int] = []
-    last = 1.1 * impact(diameter, liquid, film, velocity, cells=5).p4.time
 
     def keep(run: Impact | SmoothedImpact) -> None:
         turning.extend([run.steps] * (run.contacts > 0 and len(turning) < AFTER_CONTACT))
-        due = run.time >= last * (len(frames) - len(turning)) / FRAMES
-        if due or turning[-1:] == [run.steps]:
+        due = run.time * velocity / film >= (len(frames) - len(turning)) / FRAMES
+        if len(frames) < MOST and (due or turning[-1:] == [run.steps]):
             frames.append(Record(run).frame())
 
-    impact(diameter, liquid, film, velocity, progress=keep)
-    figure, axis = plt.subplots(figsize=(7.2, 2.4), layout="constrained")
-    first, radius = frames[0], 0.5 * diameter
+    result = impact(diameter, liquid, film, velocity, progress=keep, **options)
+    _write(path, frames, 0.5 * diameter, f"{diameter * 1e3:g} mm, {liquid}, {velocity:g} m/s")
+    return result
+
+
+def _write(path: Path, frames: list[Frame], radius: float, name: str) -> None:
+    """Draw the frames, and write them as a GIF."""
+    from matplotlib.animation import FuncAnimation, PillowWriter
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import SymLogNorm
+
+    figure, (axis,) = blank(1, 1, width=7.2, height=2.6, layout="compressed")
+    first = frames[0]
     wide, high = len(first.liquid) * first.dx * 1e3, first.liquid.shape[1] * first.dx * 1e3
     image = axis.imshow(
         _shown(first).T, origin="lower", extent=(-wide, wide, 0.0, high), cmap="RdBu_r",
@@ -55,6 +71,7 @@ def movie(
     figure.colorbar(image, ax=axis, label="pressure  [kPa]", ticks=[-1e4, -100, -1, 1, 100, 1e4], shrink=0.9)
     across = np.linspace(-radius, radius, 400) * 1e3
     axis.set_facecolor("#dde6dd")
+    axis.grid(False)
     axis.set(xlim=(-wide, wide), ylim=(0.0, 0.7 * high), xlabel="radius  [mm]", ylabel="height  [mm]")
     clock = axis.set_title("", loc="left")
     beads: list[PolyCollection] = []
@@ -66,18 +83,16 @@ def movie(
         under = 1e3 * (frame.gap + radius) - np.sqrt((1e3 * radius) ** 2 - across**2)
         beads[:] = [axis.fill_between(across, under, 1e4 * radius, color="#a8a8a8", edgecolor="#444444", zorder=3)]
         image.set_data(_shown(frame).T)
-        clock.set_text(f"{diameter * 1e3:g} mm, {liquid}, {velocity:g} m/s: {frame.time * 1e3:.3f} ms")
+        clock.set_text(f"{name}: {frame.time * 1e3:.3f} ms")
         return [image, clock, *beads]
 
+    draw(0)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # or the panel would move from frame to frame
     FuncAnimation(figure, draw, frames=len(frames)).save(path, PillowWriter(fps=FRAMES_PER_SECOND), dpi=100)  # type: ignore[arg-type]
-    plt.close(figure)
 
 
 def _shown(frame: Frame) -> np.ndarray:
     """Pressure in kPa in the liquid cells, mirrored at the axis; NaN elsewhere."""
     pressure = np.where(frame.liquid, frame.pressure / 1e3, np.nan)
     return np.concatenate([pressure[::-1], pressure])
-
-
-if __name__ == "__main__":
-    movie(Path(sys.argv[1] if len(sys.argv) > 1 else "film_impact.gif"))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from closures.restitution import singh_crossover
 from scenarios.collisions.results import plain
 
 
@@ -60,6 +61,11 @@ class FilmImpact:
     warnings: tuple[str, ...]
     history: dict[str, np.ndarray] = field(repr=False)  # columns of COLUMNS
     frames: dict[str, Frame] = field(repr=False)  # at P1 to P4
+
+    @property
+    def regime(self) -> int:
+        """Regime of the paper: 2 above the Stokes number at which the branches of its fit meet, 1 below."""
+        return 2 if self.stokes > singh_crossover(self.film_ratio) else 1
 
     def summary(self) -> dict[str, Any]:
         """The result without histories and frames, ready for JSON."""

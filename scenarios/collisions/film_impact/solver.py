@@ -10,6 +10,9 @@ from scenarios.collisions.film_impact import faces, ledger, liquid, pressure, su
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.pressure import Bead
 
+FALL = 0.02
+"""Longest step of a bead that its weight accelerates, over sqrt(film/g)."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -44,6 +47,7 @@ class Impact:
         self.time, self.contacts, self.steps = 0.0, 0, 0
         self.particles, self.volume = liquid.seed(grid, self.film, self.settings.per_side)
         self.u, self.w = np.zeros_like(grid.open_u), np.zeros_like(grid.open_w)
+        # faces, radial and horizontal, whose velocity comes from particles or an earlier step; and those beside liquid
         self.known = [np.zeros(self.u.shape, np.bool_), np.zeros(self.w.shape, np.bool_)]
         self.wet = [np.zeros(self.u.shape, np.bool_), np.zeros(self.w.shape, np.bool_)]
         self.filled, self.whole = np.zeros(grid.open_cell.shape), liquid.full(grid, self.settings.per_side)
@@ -90,6 +94,8 @@ class Impact:
             dt = min(dt, 0.2 * dx**2 / self.kinematic)
         if self.gravity > 0.0:
             dt = min(dt, s.courant * np.sqrt(dx / self.gravity))
+            if np.isfinite(bead.mass) and abs(bead.velocity) < np.sqrt(self.gravity * self.film):
+                dt = min(dt, FALL * np.sqrt(self.film / self.gravity))
         if s.tension is not None:
             dt = min(dt, s.tension.longest_step(dx, self.density))
         if bead.gap < dx:
@@ -163,31 +169,44 @@ class Impact:
 
     def solve_pressure(self, dt: float) -> None:
         """Make velocities and bead satisfy continuity."""
-        grid, bead = self.grid, self.bead
+        grid, bead, tension = self.grid, self.bead, self.settings.tension
         mobility = viscosity.mobility_of_gaps(grid, bead.radius, bead.gap, self.kinematic, dt)
-        cells, before, arrived = (self.liquid, self.filled), (self.u.copy(), self.w.copy()), bead.velocity
-        turns, moving = self.contacts == 1 and np.isnan(self.turning[0]), self.grid_energy()
-        tension = self.settings.tension
         edges = None if tension is None else tension.pressure(grid, self.filled, self.liquid, bead.radius, bead.gap)
+        cells, before = (self.liquid, self.filled), (self.u.copy(), self.w.copy())
+        arrived, moving = bead.velocity, self.grid_energy()
         self.solved = pressure.solve(
             grid, bead, (self.u, self.w), cells, mobility, self.density, dt, self.voids, edges=edges
         )
         if edges is not None:
             power = surface.work(*edges, self.liquid, self.u, self.w, grid.open_u, grid.open_w, grid.dx)
             self.losses.surface += float(power) * dt
+        self.count_pressure_losses(mobility, before, arrived, moving)
+        weight = self.density * self.gravity * float(self.volume.sum())
+        self.impulses += dt * np.array([self.solved.force, self.solved.plate, -weight])
+
+    def count_pressure_losses(
+        self, mobility: np.ndarray, before: tuple[np.ndarray, np.ndarray], arrived: float, moving: float
+    ) -> None:
+        """Add what the pressure step took from liquid and bead to the losses.
+
+        mobility  of the radial faces
+        before    velocities on the faces before the step [m/s]
+        arrived   speed of the bead before it [m/s]
+        moving    kinetic energy of the flow before it [J]
+        """
+        grid, bead, losses = self.grid, self.bead, self.losses
+        cells = self.liquid, self.filled
         impulsive, viscous = ledger.pressure_losses(
             self.u, self.w, *before, mobility, *cells, grid.open_u, grid.open_w, grid.dx, self.density, grid.outer_open
         )
-        self.losses.viscous += viscous
-        self.losses.impulsive += impulsive
-        if turns:
-            self.turning = ledger.while_turning(moving, self.grid_energy(), impulsive)
-        if self.voids is not None:
-            self.losses.voids = self.voids.work
+        losses.viscous += viscous
+        losses.impulsive += impulsive
         if np.isfinite(bead.mass):
-            self.losses.impulsive += 0.5 * bead.mass * (bead.velocity - arrived) ** 2
-        weight = self.density * self.gravity * float(self.volume.sum())
-        self.impulses += dt * np.array([self.solved.force, self.solved.plate, -weight])
+            losses.impulsive += 0.5 * bead.mass * (bead.velocity - arrived) ** 2
+        if self.voids is not None:
+            losses.voids = self.voids.work
+        if self.contacts == 1 and np.isnan(self.turning[0]):  # the first step after contact, in which the liquid turns
+            self.turning = ledger.while_turning(moving, self.grid_energy(), impulsive)
 
     def velocities_to_particles(self, dt: float, before: tuple[np.ndarray, np.ndarray], arrived: float) -> None:
         """Give the particles their new velocities, and extend the grid's around the liquid."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from inspect import signature
 from time import process_time
 from typing import Any
 
@@ -33,12 +34,6 @@ from scenarios.collisions.film_impact.volume import overfilled
 
 METHODS = {"grid": 20, "isph": 5}
 """Method -> cells or layers of particles in the film, if not given."""
-
-OF_GRID: dict[str, float | None] = {
-    "cavitation": None, "wetted_share": None, "wetted_missing": 0.5, "domain": 1.0, "flip": 0.97,
-    "particles_per_side": 3, "courant": 0.5, "surface_tension": 0.0, "contact_angle": 0.0,
-}  # fmt: skip
-"""Options of the method "grid" alone, and their defaults."""
 
 LONGEST = 30.0
 """A bead that has not left after this many times film/velocity has stuck."""
@@ -267,7 +262,7 @@ def _check(**given: float) -> None:
 def _check_of_grid(**given: float | None) -> None:
     """Refuse options of the grid for another method."""
     for name, value in given.items():
-        if value != OF_GRID[name]:
+        if value != signature(impact).parameters[name].default:
             raise InputError(name, value, 'left out with method = "isph"', "it is an option of the grid")
 
 

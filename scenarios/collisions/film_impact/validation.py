@@ -6,16 +6,16 @@ the statements of the paper without numbers.
 
 from __future__ import annotations
 
-import math
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from closures.restitution import singh, singh_crossover
+from closures.restitution import singh
 from scenarios.collisions.film_impact.figures import (
     Case,
+    draw_energies,
     draw_laws,
     draw_moments,
     draw_motion,
@@ -26,6 +26,7 @@ from scenarios.collisions.film_impact.film_laws import laws_of
 from scenarios.collisions.film_impact.isph.checks import layer_at_rest, taylor_green
 from scenarios.collisions.film_impact.materials import LIQUIDS
 from scenarios.collisions.film_impact.result import COLUMNS, FilmImpact
+from scenarios.collisions.film_impact.statements import in_order, peaks, words
 from scenarios.collisions.film_impact.study import impact, sweep
 from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
 
@@ -58,16 +59,20 @@ SENSITIVITIES: dict[str, dict[str, Any]] = {
 """Changes of the oil impact at 10 cells, one at a time."""
 
 SMOOTHED: dict[str, tuple[float, str, float, float]] = {
+    "8 mm, water, 0.2 m/s": (8e-3, "water", 0.4e-3, 0.2),
+    "2.8 mm, water, 0.35 m/s": (2.8e-3, "water", 0.4e-3, 0.35),
     "5.5 mm, m5, 0.5 m/s": (5.5e-3, "m5", 0.45e-3, 0.5),
     "8 mm, water, 1 m/s": (8e-3, "water", 0.4e-3, 1.0),
+    "4 mm, water, 1 m/s": (4e-3, "water", 0.4e-3, 1.0),
+    "2.8 mm, water, 1.5 m/s": (2.8e-3, "water", 0.4e-3, 1.5),
 }
-"""Impacts that are repeated with smoothed particles."""
+"""Impacts that are repeated with smoothed particles, three in each regime of the paper."""
+
+Pairs = dict[str, tuple[FilmImpact, FilmImpact]]
+"""The same impact with smoothed particles and on the grid, by name."""
 
 ANGLES = (0.0, 90.0)
 """Contact angles of the impacts with surface tension; 10 cells in the film [deg]."""
-
-PEAK = 0.02
-"""Least height of a peak of the liquid's energy above what surrounds it, over the highest."""
 
 oil = partial(impact, 5.5e-3, "m5", 0.45e-3, 0.5)
 """The case of the paper's study of resolution."""
@@ -75,18 +80,18 @@ oil = partial(impact, 5.5e-3, "m5", 0.45e-3, 0.5)
 
 def study(folder: Path, progress: Progress) -> list[Row]:
     """Run convergence, sensitivities and the sweep; write histories and figures; return the table."""
-    rows = convergence(progress) + sensitivities(progress) + cavitating(progress) + smoothed(progress)
+    rows = convergence(progress) + sensitivities(progress) + cavitating(progress) + exact_solutions(progress)
+    pairs = with_smoothed_particles(progress)
     cases = {case: sweep(VELOCITIES, progress, diameter=case[0], liquid=case[1], film=case[2]) for case in CASES}
-    rows += fit(cases) + conservation(cases) + words(cases) + film_laws(cases)
     stretched = {case: with_tension(case, progress) for case in (CASES[0], CASES[3], CASES[4])}
-    rows += tension(stretched)
-    fastest = {case: results[-1] for case, results in cases.items()}
+    rows += smoothed(pairs) + fit(cases) + conservation(cases) + words(cases) + film_laws(cases) + tension(stretched)
     histories = {f"{d * 1e3:g}mm_{liquid}_{v:g}": each
                  for (d, liquid, _), results in cases.items() for v, each in zip(VELOCITIES, results)}  # fmt: skip
     write_histories(folder / "histories.h5", {name: _columns(each) for name, each in histories.items()})
-    shown = cases[CASES[0]]
-    draw_moments(folder / "film_impact.png", shown[2], CASES[0][0])
-    draw_motion(folder / "film_impact_motion.png", shown[0], fastest[CASES[0]])
+    largest = cases[CASES[0]]
+    draw_moments(folder / "film_impact.png", largest[2], CASES[0][0])
+    draw_motion(folder / "film_impact_motion.png", largest[0], largest[-1])
+    draw_energies(folder / "film_impact_energies.png", pairs)
     draw_restitution(folder / "film_impact_restitution.png", cases)
     draw_laws(folder / "film_impact_laws.png", cases)
     draw_tension(folder / "film_impact_tension.png", stretched)
@@ -139,45 +144,48 @@ def cavitating(progress: Progress) -> list[Row]:
     ]
 
 
-def smoothed(progress: Progress) -> list[Row]:
-    """The method of the paper, smoothed particles at its coarsest resolution: exact solutions, and two impacts."""
+def exact_solutions(progress: Progress) -> list[Row]:
+    """Smoothed particles against a layer at rest and a decaying vortex."""
     progress("smoothed particles")
-    at_rest = layer_at_rest(10)
-    rows = [
-        Row(
-            "smoothed particles, layer at rest: force on the plate over its weight",
-            1.0 + at_rest.plate_force,
-            1.0,
-            0.02,
-        ),
-        Row("smoothed particles, layer at rest: largest speed over 0.5 m/s", at_rest.largest_speed / 0.5, 0.0, 0.01),
+    pool, name = layer_at_rest(10), "smoothed particles, layer at rest"
+    return [
+        Row(f"{name}: force on the plate over its weight", 1.0 + pool.plate_force, 1.0, 0.02),
+        Row(f"{name}: largest speed over 0.5 m/s", pool.largest_speed / 0.5, 0.0, 0.01),
         Row("smoothed particles, Taylor-Green vortex of 50 x 50: speed", 1.0 + taylor_green(50), 1.0, 0.01),
     ]
+
+
+def with_smoothed_particles(progress: Progress) -> Pairs:
+    """Impacts by the method of the paper, smoothed particles at its coarsest resolution, and on the grid."""
+    pairs = {}
     for name, case in SMOOTHED.items():
         progress(f"{name} with smoothed particles")
-        result, on_grid = impact(*case, method="isph"), impact(*case, cells=10)
-        disordered = not (result.p1.time < result.p2.time <= result.p3.time < result.p4.time)
+        pairs[name] = impact(*case, method="isph"), impact(*case, cells=10)
+    return pairs
+
+
+def smoothed(pairs: Pairs) -> list[Row]:
+    """Smoothed particles beside the grid with 10 cells, and their own account of energy."""
+    rows = []
+    for name, (result, on_grid) in pairs.items():
+        same = f"{name}: smoothed particles and grid"
         rows += [
-            Row(
-                f"{name}: restitution by smoothed particles and on the grid",
-                result.restitution,
-                on_grid.restitution,
-                0.1,
-            ),
-            Row(f"{name}: the same, speed at the plate", result.p2.velocity, on_grid.p2.velocity, unit="m/s"),
-            Row(
-                f"{name}: the same, speed once the liquid has turned",
-                result.turned_speed,
-                on_grid.turned_speed,
-                unit="m/s",
-            ),
-            Row(f"{name}: P1 to P4 of the smoothed particles out of order", float(disordered), 0.0, 0.0),
-            Row(f"{name}: peaks of the liquid's energy with smoothed particles", float(peaks(result))),
-            Row(f"{name}: energy that the smoothed particles leave unexplained", result.ledger_error, 0.0, 0.02),
-            Row(f"{name}: energy lost by the projection of the smoothed particles", result.energies["exchange"]),
-            Row(f"{name}: processor time with smoothed particles", result.seconds, unit="s"),
+            Row(f"{same}, restitution", result.restitution, on_grid.restitution, 0.1),
+            Row(f"{same}, speed at the plate", result.p2.velocity, on_grid.p2.velocity, unit="m/s"),
+            Row(f"{same}, speed once turned", result.turned_speed, on_grid.turned_speed, unit="m/s"),
         ]
-    return rows
+    every = [(-r.p1.velocity, r) for r, _ in pairs.values()]
+    ordered = [in_order(r) for _, r in every]
+    doubled = {regime: [r.regime == regime and peaks(r) > 1 for _, r in every].count(True) for regime in (1, 2)}
+    return [
+        *rows,
+        Row("smoothed particles: impacts with P1 to P4 out of order", float(ordered.count(False)), 0.0, 0.0),
+        worst("smoothed particles: energy unexplained", [(v, r.ledger_error, 0.0) for v, r in every], 0.02),
+        worst("smoothed particles: loss of the projection", [(v, r.energies["exchange"], 0.0) for v, r in every]),
+        worst("smoothed particles: processor time", [(v, r.seconds, 0.0) for v, r in every], unit="s"),
+        Row("smoothed particles: impacts of regime 1 with a second peak of energy, of 3", float(doubled[1])),
+        Row("smoothed particles: impacts of regime 2 with a second peak of energy, of 3", float(doubled[2])),
+    ]
 
 
 def fit(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
@@ -204,36 +212,6 @@ def conservation(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
         worst("liquid where there is no room for it", [(v, r.volume_error, 0.0) for v, r in every], 0.005),
         Row(f"processor time of the sweep of {len(every)}", seconds, 0.0, 300.0, unit="s"),
         worst("processor time of one impact at 20 cells", [(v, r.seconds, 0.0) for v, r in every], 10.0, unit="s"),
-    ]
-
-
-def words(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
-    """Statements of the paper: order of the moments, suction, two regimes, peaks, and a straight line in 1/St."""
-    every = [r for results in cases.values() for r in results]
-    ordered = [r.p1.time < r.p2.time <= r.p3.time < r.p4.time and r.p2.velocity < 0.0 < r.p4.velocity for r in every]
-    suction = [r.highest_pressure > 0.0 > r.lowest_pressure for r in every]
-    rows = [
-        Row("impacts with P1 to P4 out of order", float(ordered.count(False)), 0.0, 0.0),
-        Row("impacts without suction after the contact", float(suction.count(False)), 0.0, 0.0),
-    ]
-    for (diameter, liquid, _), results in cases.items():
-        name = f"{diameter * 1e3:g} mm, {liquid}"
-        stokes, e = np.array([r.stokes for r in results]), np.array([r.restitution for r in results])
-        ratio = change_of_slope(stokes, e) / singh_crossover(results[0].film_ratio)
-        if liquid == "water":
-            rows.append(Row(f"{name}: ln of St where the slope changes, over St*", math.log(ratio), 0.0, math.log(1.5)))
-        else:
-            rows.append(Row(f"{name}: ln of St where the slope changes, over St*", math.log(ratio)))
-        rows.append(Row(f"{name}: R2 of e against 1/St", straight(1.0 / stokes, e), 1.0, 0.02))
-    slow, fast = cases[CASES[3]][0], cases[CASES[0]][-1]
-    return [
-        *rows,
-        Row("peaks of the liquid's energy, regime 1 (2.8 mm, 0.2 m/s)", float(peaks(slow)), 1.0, 0.0),
-        Row("peaks of the liquid's energy, regime 2 (8 mm, 1.5 m/s)", float(peaks(fast)), 2.0, 0.0),
-        Row("liquid's energy at its least while it turns, over that before, regime 1", slow.turning_energy[0]),
-        Row("liquid's energy after it has turned, over that before, regime 1", slow.turning_energy[1]),
-        Row("liquid's energy at its least while it turns, over that before, regime 2", fast.turning_energy[0]),
-        Row("liquid's energy after it has turned, over that before, regime 2", fast.turning_energy[1]),
     ]
 
 
@@ -274,33 +252,6 @@ def film_laws(cases: dict[Case, list[FilmImpact]]) -> list[Row]:
             for name, e in laws_of(diameter, LIQUIDS[liquid], film, speed).items():
                 points.setdefault(name, []).append((speed, e, each.restitution))
     return [worst(f"restitution by the {name} against the resolved", each) for name, each in points.items()]
-
-
-def change_of_slope(stokes: np.ndarray, restitution: np.ndarray) -> float:
-    """Stokes number of the corner of the two joined lines that fit ln e against ln St best."""
-    errors = []
-    corners = np.geomspace(1.1 * stokes[0], stokes[-1] / 1.1, 200)
-    for corner in corners:
-        x = np.log(stokes / corner)
-        terms = np.stack([np.ones_like(x), np.minimum(x, 0.0), np.maximum(x, 0.0)], axis=1)
-        found = np.linalg.lstsq(terms, np.log(restitution), rcond=None)[0]
-        errors.append(float(((terms @ found - np.log(restitution)) ** 2).sum()))
-    return float(corners[int(np.argmin(errors))])
-
-
-def straight(x: np.ndarray, y: np.ndarray) -> float:
-    """Coefficient of determination R2 of a straight line."""
-    rest = y - np.polyval(np.polyfit(x, y, 1), x)
-    return float(1.0 - (rest**2).sum() / ((y - y.mean()) ** 2).sum())
-
-
-def peaks(result: FilmImpact) -> int:
-    """Peaks of the kinetic energy of the liquid."""
-    from scipy.signal import find_peaks
-
-    energy = result.history["liquid_kinetic"]
-    even = np.interp(np.linspace(0.0, result.p4.time, 400), result.history["time"], energy) / energy.max()
-    return len(find_peaks(even, prominence=PEAK)[0])
 
 
 def _columns(result: FilmImpact) -> Columns:

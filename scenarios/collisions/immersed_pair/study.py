@@ -20,17 +20,21 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, UnstableStep, nearest
 from cfddem.backend.html import table
-from cfddem.backend.law_choice import GAP_ARGUMENTS, called_by_name, chosen
+from cfddem.backend.law_choice import called_by_name, chosen
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
+from closures.kinds import GAP_ARGUMENTS
 from closures.minimum_gap import elastohydrodynamic
 from scenarios.collisions.immersed_pair.motion import Setting, follow, stage
 from scenarios.collisions.immersed_pair.surroundings import chosen_forces, fluid_around
 from scenarios.collisions.results import plain
+
+SLOWEST, FASTEST = 1e-12, 1e3
+"""Speeds of approach that are computed [m/s]."""
 
 MATERIALS = {
     "steel_smooth": Material(
@@ -203,7 +207,7 @@ class Bodies(NamedTuple):
     def reduced(self) -> tuple[float, float]:
         """Reduced radius [m] and reduced mass [kg]."""
         for name, diameter in zip(("diameter", "diameter of the target"), self.diameters):
-            _check(name, diameter, math.isfinite(diameter) and diameter > 0.0, "above 0 and finite")
+            _check(name, diameter, 1e-9 <= diameter <= 1e3, "between 1e-9 and 1000 m")
         wall = _choice("against", self.against, {"sphere": False, "wall": True})
         mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(self.materials, self.diameters)]
         other = (math.inf, math.inf) if wall else (0.5 * self.diameters[1], mass[1])
@@ -233,6 +237,7 @@ def _speed_and_viscosity(
         velocity = stokes * viscosity * film_speed_per_viscosity  # type: ignore[operator]
     if viscosity is None:
         viscosity = velocity / (stokes * film_speed_per_viscosity)  # type: ignore[operator]
+    _check("velocity", velocity, SLOWEST <= velocity <= FASTEST, f"between {SLOWEST:g} and {FASTEST:g} m/s")
     return velocity, viscosity
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ def outcome_map(stokes: np.ndarray, theta12: np.ndarray, table: dict[str, np.nda
         stokes, theta12, numbers, cmap=colours, norm=BoundaryNorm(np.arange(-0.5, 5.0), 5), shading="nearest"
     )
     axes.grid(False)
-    for each in OUTCOMES:
+    for each in (known for known in OUTCOMES if known in table["outcome"]):
         axes.plot([], [], "s", ms=9, color=COLOURS[each], label=MEANINGS[each])
     label(axes, "Stokes number  $St_n$", "-", r"angle of impact  $\theta_{12}$", "deg", title)
     legend(axes, loc="center left", bbox_to_anchor=(1.01, 0.5))
@@ -44,7 +45,9 @@ def draw_map(path: Path, conditions: dict[str, Any], count: int = 40) -> None:
     """Draw the map of outcomes for Stokes numbers up to 20 and all angles; other conditions as for a single run."""
     stokes, theta12 = np.linspace(0.5, 20.0, count), np.linspace(0.0, 85.0, count)
     kept = {name: value for name, value in conditions.items() if name not in ("stokes", "theta12")}
-    save(outcome_map(stokes, theta12, outcomes(stokes, theta12, **kept)), path)
+    number = kept.get("capillary_number", math.inf)
+    title = "no capillary pull" if number == math.inf else f"capillary number {number:g}"
+    save(outcome_map(stokes, theta12, outcomes(stokes, theta12, **kept), title), path)
 
 
 def restitution_contours(stokes: np.ndarray, theta12: np.ndarray, table: dict[str, np.ndarray]) -> Any:
@@ -90,14 +93,15 @@ def sequences(runs: list[tuple[str, Triplet, list[float]]], film_ratio: float = 
     from matplotlib.patches import Circle
 
     most = max(len(times) for _, _, times in runs)
-    figure, _ = panels(width=2.3 * most, height=2.35 * len(runs))
+    figure, _ = panels(width=1.65 * most, height=1.9 * len(runs))
     figure.clear()
     for row, (title, run, times) in enumerate(runs):
         places, clock = centres(run.history, film_ratio), run.history["time_star"]
         for column, time in enumerate(times):
+            now = _at(time, clock, places)
             axes = figure.add_subplot(len(runs), most, row * most + column + 1)
             for sphere, colour in SPHERES.items():
-                x, y = (float(np.interp(time, clock, places[:, sphere - 1, axis])) for axis in (0, 1))
+                x, y = now[sphere - 1]
                 axes.add_patch(Circle((x, y), 0.5, facecolor=colour, edgecolor="white", lw=0.8))
                 axes.text(x, y, str(sphere), color="white", ha="center", va="center", fontsize=9)
             axes.set(xlim=(-2.2, 2.2), ylim=(-1.7, 1.7), aspect="equal", xticks=[], yticks=[])
@@ -105,6 +109,14 @@ def sequences(runs: list[tuple[str, Triplet, list[float]]], film_ratio: float = 
                 side.set_visible(False)
             axes.set_title((f"{title}\n" if column == 0 else "\n") + f"t* = {time:.2f}", fontsize=9.5, loc="left")
     return figure
+
+
+def _at(time: float, clock: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Positions of the spheres at a time; spheres that have separated fly on in straight lines."""
+    last = int(np.searchsorted(clock, min(time, clock[-1])))
+    first = max(int(np.searchsorted(clock, clock[last])) - 1, 0)
+    share = (time - clock[first]) / (clock[last] - clock[first]) if last > first else 0.0
+    return np.asarray(places[first] + share * (places[last] - places[first]))
 
 
 def gaps(runs: dict[str, Triplet], minimum_gap: float) -> Any:

@@ -168,12 +168,12 @@ def _check(given: Mapping[str, Any]) -> None:
     """Check the arguments of :func:`simulate_three_spheres`."""
     thinnest = min(1.0, given["film23"], given["film13"])
     limits = {
-        "stokes": (lambda x: 0.0 < x < math.inf, "above 0 and finite"),
+        "stokes": (lambda x: 1e-5 <= x < math.inf, "at least 1e-5 and finite"),
         "theta12": (lambda x: -90.0 < x < 90.0, "between -90 and 90 degrees"),
         "theta23": (lambda x: -180.0 <= x <= 180.0, "between -180 and 180 degrees"),
         "film_ratio": (lambda x: 0.0 < x <= 0.5, "above 0 and at most 0.5"),
         "minimum_gap": (lambda x: 0.0 < x < thinnest, "above 0 and below every film"),
-        "capillary_number": (lambda x: x > 0.0, "above 0; infinite for no capillary force"),
+        "capillary_number": (lambda x: x >= 0.01, "at least 0.01; infinite for no capillary force"),
         "friction": (lambda x: 0.0 <= x < math.inf, "at least 0 and finite"),
         "restitution": (lambda x: 0.0 <= x <= 1.0, "between 0 and 1"),
         "gap23": (lambda x: given["minimum_gap"] <= x < math.inf, "at least minimum_gap and finite"),

@@ -202,7 +202,7 @@ def three_sphere_figures(folder: Path, curves: Curves) -> list[Row]:
     runs = [
         ("St = 2: changes partners", simulate_three_spheres(2.0, 45.0), [0.0, 1.0, 2.0, 2.6, 3.5, 5.0]),
         ("St = 5", simulate_three_spheres(5.0, 45.0), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]),
-        ("St = 10", simulate_three_spheres(10.0, 45.0), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]),
+        ("St = 10", simulate_three_spheres(10.0, 45.0), [0.0, 0.3, 0.6, 0.9, 1.2, 1.5]),
         (
             "St = 2, 2-3 at -45 deg",
             simulate_three_spheres(2.0, 45.0, -45.0, minimum_gap=0.04),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, label, legend, panels, shades
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, blank, label, legend, panels, shades
 
 Curve = dict[float, np.ndarray]
 TITLES = {
@@ -19,15 +19,13 @@ TITLES = {
 
 def films(stokes: np.ndarray, curves: dict[tuple[str, str], Curve]) -> Any:
     """Restitution of four films at five angles, as in figure 8 of Punch et al. (2023)."""
-    figure, panel = panels(4, width=14.0, height=4.0, sharey=True)
+    figure, panel = blank(2, 2, width=10.0, height=7.2, sharex=True, sharey=True)
     for axes, (kind, curve) in zip(panel, curves.items()):
         for (angle, values), colour in zip(curve.items(), shades(len(curve))):
             axes.plot(stokes, values, color=colour, label=f"{angle:g} deg")
         axes.set(xlim=(0, stokes[-1]), ylim=(0, 1))
         label(axes, "Stokes number  $St_n$", "-", "restitution  $e_n$", "-", TITLES[kind])
-        axes.title.set_fontsize(9.5)
-    for axes in panel[1:]:
-        axes.set_ylabel("")
+        axes.label_outer()
     legend(panel[0], loc="upper left")
     return figure
 

@@ -39,6 +39,10 @@ TRANSITION_PRESSURES = {
 """Glass transition pressure of silicone oil of 10 Pa s, as fitted for each film by Punch et al. (2023, fig. 8) [Pa]."""
 
 
+LEAST_VISCOSITY, LARGE_RADIUS = 1.0, 0.1
+"""Viscosity below which the fitted pressures are those of another liquid [Pa s], and radius that may be in mm [m]."""
+
+
 @dataclass(frozen=True)
 class WetPair:
     """Result of a wet collision; speeds are taken where the films separate, at h = film."""
@@ -127,7 +131,7 @@ def collide_wet(
         velocity=pair.speed,
         turned=math.degrees(float(motion.angle[-1])),
         history=_history(motion),
-        warnings=_warn(pair),
+        warnings=_warn(pair, given),
     )
 
 
@@ -141,7 +145,8 @@ def _check(given: Mapping[str, Any]) -> None:
         "restitution": (lambda x: 0.0 < x <= 1.0, "above 0 and at most 1"),
         "poisson": (lambda x: -1.0 < x <= 0.5, "above -1 and at most 0.5"),
     }
-    for name in ("stokes", "film", "radius", "viscosity", "density", "duration", "youngs_modulus"):
+    limits["radius"] = (lambda x: 1e-9 <= x < math.inf, "at least 1e-9 m and finite")
+    for name in ("stokes", "film", "viscosity", "density", "duration", "youngs_modulus"):
         limits[name] = (lambda x: 0.0 < x < math.inf, "above 0 and finite")
     for name in ("friction", "surface_tension"):
         limits[name] = (lambda x: 0.0 <= x < math.inf, "at least 0 and finite")
@@ -186,16 +191,24 @@ def _pair(given: Mapping[str, Any], laws: BridgeLaws) -> Pair:
     )
 
 
-def _warn(pair: Pair) -> tuple[str, ...]:
-    """Warn where the minimum gap is as large as the film."""
-    if pair.minimum_gap < pair.film:
-        return ()
-    warning = (
-        f"at {pair.speed:.3g} m/s the whole film of {pair.film:.3g} m is above its glass transition pressure and does "
-        "not act; the fitted pressure does not hold at so high a Stokes number"
-    )
-    warnings.warn(warning, stacklevel=3)
-    return (warning,)
+def _warn(pair: Pair, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Warn of a minimum gap as large as the film, of a pressure fitted to another liquid, and of a radius in mm."""
+    found = []
+    if pair.minimum_gap >= pair.film:
+        found.append(
+            f"at {pair.speed:.3g} m/s the whole film of {pair.film:.3g} m is above its glass transition pressure and "
+            "does not act; the fitted pressure does not hold at so high a Stokes number"
+        )
+    if given["glass_transition_pressure"] is None and given["viscosity"] < LEAST_VISCOSITY:
+        found.append(
+            f"glass_transition_pressure is that of silicone oil of 10 Pa s, but viscosity is {given['viscosity']:g} "
+            "Pa s; give one for this liquid"
+        )
+    if given["radius"] >= LARGE_RADIUS:
+        found.append(f"radius is {given['radius']:g} m; did you mean {1e-3 * given['radius']:g} m?")
+    for each in found:
+        warnings.warn(each, stacklevel=3)
+    return tuple(found)
 
 
 def _history(motion: Motion) -> dict[str, np.ndarray]:

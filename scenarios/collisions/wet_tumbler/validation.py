@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.plotting.curves import decades, label, legend, panels, save, shades
+from cfddem.plotting.curves import BLUE, ORANGE, decades, label, legend, panels, save, shades
 from scenarios.collisions.wet_tumbler.study import Tumbling, tumble
 from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
 
@@ -60,15 +60,15 @@ def _columns(run: Tumbling) -> Columns:
 
 def _draw_growth(path: Path, runs: list[Tumbling]) -> None:
     """Sizes of agglomerates in time, and their means against the capillary number."""
-    figure, axes = panels(2, width=11.0)
+    figure, axes = panels(2, width=10.0)
     for run, colour in zip(runs, shades(len(runs))):
         axes[0].plot(run.time, run.mean_size, color=colour, label=f"Ca = {run.capillary_number:g}")
     label(axes[0], "time", "s", "mean size of agglomerates", "spheres")
     legend(axes[0])
     numbers = [run.capillary_number for run in runs]
-    axes[1].loglog(numbers, [run.late(run.mean_size) for run in runs], "o-", color="#0b4f8a", label="mean")
+    axes[1].loglog(numbers, [run.late(run.mean_size) for run in runs], "o-", color=BLUE, label="mean")
     axes[1].loglog(
-        numbers, [run.late(run.weighed_size) for run in runs], "s--", color="#e08a00", label="that a sphere is in"
+        numbers, [run.late(run.weighed_size) for run in runs], "s--", color=ORANGE, label="that a sphere is in"
     )
     label(axes[1], "capillary number of the stirring", "-", "size, later half of the run", "spheres")
     decades(axes[1], *numbers)
@@ -85,7 +85,7 @@ def draw_spheres(path: Path, runs: list[Tumbling]) -> None:
     from matplotlib.collections import EllipseCollection
     from matplotlib.colors import LogNorm
 
-    figure, axes = panels(len(runs), width=6.2 * len(runs), height=5.4)
+    figure, axes = panels(len(runs), width=5.3 * len(runs), height=4.8)
     norm, scale = LogNorm(1.0, max(float(run.largest_size[-1]) for run in runs)), mpl.colormaps["viridis_r"]
     for axis, run in zip(np.atleast_1d(axes), runs):
         spheres, box = run.run.particles, run.run.box
@@ -106,5 +106,5 @@ def draw_spheres(path: Path, runs: list[Tumbling]) -> None:
         axis.grid(False)
         label(axis, "x", "mm", "z", "mm", f"Ca = {run.capillary_number:g}, {run.time[-1]:.2f} s")
     bar = mpl.cm.ScalarMappable(norm, scale)
-    figure.colorbar(bar, ax=list(np.atleast_1d(axes)), label="spheres in the agglomerate", shrink=0.85)
+    figure.colorbar(bar, ax=list(np.atleast_1d(axes)), label="spheres in the agglomerate  [-]", shrink=0.85)
     save(figure, path)

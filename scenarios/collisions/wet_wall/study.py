@@ -38,6 +38,10 @@ CUTTING = 1e-4
 """Relaxation time of the spring of a sliding contact towards Coulomb's limit, over the Hertz time."""
 
 
+FASTEST = 1e3
+"""Fastest impact that is computed [m/s]."""
+
+
 @dataclass(frozen=True)
 class Impact:
     """Result of a wet impact. Speeds are taken where the sphere meets the layer and where the bridge ruptures."""
@@ -159,8 +163,8 @@ def sticking_velocity(
     low, high = 0.0, 0.1
     while sticks(high):
         low, high = high, 2.0 * high
-        if high > 1e3:
-            raise InputError("film", film, "thin enough for a sphere to rebound", "it sticks even at 1000 m/s")
+        if high > FASTEST:
+            raise InputError("film", film, "thin enough for a sphere to rebound", f"it sticks even at {FASTEST:g} m/s")
     while high - low > precision * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if sticks(middle) else (low, middle)
@@ -272,10 +276,11 @@ def _check(**given: float) -> None:
     """Check the numbers of an impact."""
     limits = {
         "film": (given["film"] >= 0.0, "at least 0 and finite"),
-        "velocity": (given["velocity"] > 0.0, "above 0 and finite"),
+        "velocity": (0.0 < given["velocity"] <= FASTEST, f"above 0 and at most {FASTEST:g} m/s"),
         "angle": (0.0 <= given["angle"] < 90.0, "at least 0 and below 90 degrees"),
         "tolerance": (1e-13 <= given["tolerance"] <= 1e-3, "between 1e-13 and 1e-3"),
-        "gravity": (given["gravity"] >= 0.0, "at least 0 and finite"),
+        "spin": (abs(given["spin"]) <= 1e6, "between -1e6 and 1e6 rad/s"),
+        "gravity": (0.0 <= given["gravity"] <= 1e4, "between 0 and 1e4 m/s2"),
     }
     for name, value in given.items():
         holds, limit = limits.get(name, (True, "finite"))

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, label, legend, panels, save, shades
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank, label, legend, panels, save, shades
 from scenarios.collisions.immersed_pair.study import collide
 from scenarios.collisions.wet_wall.checks import independent
 from scenarios.collisions.wet_wall.materials import ALUMINA, FRICTION, GLASS
@@ -23,7 +23,7 @@ from scenarios.validation.table import Columns, Progress, Row, worst, write_hist
 
 Curves = dict[str, Columns]
 CHANNELS = {"viscous": BLUE, "capillary": SKY, "contact": ORANGE, "gravity": GREY}
-SPEEDS = np.concatenate([np.arange(0.2, 1.2, 0.04), np.linspace(1.2, 3.0, 7)])
+SPEEDS = np.concatenate([np.arange(0.2, 1.59, 0.04), np.linspace(1.6, 3.0, 6)])
 ANGLES = np.array([1.0, 3.0, 6.0, *np.arange(10.0, 90.0, 4.0), 88.0, 89.0])
 FLOOR = 5e-6
 """Least radius of the arc in layers whose toroid is singular; such curves are drawn dotted [m]."""
@@ -157,7 +157,7 @@ def head_on(folder: Path, curves: Curves) -> list[Row]:
             ),
         ),
     )
-    figure, axes = panels(4, width=17.0, sharey=True)
+    figure, axes = blank(2, 2, width=10.0, height=7.6, sharex=True, sharey=True)
     fastest: dict[str, float] = {}
     for place, (title, cases) in enumerate(groups):
         for name, colour, sphere, liquid, film, options in cases:
@@ -167,15 +167,12 @@ def head_on(folder: Path, curves: Curves) -> list[Row]:
             curves[f"head_on/{sphere}/{liquid}/{film * 1e6:.0f}um"] = {"velocity": (SPEEDS, "m/s"), "e": (e, "-")}
             fastest[f"{sphere} {name}"] = float(e[-1])
             singular = "smallest_arc" in options
-            axes[place].plot(
-                SPEEDS, e, ":" if singular else "-", color=colour, label=name + (" (arc floor)" * singular)
-            )
-        label(axes[place], "velocity", "m/s", "restitution" if place == 0 else "", "-", title)
+            named = name + f" (arc >= {1e6 * FLOOR:.0f} um)" * singular
+            axes[place].plot(SPEEDS, e, ":" if singular else "-", color=colour, label=named)
+        label(axes[place], "velocity", "m/s", "restitution", "-", title)
+        axes[place].label_outer()
         axes[place].set_ylim(-0.03, 1.03)
         legend(axes[place], loc="lower right")
-    axes[0].set_ylabel("restitution  [-]")
-    for axis in axes[1:]:
-        axis.set_ylabel("")
     save(figure, folder / "wet_wall_head_on.png")
     order = [fastest[f"glass_1.74 {name}"] for name in ("dry", "100 um", "200 um")]
     return [Row(f"wet wall: glass_1.74 at 3 m/s, {n}", e) for n, e in zip(("dry", "100 um", "200 um"), order)]
@@ -183,7 +180,7 @@ def head_on(folder: Path, curves: Curves) -> list[Row]:
 
 def energy(folder: Path, curves: Curves) -> list[Row]:
     """Wet wall: where the energy goes (figure 9)."""
-    figure, axes = panels(2, width=11.0)
+    figure, axes = panels(2, width=10.0)
     points, shares = [], []
     cases = (("glass_1.74", 200e-6), ("glass_0.91", 100e-6))
     for place, (sphere, film) in enumerate(cases):
@@ -208,7 +205,7 @@ def energy(folder: Path, curves: Curves) -> list[Row]:
 
 def oblique(folder: Path, curves: Curves) -> list[Row]:
     """Wet wall: oblique impacts of alumina, dry and wet (figure 10)."""
-    figure, axes = panels(3, width=15.0)
+    figure, axes = panels(3, width=11.0)
     small = {}
     for liquid, colour, name in ((None, "#222222", "dry"), ("tween", ORANGE, "Tween 20, 100 um")):
         for spin, line in ((200.0, ":"), (0.0, "-"), (-300.0, "--")):
@@ -244,7 +241,7 @@ def oblique(folder: Path, curves: Curves) -> list[Row]:
 
 def spinning(folder: Path, curves: Curves) -> list[Row]:
     """Wet wall: spin before the impact (figures 11 and 12)."""
-    figure, axes = panels(4, width=18.0)
+    figure, axes = blank(2, 2, width=10.0, height=7.6, sharex=True)
     spins = (-623.0, -961.0, -1366.0, -1777.0)
     for spin, colour in zip(spins, shades(4)):
         results = _sweep("alumina_1.74", "tween", 100e-6, spin)
@@ -267,7 +264,7 @@ def spinning(folder: Path, curves: Curves) -> list[Row]:
 
 def liquids(folder: Path, curves: Curves) -> list[Row]:
     """Wet wall: liquid and thickness at -500 rad/s (figure 13)."""
-    figure, axes = panels(4, width=18.0)
+    figure, axes = blank(2, 2, width=10.0, height=7.6, sharex=True)
     e = {}
     for name, colour, liquid, film in (
         ("dry", "#222222", None, 0.0),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, decades, label, legend, panels, save
 from scenarios.validation.fluid.flows import (
     cavity,
     duct,
@@ -95,19 +95,21 @@ def cavities(curves: Curves) -> list[Row]:
 
 def _draw(folder: Path, curves: Curves) -> None:
     """Errors against cells; velocities on the two lines of the cavity."""
-    figure, axes = panels(3, width=13.0)
+    figure, axes = panels(3, width=11.0)
     for (name, columns), colour in zip(
         ((name, columns) for name, columns in curves.items() if name.endswith("/velocity")), (BLUE, ORANGE, GREY)
     ):
         axes[0].loglog(columns["cells"][0], columns["error"][0], "o-", color=colour, label=name.split("/")[1])
     axes[0].loglog((16, 64), (0.02, 0.02 / 16), "k:", label="second order")
     label(axes[0], "cells across", "-", "error of the velocity in L2", "-")
+    decades(axes[0], 16, 32, 64)
     legend(axes[0])
     for axis, line, along in ((axes[1], "u", "height"), (axes[2], "v", "width")):
         for (reynolds, _), colour in zip(CAVITIES, (BLUE, ORANGE, GREY)):
             columns = curves[f"cavity/{reynolds}/{line}"]
             axis.plot(columns["position"][0], columns["velocity"][0], color=colour, label=f"Re {reynolds}")
             axis.plot(columns["position"][0], columns["ghia"][0], "o", color=colour, markersize=4)
+        axis.plot([], [], "o", color="#444444", markersize=4, label="Ghia et al. (1982)")
         label(axis, f"place along the {along}", "-", f"{line} over the speed of the lid", "-")
         legend(axis)
     save(figure, folder / "fluid.png")

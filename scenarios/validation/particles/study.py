@@ -187,9 +187,12 @@ def sliding_films(curves: Curves) -> list[Row]:
     return rows
 
 
+SLOPES = {"dry": "dry", "wet": "under water", "wet_overlap": "under water,\nfriction at overlap"}
+
+
 def _draw(folder: Path, curves: Curves) -> None:
     """Spin and rebound of Kharaz' spheres; slopes that begin to flow."""
-    figure, axes = panels(3, width=13.0)
+    figure, axes = panels(3, width=11.0)
     shown = (("e_t", "tangential restitution", "-"), ("omega_out", "spin after the impact", "rad/s"))
     for place, (name, words, unit) in enumerate(shown):
         part = curves[f"kharaz/{name}"]
@@ -197,9 +200,9 @@ def _draw(folder: Path, curves: Curves) -> None:
         axes[place].plot(part["angle"][0], part["model"][0], color=BLUE, label="cfddem")
         label(axes[place], "impact angle", "deg", words, unit)
         legend(axes[place])
-    for name, colour in (("dry", BLUE), ("wet", GREY), ("wet_overlap", ORANGE)):
+    for name, colour, dashes in (("dry", BLUE, "-"), ("wet", GREY, "--"), ("wet_overlap", ORANGE, ":")):
         part = curves[f"slope/friction_0.5_{name}"]
-        axes[2].plot(part["angle"][0], 1e3 * np.asarray(part["speed"][0]), color=colour, label=name.replace("_", ", "))
+        axes[2].plot(part["angle"][0], 1e3 * np.asarray(part["speed"][0]), color=colour, ls=dashes, label=SLOPES[name])
     label(axes[2], "tilt", "deg", "mean speed", "mm/s")
     legend(axes[2])
     save(figure, folder / "particles.png")

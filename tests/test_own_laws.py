@@ -1,0 +1,223 @@
+"""A user's law from its declaration to the report: what is refused, checked, recorded and read without it."""
+
+from __future__ import annotations
+
+import json
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from example_case import TEXT
+from made_up_run import BED, made_up
+
+from cfddem.analysis.comparison import compare, lines
+from cfddem.analysis.report import report
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.coupling.forces.drag import Drag
+from cfddem.plotting.report_page import page
+from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.law_ranges import effect_of_drag
+from cfddem.preflight.summary import preflight
+from cfddem.run.own_laws import record_of, warn_of_changes
+from cfddem.run.runner import Run
+from closures import check, registry
+from closures.check import first_cause
+from closures.drag import di_felice
+from closures.registry import REGISTRY, law
+
+Declare = Callable[..., Any]
+
+
+@pytest.fixture
+def declare(monkeypatch: pytest.MonkeyPatch) -> Declare:
+    """Declare a law of a source text, for the length of a test."""
+
+    registry.load_built_in_laws()
+
+    def of(name: str, value: str = "1.0", kind: str = "drag", given: str = "reynolds, voidage", **ranges: Any) -> Any:
+        scope: dict[str, Any] = {"math": math, "__name__": "a_package"}
+        exec(f"def {name}({given}):\n    return {value}\n", scope)
+        monkeypatch.setitem(REGISTRY, "drag", dict(REGISTRY["drag"]))
+        return law(kind, "a test", **ranges)(scope[name])
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "said"),
+    [
+        ("di_felice", {}, r"di_felice is built in \(closures.drag\); choose another name"),
+        ("none", {}, "none has another meaning in laws.drag; choose another name"),
+        ("mine", {"kind": "drags"}, "kind = 'drags': must be one of drag, "),
+        ("mine", {"speed": (0, 1)}, "range of speed: must be of an argument of the law, one of reynolds, voidage"),
+        ("mine", {"reynolds": (3, 1)}, r"reynolds = \(3, 1\): must be a pair of numbers \(low, high\), low < high"),
+        ("mine", {"reynolds": 3}, "reynolds = 3: must be a pair"),
+    ],
+)
+def test_an_impossible_declaration_is_refused(declare: Declare, name: str, given: Any, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        declare(name, **given)
+
+
+def test_arguments_that_nothing_gives_are_named(declare: Declare) -> None:
+    odd = declare("odd", given="re, voidage")
+    assert check(odd)[0].startswith("takes re: not a law of kind drag, it may take reynolds, voidage")
+    with pytest.raises(InputError, match=r"laws.drag = 'odd'.*it may take reynolds"):
+        Case.from_text(TEXT, "bed.toml", {"laws.drag": "odd"})
+
+
+def test_the_compiler_gives_its_first_cause() -> None:
+    long = (
+        "\x1b[1mFailed in nopython mode\x1b[0m\n\n\x1b[1mUnknown attribute 'x' of type y\x1b[0m\n\nFile 'a.py', line 3"
+    )
+    assert first_cause(TypeError(long)) == "Unknown attribute 'x' of type y; use numbers, math and if"
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("math.nan", "mine is nan at reynolds = 0.001, voidage = 0.4"),
+        ("24.0 / reynolds", "mine fails (float division by zero) at reynolds = 0"),
+        ("float(str(reynolds))", "mine cannot be compiled: "),
+    ],
+)
+def test_a_law_that_fails_is_named_by_the_check(declare: Declare, value: str, said: str) -> None:
+    declare("mine", value)
+    result = preflight(Case.from_text(TEXT, "bed.toml", {"laws.drag": "mine"}))
+    assert result.status == "error" and all(each.key == "laws.drag" for each in result.issues)
+    assert any(each.reason.startswith(said) for each in result.issues)
+
+
+def test_a_law_that_fails_beyond_its_range_is_named(declare: Declare) -> None:
+    declare("mine", "di_felice if reynolds < 1.0 else math.nan", reynolds=(0.0, 0.5)).__globals__["di_felice"] = 1.0
+    case = Case.from_text(TEXT, "bed.toml", {"laws.drag": "mine"})
+    with pytest.raises(InputError, match=r"laws.drag = 'mine'.*it is nan at Re = .*, voidage = 0\.42"):
+        estimate_bed(case)
+    assert any("'mine' must be a law that is finite" in each.reason for each in preflight(case).issues)
+
+
+def test_the_order_of_arguments_does_not_matter(declare: Declare) -> None:
+    declare("mine", "built_in(reynolds, voidage)", given="voidage, reynolds").__globals__["built_in"] = di_felice
+    mine, same = (Case.from_text(TEXT, "bed.toml", {"laws.drag": name}) for name in ("mine", "di_felice"))
+    assert estimate_bed(mine) == estimate_bed(same)
+
+
+def test_laws_are_compared_with_built_in_ones_only(declare: Declare) -> None:
+    case = Case.from_text(TEXT, "bed.toml", {"laws.drag": "tenneti"})
+    assert case.laws.drag_law is not None
+    before = effect_of_drag(case, case.laws.drag_law, estimate_bed(case))
+    declare("lost", "math.nan")
+    assert "built-in laws" in before
+    assert effect_of_drag(case, case.laws.drag_law, estimate_bed(case)) == before
+
+
+def test_a_law_that_cannot_be_compiled_leaves_no_folder(declare: Declare, tmp_path: Path) -> None:
+    declare("mine", "float(str(reynolds))")
+    case = Case.from_text(TEXT, "bed.toml", {"laws.drag": "mine"})
+    with pytest.raises(InputError, match=r"laws.drag = 'mine': must be a law that can be compiled; .*use numbers"):
+        Run.begin(case, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_law_that_is_not_finite_in_a_run_is_named_with_its_arguments() -> None:
+    drag = Drag(None, "A")
+    drag.name = "mine"
+    numbers = SimpleNamespace(reynolds=np.array([1.0, 2.5, np.nan]), voidage=np.array([0.5, 0.42, 0.5]))
+    drag._require_drag(numbers, np.array([3.0, 4.0, np.nan]))  # type: ignore[arg-type]
+    for wrong in (np.nan, -1.0, np.inf):
+        with pytest.raises(InputError, match=r"laws.drag = 'mine'.*it is .* at Re = 2.5, voidage = 0.42"):
+            drag._require_drag(numbers, np.array([3.0, wrong, 4.0]))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def broken(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """An installed package of laws with a syntax error."""
+
+    def load() -> None:
+        raise SyntaxError("invalid syntax", ("my_laws.py", 5, 1, ""))
+
+    points = [SimpleNamespace(name="my_laws", load=load)]
+    monkeypatch.setattr(registry, "entry_points", lambda group: points)
+    registry.load_package_laws.cache_clear()
+    yield
+    registry.load_package_laws.cache_clear()
+
+
+@pytest.mark.usefixtures("broken")
+def test_a_package_that_could_not_be_loaded_is_named() -> None:
+    said = (
+        r"laws.drag = 'mine'.*the package my_laws could not be loaded: SyntaxError: invalid syntax \(my_laws.py, line 5"
+    )
+    with pytest.raises(InputError, match=said):
+        Case.from_text(TEXT, "bed.toml", {"laws.drag": "mine"})
+    assert any("my_laws could not be loaded" in each.reason for each in preflight(Case.from_text(TEXT)).issues)
+
+
+# ---------------------------------------------------------------- finished runs
+
+
+def test_a_run_is_read_without_the_law_that_it_used(tmp_path: Path) -> None:
+    text = f'{BED}[laws]\ndrag = "narrow"\nagitation = "wild"\n'
+    result = report(_with_case(made_up(tmp_path / "run"), text))
+    said = "\n".join(result["warnings"])
+    assert "law narrow (laws.drag) is not installed here: no prediction" in said and "law wild" in said
+    assert result["preflight"]["numbers"] == {}
+    assert "law narrow is not installed here" in page(tmp_path / "run", tmp_path / "run.html").read_text()
+    found = compare([made_up(tmp_path / "other"), tmp_path / "run"])
+    assert found["changed"]["laws.drag"] == ["di_felice", "narrow"]
+    with pytest.raises(InputError, match=r"laws.drag = 'narrow': must be one of"):
+        Run.resume(tmp_path / "run")
+
+
+def _with_case(folder: Path, text: str) -> Path:
+    (folder / "case.toml").write_text(text)
+    return folder
+
+
+def test_a_law_is_recorded_and_its_change_is_reported(declare: Declare, tmp_path: Path) -> None:
+    declare("mine", "1.0 + reynolds")
+    case = Case.from_text(TEXT, "bed.toml", {"laws.drag": "mine"})
+    about = record_of(case)
+    mark = about["laws"]["drag"]["fingerprint"]
+    assert about["laws"]["drag"]["module"] == "a_package" and record_of(Case.from_text(TEXT)) == {}
+    noted: dict[str, Any] = {}
+    folder: Any = SimpleNamespace(about={"provenance": about}, note=lambda name, value: noted.update({name: value}))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_changes(folder, case)
+    assert noted == {}
+    declare("mine", "1.0 + 2.0 * reynolds")
+    with pytest.warns(UserWarning, match=r"laws.drag = 'mine': its source has changed since the run began"):
+        warn_of_changes(folder, case)
+    changed = noted["provenance"]["laws"]["drag"]["fingerprint"]
+    assert changed.startswith(f"{mark}, then ") and changed.count(",") == 1
+    folder.about = noted
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_changes(folder, case)
+
+
+def test_a_comparison_shows_that_the_source_of_a_law_differs(tmp_path: Path) -> None:
+    for name, mark in (("a", "0123"), ("b", "4567")):
+        path = made_up(tmp_path / name) / "run.json"
+        about = json.loads(path.read_text())
+        about["provenance"]["laws"] = {"drag": {"name": "mine", "fingerprint": mark}}
+        path.write_text(json.dumps(about))
+    found = compare([tmp_path / "a", tmp_path / "b"])
+    assert found["changed"] == {"laws.drag, source": ["0123", "4567"]}
+    assert not any("the cases are the same" in line for line in lines(found))
+
+
+def test_any_use_outside_of_the_range_gives_a_warning(tmp_path: Path) -> None:
+    import h5py
+
+    with h5py.File(made_up(tmp_path / "run") / "history.h5", "r+") as file:
+        file["out_of_range_count"][:] = 3.0
+    said = "\n".join(report(tmp_path / "run")["warnings"])
+    assert "outside of its fitted range in 3.75e-05 % of its uses (3 times)" in said
