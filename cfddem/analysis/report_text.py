@@ -109,7 +109,9 @@ def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
         yield ""
         yield "  comparison with measured data"
     for each in found:
-        opening = f"  {each['name']:<16} {each['points']} points of {spelled(each['quantity'])}: "
+        points, outside = each["points"], each["outside"]
+        part = f"{points} of {points + outside} points" if outside else f"{points} point{'' if points == 1 else 's'}"
+        opening = f"  {each['name']:<16} {part} of {spelled(each['quantity'])}: "
         yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 19)
 
 

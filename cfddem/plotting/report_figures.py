@@ -70,7 +70,7 @@ def _all(run: Run, case: Case, result: dict[str, Any]) -> Iterator[tuple[str, An
             "contact."
         )
         yield "collisions", figure, caption
-    yield "case", case_drawing(case, height), "The case before it runs, seen along y; dashed: measured bed height."
+    yield "case", case_drawing(case, height), "The case before it runs, seen along y; dashed: bed height of the run."
 
 
 def _picture(run: Run) -> Any:
