@@ -57,6 +57,7 @@ def test_every_argument_of_every_law_is_plotted_with_its_unit() -> None:
     bare = [
         f"{law.kind}.{law.name}: {name}"
         for law in every
+        if law.function.__module__.startswith("closures.")  # other tests register laws of their own
         for name in [*inspect.signature(law.function).parameters, "returns"]
         if "unit not given" in pages.unit(law, name)
     ]

@@ -74,11 +74,11 @@ def estimate_bed(case: Case) -> BedEstimate:
     elif inlet > 0.0 and number > 0.0 and fluid.is_liquid:
         voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
     height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
-    drop = weight
-    if case.bed.fixed or inlet < onset:
+    drop, fits = weight, 0.0 < voidage <= 1.0  # the voidage is negative where the particles do not fit
+    if fits and (case.bed.fixed or inlet < onset):
         flow = inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)
         drop = balance.pressure_gradient(*flow, drag) * height
-    factor = drag(reynolds, voidage) if 0.0 < voidage <= 1.0 else nan  # negative where the particles do not fit
+    factor = drag(reynolds, voidage) if fits else nan
     return BedEstimate(
         count, solids, weight, number, inlet, reynolds, onset, terminal, _terminal_by_law(case, gravity),
         voidage, height, drop, factor,
