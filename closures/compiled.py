@@ -86,10 +86,29 @@ def cache_folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="cfddem-")) / key
 
 
-def _point_compiler_at(folder: Path) -> None:
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
+def _set_compiler(setting: str, value: str) -> None:
+    """Set a setting of the compiler, whether it is loaded already or not."""
+    os.environ[f"NUMBA_{setting}"] = value
     if "numba" in sys.modules:
-        sys.modules["numba"].config.CACHE_DIR = str(folder)
+        setattr(sys.modules["numba"].config, setting, value)
+
+
+def _allow_wide_vectors() -> None:
+    """Let loops use vectors of 512 bits where the processor has them.
+
+    Compilers prefer 256 bits, because early processors with AVX-512 lowered their clock for wider ones. Loops over
+    pairs divide and gather much, and are 1.3 to 1.8 times as fast with 512 bits. The results are the same bits.
+    """
+    import llvmlite.binding as processor
+
+    if any(f"NUMBA_{name}" in os.environ for name in ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")):
+        return  # the user's own choice
+    try:
+        features = processor.get_host_cpu_features()
+    except RuntimeError:  # LLVM does not know this processor
+        return
+    if features.get("avx512f"):
+        _set_compiler("CPU_FEATURES", f"{features.flatten()},-prefer-256-bit")
 
 
 _OPTIONS: Any = {
@@ -115,9 +134,10 @@ def is_exposed(function: Callable[..., Any]) -> bool:
     return function in _EXPOSED
 
 
-_point_compiler_at(cache_folder())
+_set_compiler("CACHE_DIR", str(cache_folder()))
+_allow_wide_vectors()
 
-from numba.extending import overload  # noqa: E402  the cache folder must be known first
+from numba.extending import overload  # noqa: E402  the compiler reads its settings when it is loaded
 
 for _laws in REGISTRY.values():
     for _law in _laws.values():

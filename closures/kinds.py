@@ -18,7 +18,7 @@ AGITATION_ARGUMENTS = ("solid_fraction", "reynolds", "along", "density_ratio")
 BUILT_IN: dict[str, tuple[str, ...]] = {
     "drag": ("none",),
     "minimum_gap": ("elastohydrodynamic",),
-    "lubrication": ("nijssen", "nijssen_full", "nijssen_full_twist", "none"),
+    "lubrication": ("auto", "nijssen", "nijssen_full", "nijssen_full_twist", "none"),
     "added_mass": (),
     "agitation": ("auto", "none", "lattanzi"),
 }

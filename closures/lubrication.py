@@ -95,14 +95,15 @@ def short_film_potential(gap: float, change: float, minimum_gap: float) -> float
     >>> abs(short_film_potential(1.0, 0.1, 0.1) - math.log(1.1)) < 1e-16
     True
     """
-    part = change / (2.0 * gap + change)
+    inside, start, end = gap > minimum_gap, max(gap, 0.0), max(gap + change, 0.0)
+    # one division for both sides of h_min
+    above = change if inside else (end - start) * (end + start)
+    part = above / (2.0 * gap + change if inside else 2.0 * minimum_gap * minimum_gap)
     square = part * part
     series = 1.0 + square * (
         1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0 + square * (1.0 / 9.0 + square * (1.0 / 11.0))))
     )
-    start, end = max(gap, 0.0), max(gap + change, 0.0)
-    below = (end - start) * (end + start) * (0.5 / (minimum_gap * minimum_gap))
-    return 2.0 * part * series if gap > minimum_gap else below
+    return 2.0 * part * series if inside else part
 
 
 @law("lubrication", "difference of the film's potential; its series where the gap changes by less than a tenth")

@@ -116,6 +116,16 @@ def test_runs_are_compared_by_the_errors_of_their_means(tmp_path: Path) -> None:
     assert any("differs by" in line for line in text) and max(map(len, text)) <= 100
 
 
+def test_copies_of_the_same_data_are_not_a_difference_of_runs(tmp_path: Path) -> None:
+    folders = []
+    for name, value in (("a", 40), ("b", 40), ("c", 41)):
+        (tmp_path / name).mkdir()
+        data = csv_file(tmp_path / name, f"bed height [mm]\n{value}\n")
+        folders.append(made_up(tmp_path / f"run-{name}", f'{BED}[compare.data]\nfile = "{data}"\n'))
+    assert compare(folders[:2])["changed"] == {}
+    assert list(compare(folders[1:])["changed"]) == ["compare.data.file"]
+
+
 def test_compare_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made_up(tmp_path / "a")
     made_up(tmp_path / "b", trend=1e-3)
@@ -322,6 +332,9 @@ def test_every_kind_of_case_is_drawn(name: str) -> None:
 def test_data_that_a_run_will_not_have_are_refused_before_it_starts(tmp_path: Path, text: str, said: str) -> None:
     csv_file(tmp_path, text)
     (tmp_path / "case.toml").write_text(f'{BED}[compare.data]\nfile = "points.csv"\n')
+    done = call("check", str(tmp_path / "case.toml"), "--json")
+    (error,) = (each for each in json.loads(done.out)["issues"] if each["severity"] == "error")
+    assert done.code == 2 and error["key"] == "compare.data" and said in error["reason"]
     with pytest.raises(InputError, match=said):
         Run.begin(Case.from_toml(tmp_path / "case.toml"), tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -164,6 +165,12 @@ def test_the_search_finds_the_value_survives_failures_and_continues(box: Path) -
     assert [each.values for each in again.trials[:6]] == [each.values for each in first.trials]
     assert len(again.trials) == 14 and len(again.finished) < 14
     (estimate,) = again.estimates()
+    assert again.verdict == "the case agrees with the data at its best values"
+    far = replace(again, data=(replace(again.data[0], value=again.data[0].value + 1.0),), response=None)
+    assert (
+        "no values in these ranges agree"
+        in replace(far, trials=tuple(replace(t, chi2=1e4) for t in far.trials)).verdict
+    )
     assert abs(estimate["value"] - TRUE) < 2.0 * estimate["error"] < 0.05 and estimate["identified"]
     assert json.loads((box / "out" / "calibration.json").read_text())["failed"] == 14 - len(again.finished)
     assert (box / "out" / "calibration.png").exists() and "lost, of a test" in (box / "out" / "trials.csv").read_text()

@@ -15,6 +15,8 @@ from cfddem.case.input_errors import InputErrors, sections_of
 from cfddem.case.renamed import KEYS
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import DEEPEST_KEY, LONGEST_FILE
+from cfddem.preflight.summary import preflight
+from cfddem.run.build import laws_of
 
 GALLERY = gallery()
 LONGEST_LINE = 600
@@ -76,7 +78,7 @@ def test_all_input_errors_are_reported_at_once_each_with_its_line() -> None:
         ({"laws.drag": "wenyu"}, "(did you mean 'wen_yu'?); cfddem explain lists all laws"),
         (
             {"laws.lubrication": "nijsen"},
-            "must be one of nijssen, nijssen_full",
+            "must be one of auto, nijssen, nijssen_full",
         ),  # and laws that other tests have registered
         ({"laws.added_mass": "zubr"}, "(did you mean 'zuber'?); cfddem explain lists all laws"),
         ({"laws.added_mass": -0.5}, "laws.added_mass = -0.5: must be zero or positive, or the name of a law"),
@@ -209,6 +211,26 @@ def test_an_installed_package_can_provide_a_drag_law(monkeypatch: pytest.MonkeyP
     finally:
         registry.REGISTRY["drag"].pop("offered_drag", None)
         registry.load_package_laws.cache_clear()
+
+
+def test_a_gas_has_no_films_by_default_and_a_liquid_has() -> None:
+    gas = {"fluid.density": 1.2, "fluid.viscosity": 1.8e-5, "bed.inlet_velocity": 2.0}
+    text = TEXT.replace('lubrication = "nijssen"\n', "")
+    for changes, film in (({}, True), (gas, False), ({**gas, "laws.lubrication": "nijssen"}, True)):
+        case = Case.from_text(text, "bed.toml", changes)
+        assert (case.has_films, laws_of(case).film) == (film, film)
+    assert "none, the default in a gas" in str(preflight(Case.from_text(text, "bed.toml", gas)))
+
+
+def test_the_advised_contact_modulus_is_the_least_that_the_limit_needs() -> None:
+    """Advice is rounded up to two digits, less than 12 % too much."""
+
+    def remedies(modulus: float) -> list[str]:
+        found = preflight(Case.from_text(TEXT, "bed.toml", {"material.alumina.contact_modulus": modulus})).issues
+        return [each.remedy for each in found if "contact_modulus" in each.key]
+
+    advice = float(remedies(5e5)[0].split()[3])
+    assert not remedies(advice) and remedies(advice / 1.12)
 
 
 def test_the_json_schema_holds_every_key() -> None:

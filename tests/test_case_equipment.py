@@ -11,11 +11,13 @@ import pytest
 from in_process_ranks import on_ranks
 from test_case_walls import HOPPER, TETRAHEDRON, write_binary_stl
 
+from cfddem.analysis import measures
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.schema import Case
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
+from cfddem.run.liquid_bed_measures import bed_height, bed_solids
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 
@@ -73,6 +75,10 @@ def test_feed_outlet_and_moving_walls_do_what_the_case_says(tmp_path: Path) -> N
     left, mass = equipment.removed
     assert left > 0 and mass == pytest.approx(left * 2500.0 * np.pi / 6.0 * 4e-3**3)
     assert simulation.particles.count == 100 + equipment.fed - left
+    flying = simulation.particles.landed == 0  # neither in the height nor in the volume of the bed
+    assert 0 < flying.sum() < equipment.fed
+    assert bed_height(simulation) < measures.bed_height(simulation.particles.position, simulation.particles.radius)
+    assert bed_solids(simulation) == pytest.approx(simulation.particles.volume[~flying].sum(), rel=1e-12)
     assert walls.shift[-2] == pytest.approx([0.1 * 0.015, 0.0, 0.0])
     assert walls.shift[-1] == pytest.approx([0.0, 0.0, 5e-4 * np.sin(2.0 * np.pi * 4.0)], abs=1e-15)
     simulation.until(0.0425)
@@ -96,13 +102,23 @@ def test_a_run_resumes_bit_for_bit_without_its_surface_file(tmp_path: Path) -> N
     for time in (0.008, 0.016, 0.024, 0.032, 0.04):
         stopped.simulation.until(time)
     assert same(state(restored), state(stopped.simulation))
-    again = Run.resume(tmp_path / "straight", until=0.044)
+    (tmp_path / "straight").rename(tmp_path / "moved")
+    assert 'file = "surfaces/wall_2.stl"' in (tmp_path / "moved" / "case.toml").read_text()
+    again = Run.resume(tmp_path / "moved", until=0.044)
     assert Path(again.simulation.case.wall[2].file or "").parts[-2:] == ("surfaces", "wall_2.stl")
     again.go()
-    run = open_run(tmp_path / "straight")
+    run = open_run(tmp_path / "moved")
     assert run.status == "finished"
     found = report(run.folder)
     assert found["ledger"]["particles_lost"] == 0.0 and found["preflight"]["status"] != "error"
+    (answer,) = (each for each in found["answers"] if each["name"] == "particles")
+    counts = (run.history[name][-1] for name in ("fed_count", "removed_count"))
+    assert "100 at the start; {:.0f} fed".format(*counts) in answer["verdict"] and "removed" in answer["verdict"]
+    surface = tmp_path / "moved" / "surfaces" / "wall_2.stl"
+    surface.rename(tmp_path / "elsewhere.stl")
+    surface.symlink_to(tmp_path / "elsewhere.stl")
+    with pytest.raises(InputError, match="files outside of it are not read"):
+        Run.resume(tmp_path / "moved", until=0.048)
 
 
 def checkpoint_through_a_file(simulation: Simulation, folder: Path) -> Simulation:

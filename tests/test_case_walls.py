@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,11 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.case.wall_geometry import distance, extent, inside_surface
 from cfddem.case.walls import CaseWall
+from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.walls.motion import Motion
 from cfddem.particles.walls.stl import read_stl
-from cfddem.preflight.summary import preflight
+from cfddem.preflight.summary import Preflight, preflight
+from cfddem.run.initial_particles import particles_of
 
 HOPPER = """
 [material.bead]
@@ -79,6 +83,13 @@ def write_text_stl(path: Path, corners: np.ndarray) -> Path:
     )
     path.write_text(f"solid part\n{facets}endsolid part\n")
     return path
+
+
+def cube() -> np.ndarray:
+    """The triangles of a cube with edges of 1 (12, 3, 3)."""
+    corners = np.array(list(itertools.product((0.0, 1.0), repeat=3)))
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    return corners[np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])]
 
 
 def write_binary_stl(path: Path, corners: np.ndarray) -> Path:
@@ -214,6 +225,36 @@ def test_a_file_in_another_unit_is_seen(tmp_path: Path) -> None:
     assert preflight(Case.from_toml(path, {"wall.2.scale": 1e-3})).status == "ok"
     tiny = preflight(Case.from_toml(path, {"wall.2.scale": 1e-6, "wall.2.point": [0.03, 0.03, 0.1]}))
     assert [(each.severity, each.key) for each in tiny.issues] == [("warning", "wall.2.file")]
+
+
+def test_particles_outside_of_a_closed_vessel_are_refused(tmp_path: Path) -> None:
+    """A cube that fills most of its column is a vessel, a small one an obstacle, an open one has no inside."""
+    path = tmp_path / "vessel.toml"
+
+    def found(corners: np.ndarray, positions: list[list[float]], width: float) -> Preflight:
+        write_text_stl(tmp_path / "part.stl", corners)
+        text = HOPPER[: HOPPER.index("[[wall]]")].partition("count = 100")[0]
+        text = text.replace("width = 0.06", f"width = {width}").replace("height = 0.2", f"height = {width}")
+        wall = "[[wall]]\nshape = 'surface'\nfile = 'part.stl'\n[run]\nuntil = 0.1\n"
+        path.write_text(f"{text}positions = {positions}\n{wall}")
+        return preflight(Case.from_toml(path))
+
+    inside, outside = [0.01, 0.01, 0.01], [0.1, 0.1, 0.1]
+    vessel, obstacle = 0.2 * cube(), 0.05 * cube()
+    for corners, positions, width, place in (
+        (vessel, [inside, [0.19, 0.21, 0.21]], 0.22, "(0.19, 0.21, 0.21) m it is outside"),
+        (vessel, [[0.21, 0.21, 0.21]], 0.22, "(0.21, 0.21, 0.21) m it is outside"),
+        (obstacle, [inside, outside, [0.2, 0.1, 0.1]], 0.22, "(0.01, 0.01, 0.01) m it is inside"),
+    ):
+        (error,) = (each for each in found(corners, positions, width).issues if each.severity == "error")
+        assert "part.stl' is closed, and at " + place in error.reason
+        with pytest.raises(InputError, match=re.escape(place)):
+            particles_of(Case.from_toml(path), np.empty(0), [], Laws())
+    (warning,) = found(obstacle, [outside], 0.22).issues
+    assert warning.severity == "warning" and "outside of this closed surface" in warning.reason
+    assert not found(0.003 * cube(), [outside], 0.22).issues  # too small for a vessel
+    opened = found(vessel[2:], [inside, [0.21, 0.21, 0.21]], 0.22)
+    assert not opened.issues and "open: particles may start on both sides" in str(opened)
 
 
 # ---------------------------------------------------------------- geometry and motion

@@ -15,8 +15,10 @@ from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.io import checkpoint
+from cfddem.io.reading import open_run
 from cfddem.preflight.summary import preflight
 from cfddem.run.liquid_bed_measures import open_area, open_volume
+from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 
 CONE = """
@@ -166,6 +168,9 @@ def test_feeds_in_a_fluid_displace_none_and_resume_bit_for_bit(tmp_path: Path) -
     assert again.fluid is not None
     assert np.array_equal(again.particles.position, straight.particles.position)
     assert np.array_equal(again.fluid.velocity, straight.fluid.velocity)
+    Run.begin(straight.case, tmp_path / "run")
+    solid = open_run(tmp_path / "run").fluid("solid")
+    assert solid.any() and np.array_equal(solid > 0, ~grid_of(straight.case).open)
     assert again.equipment.fed == straight.equipment.fed > 30 and again.equipment.removed == straight.equipment.removed
 
 

@@ -1,4 +1,4 @@
-"""What a case compiles on a new machine: only what it uses."""
+"""What a case compiles on a new machine: only what it uses, for the widest vectors of the processor."""
 
 from __future__ import annotations
 
@@ -47,3 +47,15 @@ def test_a_case_compiles_only_what_it_uses(name: str, tmp_path: Path) -> None:
         [sys.executable, "-c", COUNT, name], env=environment, capture_output=True, text=True, check=True
     )
     assert 0 < int(ran.stdout) <= LOOPS[name]
+
+
+def test_loops_use_the_widest_vectors_of_the_processor() -> None:
+    """The compiler uses vectors of 512 bits where the processor has them, unless the user chose otherwise."""
+    import llvmlite.binding as processor
+    from numba import config
+
+    import closures.compiled  # noqa: F401  sets the compiler
+
+    if config.CPU_NAME or not processor.get_host_cpu_features().get("avx512f"):  # type: ignore[attr-defined]
+        pytest.skip("needs a processor with AVX-512, and no choice by the user")
+    assert config.CPU_FEATURES.endswith("-prefer-256-bit")  # type: ignore[attr-defined]

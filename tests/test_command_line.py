@@ -239,6 +239,9 @@ def test_the_status_of_the_check_sets_the_exit_code(tmp_path: Path, monkeypatch:
     assert refused.code == 2 and "above the terminal velocity" in refused.err
     assert list(tmp_path.iterdir()) == []
     assert json.loads(call("check", "liquid-bed", *high, "--json").out)["status"] == "error"
+    shared, refused = (call("check", "liquid-bed", "--ranks", ranks) for ranks in ("2", "40"))
+    assert shared.code == 0 and "can share the case, about 800 particles each" in shared.out
+    assert refused.code == 2 and "error: ranks: 40 must be at most" in refused.out
 
 
 def test_the_schema_is_json() -> None:

@@ -46,6 +46,10 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
     assert "bed.diameter " in keys and "column.width" not in keys and max(map(len, keys.splitlines())) <= 100
     both = call("explain", "stokes")
     assert both.code == 2 and "drag.stokes or " in both.err and call("explain", "drag.stokes").code == 0
+    assert "bed.jet.velocity = (required)" in call("explain", "bed.jet").out
+    assert call("explain", "wall.shape").out.startswith("wall.NUMBER.shape")
+    for name, said in (("KochHillDrag", "did you mean 'koch_hill'?"), ("MeiLift", "see laws.lift")):
+        assert said in call("explain", name).err
     unknown = call("explain", "di_felcie")
     assert unknown.code == 2 and "di_felice" in unknown.err
 

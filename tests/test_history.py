@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -13,12 +13,10 @@ from test_coupling import momentum, stirred, suspension
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
-from cfddem.coupling.forces.history import History
-from cfddem.coupling.sampled_flow import SampledFlow
-from cfddem.particles.state import Particles, make_particles
 from cfddem.run.simulation import Simulation
 from closures import history as laws
 from scenarios.beds.settling import study as settling
+from scenarios.validation.history_force import Memory, Motion, convolved, difference, modelled, oscillating, turning
 from scenarios.validation.table import numbers
 
 WATER, VISCOSITY, GLASS, DIAMETER = 1000.0, 1e-3, 2500.0, 1e-4
@@ -32,33 +30,9 @@ SCALED = {
 """Kernels over the time t_c."""
 
 
-class Memory:
+def sphere(kernel: Literal["mei_adrian", "basset"], inertia: float = math.inf) -> Memory:
     """The history force on one sphere whose slip is given."""
-
-    def __init__(self, kernel: str, inertia: float = math.inf) -> None:
-        self.history = History(kernel, WATER)  # type: ignore[arg-type]
-        self.particles: Particles = make_particles(np.zeros((1, 3)), 0.5 * DIAMETER, GLASS, viscosity=VISCOSITY)
-        for field in self.history.fields:
-            self.particles.declare(field)
-        self.inertia, self.last = np.array([inertia]), 0.0
-
-    def prepare(self, slip: np.ndarray, drag: float, step: float) -> tuple[float, np.ndarray]:
-        """Conductance and explicit force of a step."""
-        one = np.ones(1)
-        flow = SampledFlow(slip[None], np.zeros((1, 3)), one, one, one, one)
-        self.terms = self.history.terms(self.particles, flow, np.array([drag]), self.inertia, step, self.last)
-        self.last = step
-        return float(self.terms.conductance[0]), self.terms.force[0]
-
-    def along(self, slips: np.ndarray, step: float) -> np.ndarray:
-        """Mean force in every step of a slip that is given at its ends (n + 1, 3)."""
-        forces = []
-        for before, after in pairwise(slips):
-            conductance, explicit = self.prepare(before, 0.0, step)
-            implicit = conductance * 0.5 * (before + after)  # the middle of the step, for an infinite mass
-            self.history.store(self.particles, implicit[None], self.terms, step)
-            forces.append(explicit + implicit)
-        return np.array(forces)
+    return Memory(kernel, DIAMETER, WATER, VISCOSITY, inertia)
 
 
 def exponentials(kernel: str) -> tuple[np.ndarray, np.ndarray, float]:
@@ -117,7 +91,7 @@ def fall(step: float, duration: float) -> np.ndarray:
     """Speed of a sphere from rest in creeping flow, with added mass and the force of Basset."""
     mass, displaced = GLASS * math.pi / 6.0 * DIAMETER**3, WATER * math.pi / 6.0 * DIAMETER**3
     inertia, weight, drag = mass + 0.5 * displaced, (mass - displaced) * 9.81, 3.0 * math.pi * VISCOSITY * DIAMETER
-    memory, speeds = Memory("basset", inertia), [0.0]
+    memory, speeds = sphere("basset", inertia), [0.0]
     for _ in range(round(duration / step)):
         speed = speeds[-1]
         history, explicit = memory.prepare(np.array([-speed, 0.0, 0.0]), drag, step)
@@ -166,7 +140,7 @@ def test_amplitude_and_phase_of_an_oscillating_sphere(frequency: float) -> None:
     step = 2.0 * math.pi / omega / per_period
     ends = step * np.arange(per_period * periods + 1)
     slips = np.stack([np.sin(omega * ends), 0.0 * ends, 0.0 * ends], axis=1)
-    forces = Memory("basset").along(slips, step)[-per_period:, 0]
+    forces = sphere("basset").along(slips, step)[-per_period:, 0]
     middles = (ends[1:] - 0.5 * step)[-per_period:]
     found = 2.0 * complex(np.mean(forces * np.exp(-1j * omega * middles))) * 1j
     exact = 1.5 * math.pi * VISCOSITY * DIAMETER**2 * np.sqrt(1j * omega * WATER / VISCOSITY)
@@ -174,31 +148,44 @@ def test_amplitude_and_phase_of_an_oscillating_sphere(frequency: float) -> None:
     assert abs(np.angle(found / exact)) < 0.01
 
 
-def turned(shape: Callable[[float], float], time: float) -> float:
-    """The convolution of the scaled kernel with a shape of the phase; x = y^4, because the kernel is singular at 0."""
+def turned(motion: Motion, step: int) -> np.ndarray:
+    """History force on a slip that turns at constant speed, in the middle of a step: two components [N].
 
-    def smooth(y: float) -> float:
-        return 4.0 * y / (1.0 + y**3) ** 2 * shape(0.3 * (time - y**4))
+    x = y^4, because the kernel is singular at 0.
+    """
+    speed = float(np.linalg.norm(motion.slips[0]))
+    time = laws.decay_time(speed, motion.diameter, motion.kinematic)
+    now = (step + 0.5) * 0.02
 
-    return float(quad(smooth, 0.0, time**0.25, limit=2000)[0])
+    def smooth(y: float, shape: Callable[[float], float]) -> float:
+        return 4.0 * y / (1.0 + y**3) ** 2 * shape(0.3 * (now - y**4))
+
+    shapes = (lambda x: -math.sin(x), math.cos)
+    parts = [quad(smooth, 0.0, now**0.25, args=(shape,), limit=2000)[0] for shape in shapes]
+    stokes = 3.0 * math.pi * motion.viscosity * motion.diameter
+    return stokes * laws.basset(time, speed, motion.diameter, motion.kinematic) * 0.3 * speed * np.array(parts)
 
 
 @pytest.mark.slow
 def test_exponentials_and_convolution_agree_at_constant_slip_speed() -> None:
     """A slip that turns at constant speed, for 10 to 100 000 steps of 2 % of t_c: the force within 0.2 %."""
-    speed, kinematic = 0.1, VISCOSITY / WATER
-    time = laws.decay_time(speed, DIAMETER, kinematic)
-    step, turning = 0.02 * time, 0.3 / time
-    ends = step * np.arange(100_001)
-    slips = speed * np.stack([np.cos(turning * ends), np.sin(turning * ends), 0.0 * ends], axis=1)
-    forces = Memory("mei_adrian").along(slips, step)
-    scale = (
-        3.0 * math.pi * VISCOSITY * DIAMETER * laws.basset(time, speed, DIAMETER, kinematic) * speed * turning * time
-    )
+    motion = turning(100_000)
+    forces = modelled(motion)
     for n in (10, 100, 1000, 9999, 99_999):
-        middle = (n + 0.5) * 0.02
-        parts = [turned(shape, middle) for shape in (lambda x: -math.sin(x), math.cos)]
-        assert np.hypot(*(forces[n, :2] / scale - parts)) < 2e-3 * 1.6 + 1e-4
+        exact = turned(motion, n)
+        assert np.hypot(*(forces[n, :2] - exact)) < 2e-3 * np.hypot(*exact)
+
+
+def test_readings_of_the_kernel_differ_where_the_slip_speed_varies() -> None:
+    """At constant speed the force is that of both convolutions, which is that of the integral; otherwise not."""
+    motion = turning(300)
+    force, present, past = modelled(motion), convolved(motion, "present"), convolved(motion, "past")
+    assert difference(past, present) < 1e-12
+    assert difference(force, present) < 2e-3
+    assert difference(present[-1, :2], turned(motion, 299)) < 1e-4
+    motion = oscillating(1.0, steps=300)
+    force, present, past = modelled(motion), convolved(motion, "present"), convolved(motion, "past")
+    assert min(difference(force, present), difference(force, past), difference(past, present)) > 0.05
 
 
 def test_a_jump_of_the_velocity_is_remembered() -> None:
@@ -206,13 +193,13 @@ def test_a_jump_of_the_velocity_is_remembered() -> None:
     step = 1e-3 * DIFFUSION
     slips = np.zeros((60, 3))
     slips[5:, 0] = 1.0
-    memory, given = Memory("basset"), []
+    memory, given = sphere("basset"), []
     for before in slips[:-1]:
         conductance, explicit = memory.prepare(before, 0.0, step)
         implicit = conductance * before  # the transfer does not know of the jump
         memory.history.store(memory.particles, implicit[None], memory.terms, step)
         given.append(float(explicit[0] + implicit[0]))
-    known = Memory("basset").along(slips, step)[:, 0]
+    known = sphere("basset").along(slips, step)[:, 0]
     assert given[4] == 0.0
     # the impulse of the step of the jump comes one step later; afterwards the forces are equal
     assert given[5] - known[5] == pytest.approx(known[4], rel=1e-9)

@@ -51,6 +51,13 @@ def test_the_result_is_the_one_that_the_case_is_about(given: dict[str, Any], sai
     assert said in effect("tenneti", **given)
 
 
+@pytest.mark.parametrize("further", [{"laws.history": "mei_adrian"}, {"laws.added_mass": 0.5}, {}])
+def test_a_law_of_agitation_is_not_fitted_with_further_forces(further: dict[str, Any]) -> None:
+    case = Case.from_text(TEXT, "bed.toml", {"laws.agitation": "free_spheres", **further})
+    found = [each for each in preflight(case).issues if "fitted without added mass and history" in each.reason]
+    assert [each.key for each in found] == ["laws.agitation"] * bool(further)
+
+
 def test_several_arguments_are_one_sentence() -> None:
     case = Case.from_text(TEXT, "bed.toml", {"bed.fixed": True, "bed.start": "poured", "laws.drag": "tenneti"})
     (found,) = (each for each in preflight(case).issues if each.key == "laws.drag")

@@ -12,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from PIL import Image
+from test_case_walls import HOPPER, TETRAHEDRON, write_binary_stl
 
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.io.export import export
@@ -24,6 +25,8 @@ from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
 from cfddem.plotting.panels import BUBBLE, Stage, _bubbles
 from cfddem.plotting.pictures import movie, picture
+from cfddem.plotting.scene import Look, Scene
+from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
 from cfddem.plotting.window import scene, window
 from scenarios.beds.liquid_bed.movie import side_by_side
 
@@ -171,6 +174,44 @@ def test_a_run_without_a_grid_is_framed_by_its_particles(renders, tmp_path):
     assert stage.bounds[:, 0] == pytest.approx(np.array([-0.1, -0.1, -0.1]), abs=0.07)
     assert stage.bounds[:, 1] == pytest.approx(np.array([1.2, 0.7, 3.2]), abs=0.07)
     assert picture(run.folder, tmp_path / "two.png").exists()
+
+
+def test_walls_of_the_case_are_drawn_where_they_are_at_a_time(renders, tmp_path):
+    """A hopper of 50 mm around two spheres; a plate from a file that moves 10 mm in the first 0.1 s, and turns."""
+    write_binary_stl(tmp_path / "plate.stl", 0.01 * TETRAHEDRON + [0.0, 0.0, 0.02])
+    plate = '[[wall]]\nshape = "surface"\nfile = "plate.stl"\nvelocity = [0.1, 0.0, 0.0]\nspin = [0.0, 0.0, 10.0]\n'
+    for name, text in (("plain", ""), ("walls", HOPPER.replace("[run]", plate + "end = 0.1\n[run]"))):
+        run = RunFolder.create(tmp_path / name, text, {}, None, QUANTITIES)
+        if text:
+            (tmp_path / name / "surfaces").mkdir()
+            (tmp_path / "plate.stl").rename(tmp_path / name / "surfaces" / "wall_2.stl")
+        points = {"position": np.array([[0.03, 0.03, 0.05], [0.03, 0.04, 0.1]]), "radius": np.full(2, 2e-3)}
+        for step, time in enumerate((0.0, 0.1)):
+            run.write_snapshot(time, step, None, points | {"velocity": np.zeros((2, 3))})
+        stage = Stage.of(open_run(run.folder), [0], (), "speed", None)
+    assert stage.figure(0).axes
+    assert stage.bounds[0, 0] < 0.006 and stage.bounds[2, 1] == pytest.approx(0.2)  # the hopper is in view
+    walls = walls_of(open_run(run.folder))
+    shift = [_moved(_surface(walls[2], stage.bounds), walls[2], time).center for time in (0.0, 0.1, 0.2)]
+    assert np.subtract(shift[1], shift[0])[0] == pytest.approx(0.01, abs=4e-3) and shift[2] == shift[1]
+    assert _moved(_surface(walls[0], stage.bounds), walls[0], 0.0).bounds == pytest.approx(
+        (5e-3, 55e-3) * 2 + (0.04, 0.07)
+    )
+    first = Scene(open_run(run.folder), off_screen=True)
+    first.show(Look(0))
+    assert {"wall 0", "wall 1", "wall 2", "edges 2"} <= first.plotter.renderers[0].actors.keys()
+    first.plotter.close()
+
+
+def test_solid_cells_are_grey(tmp_path):
+    known = {**QUANTITIES, "fluid": {**QUANTITIES["fluid"], "solid": Quantity("1", "solid cells")}}
+    run = RunFolder.create(tmp_path / "run", "", {}, GRID, known)
+    solid = np.zeros((20, 4, 10), bool)
+    solid[3:5, :, 2:6] = True
+    fluid = {"voidage": np.ones(solid.shape), "velocity": np.zeros((*solid.shape, 3)), "solid": solid}
+    run.write_snapshot(0.0, 0, fluid, {"id": [1], "position": np.full((1, 3), 0.01), "radius": np.full(1, 1e-3)})
+    image = Stage.of(open_run(run.folder), [0], ("voidage",), "speed", None).figure(0).axes[0].images[-1].get_array()
+    assert np.array_equal(image[..., 3] > 0.0, solid[:, 2]) and image[4, 3, 0] == pytest.approx(0x9A / 255)
 
 
 def test_bubbles_and_freeboard_are_distinguished(bed):

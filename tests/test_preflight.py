@@ -41,6 +41,10 @@ def test_a_gallery_case_with_a_warning_explains_it() -> None:
     for name, key in (
         ("settling", "material.glass.contact_modulus"),
         ("lubrication-study", "material.sphere.contact_modulus"),
+        ("gas-bed", "material.seed.contact_modulus"),
+        ("gas-bed-flat", "material.polystyrene.contact_modulus"),
+        ("defluidisation", "material.seed.contact_modulus"),
+        ("spouted-bed", "material.glass.contact_modulus"),
     ):
         assert [each.key for each in preflight(GALLERY[name]).issues] == [key]
         assert "`cfddem check` warns" in gallery()[name].read_text()
@@ -148,6 +152,12 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
     [
         ({"laws.kernel_width": 0.0, "column.cell": 0.002}, "error", "column.cell", "at least 2"),
         ({"laws.kernel_width": 0.0, "column.cell": 0.004}, "warning", "column.cell", "at least 2"),
+        (
+            {"column.cell": 0.004},
+            "warning",
+            "column.cell",
+            "0.004 m is 1.3 times the diameter; averages over cells below 2",
+        ),
         ({"column.cell": 0.003}, "error", "column.cell", "0.00307692 m fits 13 times"),
         ({"column.cell": 0.00025}, "warning", "column.cell", "of the kernel width"),
         ({"column.cell": 0.0005}, "warning", "column.cell", "of the kernel width"),
@@ -218,6 +228,7 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ({"run.average_from": 5.0}, "warning", "run.average_from", "not before the end"),
         ({"bed.diameter": 1e-200}, "error", "bed.diameter", "SI units"),
         ({"laws.contact": "jkr"}, "error", "laws.contact", "but films form"),
+        ({"laws.far_film_steps": 5, "laws.lubrication": "nijssen_full"}, "error", "laws.far_film_steps", "every step"),
         (
             {"laws.rolling_resistance": "spring_dashpot"},
             "warning",

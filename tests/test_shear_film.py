@@ -6,6 +6,8 @@ Exact resistance of two spheres: the recurrences of Jeffrey & Onishi (1984) in s
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,6 +86,17 @@ def test_recurrences_give_the_published_constants() -> None:
         assert value - coefficient * math.log(1e6) == pytest.approx(constant, abs=1.01e-4)
     apart = two_spheres.resistance(200.0, 0.5)
     assert np.array(apart) == pytest.approx([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], abs=1e-2)
+
+
+def test_the_page_tabulates_what_the_film_leaves_out() -> None:
+    """Exact resistance less Stokes' and the film's, up to a gap of 0.05 radii, within the printed digit."""
+    page = (Path(__file__).parents[1] / "docs" / "theory.md").read_text()
+    table = re.findall(r"^\| 0\.0\d* \|.*$", page, re.MULTILINE)
+    rows = [[float(each) for each in row.split("|")[1:-1]] for row in table]
+    assert [row[0] for row in rows] == [1e-4, 1e-3, 0.01, 0.02, 0.05]
+    for gap, *printed in rows:
+        film_alone = np.array(two_spheres.leading(1.0)) * math.log(1.0 / gap)
+        assert two_spheres.resistance(gap) - film_alone - [1, 0, 0, 0, 1, 0] == pytest.approx(printed, abs=6e-4)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 0.25, 4.0])

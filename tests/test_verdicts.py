@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from made_up_run import WEIGHT, made_up
+from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.report import report
 from cfddem.plotting.sweep_figure import Point, sweep_figure
@@ -49,6 +49,17 @@ def test_a_drift_below_a_thousandth_of_the_mean_is_steady(tmp_path: Path, drift:
     with h5py.File(folder / "history.h5", "r+") as file:
         file["bed_height"][:] = 0.04 * (1.0 + drift * np.clip(file["time"][:] - 1.0, 0.0, 1.0))
     assert report(folder)["measures"]["bed_height"]["stationary"] is steady
+
+
+def test_a_step_of_the_inlet_within_the_window_is_named_as_the_cause_of_a_drift(tmp_path: Path) -> None:
+    ramp = BED.replace("inlet_velocity = 0.05", "inlet_velocity = [[0, 0.04], [1.4, 0.04], [1.5, 0.05]]")
+    for name, text, changes in (("ramp", ramp, True), ("steady", BED, False)):
+        found = report(made_up(tmp_path / name, text, trend=5e-3))
+        (height,) = (each for each in found["answers"] if each["name"] == "bed height")
+        assert ("in which the inlet velocity changes" in height["verdict"]) == changes
+        assert (
+            "the inlet velocity changes within that time, 0.04 to 0.05 m/s" in "".join(found["warnings"])
+        ) == changes
 
 
 def test_a_sweep_has_the_voidages_by_published_laws_beside_the_means(tmp_path: Path) -> None:

@@ -40,7 +40,8 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
         raise InputError("folders", len(folders), f"2 to {MOST} run folders")
     results = [report(folder) for folder in folders]
     runs = [open_run(folder) for folder in folders]
-    keys = changed([case_of(run) for run in runs]) | _changed_laws(runs)
+    keys = changed([case_of(run) for run in runs])
+    keys = {key: files for key, files in keys.items() if not _same_files(key, files)} | _changed_laws(runs)
     numbers = [_numbers(result) for result in results]
     measures = {}
     for name, first in numbers[0].items():
@@ -103,6 +104,16 @@ def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
     keys = dict.fromkeys(key for each in flat for key in each)
     rows = {key: [each.get(key) for each in flat] for key in keys}
     return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
+
+
+def _same_files(key: str, files: Sequence[Any]) -> bool:
+    """Whether the files of a key are copies of the same one."""
+    if not key.endswith(".file") or None in files:
+        return False
+    try:
+        return len({Path(each).read_bytes() for each in files}) == 1
+    except OSError:
+        return False
 
 
 def _changed_laws(runs: Sequence[Run]) -> dict[str, list[Any]]:

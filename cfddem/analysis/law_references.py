@@ -42,8 +42,8 @@ def _used(case: Case) -> Iterator[Law]:
         yield from (REGISTRY["lift"][name] for name in ("saffman_mei", "magnus") if laws.lift)
         yield from (REGISTRY["lift"][name] for name in ("torque",) if laws.torque)
         yield from (REGISTRY["wall_drag"][name] for name in ("towards_wall", "along_wall") if laws.wall_drag != "none")
-    if laws.lubrication != "none" and not case.bed.fixed and (case.fluid is not None or case.liquid is not None):
-        yield from (REGISTRY["lubrication"][name] for name in FILM.get(str(laws.lubrication), ()))
+    if case.has_films and not case.bed.fixed:
+        yield from (REGISTRY["lubrication"][name] for name in FILM.get(str(laws.film_in(case.fluid)), ()))
         yield laws.pair_laws.get("minimum_gap", REGISTRY["minimum_gap"]["elastohydrodynamic"])
         yield from (law for kind, law in laws.pair_laws.items() if kind == "lubrication")
     if case.liquid is not None:

@@ -15,7 +15,7 @@ from cfddem.analysis.fluctuations import impacts
 from cfddem.analysis.law_references import references_of
 from cfddem.analysis.measured import compared_with_measured, with_files
 from cfddem.analysis.regimes import RegimeMap, regime_map
-from cfddem.analysis.run_warnings import STATE, last_value, warnings_of
+from cfddem.analysis.run_warnings import NOTE, STATE, last_value, warnings_of
 from cfddem.analysis.series import block_average, drift_of, stationarity
 from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
@@ -36,9 +36,8 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
 
     folder   of the run
     data     files of measured points beside those of the case
-    returns  plain values: `case`, `status`, `window`, `answers` (name, value, error, unit, verdict), `measures`
-             (mean, error, unit, drift over the averaged rows and
-             their times, stationary), `laws`
+    returns  plain values: `case`, `status`, `window`, `films` (in words), `answers` (name, value, error, unit,
+             verdict), `measures` (mean, error, unit, drift over the averaged rows and their times, stationary), `laws`
              (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
              and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
              the window, if recorded), `warnings`, `advice` (the warnings by what to do), `wall_time`, `preflight`,
@@ -51,17 +50,19 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
     case = with_files(case_of(run), data)
     begin, end = window_of(run, case)
-    measures = _measures(run, begin)
+    measures = _measures(run, begin, inlet_changes(case, begin, end))
     drag_law = (comparison(*row) for row in compared_with_drag_law(run, case))
     laws = [*compared_with_bed_laws(case, measures), *drag_law]
     energy = _energy(run)
-    advice = warnings_of(run, case, begin, measures, laws)
+    checked = preflight(case)
+    advice = warnings_of(run, case, measures, laws, checked.issues)
     return {
         "case": case.title or folder.resolve().name,
         "folder": str(folder),
         "status": run.status,
         "message": run.message,
         "window": [begin, end],
+        "films": "" if case.bed.fixed else case.laws.film_in_words(case.fluid),
         "answers": answers(run, case, measures, laws, STATE in advice),
         "measures": measures,
         "measured": [each.score() for each in compared_with_measured(run, case, begin)],
@@ -72,11 +73,11 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         "energy_lines": _energy_lines(run, energy),
         "collisions": _collisions(run, begin),
         "impacts": _impacts(run, begin, end),
-        "warnings": [each for group in advice.values() for each in group],
+        "warnings": [each for action, group in advice.items() for each in group if action != NOTE],
         "advice": advice,
         "wall_time": run.about.get("wall_time", {}),
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
-        "preflight": preflight(case).summary(),
+        "preflight": checked.summary(),
         "provenance": run.provenance,
         "references": references_of(case),
     }
@@ -113,10 +114,24 @@ def _in_group(run: Run, group: str) -> list[str]:
     return [name for name in run.history if name in declared and declared[name].group.startswith(group)]
 
 
-def _measures(run: Run, begin: float) -> dict[str, Any]:
+def inlet_changes(case: Case, begin: float, end: float) -> str:
+    """How the inlet velocity changes between two times [s], in words; empty if it is constant."""
+    inlet = case.bed.inlet_velocity
+    if isinstance(inlet, float):
+        return ""
+    times, velocities = np.array(inlet).T
+    inside = np.append(times[(times > begin) & (times < end)], [begin, end])
+    within = np.interp(inside, times, velocities)
+    low, high = float(within.min()), float(within.max())
+    return f"the inlet velocity changes within that time, {low:.3g} to {high:.3g} m/s" if high > low else ""
+
+
+def _measures(run: Run, begin: float, changes: str) -> dict[str, Any]:
     """Every measure with a value in at least half of the rows of the window: its mean and error, and its drift.
 
     Mean and drift are of the same rows. A start-up within them counts where it moves the mean.
+
+    changes  how the inlet velocity changes in these rows, in words
     """
     inside, measures = run.history["time"] >= begin, {}
     for name in _in_group(run, "measure"):
@@ -138,6 +153,7 @@ def _measures(run: Run, begin: float) -> dict[str, Any]:
             "drift_error": drift_error,
             "drift_times": [float(time[0]), float(time[-1])],
             "stationary": None if math.isnan(drift) else steady and not start_up,
+            "inlet_changes": changes,
         }
     return measures
 

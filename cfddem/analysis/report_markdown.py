@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from cfddem.analysis.report_text import spelled, steadiness, with_error
+from cfddem.analysis.report_text import spelled, steadiness, window, with_error
 from cfddem.io.quantities import shown_unit
 
 
@@ -15,14 +15,14 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
     result   of :func:`cfddem.analysis.report.report`
     figures  caption -> place of a picture
     """
-    begin, end = result["window"]
+    end = result["window"][1]
     laws = (
         (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
         for row in result["laws"]
     )
     parts = [
         f"# {_plain(result['case'])}",
-        f"{result['status']} at {end:g} s; means from {begin:g} to {end:g} s",
+        f"{result['status']} at {end:g} s; {_plain(window(result))}",
         *_table(("", "value", "verdict"), map(_answer, result["answers"])),
         *_measured(result["measured"]),
         *_advice(result["advice"]),

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from cfddem.analysis.bed_laws import FROM_PRESSURE
+from cfddem.analysis.run_warnings import NOTE
 from cfddem.io.quantities import shown_unit
 
 WIDTH = 98
@@ -90,17 +91,25 @@ def with_error(row: dict[str, Any], unit: str | None = None) -> str:
     return number(value, row["error"], row["unit"] if unit is None else unit, row["error_is_lower_bound"])
 
 
-def _headline(result: dict[str, Any]) -> Iterator[str]:
+def window(result: dict[str, Any]) -> str:
+    """The averaging window and the lubrication films of a run in words."""
     begin, end = result["window"]
+    return f"means from {begin:g} to {end:g} s" + f"; lubrication films: {result['films']}" * bool(result["films"])
+
+
+def _headline(result: dict[str, Any]) -> Iterator[str]:
     reason = f", {result['message']}" if result["status"] == "finished" and result["message"] else ""
     yield f"{result['case']}: {result['status']}{reason}"
-    yield f"means from {begin:g} to {end:g} s"
+    yield window(result)
 
 
 def _answers(found: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
     for each in found:
         opening = f"  {each['name']:<16} {with_error(each):<26} "
+        if isinstance(each["value"], str) and len(opening) > 46:
+            yield opening.rstrip()
+            opening = " " * 46
         yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 46) or [opening]
 
 
@@ -184,5 +193,6 @@ def _advice(grouped: dict[str, list[str]]) -> Iterator[str]:
     for action, found in grouped.items():
         yield ""
         yield f"  {action}"
+        opening = "" if action == NOTE else "warning: "
         for each in found:
-            yield from textwrap.wrap(f"warning: {each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+            yield from textwrap.wrap(f"{opening}{each}", WIDTH, initial_indent="  ", subsequent_indent="    ")

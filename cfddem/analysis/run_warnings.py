@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from cfddem.case.schema import Case
 from cfddem.io.reading import Run
 from cfddem.preflight import law_ranges
 from cfddem.preflight.bed_estimate import estimate_bed
-from cfddem.preflight.issue import percent
+from cfddem.preflight.issue import Issue, percent
 from closures.registry import Law
 
 REMEDY = "choose a law with a wider range (cfddem explain)"
@@ -23,6 +23,8 @@ FINISH = "finish the run before you use its means"
 LONGER = "run longer, or average over another window"
 LAWS = "check the laws: they were used outside of their fitted ranges"
 COMPARE = "treat these comparisons with care: the published law is outside of its range"
+CASE = "check the case: before the run, it had these warnings"
+NOTE = "for information: parts of the bed were outside of the range of a law, the bed as a whole was not"
 STATE = "check the state of the bed: it is not what the case intends"
 """What to do about a group of warnings, in the order in which to do it."""
 
@@ -32,16 +34,22 @@ Grouped = dict[str, list[str]]
 Found = Iterator[tuple[str, str]]
 """What to do, and the warning."""
 
-AGITATION_SHARE, ALL = 0.25, 0.995
+INSIDE = "; by estimate, the bed as a whole is inside the range of {}"
+"""Effect of a drag law that is outside of its range in some places only."""
+
+AGITATION_SHARE, LOCAL_SHARE, ALL = 0.25, 0.25, 0.995
 """Share of the uses of a law of agitation outside of its range above which a warning is given, because surface and
-floor of every bed are outside; and the share from which the words say `all`."""
+floor of every bed are outside; that of a drag law, if the bed as a whole is inside, because dense and loose places are
+outside; and the share from which the words say `all`."""
 
 
-def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Grouped:
+def warnings_of(
+    run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], issues: Sequence[Issue]
+) -> Grouped:
     """All warnings, one line each, by what to do.
 
-    begin           start of the averaging window [s]
     measures, laws  of the report
+    issues          of the check before the run
     """
     grouped: Grouped = {}
     for action, text in (
@@ -49,6 +57,7 @@ def warnings_of(run: Run, case: Case, begin: float, measures: dict[str, Any], la
         *_defluidised(run, case),
         *_series_warnings(measures),
         *_missing_laws(case),
+        *((CASE, str(each)) for each in issues if each.in_report and not case.laws.missing),
         *_range_warnings(run, case),
         *((COMPARE, f"{row['law']}: {row['outside_range']}") for row in laws if row["outside_range"]),
     ):
@@ -109,7 +118,10 @@ def _range_warnings(run: Run, case: Case) -> Found:
             yield LAWS, f"{text}{_effect(case)}; {REMEDY}"
     elif drag is not None:
         outside = last_value(run, "out_of_range_count")
-        yield from _beyond("drag law", drag, outside, evaluations, effect=_effect(case))
+        effect = _effect(case)
+        local = effect == INSIDE.format(drag.name) and outside <= LOCAL_SHARE * evaluations
+        for action, text in _beyond("drag law", drag, outside, evaluations, effect=effect):
+            yield (NOTE, text.removesuffix(f"; {REMEDY}")) if local else (action, text)
     if isinstance(agitation, Law):
         outside = last_value(run, "agitation_out_of_range_count")
         effect = "; ".join(["", law_ranges.AGITATED, *law_ranges.by_default(case)])
@@ -124,7 +136,7 @@ def _effect(case: Case) -> str:
     try:
         bed = estimate_bed(case)
         if not law_ranges.outside(law, law_ranges.state_of(case, bed)):
-            return f"; by estimate, the bed as a whole is inside the range of {law.name}"
+            return INSIDE.format(law.name)
         found = law_ranges.effect_of_drag(case, law, bed)
     except (ArithmeticError, ValueError):  # values beyond all correlations
         return ""
@@ -146,7 +158,9 @@ def _series_warnings(measures: dict[str, Any]) -> Found:
     """Series without a stationary mean, or without an error."""
     drifting = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is False]
     if drifting:
-        remedy = "run longer, or increase run.average_from"
+        remedy, changes = "run longer, or increase run.average_from", next(iter(measures.values()))["inlet_changes"]
+        if changes:
+            remedy = f"{changes}: set run.average_from to the start of its last value, or compare with data by velocity"
         yield LONGER, f"not stationary in the averaging window: {', '.join(drifting)}; {remedy}"
     if any(each["stationary"] is None for each in measures.values()):
         yield LONGER, "the averaging window has too few rows for errors; run longer, or decrease run.history_every"

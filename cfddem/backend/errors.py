@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import reprlib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
@@ -69,12 +70,19 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
     >>> nearest("restituton", ["friction", "restitution"])
     "one of friction, restitution (did you mean 'restitution'?)"
+    >>> nearest("DiFeliceDrag", ["di_felice", "gidaspow"])
+    "one of di_felice, gidaspow (did you mean 'di_felice'?)"
     """
     words = list(known)
-    close = get_close_matches(word, words, n=3)
+    close = get_close_matches(word, words, n=3) or get_close_matches(_plain_name(word), words, n=3)
     shown = words if len(words) <= (MANY if close else 2 * MANY) else close or words[:MANY]
     more = f" and {len(words) - len(shown)} more" if len(shown) < len(words) else ""
     return f"one of {', '.join(shown)}{more}" + (f" (did you mean {close[0]!r}?)" if close else "")
+
+
+def _plain_name(word: str) -> str:
+    """The name of a class of another code as this one would write it: DiFeliceDrag is di_felice."""
+    return re.sub(r"_(drag|force|model|law)$", "", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", word).lower())
 
 
 class _Words(str):

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import NotInstalled, chosen, drag_by_name
 from cfddem.case.bed import NonNegative, Point
-from cfddem.case.materials import Checked
+from cfddem.case.materials import Checked, Fluid
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from closures.agitation import INERTIA_SHARE
 from closures.kinds import BUILT_IN
@@ -37,9 +37,10 @@ class CaseLaws(Checked):
         "A", description="model A: pressure gradient on both phases; model B: on the fluid alone"
     )
     lubrication: str | Callable[..., float] = Field(
-        "nijssen",
-        description="lubrication film between close spheres: nijssen (along the line of centres), nijssen_full (also "
-        "against sliding and rolling), nijssen_full_twist (and twisting), none, a law's name, or a function",
+        "auto",
+        description="lubrication film between close spheres: auto (nijssen in a liquid, none in a gas, lighter than "
+        "100 kg/m3), nijssen (along the line of centres), nijssen_full (also against sliding and rolling), "
+        "nijssen_full_twist (and twisting), none, a law's name, or a function",
     )
     minimum_gap: str | Callable[..., float] = Field(
         "elastohydrodynamic",
@@ -50,6 +51,12 @@ class CaseLaws(Checked):
     )
     contact_parameters: dict[str, NonNegative] = Field(
         {}, description="parameters of the contact law: normal_stiffness of linear [N/m], ..."
+    )
+    far_film_steps: int = Field(
+        1,
+        ge=1,
+        description="films of pairs that cannot touch before the next neighbour list act once in this many steps; 1 "
+        "with liquid bridges and with films that resist sliding",
     )
     friction_onset: Literal["film", "overlap"] = Field(
         "film", description="friction begins at the minimum gap of the film, or at overlap of the solids"
@@ -146,6 +153,29 @@ class CaseLaws(Checked):
     def contact_law(self) -> ContactLaw:
         """Contact law with the parameters of the case."""
         return contact_named(self.contact).with_parameters(**self.contact_parameters)
+
+    def film_in(self, fluid: Fluid | None) -> str | Callable[..., float]:
+        """The film law between close spheres in a fluid; "none" without viscosity, and by default in a gas.
+
+        Films of a gas are thinner than the asperities of most solids.
+
+        >>> [CaseLaws().film_in(Fluid(density=density, viscosity=1e-4)) for density in (1.2, 998.0)]
+        ['none', 'nijssen']
+        """
+        if fluid is None or fluid.viscosity == 0.0:
+            return "none"
+        if self.lubrication == "auto":
+            return "nijssen" if fluid.is_liquid else "none"
+        return self.lubrication
+
+    def film_in_words(self, fluid: Fluid | None) -> str:
+        """The film law in a fluid, and whether it is the default; empty without a fluid."""
+        if fluid is None or "lubrication" in self.missing:
+            return ""
+        film = self.film_in(fluid)
+        name = film if isinstance(film, str) else getattr(film, "__name__", "user-defined law")
+        kind = "liquid" if fluid.is_liquid else "gas"
+        return f"{name}, the default in a {kind}" if self.lubrication == "auto" else name
 
     @property
     def added_mass_law(self) -> float | Law:

@@ -17,7 +17,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import Positive
 from cfddem.case.data_table import Array, Column, read_table
 from cfddem.case.materials import Checked
-from cfddem.case.walls import with_surfaces_of
+from cfddem.case.walls import kept, with_surfaces_of
 
 if TYPE_CHECKING:
     from cfddem.case.schema import Case
@@ -162,11 +162,19 @@ def require_measured_units(case: Case, units: Mapping[str, str]) -> None:
     errors  InputError
     """
     for name, data in case.compare.items():
-        points = points_of(name, data)
-        known = PROFILES if points.against == "height" else {key: each for key, each in units.items() if key != "time"}
-        if points.quantity not in known:
-            raise unknown_quantity(name, points.quantity, known)
-        require_unit(points, known[points.quantity])
+        require_measured_unit(points_of(name, data), units)
+
+
+def require_measured_unit(points: Points, units: Mapping[str, str]) -> None:
+    """Refuse measured points that a run will not have, or will have in another unit.
+
+    units   of the columns of the history, by their names
+    errors  InputError
+    """
+    known = PROFILES if points.against == "height" else {key: each for key, each in units.items() if key != "time"}
+    if points.quantity not in known:
+        raise unknown_quantity(points.name, points.quantity, known)
+    require_unit(points, known[points.quantity])
 
 
 def unknown_quantity(name: str, quantity: str, known: Iterable[str]) -> InputError:
@@ -201,8 +209,11 @@ def with_files_of(case: Case, folder: Path) -> Case:
     is_run = (folder / "run.json").is_file()
     files = {}
     for name, data in case.compare.items():
-        copy = copy_of(folder, name)
-        files[name] = os.path.abspath(copy if is_run and copy.is_file() else _inside(folder, name, data.file))
+        key, copy = f"compare.{name}.file", copy_of(folder, name)
+        copied = is_run and copy.is_file()
+        files[name] = os.path.abspath(
+            kept(folder, copy, key, data.file) if copied else _inside(folder, name, data.file)
+        )
     return with_data(case, files)
 
 

@@ -36,6 +36,10 @@ UNITS: dict[str, tuple[float, str]] = {
     "m3": (1.0, "m3"), "cm3": (1e-6, "m3"), "ml": (1e-6, "m3"), "l": (1e-3, "m3"), "ul": (1e-9, "m3"),
     "mm3": (1e-9, "m3"), "m/s2": (1.0, "m/s2"), "rad/s": (1.0, "rad/s"), "N": (1.0, "N"), "mN": (1e-3, "N"),
     "kg/s": (1.0, "kg/s"), "g/s": (1e-3, "kg/s"), "kg/m3": (1.0, "kg/m3"), "g/cm3": (1e3, "kg/m3"),
+    "g/ml": (1e3, "kg/m3"), "Pa s": (1.0, "Pa s"), "mPa s": (1e-3, "Pa s"), "P": (0.1, "Pa s"), "cP": (1e-3, "Pa s"),
+    "N/m": (1.0, "N/m"), "mN/m": (1e-3, "N/m"), "dyn/cm": (1e-3, "N/m"), "dyn": (1e-5, "N"), "dyn/cm2": (0.1, "Pa"),
+    "mmH2O": (9.80665, "Pa"), "cmH2O": (98.0665, "Pa"), "inH2O": (249.08891, "Pa"), "mmHg": (133.322387, "Pa"),
+    "m3/s": (1.0, "m3/s"), "cm3/s": (1e-6, "m3/s"), "ml/s": (1e-6, "m3/s"), "l/min": (1e-3 / 60.0, "m3/s"),
 }  # fmt: skip
 """Units of a header: their size and the SI unit that they belong to."""
 

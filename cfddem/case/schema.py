@@ -37,7 +37,7 @@ class Column(Checked):
     depth: Positive | None = Field(None, description="depth along y; default: width [m]")
     height: Positive = Field(description="height along z [m]")
     cell: Positive | tuple[Positive, Positive, Positive] = Field(
-        description="edge of a cubic cell, or edges along x, y, z [m]"
+        description="edge of a cubic cell, or edges along x, y, z; at least 2 diameters [m]"
     )
     sides: Literal["no_slip", "free_slip", "periodic"] = Field(
         "no_slip", description="boundary condition of the fluid on the sides"
@@ -213,7 +213,7 @@ class Case(Checked):
     @property
     def has_films(self) -> bool:
         """Whether lubrication films form between close spheres."""
-        return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.lubrication != "none"
+        return self.laws.film_in(self.fluid) != "none"
 
     @property
     def agitation(self) -> str | Law:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 from cfddem.backend.errors import InputError
 from cfddem.case.walls import CaseWall
 from cfddem.particles.walls.stl import read_stl
+
+if TYPE_CHECKING:
+    from cfddem.case.schema import Case
 
 Array = NDArray[np.float64]
 
@@ -155,6 +159,38 @@ def _weights(triangle: Array, point: Array) -> Array | None:
     of_c = ((by - ay) * (point[1] - az) - (bz - az) * (point[0] - ay)) / area
     weights = np.array([1.0 - of_b - of_c, of_b, of_c])
     return weights if (weights >= 0.0).all() else None
+
+
+VESSEL = 0.5
+"""Share of the column from which a closed surface is taken for a vessel, whose particles are inside [-]."""
+
+
+def on_the_wrong_side(case: Case, wall: CaseWall, positions: Array) -> tuple[int, str] | None:
+    """The first particle on the wrong side of a closed surface, and what is wrong; None if there is none.
+
+    Particles belong inside a surface whose outside is solid or that encloses most of the column, outside one whose
+    inside is solid, and to one side of any other.
+
+    positions  of the particles (N, 3) [m]
+    """
+    if wall.shape != "surface" or not len(positions) or not is_closed(corners := triangles(wall)):
+        return None
+    inside = inside_surface(corners, positions)
+    wanted = enclosed_volume(corners) > VESSEL * float(np.prod(case.column.size))
+    wanted = wanted or bool(2 * np.count_nonzero(inside) > len(inside))
+    if case.fluid is not None and wall.solid != "none":
+        wanted = wall.solid == "outside"
+    wrong = np.flatnonzero(inside != wanted)
+    if not len(wrong):
+        return None
+    place = ", ".join(f"{each:.4g}" for each in positions[wrong[0]])
+    others = f", and so are {len(wrong) - 1} more" if len(wrong) > 1 else ""
+    return int(wrong[0]), f"at ({place}) m it is {'outside' if wanted else 'inside'}{others}"
+
+
+def enclosed_volume(corners: Array) -> float:
+    """Volume inside a closed surface of triangles (T, 3, 3) [m3]."""
+    return abs(float(np.einsum("ti,ti->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))) / 6.0
 
 
 def corners_of(low: Array, high: Array) -> Array:

@@ -213,9 +213,20 @@ def with_surfaces_of(case: Case, folder: Path) -> Case:
 
     def place(number: int, file: str) -> str:
         copy = copy_of(folder, number)
-        return os.path.abspath(copy if is_run and copy.is_file() else folder / file)
+        return str(kept(folder, copy, f"wall.{number}.file", file)) if is_run else os.path.abspath(folder / file)
 
     return with_surfaces(case, {n: place(n, wall.file) for n, wall in enumerate(case.wall) if wall.file is not None})
+
+
+def kept(folder: Path, copy: Path, key: str, file: str) -> Path:
+    """The copy of a file in a run folder.
+
+    key, file  of the case, in errors
+    errors     InputError if the copy is missing, or is a link to a file outside of the folder
+    """
+    if copy.is_file() and Path(os.path.realpath(copy)).is_relative_to(os.path.realpath(folder)):
+        return copy.absolute()
+    raise InputError(key, file, f"a file in the run folder, {copy}", "files outside of it are not read; copy it there")
 
 
 def with_surfaces(case: Case, files: Mapping[int, str]) -> Case:

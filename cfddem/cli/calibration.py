@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import sys
+import textwrap
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from cfddem.cli.cases import CASE, SET
+from cfddem.cli.cases import CASE, SET, print_warnings
 from cfddem.cli.printing import announce_compilation
+from cfddem.preflight.issue import WIDTH
 
 
 def calibrate(
@@ -37,11 +39,13 @@ def calibrate(
     """
     from cfddem.analysis.report_text import as_json
     from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.schema import Case
     from cfddem.run.calibration import Trial
     from cfddem.run.calibration import calibrate as search
     from cfddem.run.samples import variables
 
     path = find_case(case)
+    print_warnings(Case.from_toml(path, overrides(set or [])))
     folder = output or Path(f"{path.stem}-calibration")
 
     def progress(trial: Trial) -> None:
@@ -70,6 +74,8 @@ def lines(result: dict, folder: Path) -> list[str]:  # type: ignore[type-arg]
         out.append("too few finished trials for an estimate; repeat the command with more --trials")
     if result["best"] is not None:
         chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
-        out += ["", f"reduced chi-squared of the best trial: {result['best']['chi2']:.3g}{chi2}"]
+        chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
+        out += ["", *textwrap.wrap(result["verdict"], WIDTH)]
+        out += [f"reduced chi-squared of the best trial: {result['best']['chi2']:.3g}{chi2}"]
     out += [f"{result['trials']} trials, {result['failed']} failed; table and figure in {folder}"]
     return out

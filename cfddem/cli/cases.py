@@ -16,6 +16,7 @@ from cfddem.cli.ranks import on_ranks
 if TYPE_CHECKING:
     from cfddem.backend.communicator import Communicator
     from cfddem.case.schema import Case
+    from cfddem.preflight.summary import Preflight
 
 CASE = "case file or gallery name; default: the only TOML file here"
 SET = "KEY=VALUE that replaces a value of the case; may be repeated"
@@ -53,6 +54,7 @@ def check(
     *,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
+    ranks: Annotated[int | None, Parameter(help="number of processes that are to share the run")] = None,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
     """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run or written.
@@ -65,9 +67,39 @@ def check(
     from cfddem.case.schema import Case
     from cfddem.preflight.summary import preflight
 
-    result = preflight(Case.from_toml(find_case(case), overrides(set or [])))
+    described = Case.from_toml(find_case(case), overrides(set or []))
+    result = preflight(described)
+    if described.compare:
+        from cfddem.preflight.data_checks import check_quantities
+        from cfddem.run.history import units_of
+
+        result = result.with_errors(check_quantities(described, units_of(described)))
+    if ranks is not None and result.rows:
+        result = _with_ranks(result, described, ranks)
     print(_json.dumps(result.summary()) if json else "\n".join(with_colour(result.lines())))
     sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
+
+
+def _with_ranks(result: Preflight, described: Case, ranks: int) -> Preflight:
+    """The result of a check, and whether several processes can share the case."""
+    from dataclasses import replace
+
+    from cfddem.backend.errors import InputError
+    from cfddem.preflight.issue import Issue
+    from cfddem.preflight.overview import Row
+    from cfddem.run.build import require_parallel
+
+    if ranks < 1:
+        raise InputError("--ranks", ranks, "at least 1")
+    try:
+        require_parallel(described, ranks)
+    except InputError as failure:
+        return result.with_errors(
+            [Issue("error", failure.field, f"{failure.value} must be {failure.limit}", failure.remedy)]
+        )
+    share = described.particle_count / ranks
+    row = Row("several processes", "ranks", ranks, "", f"can share the case, about {share:.3g} particles each")
+    return replace(result, rows=(*result.rows, row))
 
 
 def stability(
@@ -143,7 +175,7 @@ def run(
     if communicator.size == 1:
         use_threads(threads)
     with live_line(log, communicator.rank == 0) as line:
-        text = described.to_toml() if set else read_text(path)
+        text = None if set else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
             prepared = Run.begin(
                 described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator
@@ -161,7 +193,16 @@ def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
         from cfddem.run.build import require_parallel
 
         require_parallel(described, communicator.size)
-    for issue in refuse_errors(described).issues if communicator.rank == 0 else ():
+    refuse_errors(described)
+    if communicator.rank == 0:
+        print_warnings(described)
+
+
+def print_warnings(described: Case) -> None:
+    """Print the warnings of the pre-run check of a case."""
+    from cfddem.preflight.summary import preflight
+
+    for issue in preflight(described).issues:
         print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
 
 

@@ -25,11 +25,14 @@ def matching(name: str) -> list[str]:
 
     returns  lines of at most 100 columns; empty if nothing matches
 
-    >>> matching("bed.jet.velocity"), matching("run.until")
-    ([], ['run.until = (required)            end time [s]'])
+    >>> matching("bed.jet.velocity"), matching("run.until")[0][:34]
+    (['bed.jet.velocity = (required)     superficial velocity, upward [m/s]'], 'run.until = (required)            ')
     """
     every, word = dict(_keys()), name.lower()
-    found = [key for key in every if key.lower() == word or key.lower().startswith(f"{word}.")]
+    plain = {key: re.sub(r"\.(NAME|NUMBER)\b", "", key).lower() for key in every}
+    found = [
+        key for key in every if any(each == word or each.startswith(f"{word}.") for each in (key.lower(), plain[key]))
+    ]
     found = found or [key for key in every if word in key.lower()]
     return [line for key in found for line in _lines(key, every[key])]
 
@@ -43,8 +46,9 @@ def _keys() -> Iterator[tuple[str, FieldInfo]]:
             continue
         for key, each in parts[0].model_fields.items():
             yield f"{SEVERAL.get(name, name)}.{key}", each
-            for part in sections_of(each) if str(each.annotation).startswith("dict") else []:
-                yield from ((f"{name}.{key}.NAME.{inner}", rest) for inner, rest in part.model_fields.items())
+            below = f"{SEVERAL.get(name, name)}.{key}{'.NAME' * str(each.annotation).startswith('dict')}"
+            for part in sections_of(each):
+                yield from ((f"{below}.{inner}", rest) for inner, rest in part.model_fields.items())
 
 
 def _lines(key: str, field: FieldInfo) -> list[str]:

@@ -25,6 +25,15 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 CONTACT_LAW = "contact_law"
 """Kind of the contact laws that a run can use."""
 
+OF_CFDEM = {
+    "meilift": "laws.lift",
+    "virtualmassforce": "laws.added_mass",
+    "viscforce": "laws.viscous_stress",
+    "gradpforce": "laws.model: the force of the pressure is always included",
+    "archimedes": "laws.gravity: buoyancy is always included",
+}
+"""Key for each force model of CFDEM that is not a law."""
+
 CURVES = 4
 """Curves in a plot, one for each value of the second argument."""
 
@@ -79,16 +88,18 @@ def find(name: str) -> Law:
     found = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not found:
         closest = _closest(word, [law.name for law in every])
-        raise InputError("law", name, f"a name listed by `cfddem explain`, such as {closest}")
+        raise InputError("law", name, f"a name listed by `cfddem explain`{closest}")
     if len(found) > 1:
         raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")
     return found[0]
 
 
 def _closest(word: str, known: list[str]) -> str:
-    """The closest known name."""
+    """A question for the closest known name, or the key that stands for a force of CFDEM; empty without one."""
+    if word.lower() in OF_CFDEM:
+        return f"; see {OF_CFDEM[word.lower()]}"
     found = nearest(word, known).partition("did you mean ")[2]
-    return found.rstrip("?)").strip("'") or "di_felice"
+    return f" (did you mean {found}" if found else ""
 
 
 def summary(law: Law) -> dict[str, Any]:

@@ -61,6 +61,9 @@ def bench(
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="dem with the film of water", negative="")] = False,
     films: Annotated[Literal["full"] | None, Parameter(help="with films that resist sliding and rolling, too")] = None,
+    far_film_steps: Annotated[
+        int, Parameter(help="films of pairs that cannot touch act once in this many steps; with --film")
+    ] = 1,
     bridges: Annotated[
         bool,
         Parameter(
@@ -85,7 +88,12 @@ def bench(
     bed = wet_bed if bridges else gas_bed
 
     targets = {
-        "dem": (lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"), dense_bed.rows),
+        "dem": (
+            lambda: dense_bed.bench(
+                particles, threads, film, bridges, full=films == "full", far_film_steps=far_film_steps
+            ),
+            dense_bed.rows,
+        ),
         "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),
         "bed": (lambda: bed.bench(threads), bed.rows),
         "scaling": (lambda: scaling.bench(threads), scaling.rows),

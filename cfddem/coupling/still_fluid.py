@@ -22,6 +22,7 @@ from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
+from cfddem.particles.far_films import rates_of_films
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Plane
@@ -113,7 +114,8 @@ class StillFluid:
             push = -0.5 * (displaced * gradient * (particles.velocity @ normal) ** 2)[:, None] * normal
         free = particles.inverse_mass > 0.0
         after = np.where(free, 1.0 / (particles.mass + coefficient * displaced), 0.0)
-        particles.film_rate[free] *= after[free] / particles.inverse_mass[free]
+        for rate in rates_of_films(particles):
+            rate[free] *= after[free] / particles.inverse_mass[free]
         particles.inverse_mass[:] = after
         return push
 

@@ -24,10 +24,10 @@ Role = Literal["state", "memory", "scratch"]
 """`state` describes the row itself, `memory` is what a law stores from step to step, `scratch` is valid within a step.
 Checkpoints hold state and memory, not scratch."""
 
-Phase = Literal["start", "shear", "film", "bridge", "motion", "liquid", "work"]
-"""When ghost rows receive values: at the start of an advance, before the impulses of films
-against sliding, those of normal films and those of bridges, after the drift, before new bridges fill, and before work
-is counted."""
+Phase = Literal["start", "shear", "far", "film", "bridge", "motion", "liquid", "work"]
+"""When ghost rows receive values: at the start of an advance, before the impulses of films against sliding, those of
+far films, those of other films and those of bridges, after the drift, before new bridges fill, and before work is
+counted."""
 
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]
 """Value in new rows: a number, or a function of the table and the new rows (k,) that returns their values."""

@@ -31,6 +31,14 @@ def with_kept_files(case: Case, folder: Path) -> Case:
     return compare.with_data(with_surfaces(case, surfaces), data)
 
 
+def text_with_kept_files(case: Case) -> str:
+    """The case as TOML text with the places of the copies in its run folder, which may move."""
+    here = Path()
+    surfaces = {n: copy_of(here, n).as_posix() for n, wall in enumerate(case.wall) if wall.file is not None}
+    data = {name: compare.copy_of(here, name).as_posix() for name in case.compare}
+    return compare.with_data(with_surfaces(case, surfaces), data).to_toml()
+
+
 def _copy(key: str, file: str, path: Path, kind: str) -> None:
     try:
         content = Path(file).read_bytes()

@@ -15,7 +15,7 @@ from cfddem.backend.law_set import specialise
 from cfddem.particles.energy_of_contacts import FILMS, note_loss
 from cfddem.particles.impulse_motion import keep_motion, mean_motion
 from cfddem.particles.interactions.shear_film import impulses_of
-from cfddem.particles.vectors import at, dot, flat, minus, plus, times
+from cfddem.particles.vectors import at, dot, flat
 from cfddem.particles.walls.nearest_point import SURFACE, touched
 
 if TYPE_CHECKING:
@@ -67,14 +67,14 @@ class ShearEnergies:
 def _shear_works(k, particles, edges, memory, walls, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
     i, j = edges.first[k], edges.second[k]
-    impulse, couple, moment = impulses_of(k, memory)
+    impulse, first, second = impulses_of(k, memory)
     velocity, spin = mean_motion(i, particles, count, step)
-    gained = dot(impulse, velocity) + dot(plus(times(particles.radius[i], couple), moment), spin)
+    gained = dot(impulse, velocity) + dot(first, spin)
     if k < edges.between_particles:
         velocity, spin = mean_motion(j, particles, count, step)
-        gained += dot(minus(times(particles.radius[j], couple), moment), spin) - dot(impulse, velocity)
+        gained += dot(second, spin) - dot(impulse, velocity)
         return -gained, 0.0
-    by_wall = dot(impulse, touched(edges, k, SURFACE)) + dot(moment, at(walls.spin, walls.wall[j]))
+    by_wall = dot(impulse, touched(edges, k, SURFACE)) - dot(second, at(walls.spin, walls.wall[j]))
     return by_wall - gained, by_wall
 
 

@@ -22,6 +22,7 @@ from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Phase
+from cfddem.particles.far_films import far_kick
 from cfddem.particles.integrate import film_kick, find_bridge_changes, finish_step, move, start_step, start_steps
 from cfddem.particles.interactions.shear_film import shear_kick
 from cfddem.particles.pair_graph import Edges
@@ -253,39 +254,47 @@ class StepsWithGhosts:
     """
 
     def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Whole, communicator: Communicator) -> None:
-        loops = (start_steps, start_step, film_kick, move, find_bridge_changes, finish_step, shear_kick)
+        loops = (start_steps, start_step, far_kick, film_kick, move, find_bridge_changes, finish_step, shear_kick)
         made = [specialise(loop, choices, threads) for loop in loops]
-        self.begin, self.start, self.film_kick, self.move, self.find_bridge_changes, self.finish, self.shear_kick = made
+        self.begin, self.start, self.far_kick, self.film_kick, self.move = made[:5]
+        self.find_bridge_changes, self.finish, self.shear_kick = made[5:]
         self.films, self.bridges, self.recording = choices["DRIFTING"], choices["BRIDGE"], choices["RECORD"]
-        self.shear, self.ghosts, self.communicator = choices["SHEAR"], ghosts, communicator
+        self.shear, self.far, self.ghosts, self.communicator = choices["SHEAR"], choices["FAR"], ghosts, communicator
 
     def __call__(self, *arguments: Any) -> tuple[int, float, int]:
         """Arguments and results of `integrate`."""
-        *pairs, p, free, gravity, step, steps, origin, reach, time, log = arguments
+        *pairs, p, free, gravity, step, steps, taken, every, origin, reach, time, log = arguments
         particles, edges = pairs[:2]
         self.ghosts.refresh("start")
         if self.bridges:
             self.begin(particles)
         largest, done, noted, full = 0.0, 0, 0, False
         if steps == 0:
-            self.finish(self._changes(pairs, p, free), *pairs, p, free, gravity, 0.0, time, log, noted)
+            self.finish(self._changes(pairs, p, free), *pairs, p, free, gravity, True, 0.0, time, log, noted)
         while done < steps and not full and largest < reach * reach:
             self.start(particles, step)
-            self._impulses(pairs, step)
+            self._impulses(pairs, step, every if self.far and (taken + done) % every == 0 else 0)
             moved = self.move(*pairs, p, free, step, origin)
             self.ghosts.refresh("motion")
             done += 1
             changes = self._changes(pairs, p, free)
-            noted = self.finish(changes, *pairs, p, free, gravity, step, time + done * step, log, noted)
+            far = not self.far or (taken + done) % every == 0
+            noted = self.finish(changes, *pairs, p, free, gravity, far, step, time + done * step, log, noted)
             largest = self.communicator.largest([largest, moved])
             full = self.recording and self.communicator.any(len(log) - noted < len(edges.first))
         return done, largest, noted
 
-    def _impulses(self, pairs: list[Any], step: float) -> None:
-        """Give ghosts what film and bridge impulses need; with both, films act here, else as particles move."""
+    def _impulses(self, pairs: list[Any], step: float, far_steps: int) -> None:
+        """Give ghosts what film and bridge impulses need; with both, films act here, else as particles move.
+
+        far_steps  number of steps for which far films act now
+        """
         if self.shear:
             self.ghosts.refresh("shear")
             self.shear_kick(*pairs[:5], step)
+        if far_steps:
+            self.ghosts.refresh("far")
+            self.far_kick(*pairs, far_steps * step)
         if self.films:
             self.ghosts.refresh("film")
         if self.bridges and self.films:

@@ -5,6 +5,8 @@ A step consists of these phases:
     kick                 half a step by the forces of the last step
     [halo: velocity, spin, load of films]
     shear impulses       of films that resist sliding: of every pair, then of every particle
+    [halo: velocity, far rate]
+    far kick             of films between pairs that cannot touch, where they act once in several steps
     [halo: velocity, film rate]
     film impulses        of every pair, then of every particle
     [halo: velocity, spin, load of bridges]
@@ -30,6 +32,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
+from cfddem.particles.far_films import far_kick
 from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
@@ -41,6 +44,7 @@ from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
     DRIFTING,
+    FAR,
     FILM,
     RECORD,
     ROLLING,
@@ -60,6 +64,7 @@ from cfddem.particles.motion import (
     kick_particles,
     larger,
 )
+from cfddem.particles.pair_graph import is_far
 from cfddem.particles.vectors import NOTHING, at, plus, put
 from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
 from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
@@ -70,7 +75,7 @@ from cfddem.particles.walls.nearest_point import advance_walls, portion, touched
 @inline
 def find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
     """Impulses of all films over the coming step."""
-    film_impulses(0, edges.between_particles, particles, edges, memory, cutoff_ratio, step)
+    film_impulses(0, edges.near if FAR else edges.between_particles, particles, edges, memory, cutoff_ratio, step)
     find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
 
 
@@ -79,7 +84,7 @@ def find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_rat
     """Impulses of the films that change much in this step, and of films at walls."""
     pairs = edges.between_particles
     for k in prange(len(edges.first)):
-        if k >= pairs or memory.hard[k]:
+        if k >= pairs or (memory.hard[k] and not (FAR and is_far(k, edges))):
             film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
 
 
@@ -119,15 +124,17 @@ def may_touch(edges):
 
 
 @inline
-def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step):
+def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, far, step):
     """Films, contacts and rolling of all edges at the present positions.
 
+    far   find films of pairs that cannot touch, too
     step  by which springs have moved since the last forces; 0 at the start [s]
     """
     pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
     kinds, rows = np.uint64(len(table)), table.reshape(-1)
     if FILM:
-        update_films(near, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
+        if far:
+            update_films(near, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
         for k in range(pairs, number):
             update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ratio)
     pair_forces(0, near, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p, free, step)
@@ -139,11 +146,11 @@ def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, 
 
 
 @part
-def sum_forces(particles, edges, memory, gravity, step):
+def sum_forces(particles, edges, memory, gravity, far, step):
     """Sum the forces on the particles, and kick them by half a step."""
     near = may_touch(edges)
     for i in prange(particles.owned):
-        gather_forces(i, particles, edges, memory, gravity, near)
+        gather_forces(i, particles, edges, memory, gravity, near, far)
         if step > 0.0:
             kick(i, particles, step)
 
@@ -192,10 +199,10 @@ def act_bridges(changes, particles, edges, memory, walls, shift, p):
 
 
 @inline
-def act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step):
+def act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, step):
     """Pairs and sums at the present positions, and the second half of the kick."""
-    find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step)
-    sum_forces(particles, edges, memory, gravity, step)
+    find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, far, step)
+    sum_forces(particles, edges, memory, gravity, far, step)
 
 
 @inline
@@ -211,14 +218,16 @@ def record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, lo
 
 @serial
 def integrate(
-    particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, steps, origin, reach, time, log
-):
+    particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, steps, taken, every, origin,
+    reach, time, log
+):  # fmt: skip
     """Find the forces at the present positions, then advance by up to `steps` steps.
 
     With `steps` = 0 nothing moves. With `steps` > 0 the first kick uses the forces of the last step. The loop stops
     early when a particle has moved by `reach` from `origin`, or when `log`, the record of collisions ended since
-    `time`, could overflow. Returns the number of steps made, the largest squared displacement (NaN if a position is
-    NaN) and the number of rows written.
+    `time`, could overflow. With the choice FAR, films of pairs that cannot touch act once in `every` steps, counted
+    from the first of the run, of which `taken` have been made. Returns the number of steps made, the largest squared
+    displacement (NaN if a position is NaN) and the number of rows written.
     """
     largest, done, noted, full = 0.0, 0, 0, False
     half = step if steps > 0 else 0.0
@@ -229,6 +238,8 @@ def integrate(
             kick_particles(particles, step)
             if SHEAR:
                 shear_kick(particles, edges, memory, walls, shift, step)
+            if FAR and (taken + done) % every == 0:
+                far_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, every * step)
             if DRIFTING and BRIDGE:
                 film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
             moved = move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step, origin)
@@ -237,7 +248,8 @@ def integrate(
         changes = find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
         if BRIDGE:
             act_bridges(changes, particles, edges, memory, walls, shift, p)
-        act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, half)
+        far = not FAR or steps == 0 or (taken + done) % every == 0
+        act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, half)
         if RECORD:
             now = time + done * step
             noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, now, log, noted)
@@ -264,14 +276,14 @@ def start_step(particles, step):
 
 @serial
 def finish_step(
-    changes, particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, time, log, noted
+    changes, particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, step, time, log, noted
 ):
     """Find and act on bridges, unless found (`changes`); act, and record; returns the number of rows written."""
     if changes < 0:
         changes = find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
     if BRIDGE:
         act_bridges(changes, particles, edges, memory, walls, shift, p)
-    act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step)
+    act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, step)
     if RECORD:
         noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted)
     return noted

@@ -5,18 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
-from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FILM, ROLLING, SHEAR
-from cfddem.particles.pair_graph import edge_role
+from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FAR, FILM, ROLLING, SHEAR
+from cfddem.particles.pair_graph import edge_role, is_far, places_of
 from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 
 
 @inline
-def gather_forces(i, particles, edges, memory, gravity, near):
-    """Sum what the edges of particle i do to it, with weight and outside force; pairs from `near` on do not touch."""
+def gather_forces(i, particles, edges, memory, gravity, near, far):
+    """Sum what the edges of particle i do to it, with weight and outside force.
+
+    near  number of leading pairs that may touch
+    far   far films have been found anew, see `far_films`
+    """
     force, couple, moment, resistance = at(particles.applied, i), NOTHING, NOTHING, 0.0
-    load = shear_load = 0.0
-    for place in range(edges.start[i], edges.start[i + 1]):
+    load = shear_load = far_resistance = 0.0
+    for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
+        if FAR and is_far(k, edges):
+            if not far:
+                break  # far pairs come last
+            far_resistance += memory.resistance[k]
+            continue
         if BRIDGE and memory.bridge_film[k] > 0.0:
             load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))
@@ -36,6 +45,8 @@ def gather_forces(i, particles, edges, memory, gravity, near):
     put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
     if FILM:
         particles.film_rate[i] = particles.inverse_mass[i] * resistance
+    if FAR and far:
+        particles.far_rate[i] = particles.inverse_mass[i] * far_resistance
     if SHEAR:
         particles.slip_rate[i] = particles.inverse_mass[i] * shear_load
         particles.turn_rate[i] = particles.inverse_inertia[i] * shear_load
@@ -56,8 +67,10 @@ def kick(i, particles, step):
 def apply_film_impulses(i, particles, edges, memory):
     """Give particle i the impulses of its films."""
     impulse = (0.0, 0.0, 0.0)
-    for place in range(edges.start[i], edges.start[i + 1]):
+    for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
+        if FAR and is_far(k, edges):
+            break  # those of far films have been given
         impulse = plus(impulse, times(sign, at(memory.impulse, k)))
     put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
 

@@ -17,7 +17,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
-from cfddem.particles.pair_graph import HOME, Edges, make_edges, near_first, shifts
+from cfddem.particles.pair_graph import HOME, THICKEST, Edges, Graph, make_edges, of_two_spheres, shifts
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import at
 from cfddem.particles.walls.arrays import near_walls
@@ -80,6 +80,42 @@ def list_edges(
         first, second = np.concatenate([first, particle]), np.concatenate([second, wall])
         image = np.concatenate([image, np.full(len(wall), HOME, np.uint8)])
     return make_edges(fields, first, second, image, pairs, particles.id, near)
+
+
+def near_first(
+    first: np.ndarray, second: np.ndarray, image: np.ndarray, particles: Particles, box: np.ndarray, allowance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Sort the pairs that may touch before the next list to the front.
+
+    allowance  skin and height of asperities [m]
+    returns    first, second and image in the new order, and the number of pairs that may touch
+    """
+    pairs = first, second, image
+    place, sorted_pairs = np.empty(len(first), np.int64), tuple(np.empty_like(each) for each in pairs)
+    graph = Graph(*pairs, len(first), len(first), *(np.zeros(0, kind) for kind in (float, np.int64, np.int32)))
+    near = _find_near(particles.view, graph, shifts(box).reshape(-1), allowance, place)
+    for old, new in zip(pairs, sorted_pairs):
+        new[place] = old
+    return *sorted_pairs, near
+
+
+@serial
+def _find_near(particles, edges, shift, allowance, place):
+    """Find the place of each pair where those that may touch come first, and their number."""
+    near = 0
+    for k in range(len(place)):
+        i, j = edges.first[k], edges.second[k]
+        _, distance, radii = of_two_spheres(k, particles, edges, shift)
+        reach = allowance + THICKEST * particles.radius[i] * particles.radius[j] / radii
+        place[k] = 1 if distance - radii < reach else 0
+        near += place[k]
+    ahead, behind = 0, near
+    for k in range(len(place)):
+        is_near = place[k] == 1
+        place[k] = ahead if is_near else behind
+        ahead += is_near
+        behind += not is_near
+    return near
 
 
 def pair_reach(largest: float, cutoff_ratio: float, skin: float) -> float:

@@ -3,9 +3,9 @@
 An edge joins two particles, or a particle and a piece of a wall. Edges of particles come first, edges of walls follow.
 Each pair has one edge. With films, pairs too far apart to touch before the next list follow those that may touch.
 
-The first body of a pair is the particle with the lower id. The list of the edges of a particle is sorted by the ids of
-the other particles; walls follow, by wall and then by triangle. So forces, and their sum over the edges of a particle,
-have the same bits for any order of the rows.
+The first body of a pair is the particle with the lower id. The list of the edges of a particle begins with pairs that
+may touch, sorted by the ids of the other particles; walls follow, by wall and then by triangle; pairs that cannot touch
+come last. So forces, and their sum over the edges of a particle, have the same bits for any order of the rows.
 
 What a pair remembers is declared by the laws of a run as fields (:mod:`cfddem.data.fields`). New lists, checkpoints and
 the arrays of compiled loops are made from the declarations.
@@ -210,22 +210,6 @@ THICKEST = 0.02
 """Upper limit of the minimum gap over the reduced radius, unless asperities are larger."""
 
 
-def near_first(
-    first: np.ndarray, second: np.ndarray, image: np.ndarray, particles: Particles, box: np.ndarray, allowance: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Sort the pairs that may touch before the next list to the front.
-
-    allowance  skin and height of asperities [m]
-    returns    first, second and image in the new order, and the number of pairs that may touch
-    """
-    apart = particles.position[first] - particles.position[second] + shifts(box)[image]
-    radii = particles.radius[first] + particles.radius[second]
-    gap = np.sqrt(np.einsum("ij,ij->i", apart, apart)) - radii
-    far = gap >= allowance + THICKEST * particles.radius[first] * particles.radius[second] / radii
-    order = np.argsort(far, kind="stable")
-    return first[order], second[order], image[order], int(np.count_nonzero(~far))  # local: edges
-
-
 @serial
 def _incidence(first, second, image, near, between_particles, ids):
     """Let the lower id of each pair be first, and list the edges of each particle by the id of the other body."""
@@ -242,7 +226,8 @@ def _incidence(first, second, image, near, between_particles, ids):
         start[i + 1] += start[i]
     incident, key = np.empty(start[count], np.int32), np.empty(start[count], np.int64)
     filled = start[:-1].copy()
-    for begin, end in ((0, near), (near, between_particles)):
+    walls = len(first)
+    for begin, end, last in ((0, near, walls), (near, between_particles, between_particles)):
         sorted_from = filled.copy()
         for k in range(begin, end):
             i, j = first[k], second[k]
@@ -250,10 +235,10 @@ def _incidence(first, second, image, near, between_particles, ids):
             _place(incident, key, sorted_from[j], filled[j], -1 - k, ids[i])
             filled[i] += 1
             filled[j] += 1
-    for k in range(between_particles, len(first)):  # already by wall and triangle
-        i = first[k]
-        incident[filled[i]] = k
-        filled[i] += 1
+        for k in range(between_particles, last):  # once, before the far pairs; already by wall and triangle
+            i = first[k]
+            incident[filled[i]] = k
+            filled[i] += 1
     return start, incident
 
 
@@ -313,6 +298,18 @@ def _gaps(edges, particles, walls, shift, result):
             i, w = edges.first[k], np.int64(edges.second[k])
             place = in_frame(walls, walls.wall[w], at(particles.position, i))
             result[k] = nearest(walls.kind, walls.shape, w, place)[1] - particles.radius[i]
+
+
+@inline
+def is_far(k, edges):
+    """Whether edge k joins two particles that cannot touch before the next list."""
+    return edges.near <= k < edges.between_particles
+
+
+@inline
+def places_of(i, edges):
+    """Places in `incident` of the edges of particle i; unsigned, so that loops need not check for negative rows."""
+    return range(np.uint64(edges.start[i]), np.uint64(edges.start[i + 1]))
 
 
 @inline

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from cfddem.particles.collision_events import COLLISION, WET_COLLISION, WET_FIEL
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.energy_count import Energies
+from cfddem.particles.far_films import sort_films
 from cfddem.particles.ghosts import Slabs, StepsWithGhosts
 from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
@@ -30,7 +29,7 @@ from cfddem.particles.listing import NeighbourLists, rows_before
 from cfddem.particles.named_state import named_state, restored_list
 from cfddem.particles.pair_graph import Edges, Graph, gaps, shifts
 from cfddem.particles.state import Particles
-from cfddem.particles.time_scales import TimeScales, check_step, time_scales
+from cfddem.particles.time_scales import TimeScales, check_step, refusing, time_scales
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restored_walls, wall_arrays
 from cfddem.particles.walls.load import wall_forces
@@ -104,6 +103,8 @@ class ParticleSolver:
         choices["TRIANGLES"] = len(self.walls.cell_member) > 0
         self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart)
         self._parameters, self._loop, self._threads = self.laws.parameters, _NO_LOOP, False
+        self._touch_walls = specialise(wall_contacts, self.choices)
+        self._sort_films = specialise(sort_films, self.choices) if self.laws.far_film_steps > 1 else _NO_LOOP
         self.gravity, self.free = gravity, free
         self.domain = None if domain is None else np.array(domain, float)
         self._checking, self._accepted = check_steps, 0.0
@@ -169,11 +170,6 @@ class ParticleSolver:
             self.particles, self.edges, self.walls, self.gap, self.table, self.laws, reference_speed, self.communicator
         )
 
-    def _limits(self) -> TimeScales:
-        """Time scales by which a step is refused; with films only existing contacts, as films may stop an approach."""
-        read = self.time_scales()
-        return replace(read, impact=math.inf, film=math.inf, crossing=math.inf) if self.laws.film else read
-
     def recommended_step(self, reference_speed: float = 0.0) -> float:
         """Recommended time step: 2 % of the Hertz time, less where stability requires it [s].
 
@@ -196,7 +192,7 @@ class ParticleSolver:
         counting, first = self.energies, True
         while steps > 0:
             if self._checking and step > self._accepted:
-                check_step(step, self._limits())
+                check_step(step, refusing(self.time_scales(), self.laws.film))
                 self._accepted = step
             if counting is not None:
                 counting.before(self, step, first)
@@ -271,7 +267,8 @@ class ParticleSolver:
         log = _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first))
         return self._loop(  # type: ignore[no-any-return]
             *self._views, self.table, self.laws.cutoff_ratio if self.laws.film else 0.0, self._parameters, self.free,
-            self.gravity, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log,
+            self.gravity, step, steps, self.steps, self.laws.far_film_steps, self._origin.reshape(-1),
+            0.5 * self.lists.skin, self.time, log,
         )  # fmt: skip
 
     def _take_list(self, edges: Edges) -> None:
@@ -287,13 +284,16 @@ class ParticleSolver:
         self.walls.travel[:] = 0.0
         if len(self.walls.kind):
             particles, graph, memory, walls, _ = self._views
-            specialise(wall_contacts, self.choices)(particles, graph, memory.minimum_gap, walls, self.free, self._reach)
+            self._touch_walls(particles, graph, memory.minimum_gap, walls, self.free, self._reach)
 
     def _relist(self) -> None:
         """Make a new neighbour list; memory and present forces of pairs are carried over."""
         self._reach = self._find_reach()
         self.particles.drop_ghosts()
         self._renew(np.arange(self.particles.count, dtype=np.int32), self.steps)
+        if self.laws.far_film_steps > 1:
+            *pairs, _, shift = self._views
+            self._sort_films(*pairs, shift, self.table, self.laws.cutoff_ratio)
         if self.lists.made % CHECK_EVERY == 0:
             self._accepted = 0.0
 

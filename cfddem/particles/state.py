@@ -25,7 +25,7 @@ PARTICLE_FIELDS = (
         "velocity",
         "m/s",
         3,
-        halo=("start", "shear", "film", "bridge", "motion", "work"),
+        halo=("start", "shear", "far", "film", "bridge", "motion", "work"),
         snapshot=True,
         meaning="velocity",
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from cfddem.particles.walls.nearest_point import Walls
 from closures import lubrication, timescales
 from closures.kinds import FILM_ARGUMENTS
 
-__all__ = ["TimeScales", "check_step", "time_scales"]
+__all__ = ["TimeScales", "check_step", "refusing", "time_scales"]
 
 
 def time_scales(
@@ -66,6 +67,11 @@ def time_scales(
     overlap = STABLE / math.sqrt(max(rate, 1e-300))
     crossing = crossing_step(communicator.smallest(particles.radius), speed)
     return TimeScales(*communicator.smallest(np.array([[hertz, impact, overlap, film, crossing]]), axis=0).tolist())
+
+
+def refusing(scales: TimeScales, films: bool) -> TimeScales:
+    """Time scales by which a step is refused; with films only those of contacts, as films may stop an approach."""
+    return replace(scales, impact=math.inf, film=math.inf, crossing=math.inf) if films else scales
 
 
 def _film_strength(laws: Laws, viscosity: float, reduced_radius: float, gap: float) -> float:

@@ -6,7 +6,7 @@ Panels are seen from the front, along the thinner horizontal side of the bed, an
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.io.reading import Run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.curves import BLUE, ORANGE, SKY, blank
+from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,6 +30,9 @@ HEADROOM = 1.4
 
 SHARP = 200
 """Pixels of a rendered image per inch of paper."""
+
+SOLID = "#9a9a9a"
+"""Colour of solid cells."""
 
 PANELS = ("spheres", "voidage", "bubbles", "streamlines")
 
@@ -66,7 +70,7 @@ class Stage:
                 raise InputError("show", name, nearest(name, PANELS))
         if "spheres" in panels or "bubbles" in panels:
             rendering.require_rendering()
-        bounds = bounds_of(run, snapshots)
+        bounds = with_walls(bounds_of(run, snapshots), run) if run.grid is None else bounds_of(run, snapshots)
         size = np.diff(bounds, axis=1).ravel()
         depth = 0 if size[0] < size[1] else 1
         limits: dict[str, tuple[float, float]] = {}
@@ -115,21 +119,31 @@ class Stage:
 
     def _spheres(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
         particles, values = colours.values(self.run, snapshot, self.colour)
-        position = particles["position"]
+        position, half = particles["position"], None
         title, behind = "spheres\nall", np.ones(len(position), bool)
         if self.cut:
             middle = float(self.bounds[self.depth].mean())
             behind = position[:, self.depth] >= middle if self.depth == 1 else position[:, self.depth] <= middle
             title = f"spheres\nbehind {'xy'[self.depth]} = {middle:.3g} m"
+            half = self._behind(middle)
         shades, limits = colours.colour_map(self.colour), self.limits["spheres"]
         view = rendering.View(self.bounds, self.depth, pixels)
-        image = rendering.spheres(view, position[behind], particles["radius"][behind], values[behind], limits, shades)
+        image = rendering.spheres(
+            view, position[behind], particles["radius"][behind], values[behind], limits, shades,
+            lambda plotter: add_walls(plotter, walls_of(self.run), self.bounds, self.run.times[snapshot], half),
+        )  # fmt: skip
         axes.imshow(image, extent=self._extent, interpolation="antialiased")
         if self.colour == colours.AGGLOMERATE:
             title = title.replace("spheres", "agglomerates, grey: single")
         else:
             _colour_bar(axes, shades, limits, colours.label(self.run, self.colour))
         axes.set_title(title, loc="left")
+
+    def _behind(self, middle: float) -> Callable[[Any], Any]:
+        """Keeps the part of a mesh behind the middle plane."""
+        origin = np.eye(3)[self.depth] * middle
+        normal = np.eye(3)[self.depth] * (1.0 if self.depth == 1 else -1.0)
+        return lambda mesh: mesh.clip(normal, origin=origin, invert=False)
 
     def _voidage(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
         values, where = self._slice(self.run.fluid("voidage", snapshot))
@@ -159,11 +173,16 @@ class Stage:
 
     def _cells(self, axes: Axes, values: np.ndarray, shades: Any, limits: tuple[float, float], label: str) -> None:
         """Draw a slice of cells with its colour bar."""
+        from matplotlib.colors import to_rgba
+
         low, high = _corners(self.run)
         extent = low[1 - self.depth], high[1 - self.depth], low[2], high[2]
         axes.imshow(
             values, origin="lower", extent=extent, cmap=shades, vmin=limits[0], vmax=limits[1], interpolation="nearest"
         )
+        if "solid" in self.run.fluid_fields:
+            solid = self._slice(self.run.fluid("solid"))[0][..., None] > 0
+            axes.imshow(solid * to_rgba(SOLID), origin="lower", extent=extent, interpolation="nearest", zorder=3)
         _colour_bar(axes, shades, limits, label)
 
     # ------------------------------------------------------------ geometry

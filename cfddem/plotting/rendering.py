@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -82,6 +83,7 @@ def spheres(
     values: np.ndarray,
     limits: tuple[float, float],
     colours: Any = "viridis",
+    others: Callable[[Any], None] = lambda plotter: None,
 ) -> np.ndarray:
     """An image of spheres.
 
@@ -90,10 +92,12 @@ def spheres(
     values            (n,) that the colours show
     limits            values of the first and the last colour
     colours           a colour map of matplotlib
+    others            adds more to the scene
     returns           (height, width, 3), white background
     """
     plotter = _plotter(view)
     add_spheres(plotter, position, radius, values, limits, colours, show_scalar_bar=False)
+    others(plotter)
     return _image(plotter)
 
 

@@ -12,7 +12,7 @@ from cfddem.analysis.measured import with_files
 from cfddem.analysis.report import case_of
 from cfddem.analysis.report import report as summary
 from cfddem.analysis.report_markdown import markdown
-from cfddem.analysis.report_text import spelled, steadiness, with_error
+from cfddem.analysis.report_text import spelled, steadiness, window, with_error
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
@@ -59,12 +59,12 @@ def markdown_page(folder: Path, output: Path, result: dict[str, Any] | None = No
 
 def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
     """The page as text."""
-    case, (begin, end), steps = with_files(case_of(run), data), result["window"], result["steps"]
+    case, end, steps = with_files(case_of(run), data), result["window"][1], result["steps"]
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
     drawn = figures_of(run, case, result)
     text: str = _template().render(
         result=result,
-        status=f"{result['status']} at {end:g} s; {counts}; means from {begin:g} to {end:g} s",
+        status=f"{result['status']} at {end:g} s; {counts}; {window(result)}",
         answers=_answers(result["answers"]),
         measures=_measures(result["measures"]),
         laws=_laws(result["laws"]),

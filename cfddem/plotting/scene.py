@@ -14,7 +14,8 @@ import numpy as np
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run
 from cfddem.plotting import colours, rendering
-from cfddem.plotting.panels import bounds_of
+from cfddem.plotting.panels import SOLID, bounds_of
+from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
 
 NOTHING = "none"
 """Choice of a layer or a colour that is not drawn."""
@@ -66,7 +67,8 @@ class Scene:
         count = len(run.times)
         self._examined = sorted(set(np.linspace(0, count - 1, min(count, _MOST_EXAMINED)).astype(int).tolist()))
         self._limits: dict[tuple[int, str], tuple[float, float]] = {}
-        self.bounds = bounds_of(run, self._examined)
+        self.bounds, self._walls = bounds_of(run, self._examined), walls_of(run)
+        self.bounds = with_walls(self.bounds, run) if run.grid is None else self.bounds
         size = np.diff(self.bounds, axis=1).ravel()
         self.depth = 0 if size[0] < size[1] else 1
         for side in (SPHERES, FLUID):
@@ -107,6 +109,7 @@ class Scene:
         self.plotter.subplot(0, SPHERES)
         if shown[SPHERES]:
             self._add_spheres(place, look)
+            add_walls(self.plotter, self._walls, self.bounds, self.run.times[place])
         self.plotter.add_text(f"t = {self.run.times[place]:.4g} s", name="time", color="black", font_size=10)
 
     # ------------------------------------------------------------ parts of the scene
@@ -149,13 +152,16 @@ class Scene:
         self.plotter.add_mesh(
             plane, scalars="values", cmap=_SHADES.get(look.layer) or colours.part_of("YlGnBu", 0.0, 0.9),
             clim=self._limits_of(FLUID, look.layer), name="drawn", lighting=False, render=False,
-            **self._bar(FLUID, label),
+            nan_color=SOLID, **self._bar(FLUID, label),
         )  # fmt: skip
 
     def _fluid(self, layer: str, snapshot: int) -> np.ndarray:
-        """Values of a fluid field (nz, ny, nx); of a vector its magnitude."""
+        """Values of a fluid field (nz, ny, nx); of a vector its magnitude. NaN in solid cells."""
         values = self.run.fluid("velocity" if layer == "speed" else layer, snapshot)
-        return colours.magnitude(values) if values.ndim == 4 else values
+        values = colours.magnitude(values) if values.ndim == 4 else values
+        if "solid" not in self.run.fluid_fields or layer == "solid":
+            return values
+        return np.where(self.run.fluid("solid", snapshot) > 0, np.nan, values)
 
     def _layer_number(self, look: Look) -> int:
         count = self.run.grid.cells[self.depth]  # type: ignore[union-attr]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import Points, held, points_of
+from cfddem.case.compare import Points, held, points_of, require_measured_unit
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import Issue
 
@@ -17,10 +18,7 @@ def check_data(case: Case) -> Iterator[Issue]:
         try:
             points = points_of(name, data)
         except InputError as failure:
-            value = "" if failure.value is None else f" = {failure.value!r}"
-            yield Issue(
-                "error", key, f"{failure.field}{value} must be {failure.limit}", failure.remedy or "correct the file"
-            )
+            yield _error(key, failure)
             continue
         if points.against == "inlet_velocity":
             yield from _check_velocities(case, key, points)
@@ -30,6 +28,26 @@ def check_data(case: Case) -> Iterator[Issue]:
             low, high = points.place.min(), points.place.max()
             reason = f"all points lie at {low:.3g} to {high:.3g} {unit}, outside of 0 to {end:.3g} {unit}"
             yield Issue("warning", key, reason, "check the unit of the column, or change the case")
+
+
+def check_quantities(case: Case, units: Mapping[str, str]) -> Iterator[Issue]:
+    """Check that the run will have the measured quantities, in the same units.
+
+    units  of the columns of its history, by their names
+    """
+    for name, data in case.compare.items():
+        with suppress(InputError):  # a file that cannot be read is reported above
+            points = points_of(name, data)
+            try:
+                require_measured_unit(points, units)
+            except InputError as failure:
+                yield _error(f"compare.{name}", failure)
+
+
+def _error(key: str, failure: InputError) -> Issue:
+    value = "" if failure.value is None else f" = {failure.value!r}"
+    field = failure.field.removeprefix(f"{key} ").removeprefix(f"{key}.")
+    return Issue("error", key, f"{field}{value} must be {failure.limit}", failure.remedy or "correct the file")
 
 
 def _check_velocities(case: Case, key: str, points: Points) -> Iterator[Issue]:

@@ -10,7 +10,7 @@ import numpy as np
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.geometry_checks import bed_key
-from cfddem.preflight.issue import Issue
+from cfddem.preflight.issue import Issue, rounded_up
 from cfddem.preflight.step_estimate import StepEstimate
 from cfddem.preflight.unit_checks import unit_of_velocity
 
@@ -22,6 +22,9 @@ Below the first, a sphere has more volume than its kernel can hold; below the se
 
 FINEST = 6.0
 """More cells than this per standard deviation of the kernel cost time and resolve nothing more [-]."""
+
+FEWEST_DIAMETERS = 2.0
+"""Smallest cell over the Sauter mean diameter whose averages have a meaning [-]."""
 
 UNEQUAL = 1.2
 """Ratio of species diameters from which a drag law should depend on the diameter ratio [-]."""
@@ -49,11 +52,18 @@ def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
             f"{smallest:.3g} m distributes a particle over {width:.2g} diameters; use at least {NARROW_KERNEL:g}",
             f"use cells of {3.0 * diameter:.2g} m, or laws.kernel_width = 1.5",
         )  # fmt: skip
+    elif smallest < FEWEST_DIAMETERS * case.bed.diameter * (1.0 - 1e-9):
+        yield Issue(
+            "warning", "column.cell",
+            f"{smallest:.3g} m is {smallest / case.bed.diameter:.2g} times the diameter; averages over cells below "
+            f"{FEWEST_DIAMETERS:g} diameters have no meaning",
+            f"use cells of {rounded_up(FEWEST_DIAMETERS * case.bed.diameter):.2g} m or more",
+        )  # fmt: skip
     if kernel > FINEST * smallest:
         yield Issue(
             "warning", "column.cell",
             f"{smallest:.3g} m is less than 1/{FINEST:g} of the kernel width {kernel:.3g} m, which costs time",
-            f"use cells of {2.0 * diameter:.2g} m or more",
+            f"use cells of {2.0 * diameter:.2g} m or more", False,
         )  # fmt: skip
 
 

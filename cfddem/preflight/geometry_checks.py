@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 
 import numpy as np
 
+from cfddem.backend.errors import InputError
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import on_the_wrong_side
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue, Severity
 
@@ -89,6 +92,11 @@ def check_positions(case: Case) -> Iterator[Issue]:
             + (f", and so do {others} more" if others else ""),
             f"the column extends from 0 to {case.column.size} m",
         )  # fmt: skip
+    for number, wall in enumerate(case.wall):
+        with suppress(InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
+            if (found := on_the_wrong_side(case, wall, positions)) is not None:
+                reason = f"wall.{number}.file = {wall.file!r} is closed, and {found[1]}"
+                yield Issue("error", f"bed.positions.{found[0]}", reason, "move it to the other side of the surface")
     overlap, rows = _largest_overlap(positions, case.bed.diameter)
     if overlap > LARGEST_INITIAL_OVERLAP:
         yield Issue(

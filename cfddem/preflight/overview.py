@@ -6,8 +6,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from cfddem.backend.errors import InputError
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import is_closed, triangles
+from cfddem.case.walls import CaseWall
 from cfddem.preflight.bed_estimate import BedEstimate, bubbles
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.cost_estimate import CostEstimate
@@ -103,6 +106,8 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate) -> Iterator[R
     group, diameter = "collisions and film", case.species[collision.species].diameter
     note = f"between particles of {collision.species}" if case.bed.species else ""
     yield Row(group, "collision speed", collision.speed, "m/s", note)
+    if films := case.laws.film_in_words(case.fluid):
+        yield Row(group, "lubrication films", math.nan, "", films)
     if collision.gap > 0.0:
         law = case.laws.pair_laws.get("minimum_gap")
         film = "elastic deformation of the solids" if law is None else law.name
@@ -144,6 +149,8 @@ def _bridges(wet: WetEstimate | None) -> Iterator[Row]:
 def _equipment(case: Case) -> Iterator[Row]:
     group = "walls and feeds"
     for number, wall in enumerate(case.wall):
+        if wall.shape == "surface":
+            yield Row(group, f"wall {number}: triangles", *_surface(wall))
         if wall.moves and math.isfinite(wall.fastest):
             yield Row(group, f"wall {number}: largest speed", wall.fastest, "m/s", wall.shape)
     for number, feed in enumerate(case.feed):
@@ -156,6 +163,16 @@ def _equipment(case: Case) -> Iterator[Row]:
             )
     if case.feed:
         yield Row(group, "particles at the end, at most", case.particle_count + fed_count(case))
+
+
+def _surface(wall: CaseWall) -> tuple[float, str, str]:
+    """Number of triangles, unit, and whether they enclose a volume."""
+    try:
+        corners = triangles(wall)
+    except (InputError, OSError, ValueError):  # reported as an error
+        return math.nan, "", ""
+    closed = is_closed(corners)
+    return len(corners), "", "closed" if closed else "open: particles may start on both sides, and pass its edges"
 
 
 def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Row]:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -50,6 +50,10 @@ class Preflight:
         """Severity of the worst issue; ok if there is none."""
         severities = {each.severity for each in self.issues}
         return "error" if "error" in severities else "warning" if severities else "ok"
+
+    def with_errors(self, found: Iterable[Issue]) -> Preflight:
+        """The result with further errors."""
+        return replace(self, issues=(*found, *self.issues))
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

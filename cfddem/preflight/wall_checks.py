@@ -11,10 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from cfddem.backend.errors import InputError
-from cfddem.case.bed import Point
+from cfddem.case.bed import POURED_SOLID_FRACTION, Point
 from cfddem.case.feeds import CaseFeed, fed_species, feed_rate
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import corners_of, distance, extent, is_closed, solid_part, triangles
+from cfddem.case.wall_geometry import (
+    corners_of,
+    distance,
+    enclosed_volume,
+    extent,
+    inside_surface,
+    is_closed,
+    solid_part,
+    triangles,
+)
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.issue import Issue, Severity
@@ -33,6 +42,10 @@ MOST_CELLS = 5_000_000
 
 SAMPLES, MOSTLY = 400, 0.5
 """Places tried in the box of a feed, and share of them that must be free of walls [-]."""
+
+
+_GRID = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 6)] * 3), axis=-1).reshape(-1, 3)
+"""Places in a box, over its edges."""
 
 
 def check_walls_and_feeds(case: Case) -> Iterator[Issue]:
@@ -92,17 +105,34 @@ def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         yield Issue(
             "error" if len(corners) > MOST_TRIANGLES else "warning", f"{key}.file",
             f"{len(corners)} triangles take long to prepare; the limit is {MOST_TRIANGLES}",
-            "simplify the surface; edges of half a diameter are enough",
+            "simplify the surface; edges of half a diameter are enough", False,
         )  # fmt: skip
     elif edge < FINE * smallest:
         yield Issue(
             "warning", f"{key}.file", f"its edges of {edge:.2g} m are below {FINE:g} diameters, which costs time",
-            "simplify the surface, or check scale: the unit of the file in m",
+            "simplify the surface, or check scale: the unit of the file in m", False,
         )  # fmt: skip
+    yield from _check_vessel(case, wall, key, corners)
     if case.fluid is not None and wall.solid != "none" and not is_closed(corners):
         yield Issue(
             "error", f"{key}.solid", "the surface is not closed, so that no cells lie inside",
             'close the surface, or set solid = "none"',
+        )  # fmt: skip
+
+
+def _check_vessel(case: Case, wall: CaseWall, key: str, corners: np.ndarray) -> Iterator[Issue]:
+    """Warn of particles that all start outside of a closed surface in which they would have room."""
+    bed = case.bed
+    places = np.array(bed.positions, float).reshape(-1, 3)
+    if bed.start_corner is not None and bed.start_size is not None:
+        places = np.array(bed.start_corner) + _GRID * np.array(bed.start_size)
+    room = sum(case.volumes.values()) / POURED_SOLID_FRACTION
+    if not len(places) or not is_closed(corners) or (case.fluid is not None and wall.solid != "none"):
+        return
+    if enclosed_volume(corners) > room and not inside_surface(corners, places).any():
+        yield Issue(
+            "warning", f"{key}.file", "all particles start outside of this closed surface, which has room for them",
+            "move bed.start_corner or bed.positions into it if it is their vessel",
         )  # fmt: skip
 
 

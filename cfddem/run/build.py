@@ -221,12 +221,13 @@ def laws_of(case: Case) -> Laws:
     own: dict[str, Any] = {kind: law.function for kind, law in laws.pair_laws.items()} if case.has_films else {}
     return Laws(
         film=case.has_films,
+        far_film_steps=laws.far_film_steps if case.has_films else 1,
         friction_onset=laws.friction_onset,
         contact=laws.contact_law,
         rolling=laws.rolling_resistance,
         rolling_damping=laws.rolling_damping,
         bridge=bridge_laws_of(case),
-        film_motions=FILM_MOTIONS.get(laws.lubrication, "normal") if case.has_films else "normal",
+        film_motions=FILM_MOTIONS.get(laws.film_in(case.fluid), "normal"),
         **own,
     )
 

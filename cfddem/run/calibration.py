@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.measured import compared_at, with_files
+from cfddem.analysis.measured import compared_at, largest_chi2, with_files
 from cfddem.analysis.report import window_of
 from cfddem.analysis.response import Response, fewest_runs, response
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
@@ -67,6 +67,22 @@ class Calibration:
         """The trial that differs least from the data."""
         return min(self.finished, key=lambda each: each.chi2, default=None)
 
+    @property
+    def verdict(self) -> str:
+        """Whether the best values agree with the data, in words; empty without a finished trial."""
+        if self.best is None:
+            return ""
+        points, chi2 = sum(len(each.value) for each in self.data), self.best.chi2
+        most = largest_chi2(points)
+        if chi2 > most and self.response is not None:
+            chi2, most = self.response.chi2, largest_chi2(max(points - len(self.variables), 1))
+        if chi2 <= most:
+            return "the case agrees with the data at its best values"
+        return (
+            f"no values in these ranges agree with the data: reduced chi-squared {chi2:.3g}, by chance at most "
+            f"{most:.2g}; the estimates are the closest values, not measured ones: check case, data and ranges"
+        )
+
     def estimates(self) -> list[dict[str, Any]]:
         """Best value, standard error and verdict of each key, as plain values."""
         found = self.response
@@ -95,6 +111,7 @@ class Calibration:
         return {
             "estimates": self.estimates(),
             "chi2": None if self.response is None else self.response.chi2,
+            "verdict": self.verdict,
             "best": None if best is None else {"trial": best.number, "values": best.values, "chi2": best.chi2},
             "trials": len(self.trials),
             "failed": len(self.trials) - len(self.finished),

@@ -14,6 +14,7 @@ from cfddem.case.feeds import CaseFeed, fed_species, feed_rate
 from cfddem.case.particle_properties import diameters_of
 from cfddem.case.schema import Case
 from cfddem.case.walls import CaseWall
+from cfddem.data.fields import Field
 from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
@@ -59,6 +60,12 @@ def wall_of(given: CaseWall, material: int, key: str) -> Wall:
         raise InputError(f"{key}.{failure.field}", failure.value, failure.limit, failure.remedy) from None
 
 
+LANDED = Field(
+    "landed", role="memory", initial=1.0, dtype=np.int8, meaning="1, or 0 before the first contact of a fed particle"
+)
+"""Declared on the particles of a run with feeds."""
+
+
 class Equipment:
     """Moving walls, feeds and outlets of a case.
 
@@ -77,6 +84,8 @@ class Equipment:
             if each.has_schedule
         ])  # fmt: skip
         self.feeds = [_feed(case, each, number) for number, each in enumerate(case.feed)]
+        if self.feeds:
+            solver.particles.declare(LANDED)
         self.outlets = [
             ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True) for each in case.outlet
         ]
@@ -92,6 +101,8 @@ class Equipment:
 
     def exchange_particles(self, solver: ParticleSolver) -> bool:
         """Insert the particles that are due, and remove those that have left; returns whether there were any."""
+        if self.feeds:
+            _note_landings(solver)
         moved = sum(feed(solver) for feed in self.feeds)
         for number, outlet in enumerate(self.outlets):
             owned = solver.particles.without_ghosts()
@@ -150,7 +161,7 @@ def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
         seed=(case.bed.seed, number, _FED),
         begin=given.begin,
         end=math.inf if given.end is None else given.end,
-        finish=_named(names.index(given.species)) if given.species is not None else None,
+        finish=_fresh(None if given.species is None else names.index(given.species)),
     )
 
 
@@ -163,10 +174,21 @@ def _sizes(species: Species) -> Callable[[int, np.random.Generator], np.ndarray]
     return draw
 
 
-def _named(number: int) -> Callable[[Particles], None]:
-    """Declares the species of new particles."""
+def _fresh(species: int | None) -> Callable[[Particles], None]:
+    """Declares the species of new particles, and that they have not landed."""
 
     def declare(fresh: Particles) -> None:
-        fresh.declare(SPECIES, np.full(fresh.count, number, np.int32))
+        fresh.declare(LANDED, np.zeros(fresh.count, np.int8))
+        if species is not None:
+            fresh.declare(SPECIES, np.full(fresh.count, species, np.int32))
 
     return declare
+
+
+def _note_landings(solver: ParticleSolver) -> None:
+    """Mark the particles that are in contact with another one or with a wall."""
+    edges, landed = solver.edges, solver.particles.landed
+    touching = (edges.force != 0.0).any(axis=1)  # local: components of a row
+    landed[edges.first[touching]] = 1
+    pairs = touching[: edges.between_particles]
+    landed[edges.second[: edges.between_particles][pairs]] = 1

@@ -30,7 +30,7 @@ from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
 from cfddem.run import equipment_measures, liquid_bed_measures, wet_measures
 from cfddem.run.budgets import conservation, energy
-from cfddem.run.liquid_bed_measures import BED, cells_of, open_area, open_volume
+from cfddem.run.liquid_bed_measures import BED, bed_solids, cells_of, open_area, open_volume
 from cfddem.run.simulation import Simulation
 
 Function = Callable[[Simulation], float]
@@ -179,14 +179,14 @@ def fluid_steps(simulation: Simulation) -> float:
 
 @measure("m")
 def bed_height(simulation: Simulation) -> float:
-    """Height below which 99 % of the particle volume lies."""
+    """Height below which 99 % of the particle volume lies; fed particles count from their first contact on."""
     return liquid_bed_measures.bed_height(simulation)
 
 
 @measure("1", when=_is_fluid_bed)
 def bed_voidage(simulation: Simulation) -> float:
     """Mean voidage of the bed, from its height."""
-    solids = measures.OF_THE_BED * simulation.communicator.sum(simulation.owned.volume)
+    solids = measures.OF_THE_BED * bed_solids(simulation)
     return 1.0 - solids / open_volume(simulation.case, 0.0, bed_height(simulation))
 
 

@@ -12,6 +12,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.liquid import Liquid
 from cfddem.case.particle_properties import ParticleProperties, particle_properties
 from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import on_the_wrong_side
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import clear_of_walls, loose_places
@@ -75,6 +76,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     _must_be_inside(made.position, case.column.size)
     if case.wall:
         _must_be_apart(made, walls, len(walls) - len(case.wall))
+        _must_be_on_one_side(case, made.position)
     return made
 
 
@@ -146,6 +148,17 @@ def _must_be_apart(made: Particles, walls: Sequence[Wall], of_column: int) -> No
             f"position of particle {rows[0]}", None, "away from walls",
             f"at ({place}) m it is in {name}; set bed.start_corner and bed.start_size",
         )  # fmt: skip
+
+
+def _must_be_on_one_side(case: Case, position: Array) -> None:
+    """Refuse particles on the wrong side of a closed surface."""
+    for number, wall in enumerate(case.wall):
+        if (found := on_the_wrong_side(case, wall, position)) is not None:
+            row, why = found
+            limit = f"on the other side of the closed surface of wall.{number}.file"
+            raise InputError(
+                f"position of particle {row}", None, limit, f"{why}; set bed.start_corner and bed.start_size"
+            )
 
 
 def _spread_evenly(case: Case, properties: ParticleProperties, walls: Sequence[Wall]) -> Array:

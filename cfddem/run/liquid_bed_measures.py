@@ -11,6 +11,7 @@ from cfddem.analysis import measures
 from cfddem.analysis.waves import FEWEST_LAYERS, LAYER
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
+from cfddem.run.equipment import LANDED
 from cfddem.run.simulation import Simulation
 
 BED = (0.2, 0.8)
@@ -103,5 +104,16 @@ def granular_temperature(simulation: Simulation) -> measures.GranularTemperature
 
 
 def bed_height(simulation: Simulation) -> float:
-    """Height below which 99 % of the particle volume lies [m]."""
-    return measures.bed_height(simulation.whole("position"), simulation.whole("radius"))
+    """Height below which 99 % of the volume of the bed lies [m]."""
+    position, radius = simulation.whole("position"), simulation.whole("radius")
+    if LANDED.name in simulation.owned:
+        landed = simulation.whole(LANDED.name) > 0
+        position, radius = position[landed], radius[landed]
+    return measures.bed_height(position, radius)
+
+
+def bed_solids(simulation: Simulation) -> float:
+    """Volume of the particles of the bed: all but those that a feed has inserted, before their first contact [m3]."""
+    owned = simulation.owned
+    counted = owned.volume * owned.landed if LANDED.name in owned else owned.volume
+    return float(simulation.communicator.sum(counted))

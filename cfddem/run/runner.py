@@ -14,15 +14,16 @@ import numpy as np
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed, RunStopped, UnstableStep
 from cfddem.backend.stopwatch import Stopwatch
+from cfddem.case.column_grid import grid_of
 from cfddem.case.compare import require_measured_units
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
 from cfddem.io.folder import AVERAGES_FROM, make_folder, read_about, require_free, require_no_foreign_files
-from cfddem.io.kept_files import keep_files, with_kept_files
+from cfddem.io.kept_files import keep_files, text_with_kept_files, with_kept_files
 from cfddem.io.provenance import provenance
-from cfddem.io.quantities import Quantities, of_fields
+from cfddem.io.quantities import Quantities, Quantity, of_fields
 from cfddem.io.rank_folders import folder_of_ranks
 from cfddem.io.writer import RunFolder
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
@@ -52,6 +53,9 @@ _SAME = 1.0 - 1e-12
 
 RECORDED = ("voidage", "velocity", "pressure")
 """Fields of the fluid in snapshots, at cell centres."""
+
+SOLID = "solid"
+"""Field of the solid cells of a grid that has any."""
 
 Report = Callable[[Status], None]
 
@@ -96,14 +100,14 @@ class Run:
     ) -> Run:
         """Prepare a case in a new folder, and write its initial state.
 
-        text               the case file as the user wrote it
+        text               the case file as the user wrote it; made from the case if None
         report             called after every row of history
         progress           called with a line of text for each part of the preparation
         fields, callbacks  of the simulation, see `Simulation`
         communicator       of the ranks that share the run; all of them call this. Rank 0 writes
         errors             InputError if the folder holds a run or cannot be written
         """
-        folder, text = Path(folder), case.to_toml() if text is None else text
+        folder, text = Path(folder), text_with_kept_files(case) if text is None else text
         history.require_shared(case, communicator.size)
         require_measures_of(case)
         require_measured_units(case, history.units_of(case))
@@ -299,9 +303,11 @@ class Run:
     def _write_snapshot(self) -> None:
         simulation, solver = self.simulation, self.simulation.particle_solver
         with simulation.wall.part("snapshots"):
-            fluid = None
+            fluid: dict[str, np.ndarray] | None = None
             if simulation.fluid is not None:
                 fluid = {name: simulation.fluid.whole(name) for name in RECORDED}
+                if SOLID in self.folder.quantities["fluid"]:
+                    fluid[SOLID] = ~simulation.fluid.grid.whole.open
             collisions = None if solver.collisions is None else self._gathered(solver.collisions.take())
             self.folder.write_snapshot(simulation.time, solver.steps, fluid, simulation.snapshot(), collisions)
         due = clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE
@@ -345,6 +351,7 @@ def quantities_of(simulation: Simulation) -> Quantities:
     return {
         "history": history.all_columns(case),
         "particles": of_fields(field for field in simulation.particles.fields.values() if field.snapshot),
-        "fluid": of_fields(field for field in FLUID_FIELDS if field.name in RECORDED),
+        "fluid": of_fields(field for field in FLUID_FIELDS if field.name in RECORDED)
+        | ({SOLID: Quantity("1", "1 in solid cells, 0 in the fluid")} if grid_of(case).solid is not None else {}),
         "collisions": of_fields(recorded) if case.run.record_collisions else {},
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -18,12 +19,16 @@ from scenarios.beds.liquid_bed import study as liquid_bed
 from scenarios.beds.packed_bed import study as packed_bed
 from scenarios.beds.settling import landing
 from scenarios.beds.settling import study as settling
+from scenarios.validation import history_force
 from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, reference, worst
 
 REYNOLDS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0)
 CELLS = (2.0, 4.0, 10.0)
 PLACES = (0.5, 0.25, 0.0)
 """Centre of a cell, a quarter off, and a corner."""
+
+COUPLED = ("E1", "E3")
+"""Cases of ten Cate et al. that also run over a floor on a grid, the slowest part of the landings."""
 
 
 def study(folder: Path, progress: Progress) -> list[Row]:
@@ -60,13 +65,8 @@ def released(curves: Curves) -> list[Row]:
     endless, fastest = settling.unbounded(bead, "brown_lawler"), measured["U_terminal"][0]
     plain = bead.with_(**{"laws.history": "none"})
     cases = [("Mordant", bead, endless, fastest), ("Mordant without history force", plain, endless, fastest)]
-    spheres = reference("tencate2002_cases")
-    for row in (0, 2):
-        density, viscosity, endless, fastest = (
-            float(spheres[name][row]) for name in ("rho_f [kg/m3]", "mu_f [Pa s]", "u_inf [m/s]", "u_max [m/s]")
-        )
-        case = settling.ten_cate(density, viscosity)
-        cases.append((f"ten Cate {spheres['case'][row]}", case, endless, fastest))
+    for name, oil in _oils().items():
+        cases.append((f"ten Cate {name}", settling.ten_cate(oil.density, oil.viscosity), oil.endless, oil.fastest))
     for name, case, endless, experiment in cases:
         times, speeds = settling.release(case)
         exact = settling.equation_of_motion(case, times)
@@ -86,34 +86,82 @@ def released(curves: Curves) -> list[Row]:
     return rows
 
 
+def remembered(curves: Curves) -> list[Row]:
+    """The history force of given motions, against direct convolutions with its kernel."""
+    steady, steps = history_force.turning(100_000), (10, 100, 1000, 9999, 99_999)
+    found = history_force.modelled(steady)[list(steps)]
+    exact = history_force.convolved(steady, "present", steps)
+    points = [(float(at), history_force.difference(*pair), 0.0) for at, *pair in zip(steps, found, exact)]
+    title = "history force, slip that turns at constant speed, 1e5 steps: deviation from the convolution"
+    rows = [worst(title, points, 2e-3, note="steps of 2 % of t_c")]
+    motions = {
+        "0.5 mm glass from rest in water": {0.0: history_force.from_rest()},
+        "slip that oscillates by 0.8 of its mean": {x: history_force.oscillating(x) for x in (0.1, 1.0, 10.0)},
+        "steel that rebounds from a wall in oil at St 27": {0.0: history_force.rebounding()},
+        "agitated slip": {float(seed): history_force.agitated(seed) for seed in (1, 2, 3, 4)},
+    }
+    readings: dict[str, Literal["present", "past"]] = {
+        "at the present slip": "present", "at the earlier slip": "past",
+    }  # fmt: skip
+    note = "root mean square, over that of the force"
+    for name, group in motions.items():
+        forces = {at: history_force.modelled(motion) for at, motion in group.items()}
+        for words, reading in readings.items():
+            points = [
+                (at, history_force.difference(forces[at], history_force.convolved(motion, reading)), 0.0)
+                for at, motion in group.items()
+            ]
+            rows.append(worst(f"history force, {name}: deviation from the kernel {words}", points, note=note))
+    return rows
+
+
 def landings(curves: Curves) -> list[Row]:
     """The sphere of ten Cate et al. falls to the floor of their box, with the extra drag beside walls."""
-    rows, spheres = [], reference("tencate2002_cases")
-    for row in (0, 2):
-        density, viscosity, terminal, fastest = (
-            float(spheres[name][row]) for name in ("rho_f [kg/m3]", "mu_f [Pa s]", "u_inf [m/s]", "u_max [m/s]")
-        )
-        for walls in ("none", "nearest", "all"):
-            name = f"ten Cate {spheres['case'][row]}, drag beside walls: {walls}"
-            gaps, speeds = landing.land(density, viscosity, walls)  # type: ignore[arg-type]
-            exact = landing.landing_ode(density, viscosity, walls, gaps)  # type: ignore[arg-type]
-            curves[f"landing/{spheres['case'][row]}_{walls}"] = {
+    rows = []
+    for case, oil in _oils().items():
+        for walls in landing.WALLS:
+            name = f"ten Cate {case}, drag beside walls: {walls}"
+            gaps, speeds = landing.land(oil.density, oil.viscosity, walls, 1e-4)
+            exact = landing.landing_ode(oil.density, oil.viscosity, walls, gaps)
+            curves[f"landing/{case}_{walls}"] = {
                 "gap": (gaps, "m"), "speed": (speeds, "m/s"), "equation": (exact, "m/s"),
             }  # fmt: skip
-            away = np.abs(speeds - exact) / terminal
+            away = np.abs(speeds - exact) / oil.endless
             rows.append(
                 Row(f"{name}: largest deviation from the equation of motion, over u_inf", away.max(), 0.0, 0.01)
             )
             last = away[gaps < 2.0 * landing.RADIUS].max()
             rows.append(Row(f"{name}: the same in the last diameter over the floor", last, 0.0, 0.05))
-            rows.append(Row(f"{name}: largest speed over measured", speeds.max() / fastest, 1.0))
-        for cell in (4.0, 2.0):
-            name = f"ten Cate {spheres['case'][row]} over a floor, coupled run, cells of {cell:g} d"
-            gaps, speeds = landing.land_on_grid(density, viscosity, cell)
-            exact = landing.landing_ode(density, viscosity, "nearest", gaps, floor_alone=True)
-            away = float(np.abs(speeds - exact).max()) / terminal
+            rows.append(Row(f"{name}: largest speed over measured", speeds.max() / oil.fastest, 1.0))
+        for cell in (4.0, 2.0) if case in COUPLED else ():
+            name = f"ten Cate {case} over a floor, coupled run, cells of {cell:g} d"
+            gaps, speeds = landing.land_on_grid(oil.density, oil.viscosity, cell)
+            exact = landing.landing_ode(oil.density, oil.viscosity, "nearest", gaps, floor_alone=True)
+            away = float(np.abs(speeds - exact).max()) / oil.endless
             rows.append(Row(f"{name}: largest deviation from the equation of motion, over u_inf", away, 0.0, 0.01))
     return rows
+
+
+class Oil(NamedTuple):
+    """One of the oils of ten Cate et al., and their sphere in it."""
+
+    density: float  # [kg/m3]
+    viscosity: float  # [Pa s]
+    endless: float  # terminal velocity without walls [m/s]
+    fastest: float  # largest speed measured in the box [m/s]
+
+
+def _oils() -> dict[str, Oil]:
+    """Oils by the name of their case; where the largest speed is not printed, by its ratio to u_inf."""
+    listed, found = reference("tencate2002_cases"), {}
+    for row, case in enumerate(listed["case"]):
+        density, viscosity, endless, ratio = (
+            float(listed[name][row]) for name in ("rho_f [kg/m3]", "mu_f [Pa s]", "u_inf [m/s]", "u_max_over_u_inf [-]")
+        )
+        printed = listed["u_max [m/s]"][row]
+        fastest = float(printed) if printed[0].isdigit() else ratio * endless
+        found[case] = Oil(density, viscosity, endless, fastest)
+    return found
 
 
 def dem06(curves: Curves) -> list[Row]:
@@ -196,7 +244,7 @@ STIRRED = Case.from_text(
     },
 )
 
-PARTS = (terminal_velocities, released, landings, dem06, packed, conserved, liquid_beds)
+PARTS = (terminal_velocities, released, remembered, landings, dem06, packed, conserved, liquid_beds)
 
 
 def _draw(folder: Path, curves: Curves) -> None:
@@ -211,7 +259,7 @@ def _draw(folder: Path, curves: Curves) -> None:
         label="uncorrected",
     )
     axes[0].semilogx(
-        terminal["reynolds"][0], terminal["velocity"][0], "s-", color=BLUE, label="corrected, worst of nine"
+        terminal["reynolds"][0], terminal["velocity"][0], "s-", color=BLUE, label="corrected,\nworst of nine"
     )
     axes[0].axhline(1.0, color="black", linewidth=0.5)
     label(axes[0], "Reynolds number", "-", "terminal velocity over that of the drag law", "-")

@@ -35,6 +35,7 @@ from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
+from cfddem.particles.far_films import rates_of_films
 from cfddem.particles.state import Particles, added_mass
 from closures.registry import Law
 
@@ -97,7 +98,8 @@ class AddedMass:
             ratio = self.coefficient(voidage[rows]) * self.density / particles.density[rows]
             after = 1.0 / particles.mass[rows] / (1.0 + ratio)
             particles.inverse_mass[rows] = after
-            particles.film_rate[rows] *= after / before  # a resistance over the inertia
+            for rate in rates_of_films(particles):
+                rate[rows] *= after / before  # a resistance over the inertia
             change[rows] = 1.0 / after - 1.0 / before
         return change
 

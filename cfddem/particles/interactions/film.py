@@ -21,6 +21,7 @@ from cfddem.particles.interactions.shear_film import edge_asymmetry, renew_shear
 from cfddem.particles.interactions.slots import (
     COUNT_FILM,
     COUNT_GAP,
+    FAR,
     SHEAR,
     USER_GAP,
     FilmState,
@@ -33,7 +34,7 @@ from cfddem.particles.interactions.slots import (
     speed_after_short_film,
     user_minimum_gap,
 )
-from cfddem.particles.pair_graph import THICKEST, geometry
+from cfddem.particles.pair_graph import THICKEST, geometry, is_far
 from cfddem.particles.vectors import LEAST, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
@@ -149,12 +150,13 @@ def clamp_speed(new_speed, speed):
 
 
 @inline
-def film_impulse_short(speed, film, rate, memory, step):
+def film_impulse_short(speed, film, rate, memory, far, step):
     """Impulse of a film over the coming step and the gap up to which it is given, where the gap hardly changes.
 
     film     :class:`~cfddem.particles.interactions.slots.FilmState`
     rate     resistance of all films over the mass, summed over both particles [1/s]
     memory   resistance, approach speed and accounted gap
+    far      the film acts once in several steps; then it may return what it has taken too much
     returns  impulse [N s], accounted gap [m], and whether `film_impulse` must find them instead
     """
     resistance, approach_speed, accounted_gap = memory
@@ -163,11 +165,12 @@ def film_impulse_short(speed, film, rate, memory, step):
     new_speed = speed_after_short_film(speed, film, accounted_gap, step, strength_per_mass, inverse_mass)
     faster = -speed > approach_speed and film.gap > film.minimum_gap
     found = new_speed == new_speed and not faster
-    new_speed = clamp_speed(new_speed, speed)
+    ahead = FAR and not far and abs(new_speed) > abs(speed)
+    new_speed = new_speed if far else clamp_speed(new_speed, speed)
     impulse = (new_speed - speed) * resistance / max(rate, LEAST)
     return (
         impulse if within and found else 0.0,
-        film.gap + step * new_speed if within and found else accounted_gap,
+        film.gap + step * new_speed if within and found and not ahead else accounted_gap,
         within and not found,
     )
 
@@ -187,9 +190,10 @@ def film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
         return
     normal_speed = dot(relative_velocity(k, particles, edges), normal)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    rate = particles.film_rate[i]
+    rates = particles.far_rate if FAR and is_far(k, edges) else particles.film_rate
+    rate = rates[i]
     if k < edges.between_particles:
-        rate += particles.film_rate[j]
+        rate += rates[j]
     strength_per_mass = rate * max(gap, memory.minimum_gap[k])
     inverse_mass = rate * portion(edges, k) / memory.resistance[k]
     viscosity, row = pair_viscosity(k, particles, edges), pair_row(k, particles, edges, walls, table)
@@ -199,6 +203,9 @@ def film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
     new_speed = speed_after_film(normal_speed, film, given, step, strength_per_mass, inverse_mass)
     if COUNT_FILM:
         memory.outside[k] += film_outside(at_least(film))
-    new_speed = clamp_speed(new_speed, normal_speed)
-    memory.accounted_gap[k] = gap + step * new_speed
+    far = FAR and is_far(k, edges)
+    ahead = FAR and not far and abs(new_speed) > abs(normal_speed)
+    new_speed = new_speed if far else clamp_speed(new_speed, normal_speed)
+    if not ahead:  # the impulse of a far film has been given for several steps, and the pair is in another list now
+        memory.accounted_gap[k] = gap + step * new_speed
     put(memory.impulse, k, times((new_speed - normal_speed) * memory.resistance[k] / rate, normal))

@@ -10,6 +10,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
+from cfddem.particles import far_films
 from cfddem.particles.interactions import bridge, contact, film, rolling, shear_film
 from cfddem.particles.interactions.bridge_law import NO_BRIDGE, BridgeLaws
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
@@ -43,6 +44,7 @@ class Laws(NamedTuple):
                           :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
     film_motions          motions that films resist: along the line of centres ("normal"), and sliding and rolling
                           ("full"), and twisting ("full_twist")
+    far_film_steps             films of pairs that cannot touch before the next list act once in this many steps
     bridge                laws of liquid bridges, where particles carry liquid
     """
 
@@ -58,10 +60,13 @@ class Laws(NamedTuple):
     lubrication: Callable[..., float] | FilmLaw | None = None
     bridge: BridgeLaws | None = None
     film_motions: str = "normal"
+    far_film_steps: int = 1
 
     def dry(self) -> Laws:
         """The same laws without films and bridges."""
-        return self._replace(film=False, minimum_gap=None, lubrication=None, bridge=None, film_motions="normal")
+        return self._replace(
+            film=False, minimum_gap=None, lubrication=None, bridge=None, film_motions="normal", far_film_steps=1
+        )
 
     def check(self) -> None:
         """Refuse unknown words, laws that cannot be compiled, and choices that exclude each other."""
@@ -75,6 +80,14 @@ class Laws(NamedTuple):
         if self.shears and not (self.film and self.integrator == "drift"):
             raise InputError(
                 "film_motions", self.film_motions, '"normal" without films, and with the integrator "verlet"'
+            )
+        if self.far_film_steps < 1:
+            raise InputError("far_film_steps", self.far_film_steps, "at least 1")
+        if self.far_film_steps > 1 and (not self.film or self.integrator != "drift" or self.shears or self.bridge):
+            raise InputError(
+                "far_film_steps",
+                self.far_film_steps,
+                "1 unless films act by impulses, along the line of centres, without bridges",
             )
         if self.bridge is not None:
             self.bridge.check()
@@ -132,7 +145,8 @@ class Laws(NamedTuple):
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
         of_bridges = () if self.bridge is None else bridge.PARTICLE_FIELDS
-        return (*of_bridges, *shear_film.PARTICLE_FIELDS) if self.shears else of_bridges
+        of_far_films = far_films.FIELDS if self.far_film_steps > 1 else ()
+        return (*of_bridges, *of_far_films, *(shear_film.PARTICLE_FIELDS if self.shears else ()))
 
     @property
     def kept_apart(self) -> set[str]:
@@ -141,7 +155,7 @@ class Laws(NamedTuple):
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
-        return _choices(self.contact_law, self._replace(contact=""))
+        return _choices(self.contact_law, self._replace(contact="", far_film_steps=min(self.far_film_steps, 2)))
 
 
 @lru_cache(maxsize=64)
@@ -155,6 +169,7 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "ROLLING": laws.rolling != "none",
         "rolling_torque": rolling.ROLLINGS[laws.rolling],
         **(built_in() if laws.film else {}),
+        "FAR": laws.far_film_steps > 1,
         "POTENTIAL": False,
         "SHEAR": laws.shears,
         "TWIST": laws.film_motions == "full_twist",

@@ -43,6 +43,9 @@ PairParticles = namedtuple("PairParticles", "position velocity spin radius inver
 ShearParticles = namedtuple("ShearParticles", "velocity spin radius viscosity slip_rate turn_rate")
 """The same of the loop over films that resist sliding."""
 
+FarParticles = namedtuple("FarParticles", "velocity radius viscosity far_rate")
+"""The same of the loop over films of pairs that cannot touch."""
+
 PairEnds = namedtuple("PairEnds", "first second image")
 """Arrays of the graph that loops over pairs read."""
 
@@ -114,7 +117,18 @@ def keep_geometry(k, separation, distance, gap, memory):
 @inline
 def pair_impulse(n, particles, edges, memory, cutoff_ratio, step):
     """Impulse of the film of one pair of particles."""
-    k = np.uint64(n)
+    impulse_of_pair(np.uint64(n), particles, particles.film_rate, edges, memory, cutoff_ratio, False, step)
+
+
+@inline
+def far_impulse(n, particles, edges, memory, cutoff_ratio, step):
+    """The same of one pair that cannot touch, where its film acts once in several steps."""
+    impulse_of_pair(np.uint64(n), particles, particles.far_rate, edges, memory, cutoff_ratio, True, step)
+
+
+@inline
+def impulse_of_pair(k, particles, rates, edges, memory, cutoff_ratio, far, step):
+    """Impulse of the film of edge k; `rates` are the resistances of films over the mass that share out the mass."""
     i, j = edges.first[k], edges.second[k]
     normal, gap = at(memory.film_normal, k), memory.film_gap[k]
     reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
@@ -122,8 +136,8 @@ def pair_impulse(n, particles, edges, memory, cutoff_ratio, step):
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
     then = (memory.resistance[k], memory.approach_speed[k], memory.accounted_gap[k])
-    rate = particles.film_rate[i] + particles.film_rate[j]
-    size, given, left = film_impulse_short(speed, film, rate, then, step)
+    rate = rates[i] + rates[j]
+    size, given, left = film_impulse_short(speed, film, rate, then, far, step)
     if COUNT_FILM:
         memory.outside[k] += film_outside(at_least(film)) if then[0] > 0.0 and not left else 0
     memory.accounted_gap[k] = given
@@ -144,6 +158,7 @@ LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force, "shift, rows, kinds, cutoff_ratio, p, free, step"),
     "update_films": PairLoop(pair_film, "shift, rows, kinds, cutoff_ratio", needed_by="FILM"),
     "film_impulses": PairLoop(pair_impulse, "cutoff_ratio, step", needed_by="FILM"),
+    "far_impulses": PairLoop(far_impulse, "cutoff_ratio, step", FarParticles, "FAR"),
     "shear_impulses": PairLoop(pair_shear, "step", ShearParticles, "SHEAR"),
     "pair_bridges": PairLoop(pair_bridge, "shift, p", WetParticles, "BRIDGE"),
     "bridge_impulses": PairLoop(pair_bridge_impulse, "shift, step", WetParticles, "BRIDGE"),

@@ -17,7 +17,7 @@ from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.kinematics import relative_velocity
 from cfddem.particles.interactions.slots import TWIST, shear_impulses
-from cfddem.particles.pair_graph import edge_role, geometry
+from cfddem.particles.pair_graph import edge_role, geometry, places_of
 from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.tangential_lubrication import (
@@ -40,8 +40,8 @@ FIELDS = (
         "1",
         9,
         "scratch",
-        meaning="impulse of the film against sliding, on the first body [N s]; its angular impulse per radius, the "
-        "same on both [N s]; angular impulse against rolling, on the first [N m s]",
+        meaning="impulse of the film against sliding, on the first body [N s]; its angular impulses on the first and "
+        "on the second body [N m s]",
     ),
 )
 """What pairs remember of the films between them that resist sliding."""
@@ -141,12 +141,12 @@ def twisted(twist, gap, minimum_gap, resistance, viscosity, inertia_rate, reduce
 
 
 @inline
-def write_impulse(k, memory, impulse, couple, moment):
-    """Write what the film of edge k does in this step."""
+def write_impulse(k, memory, impulse, first, second):
+    """Write what the film of edge k does in this step: impulse, and angular impulses on the first and second body."""
     row = _3 * np.uint64(k)
     put(memory.shear_impulse, row, impulse)
-    put(memory.shear_impulse, row + _1, couple)
-    put(memory.shear_impulse, row + _2, moment)
+    put(memory.shear_impulse, row + _1, first)
+    put(memory.shear_impulse, row + _2, second)
 
 
 @inline
@@ -192,7 +192,9 @@ def pair_shear(n, particles, edges, memory, step):
             asymmetry, 1.0, step,
         )  # fmt: skip
         moment = plus(moment, times(size, normal))
-    write_impulse(k, memory, impulse, times(lever, cross(impulse, normal)), moment)
+    couple = times(lever, cross(impulse, normal))
+    first, second = plus(times(radius[i], couple), moment), minus(times(radius[j], couple), moment)
+    write_impulse(k, memory, impulse, first, second)
 
 
 @inline
@@ -218,7 +220,8 @@ def wall_shear(k, particles, edges, memory, walls, shift, step):
             portion(edges, k), step,
         )  # fmt: skip
         moment = plus(moment, times(size, normal))
-    write_impulse(k, memory, impulse, cross(impulse, normal), moment)
+    first = plus(times(radius, cross(impulse, normal)), moment)
+    write_impulse(k, memory, impulse, first, minus(NOTHING, moment))
 
 
 @part
@@ -232,16 +235,15 @@ def find_wall_shear(particles, edges, memory, walls, shift, step):
 def apply_shear_impulses(particles, edges, memory):
     """Give every particle the impulses of its films against sliding and rolling."""
     for i in prange(particles.owned):
-        impulse, couple, moment = NOTHING, NOTHING, NOTHING
-        for place in range(edges.start[i], edges.start[i + 1]):
+        impulse, couple = NOTHING, NOTHING
+        for place in places_of(i, edges):
             k, sign = edge_role(edges.incident[place])
-            push, turn, torque = impulses_of(k, memory)
-            impulse = plus(impulse, times(sign, push))
-            couple = plus(couple, turn)
-            moment = plus(moment, times(sign, torque))
+            row = _3 * k
+            impulse = plus(impulse, times(sign, at(memory.shear_impulse, row)))
+            couple = plus(couple, at(memory.shear_impulse, row + (_1 if sign > 0.0 else _2)))
         gain = times(particles.inverse_mass[i], impulse)
         put(particles.velocity, i, plus(at(particles.velocity, i), gain))
-        gain = times(particles.inverse_inertia[i], plus(times(particles.radius[i], couple), moment))
+        gain = times(particles.inverse_inertia[i], couple)
         put(particles.spin, i, plus(at(particles.spin, i), gain))
 
 

@@ -43,6 +43,7 @@ SIDES = (
 LID = Plane(point=(0.0, 0.0, HEIGHT), normal=(0.0, 0.0, -1.0))
 
 Walls = Literal["none", "nearest", "all"]
+WALLS: tuple[Walls, ...] = ("none", "nearest", "all")
 
 
 def land(density: float, viscosity: float, walls: Walls, step: float = 5e-4) -> tuple[np.ndarray, np.ndarray]:
@@ -50,6 +51,7 @@ def land(density: float, viscosity: float, walls: Walls, step: float = 5e-4) -> 
 
     density, viscosity  of the oil [kg/m3], [Pa s]
     walls               that raise the drag; the film on the floor acts always
+    step                of the fluid; the sphere should move by little more than the gap at which it lands [s]
     """
     place = [[0.5 * WIDTH, 0.5 * WIDTH, RELEASE + RADIUS]]
     run = ParticleSolver(

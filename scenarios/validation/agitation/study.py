@@ -40,6 +40,9 @@ COMPARED = {
 KEPT = (*COMPARED.values(), "averaged", "reynolds")
 """Measured values of a box that are kept in its file."""
 
+FURTHER: dict[str, Any] = {"laws.added_mass": 0.5, "laws.history": "mei_adrian"}
+"""Forces that the closure was fitted without; the boxes are run with them, too."""
+
 PUBLISHED = {0.009: 0.635, 0.012: 0.703}
 """Velocity [m/s] and mean of the published voidages of alginate beads, where the law acts."""
 
@@ -83,7 +86,10 @@ def fits() -> Iterator[Row]:
 
 
 def boxes(folder: Path, progress: Progress) -> Iterator[Row]:
-    """The unresolved model over the resolved runs, mean of the seeds; limits for points that are not fitted."""
+    """The unresolved model over the resolved runs, mean of the seeds; limits for points that are not fitted.
+
+    With added mass and history force, which the closure was fitted without, no row has a limit.
+    """
     points: dict[str, list[dict[str, Any]]] = {}
     for row in even_rows():
         points.setdefault(matrix.name(Point(**{**row["point"], "seed": 1})), []).append(row)
@@ -91,21 +97,31 @@ def boxes(folder: Path, progress: Progress) -> Iterator[Row]:
         point, is_fitted = rows[0]["point"], fitted(rows[0])
         name = f"density ratio {point['density_ratio']:g}, solid fraction {point['solid_fraction']:g}"
         progress(name)
-        found = [_box(folder, row) for row in rows]
-        for quantity, key in COMPARED.items():
-            model, resolved = (float(np.mean([_value(each[key]) for each in some])) for some in (found, rows))
-            note = f"{model:.3g} for {resolved:.3g}, {len(rows)} seeds" + (", fitted to its force" if is_fitted else "")
-            yield Row(f"{name}: {quantity}", model / resolved, 1.0, None if is_fitted else LIMIT, note=note)
+        rule, of_fit = (None, ", fitted to its force") if is_fitted else (LIMIT, "")
+        yield from _compared(name, [_box(folder, row) for row in rows], rows, rule, of_fit)
+        name += ", with added mass and history force"
+        progress(name)
+        yield from _compared(name, [_box(folder, row, "-further", **FURTHER) for row in rows], rows, None, of_fit)
 
 
-def _box(folder: Path, row: dict[str, Any]) -> dict[str, Any]:
-    """What the unresolved model gives in the box of a resolved run."""
+def _compared(
+    name: str, found: list[dict[str, Any]], rows: list[dict[str, Any]], limit: float | None, remark: str
+) -> Iterator[Row]:
+    """Means of the unresolved model over those of the resolved runs."""
+    for quantity, key in COMPARED.items():
+        model, resolved = (float(np.mean([_value(each[key]) for each in some])) for some in (found, rows))
+        note = f"{model:.3g} for {resolved:.3g}, {len(rows)} seeds{remark}"
+        yield Row(f"{name}: {quantity}", model / resolved, 1.0, limit, note=note)
+
+
+def _box(folder: Path, row: dict[str, Any], ending: str = "", **changes: Any) -> dict[str, Any]:
+    """What the unresolved model gives in the box of a resolved run, with further keys of the case."""
 
     def compute() -> dict[str, Any]:
-        found = run(row)
+        found = run(row, **changes)
         return {name: found[name] for name in KEPT}
 
-    return kept(folder / f"box-{matrix.name(Point(**row['point']))}.json", compute)
+    return kept(folder / f"box-{matrix.name(Point(**row['point']))}{ending}.json", compute)
 
 
 def _value(mean: Any) -> float:

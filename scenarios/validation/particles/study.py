@@ -187,7 +187,7 @@ def sliding_films(curves: Curves) -> list[Row]:
     return rows
 
 
-SLOPES = {"dry": "dry", "wet": "under water", "wet_overlap": "under water,\nfriction at overlap"}
+SLOPES = {"dry": "dry", "wet": "under water", "wet_overlap": "under water,\nfriction\nat overlap"}
 
 
 def _draw(folder: Path, curves: Curves) -> None:
@@ -204,7 +204,7 @@ def _draw(folder: Path, curves: Curves) -> None:
         part = curves[f"slope/friction_0.5_{name}"]
         axes[2].plot(part["angle"][0], 1e3 * np.asarray(part["speed"][0]), color=colour, ls=dashes, label=SLOPES[name])
     label(axes[2], "tilt", "deg", "mean speed", "mm/s")
-    legend(axes[2])
+    legend(axes[2], loc="upper left")
     save(figure, folder / "particles.png")
 
 

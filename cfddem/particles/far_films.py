@@ -1,0 +1,93 @@
+"""Films of pairs that cannot touch before the next neighbour list, which may act once in several steps.
+
+These far films are weak: in one step they hardly slow a pair down. Their impulse is a difference of potentials between
+two gaps, so nothing is lost where it is given for several steps at once. In every n-th step, before the other films,
+
+    far kick     impulses of the far films over n steps: of every pair, then of every particle
+
+and only before these steps are gap and resistance of far films found. Each group of films has its own sum of
+resistances: the far films share out the whole mass of a particle, and so do the others.
+
+What moves a pair between two kicks is not foreseen. Where a film has taken more than the gap then allows, it returns
+the rest in its next kick; all other films only take.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cfddem.backend.compile import inline, part, prange, serial
+from cfddem.data.fields import Field
+from cfddem.particles.interactions.film import film_impulse
+from cfddem.particles.interactions.slots import far_impulses, update_films
+from cfddem.particles.pair_graph import edge_role, is_far, places_of
+from cfddem.particles.state import Particles
+from cfddem.particles.vectors import NOTHING, at, plus, put, times
+
+FIELDS = (Field("far_rate", "1/s", halo=("far",), meaning="resistance of the far films of the particle over its mass"),)
+"""Fields of particles whose far films act once in several steps."""
+
+
+@inline
+def sum_rates(i, particles, edges, memory):
+    """Sum the resistances of the films of particle i over its mass, those of far films apart."""
+    near = far = 0.0
+    for place in places_of(i, edges):
+        k, _ = edge_role(edges.incident[place])
+        resistance = memory.resistance[k]
+        if is_far(k, edges):
+            far += resistance
+        else:
+            near += resistance
+    particles.film_rate[i] = particles.inverse_mass[i] * near
+    particles.far_rate[i] = particles.inverse_mass[i] * far
+
+
+@part
+def _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Impulses of the far films that change much within their step."""
+    for k in prange(edges.near, edges.between_particles):
+        if memory.hard[k]:
+            film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+
+
+@part
+def _apply(particles, edges, memory):
+    """Give every particle the impulses of its far films."""
+    for i in prange(particles.owned):
+        impulse = NOTHING
+        for place in places_of(i, edges):
+            k, sign = edge_role(edges.incident[place])
+            if is_far(k, edges):
+                impulse = plus(impulse, times(sign, at(memory.impulse, k)))
+        put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
+
+
+@serial
+def far_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Give the particles the impulses of their far films.
+
+    step  for which they are given: several steps of the run [s]
+    """
+    far_impulses(edges.near, edges.between_particles, particles, edges, memory, cutoff_ratio, step)
+    _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+    _apply(particles, edges, memory)
+
+
+@part
+def _sum_all_rates(particles, edges, memory):
+    for i in prange(particles.owned):
+        sum_rates(i, particles, edges, memory)
+
+
+@serial
+def sort_films(particles, edges, memory, shift, table, cutoff_ratio):
+    """After a new list, in which other pairs are far: films at the present positions, and their sums."""
+    pairs, kinds, rows = edges.between_particles, np.uint64(len(table)), table.reshape(-1)
+    update_films(0, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
+    _sum_all_rates(particles, edges, memory)
+
+
+def rates_of_films(particles: Particles) -> list[np.ndarray]:
+    """Resistances of films over the inertia of the particles, which change with it."""
+    return [particles[name] for name in ("film_rate", "far_rate") if name in particles]
