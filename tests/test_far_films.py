@@ -46,6 +46,7 @@ def restitution(far_film_steps: int) -> float:
     return float(run.particles.velocity[1, 0] - run.particles.velocity[0, 0]) / 0.5
 
 
+@pytest.mark.slow
 def test_a_collision_is_that_of_every_step() -> None:
     """Within 1e-3: nothing of the impulse is lost, which is a difference of potentials."""
     whole = restitution(1)
@@ -54,6 +55,7 @@ def test_a_collision_is_that_of_every_step() -> None:
     assert restitution(10) != whole
 
 
+@pytest.mark.slow
 def test_films_take_energy_at_any_viscosity() -> None:
     """In a liquid as thick as syrup, where far films stop a pair within their step, no speed grows or turns round."""
     run, step = meeting(50, 1.2, check_steps=False)

@@ -124,8 +124,8 @@ def test_the_study_is_one_command_and_goes_on_where_it_was(tmp_path: Path, monke
     """With runs that give the resolved values and beds in balance, all limits hold; the second time nothing is run."""
     computed: list[str] = []
 
-    def box(row: dict[str, Any]) -> dict[str, Any]:
-        computed.append(matrix.name(Point(**row["point"])))
+    def box(row: dict[str, Any], **forces: Any) -> dict[str, Any]:
+        computed.append(matrix.name(Point(**row["point"])) + ", further forces" * bool(forces))
         return row
 
     def fluidised(described: Study, velocity: float, **changes: Any) -> FluidisedBed:

@@ -214,10 +214,10 @@ def test_a_comparison_shows_that_the_source_of_a_law_differs(tmp_path: Path) -> 
     assert not any("the cases are the same" in line for line in lines(found))
 
 
-def test_any_use_outside_of_the_range_gives_a_warning(tmp_path: Path) -> None:
+def test_any_use_outside_of_the_range_is_reported(tmp_path: Path) -> None:
     import h5py
 
     with h5py.File(made_up(tmp_path / "run") / "history.h5", "r+") as file:
         file["out_of_range_count"][:] = 3.0
-    said = "\n".join(report(tmp_path / "run")["warnings"])
+    said = "\n".join(each for group in report(tmp_path / "run")["advice"].values() for each in group)
     assert "outside of its fitted range in 3.75e-05 % of its uses (3 times)" in said
