@@ -37,6 +37,8 @@ inlet_velocity = 0.05
 [run]
 until = 2.0
 average_from = 1.0
+[laws]
+agitation = "none"
 """
 WEIGHT = 2000 * math.pi / 6.0 * 8e-9 * 1500.0 * 9.81 / 0.02**2
 """Buoyant, over the floor [Pa]."""

@@ -99,6 +99,12 @@ def test_stated_errors_are_those_that_are_found() -> None:
     assert 0.7 < np.sqrt((off**2).mean()) < 1.15
 
 
+def test_a_search_that_fits_nothing_does_not_say_that_the_data_hardly_depend_on_a_key() -> None:
+    assert calibration._verdict(False, (), True, agrees=True).startswith("not identified: the data hardly depend")
+    lost = calibration._verdict(False, (), True, agrees=False)
+    assert lost == "not known: no value in its range agrees with the data; widen it, the best is at its end"
+
+
 def test_a_parameter_without_effect_is_not_identified() -> None:
     random = np.random.default_rng(2)
     shares, error = random.random((30, 2)), np.full(12, 0.02)

@@ -140,6 +140,8 @@ def test_every_renamed_key_leads_to_a_valid_one() -> None:
         (b"[a]\nb = 1\n[a]\nc = 3", ":3: a: must be given once; line 1 gives it, too"),
         (b"a = 1\nuntil = 1,7\n", ":2: must be valid TOML; Expected newline or end of document after a statement in"),
         (b"until = 1,7 # s\n", "; decimals have a point: 1.7"),
+        (b"until = 1.7 s\n", "; numbers stand without a unit, in SI units: 1.7"),
+        (b"start = expanded\n", "must be valid TOML; Invalid value in column 9; strings need quotation marks"),
         (b"[material]\ndensity = 1.0", ":1: material: must be a table [material.NAME] for each solid"),
         (b"x = '" + b"x" * LONGEST_FILE + b"'", "must be at most 500 kB"),
         (b"x = " + b"[" * 100_000, "must be a case with lists and tables nested a few levels deep"),
@@ -150,7 +152,7 @@ def test_every_renamed_key_leads_to_a_valid_one() -> None:
         (b"x = " + b"9" * 5000, "must be valid TOML; Exceeds the limit"),
         (b"", "must be given"),
     ],
-    ids=range(12),
+    ids=range(14),
 )
 def test_a_file_that_is_no_case_is_refused_in_short_lines(tmp_path: Path, content: bytes, said: str) -> None:
     path = tmp_path / "bed.toml"

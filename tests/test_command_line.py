@@ -281,6 +281,9 @@ def test_a_sweep_keeps_finished_runs_lists_failed_ones_and_continues(
     outcomes = json.loads(again.out)
     assert [each["kept"] for each in outcomes] == [True, True, False, False]
     assert written == {path: path.stat().st_mtime_ns for path in (tmp_path / "many").glob("*/data/*.h5")}
+    (tmp_path / "heights.csv").write_text("velocity [m/s], bed height [m]\n0.1, 0.03\n")
+    data = call(*line, "--json", "--set", f"compare.heights.file={tmp_path / 'heights.csv'}")
+    assert [each["kept"] for each in json.loads(data.out)] == [True, True, False, False], "data change nothing in a run"
     other = call(*line, "--set", "diameter=0.003")
     assert "a folder of the same case" in other.err
 

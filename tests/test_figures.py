@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cfddem.case.compare import Points
 from cfddem.plotting import curves, sweep_figure
 from cfddem.plotting.colours import colour_map
 
@@ -147,5 +148,9 @@ def test_a_sweep_joins_numbers_and_never_words(tmp_path: Path, monkeypatch: pyte
         assert sweep_figure.sweep_figure(each, tmp_path / "sweep.png")
     (both,), (alone,) = drawn[0].axes, drawn[1].axes
     assert both.get_xlabel() == "bed.inlet_velocity  [m/s]" and alone.get_xlabel() == "laws.drag"
+    curve = Points("mine", "bed_height", "m", "inlet_velocity", np.array([0.04]), np.array([0.05]), np.array([np.nan]))
+    assert sweep_figure.sweep_figure(points, tmp_path / "sweep.png", [curve])
+    (measured,) = drawn[2].axes
+    assert measured.containers[-1].get_label() == "measured: mine" and len(measured.containers) == 3
     curves_of = [each.lines[0].get_linestyle() for panel in (both, alone) for each in panel.containers]
     assert curves_of == ["-", "-", "None"]

@@ -35,6 +35,12 @@ def table(name: str) -> list[dict[str, float]]:
     return [dict(zip(columns, map(float, line))) for line in zip(*columns.values())]
 
 
+def test_a_collision_prints_in_a_few_lines_and_a_name_is_no_material() -> None:
+    assert len(repr(collide(MATERIALS["delrin"], velocity=0.1, stokes=30))) < 400
+    with pytest.raises(InputError, match=r"material = 'delrin': must be a Material, such as MATERIALS\['glass'\]"):
+        collide("delrin", velocity=0.1, stokes=30)  # type: ignore[arg-type]
+
+
 def test_materials_are_those_of_yang_and_hunt() -> None:
     columns = reference("immersed_materials_yang_hunt")
     names = {"steel ball bearing": "steel_smooth", "steel bead": "steel_rough", "glass sphere": "glass"}

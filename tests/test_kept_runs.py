@@ -9,6 +9,7 @@ import pytest
 from disturbed_runs import TINY
 
 from cfddem.case.schema import Case
+from cfddem.io.kept_files import holds_surfaces_of, keep_files
 from cfddem.run import runner
 from scenarios.validation.kept_runs import finished, kept
 
@@ -23,6 +24,17 @@ def test_a_run_reports_where_it_is_and_is_not_repeated(tmp_path: Path, monkeypat
     said.clear()
     assert finished(case, tmp_path, "run", said.append, {"bed.seed": 3}).steps[-1] == first.steps[-1]
     assert said == []
+
+
+def test_another_surface_is_another_case(tmp_path: Path) -> None:
+    wall = '[[wall]]\nshape = "surface"\nfile = "part.stl"\n'
+    (tmp_path / "case.toml").write_text(TINY + wall)
+    (tmp_path / "part.stl").write_bytes(b"one")
+    case = Case.from_toml(tmp_path / "case.toml")
+    keep_files(case, tmp_path)
+    assert holds_surfaces_of(case, tmp_path)
+    (tmp_path / "part.stl").write_bytes(b"another")
+    assert not holds_surfaces_of(case, tmp_path)
 
 
 def test_numbers_are_computed_once(tmp_path: Path) -> None:

@@ -163,7 +163,7 @@ def test_a_package_that_could_not_be_loaded_is_named() -> None:
 
 
 def test_a_run_is_read_without_the_law_that_it_used(tmp_path: Path) -> None:
-    text = f'{BED}[laws]\ndrag = "narrow"\nagitation = "wild"\n'
+    text = BED.replace('agitation = "none"', 'drag = "narrow"\nagitation = "wild"')
     result = report(_with_case(made_up(tmp_path / "run"), text))
     said = "\n".join(result["warnings"])
     assert "law narrow (laws.drag) is not installed here: no prediction" in said and "law wild" in said

@@ -37,17 +37,21 @@ def test_no_gallery_case_has_errors(name: str) -> None:
 
 def test_a_gallery_case_with_a_warning_explains_it() -> None:
     for name in ("liquid-bed", "packed-bed", "sedimentation", "segregation"):
-        assert preflight(GALLERY[name]).status == "ok", preflight(GALLERY[name]).issue_lines()
-    for name, key in (
-        ("settling", "material.glass.contact_modulus"),
-        ("lubrication-study", "material.sphere.contact_modulus"),
-        ("gas-bed", "material.seed.contact_modulus"),
-        ("gas-bed-flat", "material.polystyrene.contact_modulus"),
-        ("defluidisation", "material.seed.contact_modulus"),
-        ("spouted-bed", "material.glass.contact_modulus"),
+        assert not preflight(GALLERY[name]).issues, preflight(GALLERY[name]).issue_lines()
+    for name, key, severity in (
+        ("settling", "material.glass.contact_modulus", "note"),
+        ("lubrication-study", "material.sphere.contact_modulus", "note"),
+        ("gas-bed", "material.seed.contact_modulus", "note"),
+        ("gas-bed-flat", "material.polystyrene.contact_modulus", "note"),
+        ("defluidisation", "material.seed.contact_modulus", "note"),
+        ("spouted-bed", "material.glass.contact_modulus", "warning"),
     ):
-        assert [each.key for each in preflight(GALLERY[name]).issues] == [key]
-        assert "`cfddem check` warns" in gallery()[name].read_text()
+        found = preflight(GALLERY[name])
+        assert [(each.key, each.severity) for each in found.issues] == [(key, severity)]
+        assert found.status == ("ok" if severity == "note" else "warning")
+        assert ("`cfddem check` warns" if severity == "warning" else "`cfddem check` notes") in gallery()[
+            name
+        ].read_text()
 
 
 def test_a_bed_that_breaks_up_without_agitation_is_warned_of() -> None:
@@ -200,7 +204,7 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ({"run.particle_step": 5e-5}, "warning", "run.particle_step", "2 % of the Hertz time"),
         ({"material.alumina.contact_modulus": 1e4}, "error", "material.alumina.contact_modulus", "the limit is 2 %"),
         (
-            {"material.alumina.contact_modulus": 5e5},
+            {"material.alumina.contact_modulus": 8e4},
             "warning",
             "material.alumina.contact_modulus",
             "the limit is 2 %",
@@ -220,7 +224,8 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ),
         ({"laws.drag": "schiller_naumann"}, "warning", "laws.drag", "is for single spheres"),
         ({"laws.lift": True}, "warning", "laws.lift", "lift is 0.42 % of the drag"),
-        ({"laws.agitation": "free_spheres"}, "warning", "laws.agitation", "changes bed heights by up to 2 %"),
+        ({"laws.agitation": "free_spheres"}, "note", "laws.agitation", "changes bed heights by up to 2 %"),
+        ({}, "warning", "laws.agitation", "although it was fitted to reynolds 25 to 130 and the bed has 57"),
         ({"fluid.viscosity": 0.0}, "error", "fluid.viscosity", "drag laws need a viscosity above 0"),
         ({"laws.gravity": [0, 0, 9.81]}, "error", "laws.gravity", "is not negative"),
         ({"column.width": 40.0, "column.cell": 0.16, "bed.count": 1_000_000_000}, "error", "bed.count", "GB of memory"),
@@ -248,7 +253,7 @@ def test_each_fault_gets_its_error_or_warning(given: dict[str, Any], status: str
     result = preflight(Case.from_text(TEXT, "bed.toml", given))
     found = [each for each in result.issues if each.key == key and said in each.reason + each.remedy]
     assert [each.severity for each in found] == [status], result.issue_lines()
-    assert result.status == "error" or status == "warning"
+    assert result.status == "error" or status != "error"
     assert found[0].remedy
 
 

@@ -33,7 +33,7 @@ LONGEST_FILE, MARGIN = 350, 10
 MOST_ARGUMENTS, LONGEST_FUNCTION = 8, 80
 """Positional arguments and lines of a function outside compiled loops."""
 
-COMPILED = ("serial", "threaded", "either", "part", "inline", "compiled", "njit", "jit", "overload")
+COMPILED = ("serial", "threaded", "either", "part", "inline", "vector_inline", "compiled", "njit", "jit", "overload")
 """Names of decorators that compile a function."""
 
 LOOP_FILES = re.compile(r"(_loops|/integrate|/neighbours|/filling)\.py$")

@@ -178,6 +178,8 @@ def test_the_command_prints_json() -> None:
     result = json.loads(done.stdout)
     assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
     assert result["events"][0]["pair"] == 12
+    words = cfddem("three-spheres", "--stokes", "20", "--theta12", "30").stdout
+    assert "FS: all separate" in words and "t*: time over (diameter / impact speed)" in words
 
 
 @pytest.mark.parametrize("conditions", [{"stokes": 5.0, "theta12": 30.0}, {"stokes": 2.0, "theta12": 45.0}])

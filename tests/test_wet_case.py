@@ -117,6 +117,8 @@ def test_a_wet_case_survives_its_own_text() -> None:
     case = made(**{name.replace(".", "__"): value for name, value in SPRAY.items()})
     assert Case.from_text(case.to_toml()) == case
     assert full_key("viscosity") == "fluid.viscosity"
+    with pytest.raises(InputError, match=r"must be written as fluid\.density or material\.NAME\.density"):
+        full_key("density")
     assert full_key("surface_tension") == "liquid.surface_tension"
 
 

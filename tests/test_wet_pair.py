@@ -118,7 +118,8 @@ def test_the_law_of_thick_films_reports_its_range() -> None:
 
 @pytest.mark.parametrize(
     ("name", "value", "said"),
-    [("stokes", 0.0, "above 0"), ("angle", 90.0, "below 90"), ("bridge", "bent", "static"), ("cut", "none", "zero"),
+    [("stokes", 0.0, "above 0"), ("stokes", 5e-324, "1e-12 to 1000 m/s"),
+     ("angle", 90.0, "below 90"), ("bridge", "bent", "static"), ("cut", "none", "zero"),
      ("tangential", "nas", "nase"), ("film", math.inf, "finite"), ("restitution", 0.0, "above 0"),
      ("poisson", 0.6, "0.5"), ("glass_transition_pressure", -1.0, "above 0"),
      ("friction", math.nan, "finite")],

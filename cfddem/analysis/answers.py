@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cfddem.analysis.bed_laws import FROM_HEIGHT, FROM_PRESSURE, weight_over_floor
+from cfddem.analysis.measures import OF_THE_BED
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.io.reading import Run
 from cfddem.preflight.bed_estimate import BedEstimate, estimate_bed
+from cfddem.preflight.issue import percent
 
 AGREES = 2.0
 """A mean agrees with a number if it differs by at most this many standard errors."""
@@ -124,7 +127,7 @@ def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) 
     else:
         share = abs(drift) / abs(mean) if mean else math.inf
         begin, end = measure["drift_times"]
-        steady = f"still drifts by {100.0 * share:.2g} % from {begin:g} to {end:g} s"
+        steady = f"still drifts by {percent(float(f'{share:.2g}'))} from {begin:g} to {end:g} s"
         steady += ", in which the inlet velocity changes" * bool(measure.get("inlet_changes"))
         if share > DRIFTING:
             steady, holds = f"{steady}, do not use the mean", False
@@ -141,7 +144,7 @@ def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) ->
     verdict = ""
     published = _published(laws)
     if published:
-        solids = estimate_bed(case).solid_volume / case.column.floor_area
+        solids = OF_THE_BED * estimate_bed(case).solid_volume / case.column.floor_area  # as the bed height is defined
         low, high = (solids / (1.0 - each) for each in (min(published), max(published)))
         verdict = f"published laws give {low:.3g} to {high:.3g} m"
     yield _mean("bed height", height, verdict, None)
@@ -188,7 +191,7 @@ def _shallow(case: Case, measures: dict[str, Any]) -> str:
     """What the kernel does to the pressure drop of a packed bed of few cells, in words; empty for others."""
     if "bed_height" not in measures or case.bed.start == "packed":
         return ""
-    bed, count = estimate_bed(case), cell_counts(case.column.size, case.column.cell)[2]
+    bed, count = _bed_at_end(case, measures["bed_height"]), cell_counts(case.column.size, case.column.cell)[2]
     cells = measures["bed_height"]["mean"] / case.column.height * count
     packed = bed.inlet <= bed.onset and measures.get(FROM_HEIGHT, {}).get("mean", 1.0) < LOOSE
     if cells >= SHALLOW or not (case.bed.fixed or packed):
@@ -229,13 +232,15 @@ def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, st
     flows = case.fluid is not None and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
     if case.particle_count == 1:
         return ("sphere at rest", moving, None) if at_rest and not flows else ("sphere in motion", moving, None)
-    bed, drop = estimate_bed(case), measures.get("pressure_drop")
+    drop = measures.get("pressure_drop")
+    bed = estimate_bed(case) if drop is None else _bed_at_end(case, drop)
     if not flows or drop is None or weight is None or not weight > 0.0 or not bed.onset > 0.0:
         return ("particles at rest", moving, None) if at_rest else ("particles in motion", moving, None)
     share, error = drop["mean"] / weight, 100.0 * drop["error"] / weight
     spread = f" +- {error:.1f}" if error >= 0.05 else ""
     carried = f"the flow carries {100.0 * share:.1f}{spread} % of the buoyant weight"
-    ratio = f"the inlet velocity is {bed.inlet / bed.onset:.2g} times that of minimum fluidisation"
+    when = " at the end" * bool(drop.get("inlet_changes"))
+    ratio = f"the inlet velocity{when} is {bed.inlet / bed.onset:.2g} times that of minimum fluidisation"
     lying = measures["wall_load"]["mean"] > LYING * weight if "wall_load" in measures else share < 1.0 - LYING
     if at_rest and lying and bed.inlet > bed.onset:
         return "at rest, not fluidised", f"{carried}, although {ratio}; {moving}", False
@@ -243,6 +248,15 @@ def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, st
     if not _usable(drop):
         return f"so far: {regime}", f"{reason}; the pressure drop is not known to be steady", None
     return regime, reason, (share >= CARRIED) == (bed.inlet > bed.onset)
+
+
+def _bed_at_end(case: Case, measure: dict[str, Any]) -> BedEstimate:
+    """The bed of a case at the inlet velocity with which the averaging window of a measure ends."""
+    bed, inlet = estimate_bed(case), case.bed.inlet_velocity
+    if isinstance(inlet, float) or not case.bed.highest_inlet_velocity:
+        return bed
+    last = float(np.interp(measure["drift_times"][1], *np.array(inlet).T))
+    return replace(bed, inlet=bed.inlet * last / case.bed.highest_inlet_velocity)
 
 
 def _of_a_bed(case: Case, bed: BedEstimate, carried: float) -> str:

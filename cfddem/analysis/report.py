@@ -91,12 +91,26 @@ def case_of(run: Run) -> Case:
 def window_of(run: Run, case: Case) -> tuple[float, float]:
     """Start and end of the averaging window [s]: from `run.average_from`, or the second half of the run.
 
+    If the inlet velocity changes in steps, the window is the second half of the last step.
+
     The run has recorded the start if the errors of its means have ended it.
     """
     end = float(run.history["time"][-1])
     if run.averages_from is not None:
         return run.averages_from, end
-    return (0.5 * end if case.run.average_from is None else min(case.run.average_from, end)), end
+    return (_start_of_means(case, end) if case.run.average_from is None else min(case.run.average_from, end)), end
+
+
+def _start_of_means(case: Case, end: float) -> float:
+    """Middle of a run, or of the time for which its inlet holds its last velocity [s]."""
+    inlet = case.bed.inlet_velocity
+    if isinstance(inlet, float):
+        return 0.5 * end
+    times, velocities = np.array(inlet).T
+    last = np.interp(end, times, velocities)
+    changing = [time for time, each in zip(times, velocities) if time < end and each != last]
+    begins = [time for time in times if time < end and time > max(changing, default=-math.inf)]
+    return 0.5 * (max(begins[0], 0.0) + end) if begins else 0.5 * end
 
 
 def recorded_regimes(run: Run, begin: float) -> RegimeMap | None:

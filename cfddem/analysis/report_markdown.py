@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from cfddem.analysis.report_text import spelled, steadiness, window, with_error
+from cfddem.analysis.report_text import bounds_note, spelled, steadiness, window, with_error
 from cfddem.io.quantities import shown_unit
 
 
@@ -24,6 +24,7 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
         f"# {_plain(result['case'])}",
         f"{result['status']} at {end:g} s; {_plain(window(result))}",
         *_table(("", "value", "verdict"), map(_answer, result["answers"])),
+        *bounds_note(result),
         *_measured(result["measured"]),
         *_advice(result["advice"]),
         *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),

@@ -18,6 +18,9 @@ WIDTH = 98
 REMARKS = {FROM_PRESSURE: "; middle of the bed"}
 """What a reader should know about a mean, by its name."""
 
+LOWER_BOUND = "'at least' before an error: the averaging window is too short to know it; run longer"
+"""What "at least" before an error means."""
+
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
@@ -60,8 +63,8 @@ def steadiness(measure: dict[str, Any]) -> str:
         return "too few rows"
     if measure["stationary"]:
         return "stationary"
-    drift = measure["drift"]
-    return f"drifts by {drift:+.2g}" if abs(drift) > 3.0 * measure["drift_error"] else "still settling"
+    drift, unit = measure["drift"], "" if measure["unit"] == "1" else f" {measure['unit']}"
+    return f"drifts by {drift:+.2g}{unit}" if abs(drift) > 3.0 * measure["drift_error"] else "still settling"
 
 
 def spelled(name: str) -> str:
@@ -97,20 +100,28 @@ def window(result: dict[str, Any]) -> str:
     return f"means from {begin:g} to {end:g} s" + f"; lubrication films: {result['films']}" * bool(result["films"])
 
 
+def bounds_note(result: dict[str, Any]) -> list[str]:
+    """What "at least" means, if an answer says it."""
+    bounds = (each["error_is_lower_bound"] and not math.isnan(each["error"]) for each in result["answers"])
+    return [LOWER_BOUND] * any(bounds)
+
+
 def _headline(result: dict[str, Any]) -> Iterator[str]:
     reason = f", {result['message']}" if result["status"] == "finished" and result["message"] else ""
     yield f"{result['case']}: {result['status']}{reason}"
     yield window(result)
+    yield from bounds_note(result)
 
 
 def _answers(found: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
+    wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each["value"], str)), 0)
     for each in found:
-        opening = f"  {each['name']:<16} {with_error(each):<26} "
-        if isinstance(each["value"], str) and len(opening) > 46:
+        opening = f"  {each['name']:<16} {with_error(each):<{wide}} "
+        if isinstance(each["value"], str) and len(opening) > wide + 20:
             yield opening.rstrip()
-            opening = " " * 46
-        yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 46) or [opening]
+            opening = " " * (wide + 20)
+        yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * (wide + 20)) or [opening]
 
 
 def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
@@ -128,9 +139,10 @@ def _measures(result: dict[str, Any]) -> Iterator[str]:
     answered = {each["name"] for each in result["answers"]}
     yield ""
     yield "  all other means"
-    for name, each in result["measures"].items():
-        if spelled(name) not in answered:
-            yield f"  {spelled(name):<28} {with_error(each):<28} {steadiness(each)}{REMARKS.get(name, '')}"
+    others = {name: each for name, each in result["measures"].items() if spelled(name) not in answered}
+    wide = max(28, *(len(with_error(each)) for each in others.values()), 0)
+    for name, each in others.items():
+        yield f"  {spelled(name):<28} {with_error(each):<{wide}} {steadiness(each)}{REMARKS.get(name, '')}"
 
 
 def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
@@ -147,7 +159,7 @@ def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
 
 def _ledger(ledger: dict[str, float]) -> Iterator[str]:
     yield ""
-    yield "  conservation, largest imbalance of the run"
+    yield "  conservation, largest relative imbalance of the run"
     for name, value in ledger.items():
         yield f"  {spelled(name):<26} {value:.2g}"
 

@@ -24,7 +24,7 @@ LONGER = "run longer, or average over another window"
 LAWS = "check the laws: they were used outside of their fitted ranges"
 COMPARE = "treat these comparisons with care: the published law is outside of its range"
 CASE = "check the case: before the run, it had these warnings"
-NOTE = "for information: parts of the bed were outside of the range of a law, the bed as a whole was not"
+NOTE = "for information: no action is needed"
 STATE = "check the state of the bed: it is not what the case intends"
 """What to do about a group of warnings, in the order in which to do it."""
 
@@ -36,6 +36,12 @@ Found = Iterator[tuple[str, str]]
 
 INSIDE = "; by estimate, the bed as a whole is inside the range of {}"
 """Effect of a drag law that is outside of its range in some places only."""
+
+CURVES = "of a process that never becomes steady, read the curves over time (cfddem view --history) instead of means"
+"""Remedy for a run without a steady state, such as a batch that settles."""
+
+MISSED = 0.1
+"""Share of the spray that may miss the particles without a warning."""
 
 AGITATION_SHARE, LOCAL_SHARE, ALL = 0.25, 0.25, 0.995
 """Share of the uses of a law of agitation outside of its range above which a warning is given, because surface and
@@ -55,13 +61,20 @@ def warnings_of(
     for action, text in (
         *_status_warnings(run),
         *_defluidised(run, case),
-        *_series_warnings(measures),
+        *_spray_missed(run),
+        *_series_warnings(case, measures),
         *_missing_laws(case),
-        *((CASE, str(each)) for each in issues if each.in_report and not case.laws.missing),
+        *(
+            (NOTE if each.severity == "note" else CASE, str(each))
+            for each in issues
+            if each.in_report and not case.laws.missing
+        ),
         *_range_warnings(run, case),
         *((COMPARE, f"{row['law']}: {row['outside_range']}") for row in laws if row["outside_range"]),
     ):
         grouped.setdefault(action, []).append(text)
+    if NOTE in grouped:
+        grouped[NOTE] = grouped.pop(NOTE)
     return grouped
 
 
@@ -79,6 +92,16 @@ def _defluidised(run: Run, case: Case) -> Found:
     )  # fmt: skip
     if found is not None:
         yield STATE, str(found)
+
+
+def _spray_missed(run: Run) -> Found:
+    """A spray that finds few particles in its zone."""
+    history, none = run.history, np.zeros(1)
+    missed, landed = (history.get(name, none)[-1] for name in ("liquid_missed", "liquid_sprayed"))
+    if missed > MISSED * (missed + landed):
+        share = percent(missed / (missed + landed))
+        remedy = "move spray.nozzle nearer to the bed, or give a longer zone"
+        yield STATE, f"{share} of the spray found no particle in its zone: {remedy}"
 
 
 def last_value(run: Run, name: str) -> int:
@@ -124,8 +147,10 @@ def _range_warnings(run: Run, case: Case) -> Found:
             yield (NOTE, text.removesuffix(f"; {REMEDY}")) if local else (action, text)
     if isinstance(agitation, Law):
         outside = last_value(run, "agitation_out_of_range_count")
-        effect = "; ".join(["", law_ranges.AGITATED, *law_ranges.by_default(case)])
-        yield from _beyond("law of agitation", agitation, outside, evaluations, AGITATION_SHARE, effect)
+        effect, default = f"; {law_ranges.AGITATED}", law_ranges.by_default(case)
+        for action, text in _beyond("law of agitation", agitation, outside, evaluations, AGITATION_SHARE, effect):
+            words = "; ".join([text.removesuffix(f"; {REMEDY}"), *default])
+            yield (action if default else NOTE), words
 
 
 def _effect(case: Case) -> str:
@@ -154,11 +179,14 @@ def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float 
         yield LAWS, f"the {kind} {law.name} {what}"
 
 
-def _series_warnings(measures: dict[str, Any]) -> Found:
+def _series_warnings(case: Case, measures: dict[str, Any]) -> Found:
     """Series without a stationary mean, or without an error."""
-    drifting = [name.replace("_", " ") for name, each in measures.items() if each["stationary"] is False]
+    left_out = ("bed_height",) if case.particle_count == 1 else ()  # a sphere that falls is no bed
+    unsteady = [name for name, each in measures.items() if each["stationary"] is False and name not in left_out]
+    drifting = [name.replace("_", " ") for name in unsteady]
     if drifting:
-        remedy, changes = "run longer, or increase run.average_from", next(iter(measures.values()))["inlet_changes"]
+        changes = next(iter(measures.values()))["inlet_changes"]
+        remedy = f"run longer, or increase run.average_from; {CURVES}"
         if changes:
             remedy = f"{changes}: set run.average_from to the start of its last value, or compare with data by velocity"
         yield LONGER, f"not stationary in the averaging window: {', '.join(drifting)}; {remedy}"

@@ -7,7 +7,8 @@
     threaded_part  the same, on all threads
     vector_part    as `part`, over arrays that do not overlap: on several rows at once where the processor can
     inline         a helper, compiled into the loops that call it
-    fused          the same; a product that is added to something may be rounded with the sum, where the processor can
+    vector_inline  as `inline`, for loops over arrays that do not overlap
+    fused          as `inline`; a product and the sum that it enters may be rounded once, where the processor can
 
 None of them lets the compiler reorder arithmetic: results are the same bits on any number of threads, and a NaN stays a
 NaN. In a `fused` helper no sum may be of two products, because the compiler could round either of them.
@@ -45,6 +46,7 @@ __all__ = [
     "threaded",
     "threaded_part",
     "use_threads",
+    "vector_inline",
     "vector_part",
 ]
 
@@ -98,6 +100,12 @@ def vector_part(function: Callable[..., Any]) -> Any:
     """
     compiled = njit(error_model="numpy", noalias=True)(function)  # type: ignore[call-overload]
     return _marked(compiled, vector_part)
+
+
+def vector_inline(function: Callable[..., Any]) -> Any:
+    """Compile a helper as `inline` does, where what it writes shares no memory with its other array arguments."""
+    compiled = njit(**_INLINE, noalias=True)(function)  # type: ignore[call-overload]
+    return _marked(compiled, vector_inline)
 
 
 def threaded_part(function: Callable[..., Any]) -> Any:

@@ -119,6 +119,10 @@ def value_columns(path: Path) -> list[str]:
 def _columns(path: Path) -> dict[str, Column]:
     """The columns of a file by their names; a velocity is that of the inlet."""
     columns = {each.name: each for each in read_table(path)}
+    for name, each in columns.items():
+        if each.unit == "m3/s":
+            remedy = "divide the flow rate by the floor area of the column in which it was measured"
+            raise InputError(f"{path} {name}", None, "a velocity, such as: velocity [cm/s]", remedy)
     for name in VELOCITIES:
         if name in columns and "inlet_velocity" not in columns:
             columns["inlet_velocity"] = columns.pop(name)
@@ -138,6 +142,25 @@ def held(case: Case, velocities: Array) -> np.ndarray:
         steps = [low for (_, low), (_, high) in pairwise(inlet) if math.isclose(low, high, rel_tol=HELD)]
         steps += [velocity for time, velocity in inlet[-1:] if time < case.run.until]
     return np.array([any(math.isclose(each, step, rel_tol=HELD) for step in steps) for each in velocities])
+
+
+def steps_of(velocities: Array, until: float) -> str:
+    """Inlet velocities of a case that holds each of some velocities for an equal time, as in a case file.
+
+    velocities  [m/s]
+    until       end of the run [s]
+
+    >>> steps_of(np.array([0.03, 0.05]), 2.0)
+    'bed.inlet_velocity = [[0, 0.03], [1, 0.03], [1.01, 0.05], [2, 0.05]]'
+    """
+    held_at = sorted(set(velocities.tolist()))
+    step = until / len(held_at)
+    begins = [step * (place + 0.01 * (place > 0)) for place in range(len(held_at))]
+    pairs = [
+        f"[{begin:.4g}, {each:.4g}], [{step * (place + 1):.4g}, {each:.4g}]"
+        for place, (begin, each) in enumerate(zip(begins, held_at))
+    ]
+    return f"bed.inlet_velocity = [{', '.join(pairs)}]"
 
 
 def _errors(path: Path, data: CaseData, chosen: Column, column: Column | None) -> Array:

@@ -1,4 +1,4 @@
-"""Reads measured points from a CSV file whose header gives units. Reading is data only; nothing is executed.
+"""Reads measured points from a CSV file whose header gives units, in brackets or parentheses. Nothing is executed.
 
     time [s], bed height [mm], error [mm]
     0.5, 41.2, 0.4
@@ -40,6 +40,8 @@ UNITS: dict[str, tuple[float, str]] = {
     "N/m": (1.0, "N/m"), "mN/m": (1e-3, "N/m"), "dyn/cm": (1e-3, "N/m"), "dyn": (1e-5, "N"), "dyn/cm2": (0.1, "Pa"),
     "mmH2O": (9.80665, "Pa"), "cmH2O": (98.0665, "Pa"), "inH2O": (249.08891, "Pa"), "mmHg": (133.322387, "Pa"),
     "m3/s": (1.0, "m3/s"), "cm3/s": (1e-6, "m3/s"), "ml/s": (1e-6, "m3/s"), "l/min": (1e-3 / 60.0, "m3/s"),
+    "l/s": (1e-3, "m3/s"), "l/h": (1e-3 / 3600.0, "m3/s"), "ml/min": (1e-6 / 60.0, "m3/s"),
+    "m3/h": (1.0 / 3600.0, "m3/s"),
 }  # fmt: skip
 """Units of a header: their size and the SI unit that they belong to."""
 
@@ -119,10 +121,11 @@ def _text(path: Path) -> str:
 
 def _heading(place: str, text: str) -> tuple[str, str]:
     """Name and unit of a column."""
+    text = text if "[" in text else re.sub(r"\(([^()]*)\)\s*$", r"[\1]", text)
     found = _HEADING.fullmatch(text)
     if found is None or not found["name"] or not text.isprintable():
         raise InputError(place, shown(text), "a name and a unit, such as: bed height [mm]")
-    unit = (found["unit"] or "").translate(_PLAIN)
+    unit = re.sub(r"\b([mu]?)L\b", r"\1l", (found["unit"] or "").translate(_PLAIN))
     if found["unit"] is None:
         raise InputError(place, shown(text), "followed by its unit, such as: bed height [mm], voidage [-]")
     if unit not in UNITS:

@@ -102,8 +102,9 @@ def full_key(key: str) -> str:
         found = [each for each in found if not each.startswith(("liquid.", "spray."))] or found
     if len(found) > 1:
         raise InputError("key", key, f"unambiguous: {' or '.join(found)}")
-    if not found and key in Material.model_fields:
-        raise InputError("key", key, f"written as material.NAME.{key}", "NAME is the name of a material of the case")
+    if key in Material.model_fields:
+        meant = " or ".join([*found, f"material.NAME.{key}"])
+        raise InputError("key", key, f"written as {meant}", "NAME is the name of a material of the case")
     if not found:
         raise InputError("key", key, nearest(key, sorted({*Case.model_fields, *itertools.chain(*tables.values())})))
     return found[0]

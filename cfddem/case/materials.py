@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.case.input_errors import dotted, input_error
 
 
@@ -39,6 +39,11 @@ class Checked(BaseModel):
             super().__init__(**values)
         except ValidationError as failure:
             raise input_error(failure, type(self), values) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise InputError(
+            name, shown(value), "left as it is", "case.with_(**{'bed.diameter': 2e-3}) makes a changed copy"
+        )
 
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]  # a nested description keeps its own errors
 

@@ -81,16 +81,16 @@ class CaseRun(Checked):
     until: Positive = Field(description="end time [s]")
     every: Positive | None = Field(None, description="interval between snapshots; default: until / 50 [s]")
     history_every: Positive | None = Field(None, description="interval between history rows; default: every / 10 [s]")
-    average_from: float | None = Field(None, ge=0, description="start of time averages; default: until / 2 [s]")
+    average_from: float | None = Field(
+        None, ge=0, description="start of time averages; default: middle of the run, or of its last inlet step [s]"
+    )
     until_error: dict[str, Positive] = Field(
         {},
         description="end early, once the standard error of the mean of each named measure is below this fraction of "
         "the mean; averages then begin where the start-up ends [-]",
     )
     particle_step: Positive | None = Field(None, description="particle time step; default: 2 % of the Hertz time [s]")
-    fluid_step: Positive | None = Field(
-        None, description="upper limit of the fluid time step; default: set by its stability criteria [s]"
-    )
+    fluid_step: Positive | None = Field(None, description="longest fluid time step; default: set by stability [s]")
     reference_speed: Positive | None = Field(
         None, description="expected highest collision speed, which sets the time step; default: estimated [m/s]"
     )

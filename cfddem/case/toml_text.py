@@ -58,6 +58,8 @@ def parse(text: str, name: str) -> dict[str, Any]:
             raise _given_twice(text, line, name) from None
         comma = re.fullmatch(r"[^=]*=\s*(-?\d+),(\d+)\s*(#.*)?", text.split("\n")[line - 1])
         remedy = f"; decimals have a point: {comma[1]}.{comma[2]}" if comma else ""
+        unit = re.fullmatch(r"[^=#]*=\s*([-+]?[.\d]+(?:e[-+]?\d+)?)\s*[A-Za-z%µ°][^=]*", text.split("\n")[line - 1])
+        remedy += f"; numbers stand without a unit, in SI units: {unit[1]}" if unit else ""
         remedy += "; strings need quotation marks" if reason == "Invalid value" else ""
         raise InputError(place, None, "valid TOML", reason + where + remedy) from None
 

@@ -203,7 +203,8 @@ def print_warnings(described: Case) -> None:
     from cfddem.preflight.summary import preflight
 
     for issue in preflight(described).issues:
-        print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
+        if issue.severity != "note":
+            print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
 
 
 def _print_report(folder: Path) -> None:

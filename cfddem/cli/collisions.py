@@ -12,7 +12,7 @@ from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_
 from scenarios.collisions.film_impact.figures import draw_moments
 from scenarios.collisions.film_impact.movie import movie as write_movie
 from scenarios.collisions.immersed_pair.measured import MeasuredCollisions, compare_points
-from scenarios.collisions.three_spheres.figures import draw_map
+from scenarios.collisions.three_spheres.figures import MEANINGS, draw_map
 
 
 def _collide(
@@ -101,7 +101,9 @@ def _show_triplet(result: three_spheres.Triplet, json: bool) -> None:
         show(values, {}, json)
         return
     events, contacts = values.pop("events"), values.pop("contacts")
+    values["outcome"] = MEANINGS[values["outcome"]]
     show(values | {f"contacts{pair}": count for pair, count in contacts.items()}, {}, json)
+    print("\nt: time over (film / impact speed); t*: time over (diameter / impact speed); speeds over the impact speed")
     for event in events:
         print("t = {time:<9.4f} t* = {time_star:<8.4f} {pair} {kind:<8} at {speed:.4f}".format(**event))
 

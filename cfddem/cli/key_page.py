@@ -37,6 +37,11 @@ def matching(name: str) -> list[str]:
     return [line for key in found for line in _lines(key, every[key])]
 
 
+def every_key() -> list[str]:
+    """Names of all keys, with their tables."""
+    return [key for key, _ in _keys()]
+
+
 def _keys() -> Iterator[tuple[str, FieldInfo]]:
     """Every key with its table."""
     for name, field in Case.model_fields.items():

@@ -87,7 +87,9 @@ def find(name: str) -> Law:
     every = [law for those in laws().values() for law in those.values()]
     found = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not found:
-        closest = _closest(word, [law.name for law in every])
+        from cfddem.cli.key_page import every_key
+
+        closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
         raise InputError("law", name, f"a name listed by `cfddem explain`{closest}")
     if len(found) > 1:
         raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")

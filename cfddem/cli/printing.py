@@ -36,7 +36,8 @@ def show(values: dict[str, Any], units: dict[str, str], as_json: bool) -> None:
         return
     width = max(len(name) for name in values)
     for name, value in values.items():
-        print(f"{name:<{width}}  {_readable(value)} {units.get(name, '')}".rstrip())
+        unit = "" if value is None else units.get(name, "")
+        print(f"{name:<{width}}  {_readable(value)} {unit}".rstrip())
 
 
 def _readable(value: Any) -> str:

@@ -21,7 +21,8 @@ def report(
         bool, Parameter(help="print the report as Markdown; writes no page unless -o is given", negative="")
     ] = False,
     data: Annotated[
-        list[Path] | None, Parameter(help="CSV file of measured points, beside those of the case; may be repeated")
+        list[Path] | None,
+        Parameter(help="CSV file of measured points, beside those of the case; may be repeated", negative=""),
     ] = None,
 ) -> None:
     """Report the results of a run as text and as a page with figures.
@@ -54,7 +55,9 @@ def report(
 
 
 def compare(
-    folders: Annotated[list[Path], Parameter(help="run folders; the first is the reference", negative="")],
+    folders: Annotated[
+        list[Path], Parameter(help="run folders, or that of a sweep; the first run is the reference", negative="")
+    ],
     *,
     output: Annotated[
         Path, Parameter(name=["--output", "-o"], help="HTML page, or PNG with the histories alone")
@@ -70,8 +73,12 @@ def compare(
     from cfddem.analysis.report_text import as_json
     from cfddem.backend.errors import InputError
     from cfddem.io.files import require_folder
+    from cfddem.io.folder import runs_inside
 
     require_folder(output)
+    folders = [
+        run for each in folders for run in ([each] if (each / "run.json").exists() else runs_inside(each) or [each])
+    ]
     if output.suffix.lower() not in (".html", ".png"):
         raise InputError("output", str(output), "a file that ends in .html or .png")
     result = compared(folders)

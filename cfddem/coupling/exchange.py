@@ -145,13 +145,13 @@ class Exchange:
         not_seen = _not_seen(flow, drag, agitation, history)
         conductance = drag if history is None else drag + history.conductance
         implicit = self.momentum.prepare(particles, cell_map, flow, step, not_seen, conductance)
-        lost = deferred - added - transverse
-        for each in (agitation, history):
-            if each is not None and each.force is not None:
-                lost = lost - each.force
         explicit = self.added_mass or self.lift or self.viscous_stress or history is not None or self.wall_drag
         source = None
         if explicit or (agitation is not None and agitation.force is not None):
+            lost = deferred - added - transverse
+            for each in (agitation, history):
+                if each is not None and each.force is not None:
+                    lost = lost - each.force
             source = self._source(cell_map, lost)
         return CouplingTerms(
             cell_map, flow, drag, implicit, transverse + added, heavier, 1.0 - solid, source, agitation, history
@@ -167,11 +167,11 @@ class Exchange:
         fluid, cell_map, step = self.fluid, terms.cell_map, terms.step
         received = self.momentum.apply(particles, cell_map, terms.implicit, *fluid.drag_response())
         drag, history = self._drag_and_history(particles, terms, received)
-        excess_mass = particles.mass - fluid.density * cell_map.volume
+        excess_mass = (particles.density - fluid.density) * cell_map.volume
         forces = FluidForces(
             drag=drag,
             pressure=self.pressure.force(particles, cell_map),
-            weight=np.stack([excess_mass * each for each in gravity], axis=-1),
+            weight=excess_mass[:, None] * gravity,
             explicit=terms.explicit,
             agitation=terms.fluctuating_force,
             history=history,

@@ -44,10 +44,13 @@ SLAB = 4
 
 
 class Stencil(NamedTuple):
-    """Cells on which particles deposit, and the weight of each."""
+    """Cells on which particles deposit: for each of their equal pieces a cell and the seven beside, above and behind.
 
-    cells: np.ndarray  # (N, m) uint32, flat index of the cell, ghosts included
-    weights: Array  # (N, m), the sum of a row is 1
+    A layer of cells around the grid takes part, see :meth:`cfddem.coupling.reach.Reach.strays`.
+    """
+
+    first: np.ndarray  # (N, pieces) uint32, flat index of the lowest of the eight cells
+    shares: Array  # (N, pieces, 3) in the next cell along x, y, z
 
 
 class ParticleCellMap(NamedTuple):
@@ -91,8 +94,11 @@ class FilterKernel:
         self.reach = Reach(grid, periodic)
         self._origin, self._inverse = self.reach.origin, 1.0 / np.array(grid.spacing)
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
-        self._buffers: dict[int, Array] = {}
-        self._home = self.reach.homes()
+        self._buffers, self._layered = dict[int, Array](), dict[int, Array]()
+        self._cells, (_, ny, nx) = self.reach.shape[::-1], self.reach.shape
+        corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
+        self._corners = np.array(corners, np.uint32)
+        self._strays, self._homes = self.reach.strays()
         self._gates = _gates(grid, self.halo)
         self.sweeps, self.strength = self._diffusion()
 
@@ -124,26 +130,41 @@ class FilterKernel:
 
     def stencil(self, position: Array, radius: Array) -> Stencil:
         """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
-        shape = len(position), 8 * len(self._offsets)
-        stencil = Stencil(np.empty(shape, np.uint32), np.empty(shape))
+        shape = len(position), len(self._offsets)
+        stencil = Stencil(np.empty(shape, np.uint32), np.empty((*shape, 3)))
         position = self.reach.placed(position, radius if len(self._offsets) > 1 else None)
-        loops.stencils(position, radius, self._offsets, self._linear, self._origin, self._inverse, self._home, *stencil)
+        loops.stencils(
+            position, radius, self._offsets, self._linear, self._origin, self._inverse, self._cells, *stencil
+        )
         return stencil
 
     def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx)."""
-        fields = np.zeros((math.prod(self.reach.shape), values.shape[1]))
-        loops.deposit(cell_map.order, cell_map.start, np.ascontiguousarray(values), *cell_map.stencil, fields)
-        return self.reach.collected(np.ascontiguousarray(fields.T).reshape(-1, *self.reach.shape))
+        by_cell, inner = self._by_cell(values.shape[1])
+        values = np.ascontiguousarray(values)
+        by_cell.fill(0.0)
+        loops.deposit(cell_map.order, cell_map.start, values, *cell_map.stencil, self._corners, by_cell)
+        np.add.at(by_cell, self._homes, by_cell[self._strays])
+        by_cell[self._strays] = 0.0
+        return self.reach.collected(np.array(inner, order="C"))
 
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
         count = len(fields)
-        values = np.empty((len(stencil.cells), count))
-        by_cell = np.zeros((math.prod(self.reach.shape), -(-count // loops.FOUR) * loops.FOUR))
-        by_cell[:, :count] = self.reach.spread(fields).reshape(count, -1).T
-        loops.gather(*stencil, by_cell, values)
-        return values
+        columns = -(-count // loops.FOUR) * loops.FOUR
+        values = np.empty((len(stencil.first), columns))
+        by_cell, inner = self._by_cell(columns)
+        inner[:count] = self.reach.spread(fields)
+        by_cell[self._strays] = by_cell[self._homes]
+        loops.gather(*stencil, self._corners, by_cell, values)
+        return values[:, :count]
+
+    def _by_cell(self, columns: int) -> tuple[Array, Array]:
+        """Fields with a layer around, the same in every call: (cells, m), and a view without it (m, nz, ny, nx)."""
+        if columns not in self._layered:
+            self._layered[columns] = np.zeros((*(n + 2 for n in self.reach.shape), columns))
+        fields = self._layered[columns]
+        return fields.reshape(-1, columns), np.moveaxis(fields[1:-1, 1:-1, 1:-1], -1, 0)
 
     def smooth(self, fields: Array) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""

@@ -11,6 +11,9 @@ from cfddem.backend.compile import inline, prange, serial, threaded
 FOUR = 4
 """Components of a cell that are gathered together."""
 
+CORNERS = 8
+"""Cells on which a particle deposits, or a piece of it."""
+
 
 @inline
 def cell_and_share(coordinate, linear):
@@ -19,23 +22,39 @@ def cell_and_share(coordinate, linear):
     return start, linear * (coordinate - 0.5 * linear - start)
 
 
+@inline
+def _within_layers(coordinate, linear, cells):
+    """The same; of cells with a layer on both sides, where farther particles are put, the first one below the last."""
+    start, share = cell_and_share(coordinate, linear)
+    if start >= cells:
+        return cells - 1, 1.0
+    return (start, share) if start >= -1 else (-1, 0.0)
+
+
 @threaded
-def stencils(position, radius, offsets, linear, origin, inverse, home, cells, weights):
-    """Cells of every particle, eight for each of its pieces, and the weight of each (N, m); home is padded by one."""
-    pz, py, px = home.shape
+def stencils(position, radius, offsets, linear, origin, inverse, cells, first, shares):
+    """First cell of every piece of every particle, and its shares in the next cell along x, y, z (N, pieces, 3).
+
+    cells  along x, y, z, to which a layer around all of them is added
+    first  flat index of the cell among these (N, pieces)
+    """
     for n in prange(len(position)):
         for s in range(len(offsets)):
-            i, a = cell_and_share((position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0], linear)
-            j, b = cell_and_share((position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1], linear)
-            k, c = cell_and_share((position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2], linear)
-            share = 1.0 / len(offsets)
-            for corner in range(8):
-                up, back, right = corner >> 2, corner >> 1 & 1, corner & 1
-                x, y = min(max(i + 1 + right, 0), px - 1), min(max(j + 1 + back, 0), py - 1)
-                z = min(max(k + 1 + up, 0), pz - 1)
-                across = (b if back else 1.0 - b) * (a if right else 1.0 - a)
-                cells[n, 8 * s + corner] = home[z, y, x]
-                weights[n, 8 * s + corner] = share * (c if up else 1.0 - c) * across
+            x = (position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0]
+            y = (position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1]
+            z = (position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2]
+            i, a = _within_layers(x, linear, cells[0])
+            j, b = _within_layers(y, linear, cells[1])
+            k, c = _within_layers(z, linear, cells[2])
+            first[n, s] = ((k + 1) * (cells[1] + 2) + j + 1) * (cells[0] + 2) + i + 1
+            shares[n, s, 0], shares[n, s, 1], shares[n, s, 2] = a, b, c
+
+
+@inline
+def _weight(corner, a, b, c):
+    """Weight of one of the eight cells that a piece touches, counted along x first, then y, then z."""
+    up, back, right = corner >> 2, corner >> 1 & 1, corner & 1
+    return (c if up else 1.0 - c) * ((b if back else 1.0 - b) * (a if right else 1.0 - a))
 
 
 @serial
@@ -55,50 +74,50 @@ def sort_into_slabs(position, origin, inverse, thickness, order, start):
 
 
 @threaded
-def deposit(order, start, values, cells, weights, fields):
-    """Fill even slabs together, then odd ones, then a last one that would touch the first across a periodic border."""
+def deposit(order, start, values, first, shares, corners, fields):
+    """Add values (N, m) to fields (cells, m): even slabs together, then odd ones.
+
+    corners  distance of the eight cells from the first in flat arrays; unsigned, since no index counts from the end
+    """
     slabs = len(start) - 1
-    even = slabs - slabs % 2
-    for phase in range(3):
-        first, last = (phase, even) if phase < 2 else (even, slabs)
-        for half in prange((last - first + 1) // 2):
-            slab = first + 2 * half
+    for phase in range(2):
+        for half in prange((slabs - phase + 1) // 2):
+            slab = phase + 2 * half
             for place in range(start[slab], start[slab + 1]):
-                _deposit_one(order[place], values, cells, weights, fields)
+                _deposit_one(order[place], values, first, shares, corners, fields)
 
 
 @serial
-def _deposit_one(n, values, cells, weights, fields):
+def _deposit_one(n, values, first, shares, corners, fields):
     """Add the values of one particle to its cells."""
-    for s in range(cells.shape[1]):
-        cell, weight = cells[n, s], weights[n, s]
+    for s in range(first.shape[1]):
+        cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
         for m in range(values.shape[1]):
-            fields[cell, m] += weight * values[n, m]
+            part = values[n, m] / first.shape[1]
+            for corner in range(CORNERS):
+                fields[cell + corners[corner], m] += _weight(corner, a, b, c) * part
 
 
 @threaded
-def gather(cells, weights, field, values):
-    """Weighted mean around every particle, with the weights of `_deposit_one`: field (cells, M) to values (N, m).
+def gather(first, shares, corners, fields, values):
+    """Weighted mean around every particle, with the weights of `_deposit_one`: fields (cells, m) to values (N, m).
 
-    M is m, rounded up to a multiple of FOUR.
+    m is a multiple of FOUR.
     """
-    wanted = values.shape[1]
+    part = 1.0 / first.shape[1]
     for n in prange(len(values)):
-        for first in range(0, field.shape[1], FOUR):
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
-            for s in range(cells.shape[1]):
-                here, weight = field[cells[n, s], first : first + FOUR], weights[n, s]
-                a += weight * here[0]
-                b += weight * here[1]
-                c += weight * here[2]
-                d += weight * here[3]
-            values[n, first] = a
-            if first + 1 < wanted:
-                values[n, first + 1] = b
-            if first + 2 < wanted:
-                values[n, first + 2] = c
-            if first + 3 < wanted:
-                values[n, first + 3] = d
+        for m in range(0, values.shape[1], FOUR):
+            p, q, r, t = 0.0, 0.0, 0.0, 0.0
+            for s in range(first.shape[1]):
+                cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
+                for corner in range(CORNERS):
+                    weight, here = _weight(corner, a, b, c), fields[cell + corners[corner], m : m + FOUR]
+                    p += weight * here[0]
+                    q += weight * here[1]
+                    r += weight * here[2]
+                    t += weight * here[3]
+            out = values[n, m : m + FOUR]
+            out[0], out[1], out[2], out[3] = part * p, part * q, part * r, part * t
 
 
 @threaded

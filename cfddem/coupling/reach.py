@@ -37,10 +37,10 @@ class Reach:
         self.shape = (nz, ny, nx)
         self.origin = np.array(grid.origin) - self._ghosts * np.array(grid.spacing)
 
-    def homes(self) -> np.ndarray:
-        """Flat index of the cell that receives a deposit, for every cell and a layer around all (nz+2, ny+2, nx+2).
+    def strays(self) -> tuple[np.ndarray, np.ndarray]:
+        """Cells whose deposit another cell receives, and these cells: flat indices, with a layer around all cells.
 
-        It is the cell itself, the nearest open cell of a solid one, or that of the cell whose value a ghost takes.
+        The other cell is the nearest open one of a solid cell, or the one whose value a ghost takes.
         """
         whole, counts = self.grid.whole, self.grid.whole.cells
         lines = []
@@ -61,7 +61,9 @@ class Reach:
         begin = (np.array(self.grid.first) - self._ghosts)[::-1, None, None, None]
         # a particle cannot reach a home so deep in the solid that it lies outside
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
-        return np.ravel_multi_index(tuple(inside), self.shape).astype(np.int64)
+        flat = np.ravel_multi_index(tuple(inside + 1), homes.shape[1:]).ravel()
+        strays = np.flatnonzero(flat != np.arange(flat.size))
+        return strays, flat[strays]
 
     def placed(self, position: Array, radius: Array | None = None) -> Array:
         """Positions (N, 3) [m] as periodic images that lie nearest to the cells of the rank.

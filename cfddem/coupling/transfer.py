@@ -109,11 +109,11 @@ class Transfer:
         kernel, value = self.kernel, _columns(particles[self.value])
         if conductance is None:
             conductance = self.conductance(particles, flow)
-        disturbance = _or_zero(disturbance, value)
+        disturbance, capacity = _or_zero(disturbance, value), self.capacity(particles)
         implicit, target = np.empty(particles.count), np.empty(value.shape)
         carried = np.empty((particles.count, 1 + value.shape[1]))
         _implicit_coefficients(
-            conductance, self.capacity(particles), self._other(particles), value, disturbance, step,
+            conductance, capacity, self._other(particles, capacity), value, disturbance, step,
             implicit, target, carried,
         )  # fmt: skip
         cells = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
@@ -129,21 +129,21 @@ class Transfer:
         seen    u, the value of the fluid in its implicit step (nz, ny, nx, m)
         """
         kernel, value = self.kernel, _columns(particles[self.value])
-        fields = np.moveaxis(np.concatenate([weight, weight * seen], axis=-1), -1, 0)
+        fields = np.concatenate([np.moveaxis(each, -1, 0) for each in (weight, weight * seen)])
         gathered, rate = kernel.gather(cell_map.stencil, kernel.smooth(fields)), np.empty(value.shape)
         before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
         _receive(gathered, sent.implicit, sent.target, sent.step, value, rate, before, received)
         self.last_step = sent.step
         return rate
 
-    def _other(self, particles: Particles) -> Array:
+    def _other(self, particles: Particles, capacity: Array) -> Array:
         """Mean over the step before of everything but this transfer (N, m)."""
         value = _columns(particles[self.value])
         if self.last_step == 0.0:
             return _or_zero(None if self.source is None else self.source(particles), value)
         before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
         other = np.empty(value.shape)
-        _mean_other(value, before, received, self.capacity(particles), self.last_step, other)
+        _mean_other(value, before, received, capacity, self.last_step, other)
         return other
 
 

@@ -178,27 +178,27 @@ class Boundaries:
         assert isinstance(inlet, Inlet)
         if not here.any():
             return np.zeros((0, 3))  # of a block beside the inlet
-        x, y, z = (c[here] for c in self._points(side))
-        by_function = callable(inlet.velocity)
-        given = np.asarray(inlet.velocity(x, y, z, time) if callable(inlet.velocity) else inlet.velocity, dtype=float)
-        vector = np.zeros((x.size, 3))
-        if given.ndim == 0 or (by_function and given.shape == (x.size,)):
+        count, by_function = int(here.sum()), callable(inlet.velocity)  # local: faces of this rank
+        velocity = inlet.velocity
+        if callable(velocity):
+            x, y, z = (c[here] for c in self._points(side))
+            velocity = velocity(x, y, z, time)
+        given, vector = np.asarray(velocity, dtype=float), np.zeros((count, 3))
+        if given.ndim == 0 or (by_function and given.shape == (count,)):
             vector[:, side.axis] = side.inward * given
-        elif given.shape == (x.size, 3) or (not by_function and given.shape == (3,)):
+        elif given.shape == (count, 3) or (not by_function and given.shape == (3,)):
             vector[:] = given
         else:
-            wanted = (
-                f"of shape ({x.size},) or ({x.size}, 3) for {x.size} faces" if by_function else "a speed or a vector"
-            )
+            wanted = f"of shape ({count},) or ({count}, 3) for {count} faces" if by_function else "a speed or a vector"
             raise InputError(f"boundaries.{side.name}.velocity", given.shape, wanted)
         if inlet.in_time is not None and not steady:
             vector *= float(inlet.in_time(time))
         bad = ~np.isfinite(vector).all(axis=1)
         if bad.any():
-            n = int(np.argmax(bad))
+            place = ", ".join(f"{c[here][np.argmax(bad)]:g}" for c in self._points(side))
             raise InputError(
                 f"boundaries.{side.name}.velocity", None, "finite everywhere",
-                f"it is not at x, y, z = {x[n]:g}, {y[n]:g}, {z[n]:g} m, t = {time:g} s",
+                f"it is not at x, y, z = {place} m, t = {time:g} s",
             )  # fmt: skip
         return vector
 
@@ -232,7 +232,7 @@ class Boundaries:
             across = np.roll(solid, 1, axis=2 - d)
             buried[d], blocked[d] = solid * across, solid + across > 0.0
         for side in self.sides:
-            face = LOW + grid.cells[side.axis] if side.high else LOW
+            face = side.face(grid)
             inside = side.layer(fluid, face - 1 if side.high else face)
             side.layer(solved[side.axis], face)[:] = side.outlet * inside
         self.halo.fill_borders(solved)
@@ -260,3 +260,10 @@ class Boundaries:
         for side in self.sides:
             cells = self.grid.cells[side.axis]
             fill_side(velocity, side.axis, side.high, cells, side.wall, side.mirror, side.outlet)
+
+    def set_faces(self, velocity: Array) -> None:
+        """Set the boundary faces of a velocity (3, nz, ny, nx), as `fill_velocity`, and no ghosts beyond the sides."""
+        self.halo.fill_faces(velocity)
+        for side in self.sides:
+            normal = side.layer(velocity[side.axis], side.face(self.grid))
+            np.copyto(normal, side.wall[side.axis], where=~side.outlet)

@@ -34,8 +34,8 @@ the pressure is the one that makes the new velocity satisfy continuity, and drag
 
 from __future__ import annotations
 
-from cfddem.backend.compile import inline, prange, serial, threaded
-from cfddem.fluid.grid import LOW, UNIT
+from cfddem.backend.compile import inline, prange, serial, threaded, vector_inline
+from cfddem.fluid.grid import LOW
 
 # ---------------------------------------------------------------- terms, one function each
 
@@ -81,10 +81,27 @@ def slip_weight(face_voidage, cell_voidage, model_b):
 # ---------------------------------------------------------------- loops
 
 
+@inline
+def strides(shape):
+    """Distance of the next cell along x, y, z in a padded field of this shape that is laid out flat."""
+    return 1, shape[2], shape[1] * shape[2]
+
+
+@inline
+def inside(k, shape, margin):
+    """Where the inside faces of plane k, and so many layers of ghosts around them, begin in a flat field, and how many.
+
+    The ghosts between two rows are among them: one long loop over a plane is faster than short ones over its rows.
+    What it writes into these ghosts is not used.
+    """
+    edge, plane = (LOW - margin) * (shape[2] + 1), shape[1] * shape[2]
+    return k * plane + edge, plane - 2 * edge
+
+
 @serial
-def row(field, k, j, start, count):
-    """Cells start ... start + count of a row: loops over rows indexed from zero are the ones that vectorise."""
-    return field[k, j, start : start + count]
+def line(field, start, count):
+    """Part of a flat field: loops over lines indexed from zero are the ones that vectorise."""
+    return field[start : start + count]
 
 
 @threaded
@@ -95,72 +112,65 @@ def transport(velocity, voidage, viscosity, buried, density, inverse, central, f
     padded cell fields; buried (3, ...) is 1 on faces inside a solid mask, whose neighbours see a no-slip wall half
     way; inverse 1/spacing along x, y, z [1/m].
     """
-    pz, py, px = voidage.shape
-    for k in prange(1, pz):
-        for j in range(1, py):
-            n = px - 1
-            for d in range(velocity.shape[0]):
-                dk, dj, di = UNIT[d]
-                here, before = row(voidage, k, j, 1, n), row(voidage, k - dk, j - dj, 1 - di, n)
-                out, u = row(flux[d], k, j, 1, n), row(velocity[d], k, j, 1, n)
-                for i in range(n):
-                    out[i] = 0.5 * (here[i] + before[i]) * u[i]
-            if k < pz - 1 and j < py - 1:
-                n = px - 2
-                out, effective_viscosity = row(expansion, k, j, 1, n), row(viscosity, k, j, 1, n)
-                u0, u1 = row(velocity[0], k, j, 1, n), row(velocity[0], k, j, 2, n)
-                v0, v1 = row(velocity[1], k, j, 1, n), row(velocity[1], k, j + 1, 1, n)
-                w0, w1 = row(velocity[2], k, j, 1, n), row(velocity[2], k + 1, j, 1, n)
-                for i in range(n):
-                    growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
-                    out[i] = (2.0 / 3.0) * effective_viscosity[i] * growth
+    shape, step = voidage.shape, strides(voidage.shape)
+    voidage, viscosity, expansion = voidage.reshape(-1), viscosity.reshape(-1), expansion.reshape(-1)
+    velocity, flux = velocity.reshape(3, -1), flux.reshape(3, -1)
+    buried, rate = buried.reshape(3, -1), rate.reshape(3, -1)
+    for k in prange(LOW - 1, shape[0] - LOW + 1):
+        at, n = inside(k, shape, 1)
+        for d in range(3):
+            here, before = line(voidage, at, n), line(voidage, at - step[d], n)
+            out, u = line(flux[d], at, n), line(velocity[d], at, n)
+            for i in range(n):
+                out[i] = 0.5 * (here[i] + before[i]) * u[i]
+        out, effective_viscosity = line(expansion, at, n), line(viscosity, at, n)
+        u0, u1 = line(velocity[0], at, n), line(velocity[0], at + step[0], n)
+        v0, v1 = line(velocity[1], at, n), line(velocity[1], at + step[1], n)
+        w0, w1 = line(velocity[2], at, n), line(velocity[2], at + step[2], n)
+        for i in range(n):
+            growth = (u1[i] - u0[i]) * inverse[0] + (v1[i] - v0[i]) * inverse[1] + (w1[i] - w0[i]) * inverse[2]
+            out[i] = (2.0 / 3.0) * effective_viscosity[i] * growth
     # The high boundary face of a direction is the low face of the first ghost cell: one more than cells.
-    for k in prange(LOW, pz - LOW):
-        n = px - 2 * LOW
-        for j in range(LOW, py - LOW):
-            for d in range(velocity.shape[0]):
-                dk, dj, di = UNIT[d]
-                out = row(rate[d], k, j, LOW, n)
-                right, left = row(expansion, k, j, LOW, n), row(expansion, k - dk, j - dj, LOW - di, n)
-                for i in range(n):
-                    out[i] = (left[i] - right[i]) * inverse[d]
-                for e in range(velocity.shape[0]):
-                    _balance(
-                        out, velocity[d], velocity[e], flux[e], viscosity, buried[d], k, j, n, d, e,
-                        density, inverse[e], inverse[d], central,
-                    )  # fmt: skip
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        for d in range(3):
+            out, right, left = line(rate[d], at, n), line(expansion, at, n), line(expansion, at - step[d], n)
+            for i in range(n):
+                out[i] = (left[i] - right[i]) * inverse[d]
+            for e in range(3):
+                _balance(
+                    out, velocity[d], velocity[e], flux[e], viscosity, buried[d], at, step[d], step[e],
+                    density, inverse[e], inverse[d], central,
+                )  # fmt: skip
 
 
-@serial
-def _balance(out, u, v, flux, viscosity, buried, k, j, n, d, e, density, inverse_e, inverse_d, central):
-    """Add to a row of the component u_d the balance over its two momentum faces along e; v is u_e.
+@vector_inline
+def _balance(out, u, v, flux, viscosity, buried, at, d, e, density, inverse_e, inverse_d, central):
+    """Add to a line of the component u_d the balance over its two momentum faces along e; v is u_e.
 
     Across the component (e != d) these faces lie around edges of the grid, between the cells right and left of the
     face and those below or above them; along it (e == d) they are the centres of the two cells, where the same
     differences of u = v give twice the stretching.
+
+    at    place of the line in flat fields
+    d, e  distance of the next cell along both directions there
     """
-    dk, dj, di = UNIT[d]
-    ek, ej, ei = UNIT[e]
-    u0, u1 = row(u, k - 2 * ek, j - 2 * ej, LOW - 2 * ei, n), row(u, k - ek, j - ej, LOW - ei, n)
-    u2, u3 = row(u, k, j, LOW, n), row(u, k + ek, j + ej, LOW + ei, n)
-    u4 = row(u, k + 2 * ek, j + 2 * ej, LOW + 2 * ei, n)
-    wall_low, wall_high = row(buried, k - ek, j - ej, LOW - ei, n), row(buried, k + ek, j + ej, LOW + ei, n)
-    f_right, f_left = row(flux, k, j, LOW, n), row(flux, k - dk, j - dj, LOW - di, n)
-    f_right_up = row(flux, k + ek, j + ej, LOW + ei, n)
-    f_left_up = row(flux, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-    v_right, v_left = row(v, k, j, LOW, n), row(v, k - dk, j - dj, LOW - di, n)
-    v_right_up = row(v, k + ek, j + ej, LOW + ei, n)
-    v_left_up = row(v, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-    m_right, m_left = row(viscosity, k, j, LOW, n), row(viscosity, k - dk, j - dj, LOW - di, n)
+    n = out.size
+    u0, u1, u2 = line(u, at - 2 * e, n), line(u, at - e, n), line(u, at, n)
+    u3, u4 = line(u, at + e, n), line(u, at + 2 * e, n)
+    wall_low, wall_high = line(buried, at - e, n), line(buried, at + e, n)
+    f_right, f_left = line(flux, at, n), line(flux, at - d, n)
+    f_right_up, f_left_up = line(flux, at + e, n), line(flux, at - d + e, n)
+    v_right, v_left = line(v, at, n), line(v, at - d, n)
+    v_right_up, v_left_up = line(v, at + e, n), line(v, at - d + e, n)
+    m_right, m_left = line(viscosity, at, n), line(viscosity, at - d, n)
     if e == d:
         shared, mirror = 0.0, 0.0
         m_right_down, m_left_down, m_right_up, m_left_up = m_left, m_left, m_right, m_right
     else:
         shared, mirror = 1.0, 1.0
-        m_right_up = row(viscosity, k + ek, j + ej, LOW + ei, n)
-        m_left_up = row(viscosity, k - dk + ek, j - dj + ej, LOW - di + ei, n)
-        m_right_down = row(viscosity, k - ek, j - ej, LOW - ei, n)
-        m_left_down = row(viscosity, k - dk - ek, j - dj - ej, LOW - di - ei, n)
+        m_right_up, m_left_up = line(viscosity, at + e, n), line(viscosity, at - d + e, n)
+        m_right_down, m_left_down = line(viscosity, at - e, n), line(viscosity, at - d - e, n)
     for i in range(n):
         centre = u2[i]
         inflow = carried(0.5 * (f_right[i] + f_left[i]), u0[i], u1[i], centre, u3[i], central)
@@ -187,74 +197,101 @@ def predict(
     the middle of the step, that stored with the new velocity; drag beta [kg/m3/s], drag_momentum beta v and source
     [N/m3], cell fields; driving mean pressure fall [Pa/m]; solved (3, ...) 1 where a face carries an unknown.
     """
-    pz, py, px = voidage.shape
-    n = px - 2 * LOW
-    for k in prange(LOW, pz - LOW):
-        for j in range(LOW, py - LOW):
-            for d in range(old.shape[0]):
-                dk, dj, di = UNIT[d]
-                e_right, e_left = row(voidage, k, j, LOW, n), row(voidage, k - dk, j - dj, LOW - di, n)
-                c_right, c_left = row(centred, k, j, LOW, n), row(centred, k - dk, j - dj, LOW - di, n)
-                s_right, s_left = row(stored, k, j, LOW, n), row(stored, k - dk, j - dj, LOW - di, n)
-                b_right, b_left = row(drag, k, j, LOW, n), row(drag, k - dk, j - dj, LOW - di, n)
-                v = drag_momentum[d]
-                v_right, v_left = row(v, k, j, LOW, n), row(v, k - dk, j - dj, LOW - di, n)
-                x = source[d]
-                x_right, x_left = row(x, k, j, LOW, n), row(x, k - dk, j - dj, LOW - di, n)
-                p_right, p_left = row(pressure, k, j, LOW, n), row(pressure, k - dk, j - dj, LOW - di, n)
-                first, second = row(rate_a[d], k, j, LOW, n), row(rate_b[d], k, j, LOW, n)
-                u, out, mobility_row = (
-                    row(old[d], k, j, LOW, n),
-                    row(new[d], k, j, LOW, n),
-                    row(mobility[d], k, j, LOW, n),
+    shape, steps = voidage.shape, strides(voidage.shape)
+    voidage, centred, stored = voidage.reshape(-1), centred.reshape(-1), stored.reshape(-1)
+    pressure, drag = pressure.reshape(-1), drag.reshape(-1)
+    drag_momentum, source = drag_momentum.reshape(3, -1), source.reshape(3, -1)
+    rate_a, rate_b, solved = rate_a.reshape(3, -1), rate_b.reshape(3, -1), solved.reshape(3, -1)
+    old, new, mobility = old.reshape(3, -1), new.reshape(3, -1), mobility.reshape(3, -1)
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        for d in range(3):
+            below = at - steps[d]
+            e_right, e_left = line(voidage, at, n), line(voidage, below, n)
+            c_right, c_left = line(centred, at, n), line(centred, below, n)
+            s_right, s_left = line(stored, at, n), line(stored, below, n)
+            b_right, b_left = line(drag, at, n), line(drag, below, n)
+            v_right, v_left = line(drag_momentum[d], at, n), line(drag_momentum[d], below, n)
+            x_right, x_left = line(source[d], at, n), line(source[d], below, n)
+            p_right, p_left = line(pressure, at, n), line(pressure, below, n)
+            first, second, free = line(rate_a[d], at, n), line(rate_b[d], at, n), line(solved[d], at, n)
+            u, out, mobility_here = line(old[d], at, n), line(new[d], at, n), line(mobility[d], at, n)
+            for i in range(n):
+                face = 0.5 * (c_right[i] + c_left[i])
+                right, left = slip_weight(face, c_right[i], model_b), slip_weight(face, c_left[i], model_b)
+                beta = 0.5 * (right * b_right[i] + left * b_left[i])
+                beta_v = 0.5 * (right * v_right[i] + left * v_left[i])
+                theta = implicitness(beta * step / (density * face))
+                gradient = (p_right[i] - p_left[i]) * inverse[d]
+                share = face + model_b * (1.0 - face)
+                momentum = (
+                    density * 0.5 * (s_right[i] + s_left[i]) * u[i]
+                    + step * ((1.0 - weight_b) * first[i] + weight_b * second[i])  # convection, viscous stress
+                    - step * share * gradient  # pressure, gravity within
+                    + step * share * driving[d]
+                    + step * 0.5 * (x_right[i] + x_left[i])
+                    + step * (beta_v - (1.0 - theta) * beta * u[i])  # drag, its explicit part
                 )
-                free = row(solved[d], k, j, LOW, n)
-                for i in range(n):
-                    face = 0.5 * (c_right[i] + c_left[i])
-                    right, left = slip_weight(face, c_right[i], model_b), slip_weight(face, c_left[i], model_b)
-                    beta = 0.5 * (right * b_right[i] + left * b_left[i])
-                    beta_v = 0.5 * (right * v_right[i] + left * v_left[i])
-                    theta = implicitness(beta * step / (density * face))
-                    gradient = (p_right[i] - p_left[i]) * inverse[d]
-                    share = face + model_b * (1.0 - face)
-                    momentum = (
-                        density * 0.5 * (s_right[i] + s_left[i]) * u[i]
-                        + step * ((1.0 - weight_b) * first[i] + weight_b * second[i])  # convection, viscous stress
-                        - step * share * gradient  # pressure, gravity within
-                        + step * share * driving[d]
-                        + step * 0.5 * (x_right[i] + x_left[i])
-                        + step * (beta_v - (1.0 - theta) * beta * u[i])  # drag, its explicit part
-                    )
-                    inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
-                    out[i] = momentum / inertia if free[i] > 0.0 else u[i]
-                    mobility_row[i] = free[i] * step * share / inertia
+                inertia = density * 0.5 * (e_right[i] + e_left[i]) + step * theta * beta  # drag, its implicit part
+                out[i] = momentum / inertia if free[i] > 0.0 else u[i]
+                mobility_here[i] = free[i] * step * share / inertia
+
+
+@inline
+def half_of_drag(voidage, drag, other_voidage, other_drag, free, old, new, density, step, model_b):
+    """Half of the weight with which the drag of a cell acts on one of its faces, and u_theta there."""
+    other_voidage, other_drag = (other_voidage, other_drag) if free > 0.0 else (voidage, drag)
+    face = 0.5 * (voidage + other_voidage)
+    own = slip_weight(face, voidage, model_b)
+    beta = 0.5 * (own * drag + slip_weight(face, other_voidage, model_b) * other_drag)
+    theta = implicitness(beta * step / (density * face))
+    return 0.5 * own, theta * new + (1.0 - theta) * old
 
 
 @threaded
 def drag_seen(old, new, voidage, drag, solved, density, step, model_b, weight, seen):
-    """Weight W and velocity u_d with which the drag of every cell has acted over a step: half on each face."""
-    nz, ny, nx, dimensions = weight.shape
-    for k in prange(nz):
-        for j in range(ny):
-            for i in range(nx):
-                c, b, a = k + LOW, j + LOW, i + LOW
-                own_voidage, own_drag = voidage[c, b, a], drag[c, b, a]
-                for d in range(dimensions):
-                    dk, dj, di = UNIT[d]
-                    total, carried_velocity = 0.0, 0.0
-                    for side in range(2):
-                        # The face is the low face of cell f; the neighbour across it is n.
-                        fk, fj, fi = c + side * dk, b + side * dj, a + side * di
-                        nk, nj, ni = c + (2 * side - 1) * dk, b + (2 * side - 1) * dj, a + (2 * side - 1) * di
-                        other_voidage, other_drag = voidage[nk, nj, ni], drag[nk, nj, ni]
-                        if solved[d, fk, fj, fi] == 0.0:
-                            other_voidage, other_drag = own_voidage, own_drag
-                        face = 0.5 * (own_voidage + other_voidage)
-                        own = slip_weight(face, own_voidage, model_b)
-                        beta = 0.5 * (own * own_drag + slip_weight(face, other_voidage, model_b) * other_drag)
-                        theta = implicitness(beta * step / (density * face))
-                        u = theta * new[d, fk, fj, fi] + (1.0 - theta) * old[d, fk, fj, fi]
-                        total += 0.5 * own
-                        carried_velocity += 0.5 * own * u
-                    weight[k, j, i, d] = total
-                    seen[k, j, i, d] = carried_velocity / total
+    """Weight W and velocity u_d with which the drag of every cell has acted over a step: half on each face.
+
+    weight, seen  padded (3, ...); only cells are written
+    """
+    shape, steps = voidage.shape, strides(voidage.shape)
+    voidage, drag, solved = voidage.reshape(-1), drag.reshape(-1), solved.reshape(3, -1)
+    old, new, weight, seen = old.reshape(3, -1), new.reshape(3, -1), weight.reshape(3, -1), seen.reshape(3, -1)
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        e_here, b_here = line(voidage, at, n), line(drag, at, n)
+        for d in range(3):
+            below, above = at - steps[d], at + steps[d]
+            e_below, e_above = line(voidage, below, n), line(voidage, above, n)
+            b_below, b_above = line(drag, below, n), line(drag, above, n)
+            free_low, free_high = line(solved[d], at, n), line(solved[d], above, n)
+            old_low, old_high = line(old[d], at, n), line(old[d], above, n)
+            new_low, new_high = line(new[d], at, n), line(new[d], above, n)
+            out, out_seen = line(weight[d], at, n), line(seen[d], at, n)
+            for i in range(n):
+                low, u_low = half_of_drag(
+                    e_here[i], b_here[i], e_below[i], b_below[i], free_low[i], old_low[i], new_low[i],
+                    density, step, model_b,
+                )  # fmt: skip
+                high, u_high = half_of_drag(
+                    e_here[i], b_here[i], e_above[i], b_above[i], free_high[i], old_high[i], new_high[i],
+                    density, step, model_b,
+                )  # fmt: skip
+                out[i] = low + high
+                out_seen[i] = (low * u_low + high * u_high) / (low + high)
+
+
+@threaded
+def in_cells(faces, counted, cells):
+    """Mean over the two faces of every cell (3, ...); a face that does not count takes the value of the other."""
+    shape, steps = counted.shape[1:], strides(counted.shape[1:])
+    faces, counted, cells = faces.reshape(3, -1), counted.reshape(3, -1), cells.reshape(3, -1)
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        for d in range(3):
+            low, high = line(faces[d], at, n), line(faces[d], at + steps[d], n)
+            share_low, share_high = line(counted[d], at, n), line(counted[d], at + steps[d], n)
+            out = line(cells[d], at, n)
+            for i in range(n):
+                number = max(share_low[i] + share_high[i], 1.0)
+                out[i] = (low[i] * share_low[i] + high[i] * share_high[i]) / number

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.backend.compile import serial
 from cfddem.fluid.conditions import Condition
-from cfddem.fluid.grid import HIGH, LOW, layers
+from cfddem.fluid.grid import HIGH, LOW, Grid, layers
 from cfddem.fluid.halo import place
 
 
@@ -48,6 +48,10 @@ class Side:
     def inward(self) -> float:
         """Sign of a normal velocity that points into the box."""
         return -1.0 if self.high else 1.0
+
+    def face(self, grid: Grid) -> int:
+        """Index of the layer of faces on the side, in padded velocities."""
+        return LOW + grid.cells[self.axis] if self.high else LOW
 
     def layer(self, array: Any, index: int) -> Any:
         """View of one layer of cells parallel to the side."""

@@ -214,7 +214,7 @@ class FluidSolver(FluidBudgets):
             self.boundaries.driving, self.faces.solved, self.density, step, self.inverse_spacing, self.model_b,
             new, fields.mobility,
         )  # fmt: skip
-        self.boundaries.fill_velocity(new)
+        self.boundaries.set_faces(new)
 
     def _flux_scale(self, step: float) -> float:
         """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.backend.compile import prange, threaded
-from cfddem.fluid.grid import LOW, UNIT, Array
+from cfddem.backend.compile import prange, threaded, vector_inline
+from cfddem.fluid.grid import LOW, Array
 from cfddem.fluid.state import FluidState
 from cfddem.fluid.step_limit import Rates
 
@@ -39,20 +39,31 @@ def largest_rates(velocity, voidage, viscosity, open_cells, density, inverse, ad
     its six neighbours.
     """
     nz, ny, nx = open_cells.shape
-    squares = 2.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
     for k in prange(nz):
-        fastest, stiffest, flux = 0.0, 0.0, 0.0
+        largest = np.zeros((3, nx))  # of the cells at each place in a row
         for j in range(ny):
-            for i in range(nx):
-                kk, jj, ii = k + LOW, j + LOW, i + LOW
-                crossing, largest = 0.0, viscosity[kk, jj, ii]
-                for d in range(velocity.shape[0]):
-                    dk, dj, di = UNIT[d]
-                    speed = max(abs(velocity[d, kk, jj, ii]), abs(velocity[d, kk + dk, jj + dj, ii + di]))
-                    crossing += speed * inverse[d]
-                    flux = max(flux, speed * voidage[kk, jj, ii])
-                    around = max(viscosity[kk - dk, jj - dj, ii - di], viscosity[kk + dk, jj + dj, ii + di])
-                    largest = max(largest, around)
-                fastest = max(fastest, crossing)
-                stiffest = max(stiffest, open_cells[k, j, i] * largest * squares / (density * voidage[kk, jj, ii]))
-        advection[k], viscous[k], fluxes[k] = fastest, stiffest, flux
+            _row_rates(
+                k, j, velocity, voidage, viscosity, open_cells, density, inverse, largest[0], largest[1], largest[2]
+            )
+        advection[k], viscous[k], fluxes[k] = largest[0].max(), largest[1].max(), largest[2].max()  # local: a plane
+
+
+@vector_inline
+def _row_rates(k, j, velocity, voidage, viscosity, open_cells, density, inverse, advection, viscous, fluxes):
+    """Raise the largest rates at every place in a row to those of row j in plane k."""
+    n, b, c, i = fluxes.size, j + LOW, k + LOW, LOW
+    u0, u1 = velocity[0, c, b, i : i + n], velocity[0, c, b, i + 1 : i + 1 + n]
+    v0, v1 = velocity[1, c, b, i : i + n], velocity[1, c, b + 1, i : i + n]
+    w0, w1 = velocity[2, c, b, i : i + n], velocity[2, c + 1, b, i : i + n]
+    here, fluid, is_open = viscosity[c, b, i : i + n], voidage[c, b, i : i + n], open_cells[k, j]
+    west, east = viscosity[c, b, i - 1 : i - 1 + n], viscosity[c, b, i + 1 : i + 1 + n]
+    south, north = viscosity[c, b - 1, i : i + n], viscosity[c, b + 1, i : i + n]
+    down, up = viscosity[c - 1, b, i : i + n], viscosity[c + 1, b, i : i + n]
+    squares = 2.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
+    for x in range(n):
+        u, v, w = max(abs(u0[x]), abs(u1[x])), max(abs(v0[x]), abs(v1[x])), max(abs(w0[x]), abs(w1[x]))
+        around = max(max(max(west[x], east[x]), max(south[x], north[x])), max(down[x], up[x]))
+        stiffness = is_open[x] * max(here[x], around) * squares / (density * fluid[x])
+        advection[x] = max(advection[x], u * inverse[0] + v * inverse[1] + w * inverse[2])
+        viscous[x] = max(viscous[x], stiffness)
+        fluxes[x] = max(fluxes[x], max(u, max(v, w)) * fluid[x])

@@ -17,7 +17,7 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import checked_viscosity
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, sample
-from cfddem.fluid.momentum import drag_seen, transport
+from cfddem.fluid.momentum import drag_seen, in_cells, transport
 from cfddem.fluid.viscosity import EffectiveViscosity
 
 
@@ -55,6 +55,7 @@ class FluidState:
         self.inverse_spacing = 1.0 / np.array(grid.spacing)
         self.face_areas = np.array([grid.face_area(d) for d in range(3)])
         self.open_cells = grid.open.astype(float)
+        self._every_face = np.ones_like(self.faces.solved)
         self._effective = EffectiveViscosity(grid, boundaries.halo, self.density, float(properties.smagorinsky))
 
     # ------------------------------------------------------------ fields
@@ -74,11 +75,7 @@ class FluidState:
     @property
     def velocity(self) -> Array:
         """Velocity at cell centres (nz, ny, nx, 3) [m/s], mean of the two faces of each component."""
-        means = []
-        for d in range(3):
-            faces = np.moveaxis(self.face_velocity(d), 2 - d, 0)
-            means.append(np.moveaxis(0.5 * (faces[1:] + faces[:-1]), 0, 2 - d))
-        return np.stack(means, axis=-1)
+        return np.moveaxis(self._in_cells(self.fields.velocity, self._every_face), 0, -1)
 
     @property
     def voidage(self) -> Array:
@@ -158,12 +155,12 @@ class FluidState:
 
         Add rho g for the gradient of the static pressure.
         """
-        return self._in_cells(self._pressure_gradient())
+        return self._in_cells(self._pressure_gradient(), self.faces.solved)
 
     def cell_viscous_force(self) -> Array:
         """div tau of every cell, the stress of the fluid between the particles (not times eps), mean of its two faces
         (3, nz, ny, nx) [N/m3]."""
-        return self._in_cells(self._stress_between_particles())
+        return self._in_cells(self._stress_between_particles(), self.faces.solved)
 
     def drag_response(self) -> tuple[Array, Array]:
         """How the implicit drag of the last step saw the fluid, cell by cell.
@@ -172,23 +169,21 @@ class FluidState:
                  the implicit drag has seen [m/s]
         """
         fields = self.fields
-        weight, seen = np.empty((*self.grid.shape, 3)), np.empty((*self.grid.shape, 3))
+        weight, seen = np.empty((2, *fields.velocity.shape))
         drag_seen(
             fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
             self.density, self.last_step, self.model_b, weight, seen,
         )  # fmt: skip
-        return weight, seen
+        return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(seen), 0, -1)
 
-    def _in_cells(self, faces: Array) -> Array:
-        """Mean over the two faces of every cell; a face without an unknown takes the value of the other one."""
-        cells, solved = np.empty((3, *self.grid.shape)), self.faces.solved
-        inner = self.grid.inner
-        for d in range(3):
-            balanced = faces[d] * solved[d]
-            low, high = inner(balanced), inner(np.roll(balanced, -1, axis=2 - d))
-            number = inner(solved[d]) + inner(np.roll(solved[d], -1, axis=2 - d))
-            cells[d] = (low + high) / np.maximum(number, 1.0)
-        return cells
+    def _in_cells(self, faces: Array, counted: Array) -> Array:
+        """Mean over the two faces of every cell (3, nz, ny, nx).
+
+        counted  1 for faces that count, 0 for those that take the value of the other one
+        """
+        cells = np.empty_like(faces)
+        in_cells(faces, counted, cells)
+        return self.grid.inner(cells)
 
     def _pressure_gradient(self) -> Array:
         """grad p' on the faces (3, ...) [Pa/m], with the mean gradient of periodic directions."""

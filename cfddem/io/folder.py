@@ -39,9 +39,11 @@ def read_about(folder: Path) -> dict[str, Any]:
     try:
         about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         found = int(about["format"])
+    except NotADirectoryError:
+        raise InputError("folder", str(folder), "a run folder", "it is a file") from None
     except FileNotFoundError:
-        inside = sorted(each.parent.name for each in folder.glob("*/run.json"))
-        why = "it contains no run.json"
+        inside = [each.name for each in runs_inside(folder)]
+        why = "it contains no run.json" if folder.exists() else "it does not exist"
         if inside:
             why += f", but the runs {', '.join(inside[:MOST_NAMED])}" + " ..." * (len(inside) > MOST_NAMED)
         raise InputError("folder", str(folder), "a run folder", why) from None
@@ -53,6 +55,11 @@ def read_about(folder: Path) -> dict[str, Any]:
     with damage_named(path, "restore it, the snapshots are in data/"):
         require_about(about)
     return about
+
+
+def runs_inside(folder: Path) -> list[Path]:
+    """Run folders inside a folder, such as that of a sweep, by name."""
+    return sorted(each.parent for each in folder.glob("*/run.json"))
 
 
 def scan(folder: Path) -> tuple[list[Snapshot], Layout | None]:

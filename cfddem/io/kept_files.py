@@ -31,6 +31,12 @@ def with_kept_files(case: Case, folder: Path) -> Case:
     return compare.with_data(with_surfaces(case, surfaces), data)
 
 
+def holds_surfaces_of(case: Case, folder: Path) -> bool:
+    """Whether the copies of STL files in a run folder are those that the case names now."""
+    files = {number: Path(wall.file) for number, wall in enumerate(case.wall) if wall.file is not None}
+    return all(copy_of(folder, number).read_bytes() == file.read_bytes() for number, file in files.items())
+
+
 def text_with_kept_files(case: Case) -> str:
     """The case as TOML text with the places of the copies in its run folder, which may move."""
     here = Path()

@@ -149,7 +149,7 @@ class Particles(Table):
 
 def sphere_volume(radius: np.ndarray) -> np.ndarray:
     """Volume of spheres (N,) [m3]."""
-    return np.asarray((4.0 / 3.0) * np.pi * radius**3)
+    return np.asarray((4.0 / 3.0) * np.pi * (radius * radius * radius))  # faster than the power
 
 
 def rows_of(ids: np.ndarray, among: np.ndarray, order: np.ndarray) -> np.ndarray:

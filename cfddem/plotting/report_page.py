@@ -12,7 +12,8 @@ from cfddem.analysis.measured import with_files
 from cfddem.analysis.report import case_of
 from cfddem.analysis.report import report as summary
 from cfddem.analysis.report_markdown import markdown
-from cfddem.analysis.report_text import spelled, steadiness, window, with_error
+from cfddem.analysis.report_text import bounds_note, spelled, steadiness, window, with_error
+from cfddem.analysis.run_warnings import NOTE
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
@@ -65,6 +66,8 @@ def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
     text: str = _template().render(
         result=result,
         status=f"{result['status']} at {end:g} s; {counts}; {window(result)}",
+        bounds_note=bounds_note(result),
+        note=NOTE,
         answers=_answers(result["answers"]),
         measures=_measures(result["measures"]),
         laws=_laws(result["laws"]),

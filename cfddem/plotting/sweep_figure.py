@@ -8,13 +8,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from cfddem.case.compare import Points
 from cfddem.case.input_errors import field_of
 from cfddem.case.schema import Case
 from cfddem.io.quantities import shown_unit
-from cfddem.plotting.curves import BLUE, blank, label, legend, legend_below, save, shades
+from cfddem.plotting.curves import BLUE, ORANGE, blank, label, legend, legend_below, save, shades
 
 SHOWN = ("bed_height", "bed_voidage", "pressure_drop")
 """Measures in the figure."""
+
+VELOCITY = "bed.inlet_velocity"
+"""Key of a sweep beside which measured curves are drawn."""
 
 MOST_LABELLED = 8
 """Largest number of curves with a legend."""
@@ -27,12 +33,13 @@ class Point(NamedTuple):
     measures: Mapping[str, tuple[float, float, str]]  # mean, error, unit
 
 
-def sweep_figure(points: Sequence[Point], path: Path) -> bool:
+def sweep_figure(points: Sequence[Point], path: Path, measured: Sequence[Points] = ()) -> bool:
     """Draw the means against the first key with numbers, one curve for each combination of the other keys.
 
     Where all keys have words, each word of the first key has its place, and its points are not joined.
 
-    returns  whether there was anything to draw
+    measured  curves against the inlet velocity, for a sweep of it
+    returns   whether there was anything to draw
     """
     names = [name for name in SHOWN if points and all(name in each.measures for each in points)]
     if not names:
@@ -55,6 +62,8 @@ def sweep_figure(points: Sequence[Point], path: Path) -> bool:
             panel.errorbar(x, mean, yerr=bars, fmt=style, color=colour, capsize=2.0, label=group or None)
             if name == "bed_voidage" and numeric and not others:
                 _draw_laws(panel, x, members)
+        if first == VELOCITY:
+            _draw_measured(panel, [each for each in measured if each.quantity == name])
         unit = shown_unit(points[0].measures[name][2])
         label(panel, first, unit_of(first), name.replace("_", " "), unit)
         if not numeric:
@@ -70,6 +79,16 @@ def sweep_figure(points: Sequence[Point], path: Path) -> bool:
 def _is_numeric(points: Sequence[Point], key: str) -> bool:
     """Whether all values of a key are numbers."""
     return all(isinstance(each.values[key], int | float) for each in points)
+
+
+def _draw_measured(panel: Any, measured: Sequence[Points]) -> None:
+    """Draw measured points with their errors."""
+    for each in measured:
+        bars = np.where(np.isfinite(each.error), each.error, 0.0)
+        style = {"color": ORANGE, "markersize": 5.0, "capsize": 2.5, "zorder": 3}
+        panel.errorbar(each.place, each.value, yerr=bars, fmt="s", label=f"measured: {each.name}", **style)
+    if measured:
+        legend(panel)
 
 
 def _draw_laws(panel: Any, x: Sequence[Any], points: Sequence[Point]) -> None:

@@ -9,10 +9,11 @@ from typing import Any
 
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
-from cfddem.preflight.issue import Issue
+from cfddem.preflight.issue import Issue, plain
+from cfddem.preflight.law_ranges import outside, state_of
 from cfddem.preflight.mixture import bed_drag
-from closures.agitation import agitated_temperature
-from closures.registry import Law
+from closures.agitation import agitated_temperature, free_spheres
+from closures.registry import Law, law_of
 from closures.stability import UniformBed, Wave
 
 GRID_DAMPING = 5.0
@@ -113,6 +114,8 @@ def lines(found: BedWaves) -> list[str]:
     for row in made["waves"]:
         text = f"{1e3 * row['wavelength']:>12.1f}{row['speed']:>10.3f}{row['growth']:>10.2f}{row['on_cells']:>10.2f}"
         out.append(text + f"{row['agitated']:>10.2f}" * agitated)
+    meaning = "growth: by theory; on cells: less the damping of the cells"
+    out += ["", meaning + "; agitated: on cells, with agitation" * agitated]
     fastest = made["fastest"]
     verb = "grows" if fastest["growth"] > 0.0 else "decays"
     out += [
@@ -222,9 +225,14 @@ def check_waves(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     wavelength, wave = found.fastest(found.bed)
     grown = found.amplification(wave)
     if grown > math.exp(WARN_AT):
+        beyond = (
+            outside(law_of(free_spheres), state_of(case, bed)).removeprefix("free_spheres ").replace(", but", " and")
+        )
+        beyond = f", although it {beyond}" if beyond else ""
+        fold = plain(float(f"{grown:.2g}"))
         yield Issue(
             "warning", "laws.agitation",
-            f"without agitation, waves of {1e3 * wavelength:.2g} mm grow {grown:.2g}-fold on their way through the "
+            f"without agitation, waves of {1e3 * wavelength:.2g} mm grow {fold}-fold on their way through the "
             "bed, which breaks up into plugs",
-            'set laws.agitation = "free_spheres", which weakens waves; cfddem stability shows them',
+            f'set laws.agitation = "free_spheres", which weakens waves{beyond}; cfddem stability shows them',
         )  # fmt: skip

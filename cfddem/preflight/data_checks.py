@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import Points, held, points_of, require_measured_unit
+from cfddem.case.compare import Points, held, points_of, require_measured_unit, steps_of
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import Issue
 
@@ -52,10 +52,15 @@ def _error(key: str, failure: InputError) -> Issue:
 
 def _check_velocities(case: Case, key: str, points: Points) -> Iterator[Issue]:
     """Check that the case holds the velocities of measured points."""
-    missing = points.place[~held(case, points.place)]
-    if len(missing):
-        listed = ", ".join(f"{each:.3g}" for each in missing[:5]) + (" ..." if len(missing) > 5 else "")
+    found = held(case, points.place)
+    if not found.all():
+        some = f"only {found.sum()} of" if found.any() else "none of"
+        missing = [f"{each:.3g}" for each in points.place[~found]]
+        listed = ", ".join(missing[:5]) + " ..." * (len(missing) > 5)
+        values = ",".join(f"{each:.4g}" for each in sorted(set(points.place.tolist())))
         yield Issue(
-            "warning", key, f"the inlet does not hold {len(missing)} of {len(points.place)} velocities: {listed} m/s",
-            "give bed.inlet_velocity in steps, [[0, 0.01], [0.1, 0.01], [0.11, 0.02], [0.2, 0.02]]",
+            "note" if found.any() else "warning", key,
+            f"the run is compared at {some} {len(found)} velocities; its inlet does not hold {listed} m/s",
+            f"for all: cfddem sweep --over inlet_velocity={values}; or {steps_of(points.place, case.run.until)}",
+            not found.any(),
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""One warning or error of the pre-run check."""
+"""One error, warning or note of the pre-run check."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ from typing import Literal
 WIDTH = 100
 """Columns of printed text."""
 
-Severity = Literal["warning", "error"]
+Severity = Literal["note", "warning", "error"]
+"""An error stops the run, a warning says what to change, a note needs no action."""
+
+ORDER: tuple[Severity, ...] = ("error", "warning", "note")
+"""Severities in the order in which they are printed."""
 
 
 @dataclass(frozen=True)
 class Issue:
-    """A reason why a run will fail (error) or may give wrong or useless results (warning)."""
+    """Why a run will fail (error), why it may give wrong or useless results (warning), or what else to know (note)."""
 
     severity: Severity
     key: str  # of the case
     reason: str  # what is wrong, with number and limit
     remedy: str
-    in_report: bool = True  # false: about time, memory or disk, or counted in the run itself
+    in_report: bool = True  # false: about time, memory or disk, or told by the report itself
 
     def lines(self, opening: str = "") -> list[str]:
         """The issue as text, at most 100 columns wide."""
@@ -39,6 +43,15 @@ def rounded_up(value: float) -> float:
     """
     place = math.floor(math.log10(value)) - 1
     return float(f"{math.ceil(round(value / 10.0**place, 9))}e{place}")
+
+
+def plain(value: float) -> str:
+    """A number without a power of ten where it has few digits.
+
+    >>> plain(1.5e6), plain(680000.0), plain(220.3), plain(1.7e-8), plain(2.6e9)
+    ('1500000', '680000', '220', '1.7e-08', '2.6e+09')
+    """
+    return f"{value:.0f}" if 100.0 <= value < 1e8 else f"{value:.3g}"
 
 
 def percent(part: float) -> str:

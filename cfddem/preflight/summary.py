@@ -22,7 +22,7 @@ from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
 from cfddem.preflight.cost_estimate import estimate_cost
 from cfddem.preflight.geometry_checks import fits
-from cfddem.preflight.issue import WIDTH, Issue
+from cfddem.preflight.issue import ORDER, WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
 from cfddem.preflight.own_laws import check_own_laws
 from cfddem.preflight.step_estimate import estimate_steps
@@ -47,9 +47,9 @@ class Preflight:
 
     @property
     def status(self) -> Literal["ok", "warning", "error"]:
-        """Severity of the worst issue; ok if there is none."""
+        """Severity of the worst error or warning; ok if there is none."""
         severities = {each.severity for each in self.issues}
-        return "error" if "error" in severities else "warning" if severities else "ok"
+        return "error" if "error" in severities else "warning" if "warning" in severities else "ok"
 
     def with_errors(self, found: Iterable[Issue]) -> Preflight:
         """The result with further errors."""
@@ -84,10 +84,9 @@ class Preflight:
         return html.table(f"{self.title}: {self.status}", issues + numbers)
 
     def issue_lines(self) -> list[str]:
-        """Errors and warnings as text, at most 100 columns wide."""
-        if not self.issues:
-            return ["ok: no errors, no warnings"]
-        return [line for each in self.issues for line in each.lines()]
+        """Errors, warnings and notes as text, at most 100 columns wide."""
+        found = [line for each in self.issues for line in each.lines()]
+        return [*found, "ok: no errors, no warnings"] if self.status == "ok" else found
 
 
 def preflight(case: Case) -> Preflight:
@@ -122,7 +121,7 @@ def _preflight(case: Case, title: str) -> Preflight:
         steps = estimate_steps(case, bed)
         cost = estimate_cost(case, bed, steps)
         issues = find_issues(case, bed, collision, wet, steps, cost)
-        issues = sorted([*issues, *own], key=lambda each: each.severity != "error")
+        issues = sorted([*issues, *own], key=lambda each: ORDER.index(each.severity))
         rows = overview(case, bed, collision, wet, steps, cost) if fits(case) else ()  # else they mean nothing
         return Preflight(title, rows, tuple(issues))
     except InputError as failure:

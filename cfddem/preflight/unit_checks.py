@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.geometry_checks import bed_key, fits
-from cfddem.preflight.issue import Issue
+from cfddem.preflight.issue import Issue, percent
 
 LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID, SOFT_SOLID = 5.0, 1e-4, 5e-5, 10.0, 1e4
 """Plausible values in SI units; others suggest a wrong unit.
@@ -15,6 +15,10 @@ LIGHT_GAS, VISCOUS_GAS, THIN_LIQUID, LIGHT_SOLID, SOFT_SOLID = 5.0, 1e-4, 5e-5, 
 Fluids lighter than the first [kg/m3] are less viscous than the second [Pa s]; liquids are more viscous than the third;
 solids are denser than the fourth [kg/m3] and stiffer than the last [Pa].
 """
+
+LARGE_TENSION, ROUGH = 3.0, 0.05
+"""Surface tension above that of every liquid, molten metals included [N/m]; roughness over the diameter of a particle
+above which the surface is no longer that of a sphere [-]."""
 
 LARGE_PARTICLE, VISCOUS_LIQUID = 0.1, 0.1
 """Diameter [m] and viscosity [Pa s] from which values may have been given in mm and mPa s."""
@@ -55,6 +59,24 @@ def check_units(case: Case) -> Iterator[Issue]:
             "warning", "fluid.viscosity", f"{fluid.viscosity:.3g} Pa s is below that of any common liquid",
             "give the dynamic viscosity, the kinematic one times the density; water has 1e-3 Pa s",
         )  # fmt: skip
+    if case.liquid is not None and case.liquid.surface_tension > LARGE_TENSION:
+        tension = case.liquid.surface_tension
+        yield Issue(
+            "error", "liquid.surface_tension", f"{tension:.3g} N/m is above that of any liquid; did you mean "
+            f"{1e-3 * tension:.3g} N/m ({tension:.3g} mN/m)?", "water has 0.072 N/m",
+        )  # fmt: skip
+    smallest: dict[str, float] = {}
+    for species in case.species.values():
+        name = case.material_name_of(species)
+        smallest[name] = min(species.diameter, smallest.get(name, species.diameter))
+    for name, diameter in smallest.items():
+        rough = case.material[name].roughness
+        if rough > ROUGH * diameter:
+            yield Issue(
+                "error", f"material.{name}.roughness",
+                f"{rough:.3g} m is {percent(rough / diameter)} of the diameter; the limit is {percent(ROUGH)}",
+                "give it in m; smooth glass has about 1e-7",
+            )  # fmt: skip
     for name, solid in case.material.items():
         if solid.density < LIGHT_SOLID:
             yield Issue(

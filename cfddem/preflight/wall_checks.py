@@ -68,6 +68,15 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
         if any(each.severity == "error" for each in found):
             return
     yield from _check_place(case, wall, key)
+    ends = {"radius": wall.radius or 0.0, "top_radius": wall.top_radius or 0.0}
+    narrow = min(ends, key=lambda each: ends[each])
+    opening = 2.0 * ends[narrow] if wall.shape == "cone" else 0.0
+    if 0.0 < opening < case.bed.largest_diameter:
+        yield Issue(
+            "warning", f"{key}.{narrow}",
+            f"an opening of {opening:.3g} m is narrower than a particle, {case.bed.largest_diameter:.3g} m",
+            "use a larger radius; below about five diameters particles form arches",
+        )  # fmt: skip
     if wall.moves and wall.has_schedule and wall.begin >= case.run.until:
         yield Issue("warning", f"{key}.begin", f"{wall.begin:g} s is not before the end of the run", "begin earlier")
     if math.isnan(wall.fastest) and case.run.reference_speed is None:

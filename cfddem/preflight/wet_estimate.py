@@ -137,6 +137,12 @@ def _check_spray(case: Case) -> Iterator[Issue]:
     if spray is None:
         return
     duration = max(min(spray.end or math.inf, case.run.until) - spray.begin, 0.0)
+    if spray.begin >= case.run.until:
+        yield Issue(
+            "warning", "spray.begin", f"{spray.begin:g} s is not before the end of the run, {case.run.until:g} s: "
+            "nothing is sprayed", "begin earlier, or run longer",
+        )  # fmt: skip
+        return
     content = spray.rate * duration / sum(case.volumes.values())
     if content > CONTENT:
         yield Issue(

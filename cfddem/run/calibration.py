@@ -24,7 +24,7 @@ from cfddem.analysis.measured import compared_at, largest_chi2, with_files
 from cfddem.analysis.report import window_of
 from cfddem.analysis.response import Response, fewest_runs, response
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
-from cfddem.case.compare import Points, held, points_of, require_measured_units
+from cfddem.case.compare import Points, held, points_of, require_measured_units, steps_of
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.reading import open_run
@@ -72,26 +72,30 @@ class Calibration:
         """Whether the best values agree with the data, in words; empty without a finished trial."""
         if self.best is None:
             return ""
-        points, chi2 = sum(len(each.value) for each in self.data), self.best.chi2
-        most = largest_chi2(points)
-        if chi2 > most and self.response is not None:
-            chi2, most = self.response.chi2, largest_chi2(max(points - len(self.variables), 1))
-        if chi2 <= most:
+        agrees, chi2, most = self._agrees()
+        if agrees:
             return "the case agrees with the data at its best values"
         return (
             f"no values in these ranges agree with the data: reduced chi-squared {chi2:.3g}, by chance at most "
             f"{most:.2g}; the estimates are the closest values, not measured ones: check case, data and ranges"
         )
 
+    def _agrees(self) -> tuple[bool, float, float]:
+        """Whether the best values agree with the data, their reduced chi-squared, and the largest one by chance."""
+        points, chi2 = sum(len(each.value) for each in self.data), min(each.chi2 for each in self.finished)
+        most = largest_chi2(points)
+        if chi2 > most and self.response is not None:
+            chi2, most = self.response.chi2, largest_chi2(max(points - len(self.variables), 1))
+        return chi2 <= most, chi2, most
+
     def estimates(self) -> list[dict[str, Any]]:
         """Best value, standard error and verdict of each key, as plain values."""
-        found = self.response
-        if found is None:
+        if (found := self.response) is None:
             return []
-        rows = []
+        rows, agrees = [], self._agrees()[0]
         for place, each in enumerate(self.variables):
             share, error = float(found.best[place]), float(found.error[place])
-            low, high = (each.value(min(max(share + sign * error, 0.0), 1.0)) for sign in (-1.0, 1.0))
+            low, high = (each.value(min(max(end, 0.0), 1.0)) for end in (share - error, share + error))
             tied = [
                 f"{self.variables[b if a == place else a].key} ({r:+.2f})"
                 for a, b, r in found.tied() if place in (a, b)
@@ -101,7 +105,7 @@ class Calibration:
                 "key": each.key, "value": each.value(share), "error": 0.5 * (high - low) if each.logarithmic
                 else error * (each.high - each.low), "low": each.low, "high": each.high,
                 "identified": identified, "tied": tied, "at_limit": min(share, 1.0 - share) < 0.01,
-                "verdict": _verdict(identified, tied, min(share, 1.0 - share) < 0.01),
+                "verdict": _verdict(identified, tied, min(share, 1.0 - share) < 0.01, agrees),
             })  # fmt: skip
         return rows
 
@@ -181,7 +185,8 @@ def _data(case: Case) -> list[Points]:
             remedy = "add a column error, or relative_error in [compare] of the case"
             raise InputError(f"data {each.name}", None, "given with standard errors", remedy)
         if each.against == "inlet_velocity" and not held(case, each.place).all():  # local: measured points
-            missing, remedy = float(each.place[~held(case, each.place)][0]), "give bed.inlet_velocity in steps"
+            missing = float(each.place[~held(case, each.place)][0])
+            remedy = f"for all points: {steps_of(each.place, case.run.until)}"
             raise InputError(f"data {each.name} inlet_velocity", missing, "a velocity that the case holds", remedy)
     return data
 
@@ -321,18 +326,19 @@ def _joined(data: Sequence[Points]) -> tuple[Array, Array, Array]:
 
 
 def _response(varied: Sequence[Variable], data: Sequence[Points], done: Sequence[Trial]) -> Response | None:
-    good = [each for each in done if each.computed]
-    if not good:
+    if not (good := [each for each in done if each.computed]):
         return None
     shares = np.array([[each.share(trial.values[each.key]) for each in varied] for trial in good])
     return response(shares, np.array([trial.computed for trial in good]), *_joined(data))
 
 
-def _verdict(identified: bool, tied: Sequence[str], at_limit: bool) -> str:
+def _verdict(identified: bool, tied: Sequence[str], at_limit: bool, agrees: bool) -> str:
     if tied:
         return f"only together with {', '.join(tied)}: these keys cannot be told apart by the data"
-    if not identified:
+    if not identified and agrees:
         return "not identified: the data hardly depend on it within its range"
+    if not identified:
+        return "not known: no value in its range agrees with the data" + "; widen it, the best is at its end" * at_limit
     return "identified" + (", at the end of its range: widen it" if at_limit else "")
 
 

@@ -45,7 +45,8 @@ def run_case(
     """
     folder = Path(folder)
     for issue in refuse_errors(case).issues:
-        print("\n".join(issue.lines()), file=sys.stderr)
+        if issue.severity != "note":
+            print("\n".join(issue.lines()), file=sys.stderr)
     if overwrite and (folder / "run.json").exists():
         _delete_run(folder)
     with notebook_line() if in_notebook() else live_line() as line:

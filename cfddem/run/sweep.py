@@ -11,15 +11,17 @@ import itertools
 import math
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.case.compare import Points, points_of
 from cfddem.case.gallery import full_key, read_value
 from cfddem.case.schema import Case
+from cfddem.io.kept_files import holds_surfaces_of, text_with_kept_files
 from cfddem.io.quantities import shown_unit
 from cfddem.preflight.summary import preflight
 
@@ -120,6 +122,7 @@ def sweep(
     if jobs < 1:
         raise InputError("--jobs", jobs, "at least 1")
     runs = cases_of(path, over, overrides or {})
+    measured = _curves(case for case, _ in runs.values())
     make_output(output)
     place = output.absolute() if scheduler else output  # workers have other working folders
     outcomes: dict[str, Outcome] = {}
@@ -135,7 +138,7 @@ def sweep(
         for name, (_, values) in runs.items()
     ]
     write_table(ordered, output / "sweep.csv")
-    _write_figure(ordered, output / "sweep.png", not isinstance(over, Mapping))
+    _write_figure(ordered, output / "sweep.png", not isinstance(over, Mapping), measured)
     return ordered
 
 
@@ -213,7 +216,8 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> 
             Run.begin(case, folder).go()
         else:
             before = open_run(folder)
-            if Case.from_text(before.case_text, str(folder / "case.toml")) != case:
+            same = _without_data(before.case_text) == _without_data(text_with_kept_files(case))
+            if not same or not holds_surfaces_of(case, folder):
                 raise InputError("output", str(folder), "a folder of the same case", "choose another folder")
             kept = before.status == "finished"
             if not kept:
@@ -225,6 +229,11 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> 
     except Exception as failure:  # a failed run must not end the sweep
         outcome = Outcome(str(folder), values, "failed", f"{type(failure).__name__}: {failure}")
     return _measured(outcome, time.monotonic() - begun, kept)
+
+
+def _without_data(text: str) -> Case:
+    """A case as a run folder holds it, without measured data, which change nothing in a run."""
+    return Case.from_text(text).model_copy(update={"compare": {}})
 
 
 def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
@@ -260,11 +269,20 @@ def _width(name: str) -> int:
     return 1 if name.startswith(PUBLISHED) else 2
 
 
-def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool) -> None:
+def _curves(cases: Iterable[Case]) -> list[Points]:
+    """Measured curves against the inlet velocity that the first case names."""
+    found = [points_of(name, each) for case in itertools.islice(cases, 1) for name, each in case.compare.items()]
+    return [each for each in found if each.against == "inlet_velocity"]
+
+
+def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool, measured: Sequence[Points]) -> None:
     from cfddem.plotting.sweep_figure import Point, sample_figure, sweep_figure
 
-    draw = sample_figure if sampled else sweep_figure
-    draw([Point(each.values, each.measures) for each in outcomes if each.measures], path)
+    points = [Point(each.values, each.measures) for each in outcomes if each.measures]
+    if sampled:
+        sample_figure(points, path)
+    else:
+        sweep_figure(points, path, measured)
 
 
 def failures(outcomes: Sequence[Outcome]) -> Iterator[str]:

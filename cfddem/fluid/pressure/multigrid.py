@@ -58,7 +58,7 @@ class Level:
     def __post_init__(self) -> None:
         self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
         self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
-        self.sums = np.zeros(self.shape[0])
+        self.sums, self.rows = np.zeros(self.shape[0]), np.zeros(self.shape[::2])  # of each plane a sum, and a row
         self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
 
     @property
@@ -216,19 +216,19 @@ class PressureEquation:
     def _cycle_here(self, depth: int) -> None:
         """Sweep forward, correct from the coarser grid, sweep backward."""
         level = self.levels[depth]
-        system = (level.x, level.b, level.ax, level.ay, level.az)
+        system = (level.x, level.b, level.ax, level.ay, level.az, level.inverse, level.rows)
         level.x.fill(0.0)
         if depth == len(self.levels) - 1:
-            smooth(*system, level.inverse, 15, False)
-            smooth(*system, level.inverse, 15, True)
+            smooth(*system, 15, False)
+            smooth(*system, 15, True)
             return
         coarse = self.levels[depth + 1]
-        smooth(*system, level.inverse, SWEEPS, False)
+        smooth(*system, SWEEPS, False)
         apply(level.x, level.ax, level.ay, level.az, level.diagonal, level.image, level.sums)
         restrict(level.b, level.image, level.factors, level.shift, coarse.b)
         self._cycle(depth + 1)
         prolong(coarse.x, level.factors, level.shift, level.x)
-        smooth(*system, level.inverse, SWEEPS, True)
+        smooth(*system, SWEEPS, True)
 
     def _remove_means(self, values: Array) -> None:
         if self.closed_regions is not None:

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from cfddem.backend.compile import prange, serial, threaded
+from cfddem.backend.compile import prange, serial, threaded, vector_inline
 from cfddem.fluid.halo import neighbours
 
 
-@serial
-def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
+@vector_inline
+def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
     """Relax the cells of one colour in a plane; whole rows are computed, which vectorises, and half is kept."""
     nz, ny, nx = x.shape
     below, above = neighbours(k, nz)
-    new = np.empty(nx)
     # Of one colour only the first and the last row can be neighbours (periodic y): backward takes the last one first.
-    shift = ny - 1 if backward else 0
+    last, _ = neighbours(0, ny)
     for count in range(ny):
-        j = (count + shift) % ny
+        j = (last if count == 0 else count - 1) if backward else count
         front, back = neighbours(j, ny)
         here, west, rhs, invert = x[k, j], ax[k, j], b[k, j], inverse[k, j]
         south, north, down, up = x[k, front], x[k, back], x[below, j], x[above, j]
@@ -39,8 +36,8 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse):
 
 
 @threaded
-def smooth_colour(x, b, ax, ay, az, inverse, colour, backward):
-    """Relax the cells of one colour in place."""
+def smooth_colour(x, b, ax, ay, az, inverse, rows, colour, backward):
+    """Relax the cells of one colour in place; rows (nz, nx) are overwritten."""
     nz = x.shape[0]
     # Of an odd number of planes the last has the colour of the first, its neighbour if periodic: it goes alone.
     together = nz - (nz & 1)
@@ -49,7 +46,7 @@ def smooth_colour(x, b, ax, ay, az, inverse, colour, backward):
         begin, end = (together, nz) if alone else (0, together)
         if begin < end:
             for k in prange(begin, end):
-                _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse)
+                _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, rows[k])
 
 
 @serial
@@ -59,13 +56,13 @@ def colour_of(half, backward):
 
 
 @serial
-def smooth(x, b, ax, ay, az, inverse, sweeps, backward):
-    """Gauss-Seidel by colours in place; backward is the exact transpose of forward."""
+def smooth(x, b, ax, ay, az, inverse, rows, sweeps, backward):
+    """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten."""
     for half in range(2 * sweeps):
-        smooth_colour(x, b, ax, ay, az, inverse, colour_of(half, backward), backward)
+        smooth_colour(x, b, ax, ay, az, inverse, rows, colour_of(half, backward), backward)
 
 
-@serial
+@vector_inline
 def _apply_row(k, j, x, ax, ay, az, diagonal, out):
     """out = L x along one row."""
     nz, ny, nx = x.shape

@@ -15,7 +15,7 @@ import numpy as np
 from cfddem.backend.compile import prange, threaded
 from cfddem.fluid.checks import refuse_nan
 from cfddem.fluid.grid import LOW, UNIT, Array
-from cfddem.fluid.momentum import row
+from cfddem.fluid.momentum import inside, line, strides
 from cfddem.fluid.pressure.ranks import pressure_equation
 from cfddem.fluid.pressure.regions import ClosedRegions
 from cfddem.fluid.state import FluidState
@@ -58,8 +58,8 @@ class Projection:
             fluid.grid.inner(fields.correction)[:] = correction
             fluid.boundaries.fill_pressure(fields.correction, correction=True)
             subtract_gradient(velocity, fields.mobility, fields.correction, fluid.inverse_spacing)
-            fluid.boundaries.fill_velocity(velocity)
             fluid.pressure[:] += correction
+        fluid.boundaries.fill_velocity(velocity)
         return iterations
 
 
@@ -112,13 +112,12 @@ def assemble(
 @threaded
 def subtract_gradient(new, mobility, correction, inverse):
     """Subtract mobility times the gradient of the pressure correction from the velocity."""
-    pz, py, px = correction.shape
-    n = px - 2 * LOW
-    for k in prange(LOW, pz - LOW):
-        for j in range(LOW, py - LOW):
-            for d in range(new.shape[0]):
-                dk, dj, di = UNIT[d]
-                right, left = row(correction, k, j, LOW, n), row(correction, k - dk, j - dj, LOW - di, n)
-                out, mobility_row = row(new[d], k, j, LOW, n), row(mobility[d], k, j, LOW, n)
-                for i in range(n):
-                    out[i] -= mobility_row[i] * ((right[i] - left[i]) * inverse[d])
+    shape, steps = correction.shape, strides(correction.shape)
+    new, mobility, correction = new.reshape(3, -1), mobility.reshape(3, -1), correction.reshape(-1)
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        for d in range(3):
+            right, left = line(correction, at, n), line(correction, at - steps[d], n)
+            out, mobility_here = line(new[d], at, n), line(mobility[d], at, n)
+            for i in range(n):
+                out[i] -= mobility_here[i] * ((right[i] - left[i]) * inverse[d])

@@ -103,7 +103,7 @@ class SharedLevel(Level):
         """Relax all cells of all ranks."""
         for half in range(2 * SWEEPS):
             colour = (colour_of(half, backward) + self.first + 1) % 2  # arrays begin at the layer before the first
-            smooth_colour(self.x, self.b, self.ax, self.ay, self.az, self.inverse, colour, backward)
+            smooth_colour(self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows, colour, backward)
             self.fill(self.x)
 
     def restrict_to(self, coarse: Level) -> None:

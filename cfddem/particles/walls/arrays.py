@@ -132,38 +132,53 @@ def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: fl
     if len(walls.kind) == 0:
         return nothing, nothing
     count = np.zeros(particles.count, np.int64)
-    _near(particles.view, flat(walls), cutoff_ratio, skin, count, nothing, nothing, False)
-    begin = np.cumsum(count) - count
+    _list_pieces(particles, walls, cutoff_ratio, skin, count, nothing, nothing, False)
+    begin, end = np.cumsum(count) - count, np.cumsum(count) - count
     first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))
-    _near(particles.view, flat(walls), cutoff_ratio, skin, begin, first, second, True)
+    _list_pieces(particles, walls, cutoff_ratio, skin, end, first, second, True)
+    if len(walls.cell_member):
+        _sort_rows(second, begin, end)
     return first, second
 
 
-@serial
-def _near(particles, walls, cutoff_ratio, skin, count, first, second, fill):
+def _list_pieces(particles, walls, cutoff_ratio, skin, count, first, second, fill):  # type: ignore[no-untyped-def]
     """Count the pieces near each particle, or write them from `count` on."""
+    _list_single(particles.view, flat(walls), cutoff_ratio, skin, count, first, second, fill)
+    if len(walls.cell_member):  # the search in cells is compiled only where there are meshes
+        _list_meshes(particles.view, flat(walls), cutoff_ratio, skin, count, first, second, fill)
+
+
+@serial
+def _list_single(particles, walls, cutoff_ratio, skin, count, first, second, fill):
+    """Count or write the pieces near each particle that are no triangles."""
     for i in range(particles.owned):
-        if particles.inverse_mass[i] == 0.0:
-            continue
-        reach, begin = (1.0 + cutoff_ratio) * particles.radius[i] + skin, count[i]
-        for w in walls.single:
-            _list(i, w, walls.wall[w], particles, walls, reach, count, first, second, fill)
-        for m in range(len(walls.sweep)):
-            if walls.cell_number[3 * m] > 0:
-                _list_triangles(i, m, particles, walls, reach, count, first, second, fill)
-        if fill:
-            _sort(second, begin, count[i])
+        if particles.inverse_mass[i] > 0.0:
+            reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
+            for w in walls.single:
+                _list(i, w, walls.wall[w], particles, walls, reach, count, first, second, fill)
 
 
-@inline
-def _sort(values, begin, end):
-    """Sort a part of an array in place."""
-    for last in range(begin + 1, end):
-        value, place = values[last], last
-        while place > begin and values[place - 1] > value:
-            values[place] = values[place - 1]
-            place -= 1
-        values[place] = value
+@serial
+def _list_meshes(particles, walls, cutoff_ratio, skin, count, first, second, fill):
+    """Count or write the triangles near each particle."""
+    for i in range(particles.owned):
+        if particles.inverse_mass[i] > 0.0:
+            reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
+            for m in range(len(walls.sweep)):
+                if walls.cell_number[3 * m] > 0:
+                    _list_triangles(i, m, particles, walls, reach, count, first, second, fill)
+
+
+@serial
+def _sort_rows(values, begins, ends):
+    """Sort parts of an array in place."""
+    for begin, end in zip(begins, ends):
+        for last in range(begin + 1, end):
+            value, place = values[last], last
+            while place > begin and values[place - 1] > value:
+                values[place] = values[place - 1]
+                place -= 1
+            values[place] = value
 
 
 @inline

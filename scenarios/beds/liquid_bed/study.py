@@ -53,6 +53,21 @@ def glass(velocity: float) -> Case:
     return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.04})
 
 
+def coarse_glass(velocity: float) -> Case:
+    """The same bed of beads 1.6 times as large, in a column as many diameters wide, at a velocity [m/s]."""
+    return glass(velocity).with_(
+        **{
+            "title": "Liquid-fluidised bed of coarse glass beads",
+            "column.width": 0.016,
+            "column.height": 0.064,
+            "column.cell": 0.004,
+            "bed.diameter": 1.6e-3,
+            "run.reference_speed": 0.08,
+            "run.particle_step": None,
+        }
+    )
+
+
 def alumina(velocity: float) -> Case:
     """Heavier and larger beads at a velocity [m/s], after Ferreira et al. (2023); plugs rise in this bed."""
     beads = {

@@ -72,8 +72,8 @@ class Collision:
     friction_used: float  # [-]
     stop_gap: float | None  # where a pair that does not separate stops [m]
     spin: tuple[float, float]  # of striker and target about the plane's normal [rad/s]
-    time: np.ndarray  # [s]
-    gap: np.ndarray  # at these times [m]
+    time: np.ndarray = field(repr=False)  # [s]
+    gap: np.ndarray = field(repr=False)  # at these times [m]
     history: dict[str, np.ndarray] = field(repr=False)  # more columns at these times
     warnings: tuple[str, ...] = ()
 
@@ -183,7 +183,7 @@ def _choice(name: str, value: str, choices: dict[str, Chosen]) -> Chosen:
     return choices[value]
 
 
-def _check(name: str, value: float, holds: bool, limit: str) -> None:
+def _check(name: str, value: Any, holds: bool, limit: str) -> None:
     if not holds:
         raise InputError(name, value, limit)
 
@@ -206,6 +206,8 @@ class Bodies(NamedTuple):
 
     def reduced(self) -> tuple[float, float]:
         """Reduced radius [m] and reduced mass [kg]."""
+        for each in self.materials:
+            _check("material", each, isinstance(each, Material), "a Material, such as MATERIALS['glass']")
         for name, diameter in zip(("diameter", "diameter of the target"), self.diameters):
             _check(name, diameter, 1e-9 <= diameter <= 1e3, "between 1e-9 and 1000 m")
         wall = _choice("against", self.against, {"sphere": False, "wall": True})

@@ -14,7 +14,7 @@ from scenarios.collisions.three_spheres.study import OUTCOMES, Triplet, centres,
 
 COLOURS = {"FA": "#3b3b3b", "PA1": BLUE, "PA2": GREEN, "PA3": ORANGE, "FS": "#dcebf5"}
 MEANINGS = {
-    "FA": "FA: all three stick",
+    "FA": "FA: all stick",
     "PA1": "PA1: sphere 1 leaves",
     "PA2": "PA2: sphere 2 leaves",
     "PA3": "PA3: sphere 3 leaves",

@@ -38,6 +38,8 @@ TRANSITION_PRESSURES = {
 }
 """Glass transition pressure of silicone oil of 10 Pa s, as fitted for each film by Punch et al. (2023, fig. 8) [Pa]."""
 
+SLOWEST, FASTEST = 1e-12, 1e3
+"""Speeds of impact that can be followed [m/s]."""
 
 LEAST_VISCOSITY, LARGE_RADIUS = 1.0, 0.1
 """Viscosity below which the fitted pressures are those of another liquid [Pa s], and radius that may be in mm [m]."""
@@ -177,6 +179,9 @@ def _pair(given: Mapping[str, Any], laws: BridgeLaws) -> Pair:
     elastic = (given["youngs_modulus"], given["poisson"])
     mass = given["density"] * 4.0 / 3.0 * math.pi * radius**3
     speed = given["stokes"] * film_strength(viscosity, 0.5 * radius) / (0.5 * mass)
+    if not SLOWEST <= speed <= FASTEST:
+        limit = f"that of an impact at {SLOWEST:g} to {FASTEST:g} m/s; it gives {speed:.3g} m/s"
+        raise InputError("stokes", given["stokes"], limit)
     return Pair(
         speed=speed,
         film=film,
