@@ -81,7 +81,7 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
-LONG = {"averages", "user-law", "contact-law", "wet-particles", "cluster", "walls"}
+LONG = {"averages", "layers", "user-law", "contact-law", "wet-particles", "cluster", "walls"}
 """Pages with many laws, each of which is compiled."""
 
 

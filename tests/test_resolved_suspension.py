@@ -46,6 +46,7 @@ def test_momentum_of_spheres_and_fluid_is_conserved_to_round_off(one_thread):
     assert np.abs(suspension.momentum).max() < 1e-12 * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1.03, 7.0])
 def test_density_ratios_from_just_above_one_are_stable(one_thread, ratio):
     suspension = stirred(Point(ratio, 0.3, 20.0, diameter=6, box=3.0), 300)

@@ -103,7 +103,8 @@ def _show_triplet(result: three_spheres.Triplet, json: bool) -> None:
     events, contacts = values.pop("events"), values.pop("contacts")
     values["outcome"] = MEANINGS[values["outcome"]]
     show(values | {f"contacts{pair}": count for pair, count in contacts.items()}, {}, json)
-    print("\nt: time over (film / impact speed); t*: time over (diameter / impact speed); speeds over the impact speed")
+    print("\nt: time over (film / impact speed); t*: time over (diameter / impact speed)")
+    print("speeds: over the impact speed")
     for event in events:
         print("t = {time:<9.4f} t* = {time_star:<8.4f} {pair} {kind:<8} at {speed:.4f}".format(**event))
 

@@ -46,7 +46,7 @@ SLAB = 4
 class Stencil(NamedTuple):
     """Cells on which particles deposit: for each of their equal pieces a cell and the seven beside, above and behind.
 
-    A layer of cells around the grid takes part, see :meth:`cfddem.coupling.reach.Reach.strays`.
+    A layer of cells around the grid takes part, see :meth:`cfddem.coupling.reach.Reach.collecting`.
     """
 
     first: np.ndarray  # (N, pieces) uint32, flat index of the lowest of the eight cells
@@ -94,11 +94,12 @@ class FilterKernel:
         self.reach = Reach(grid, periodic)
         self._origin, self._inverse = self.reach.origin, 1.0 / np.array(grid.spacing)
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
-        self._buffers, self._layered = dict[int, Array](), dict[int, Array]()
+        self._buffers: dict[int, Array] = {}
         self._cells, (_, ny, nx) = self.reach.shape[::-1], self.reach.shape
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
         self._corners = np.array(corners, np.uint32)
-        self._strays, self._homes = self.reach.strays()
+        self._collecting = self.reach.collecting()
+        self._spreading = self._collecting.T.tocsr()
         self._gates = _gates(grid, self.halo)
         self.sweeps, self.strength = self._diffusion()
 
@@ -140,31 +141,21 @@ class FilterKernel:
 
     def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx)."""
-        by_cell, inner = self._by_cell(values.shape[1])
         values = np.ascontiguousarray(values)
-        by_cell.fill(0.0)
+        by_cell = np.zeros((self._collecting.shape[1], values.shape[1]))
         loops.deposit(cell_map.order, cell_map.start, values, *cell_map.stencil, self._corners, by_cell)
-        np.add.at(by_cell, self._homes, by_cell[self._strays])
-        by_cell[self._strays] = 0.0
-        return self.reach.collected(np.array(inner, order="C"))
+        fields = np.ascontiguousarray((self._collecting @ by_cell).T)
+        return self.reach.collected(fields.reshape(-1, *self.reach.shape))
 
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
         count = len(fields)
         columns = -(-count // loops.FOUR) * loops.FOUR
         values = np.empty((len(stencil.first), columns))
-        by_cell, inner = self._by_cell(columns)
-        inner[:count] = self.reach.spread(fields)
-        by_cell[self._strays] = by_cell[self._homes]
-        loops.gather(*stencil, self._corners, by_cell, values)
+        by_cell = np.zeros((self._collecting.shape[0], columns))
+        by_cell[:, :count] = self.reach.spread(fields).reshape(count, -1).T
+        loops.gather(*stencil, self._corners, self._spreading @ by_cell, values)
         return values[:, :count]
-
-    def _by_cell(self, columns: int) -> tuple[Array, Array]:
-        """Fields with a layer around, the same in every call: (cells, m), and a view without it (m, nz, ny, nx)."""
-        if columns not in self._layered:
-            self._layered[columns] = np.zeros((*(n + 2 for n in self.reach.shape), columns))
-        fields = self._layered[columns]
-        return fields.reshape(-1, columns), np.moveaxis(fields[1:-1, 1:-1, 1:-1], -1, 0)
 
     def smooth(self, fields: Array) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""

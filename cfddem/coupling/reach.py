@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
+from scipy.sparse import csr_array
 
 from cfddem.backend.errors import RunFailed
 from cfddem.fluid.block import THINNEST
@@ -37,11 +38,21 @@ class Reach:
         self.shape = (nz, ny, nx)
         self.origin = np.array(grid.origin) - self._ghosts * np.array(grid.spacing)
 
-    def strays(self) -> tuple[np.ndarray, np.ndarray]:
-        """Cells whose deposit another cell receives, and these cells: flat indices, with a layer around all cells.
+    def collecting(self) -> csr_array:
+        """Matrix that brings deposits on the cells and a layer around them to the cells that receive them (n, m) [-].
 
-        The other cell is the nearest open one of a solid cell, or the one whose value a ghost takes.
+        A cell receives its own, then those of solid cells to which it is the nearest open one, and of ghosts that take
+        its value. The order of a row is that of the sum, on any number of ranks.
         """
+        homes = self._homes()
+        own = np.ravel_multi_index(np.indices(self.shape).reshape(3, -1) + 1, np.array(self.shape) + 2)
+        strays = np.arange(homes.size) != own[homes]
+        order = np.lexsort((strays, homes))
+        begins = np.searchsorted(homes[order], np.arange(own.size + 1))
+        return csr_array((np.ones(homes.size), order, begins), shape=(own.size, homes.size))
+
+    def _homes(self) -> np.ndarray:
+        """Cell that receives the deposit on each of the cells and of a layer around them; flat indices."""
         whole, counts = self.grid.whole, self.grid.whole.cells
         lines = []
         for first, n, ghosts, count, repeats in zip(
@@ -61,9 +72,7 @@ class Reach:
         begin = (np.array(self.grid.first) - self._ghosts)[::-1, None, None, None]
         # a particle cannot reach a home so deep in the solid that it lies outside
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
-        flat = np.ravel_multi_index(tuple(inside + 1), homes.shape[1:]).ravel()
-        strays = np.flatnonzero(flat != np.arange(flat.size))
-        return strays, flat[strays]
+        return np.ravel_multi_index(tuple(inside), self.shape).ravel()
 
     def placed(self, position: Array, radius: Array | None = None) -> Array:
         """Positions (N, 3) [m] as periodic images that lie nearest to the cells of the rank.

@@ -189,9 +189,13 @@ class FluidState:
         """grad p' on the faces (3, ...) [Pa/m], with the mean gradient of periodic directions."""
         pressure, gradient = self.fields.pressure, np.empty_like(self.fields.velocity)
         self.boundaries.fill_pressure(pressure)
-        for d in range(3):
-            gradient[d] = (pressure - np.roll(pressure, 1, axis=2 - d)) * self.inverse_spacing[d]
-            gradient[d] -= self.boundaries.driving[d]
+        values = pressure.reshape(-1)
+        for d, rise in enumerate(gradient.reshape(3, -1)):
+            before = pressure.strides[2 - d] // pressure.itemsize  # distance of the cell before in the flat array
+            np.subtract(values[before:], values[:-before], out=rise[before:])
+            rise[:before] = 0.0  # outermost ghosts
+            rise *= self.inverse_spacing[d]
+            rise -= self.boundaries.driving[d]
         return gradient
 
     def viscous_force(self, velocity: Array, voidage: Array) -> Array:

@@ -53,9 +53,8 @@ def check_ranges(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     if isinstance(added, Law) and (found := outside(added, state, ratios)):
         yield Issue("warning", "laws.added_mass", found + _and(_effect_of_added_mass(case, state)), REMEDY)
     if isinstance(agitation, Law) and (found := outside(agitation, state)):
-        asked = case.laws.agitation != "auto"
         remedy = "; ".join(["trust heights more than granular temperatures", *by_default(case)])
-        yield Issue("note" if asked else "warning", "laws.agitation", found + _and(AGITATED), remedy, not asked)
+        yield Issue("note", "laws.agitation", found + _and(AGITATED), remedy, case.laws.agitation == "auto")
     if isinstance(agitation, Law) and agitation.name in TIMES and (added != 0.0 or case.laws.history != "none"):
         remedy = 'leave these forces out, or set laws.agitation = "none"'
         yield Issue("warning", "laws.agitation", f"{agitation.name} was {NOT_FITTED_WITH}", remedy)

@@ -70,7 +70,7 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
     yield from _check_place(case, wall, key)
     ends = {"radius": wall.radius or 0.0, "top_radius": wall.top_radius or 0.0}
     narrow = min(ends, key=lambda each: ends[each])
-    opening = 2.0 * ends[narrow] if wall.shape == "cone" else 0.0
+    opening = 2.0 * ends[narrow] if wall.shape == "cone" and wall.solid != "inside" else 0.0
     if 0.0 < opening < case.bed.largest_diameter:
         yield Issue(
             "warning", f"{key}.{narrow}",
