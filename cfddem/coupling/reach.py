@@ -45,8 +45,9 @@ class Reach:
         its value. The order of a row is that of the sum, on any number of ranks.
         """
         homes = self._homes()
-        own = np.ravel_multi_index(np.indices(self.shape).reshape(3, -1) + 1, np.array(self.shape) + 2)
-        strays = np.arange(homes.size) != own[homes]
+        layered = np.arange(homes.size).reshape([n + 2 for n in self.shape])
+        own = layered[1:-1, 1:-1, 1:-1].ravel()
+        strays = layered.ravel() != own[homes]
         order = np.lexsort((strays, homes))
         begins = np.searchsorted(homes[order], np.arange(own.size + 1))
         return csr_array((np.ones(homes.size), order, begins), shape=(own.size, homes.size))
