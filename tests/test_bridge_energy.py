@@ -30,6 +30,7 @@ def ledger(run: ParticleSolver, step: float, steps: int) -> tuple[float, dict[st
     return count.mechanical(run) - before - gained + lost, done, before + put_in
 
 
+@pytest.mark.slow
 def test_a_pair_loses_what_the_closed_forms_say() -> None:
     """Formation at both films, rupture at its length: within 2 %, by the gap of a step."""
     velocity = np.array([[0.15, 0, 0], [-0.15, 0, 0]])

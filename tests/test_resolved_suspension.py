@@ -67,6 +67,7 @@ def test_zick_and_homsys_values_agree_with_the_expansion_where_it_holds():
         assert abs(verification.ZICK_HOMSY[solid_fraction] / exact - 1.0) < 2e-3
 
 
+@pytest.mark.slow
 def test_the_bits_do_not_depend_on_threads():
     before = use_threads(None)
     try:

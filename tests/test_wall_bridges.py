@@ -165,11 +165,13 @@ def test_liquid_of_a_wall_moves_with_its_surface(kind: str) -> None:
         assert int(run.walls.patch_count[0]) == patches
 
 
+@pytest.mark.slow
 def test_patches_that_are_too_small_are_refused() -> None:
     with pytest.raises(InputError, match="wall_patch"):
         above(Plane(), (0.0, 0.0, RADIUS + GAP), replace(WET_WALLS, wall_patch=0.1 * RADIUS))
 
 
+@pytest.mark.slow
 def test_more_patches_than_there_is_room_for_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Never written beyond the arrays."""
     monkeypatch.setattr(wall_liquid, "PATCHES_OF_A_PARTICLE", 0)
