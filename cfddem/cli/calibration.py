@@ -40,12 +40,13 @@ def calibrate(
     from cfddem.analysis.report_text import as_json
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
+    from cfddem.preflight.summary import preflight
     from cfddem.run.calibration import Trial
     from cfddem.run.calibration import calibrate as search
     from cfddem.run.samples import variables
 
     path = find_case(case)
-    print_warnings(Case.from_toml(path, overrides(set or [])))
+    print_warnings(preflight(Case.from_toml(path, overrides(set or []))))
     folder = output or Path(f"{path.stem}-calibration")
 
     def progress(trial: Trial) -> None:
@@ -73,7 +74,6 @@ def lines(result: dict, folder: Path) -> list[str]:  # type: ignore[type-arg]
     if not result["estimates"]:
         out.append("too few finished trials for an estimate; repeat the command with more --trials")
     if result["best"] is not None:
-        chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
         chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
         out += ["", *textwrap.wrap(result["verdict"], WIDTH)]
         out += [f"reduced chi-squared of the best trial: {result['best']['chi2']:.3g}{chi2}"]

@@ -193,18 +193,15 @@ def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
         from cfddem.run.build import require_parallel
 
         require_parallel(described, communicator.size)
-    refuse_errors(described)
+    result = refuse_errors(described)
     if communicator.rank == 0:
-        print_warnings(described)
+        print_warnings(result)
 
 
-def print_warnings(described: Case) -> None:
-    """Print the warnings of the pre-run check of a case."""
-    from cfddem.preflight.summary import preflight
-
-    for issue in preflight(described).issues:
-        if issue.severity != "note":
-            print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
+def print_warnings(result: Preflight) -> None:
+    """Print the errors and warnings of a pre-run check."""
+    for issue in result.to_act_on:
+        print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
 
 
 def _print_report(folder: Path) -> None:

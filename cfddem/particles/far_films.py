@@ -20,16 +20,35 @@ from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.film import film_impulse
 from cfddem.particles.interactions.slots import far_impulses, update_films
+from cfddem.particles.motion import apply_all_film_impulses
 from cfddem.particles.pair_graph import edge_role, is_far, places_of
 from cfddem.particles.state import Particles
-from cfddem.particles.vectors import NOTHING, at, plus, put, times
 
 FIELDS = (Field("far_rate", "1/s", halo=("far",), meaning="resistance of the far films of the particle over its mass"),)
 """Fields of particles whose far films act once in several steps."""
 
 
+@part
+def _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Impulses of the far films that change much within their step."""
+    for k in prange(edges.near, edges.between_particles):
+        if memory.hard[k]:
+            film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+
+
+@serial
+def far_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+    """Give the particles the impulses of their far films.
+
+    step  for which they are given: several steps of the run [s]
+    """
+    far_impulses(edges.near, edges.between_particles, particles, edges, memory, cutoff_ratio, step)
+    _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+    apply_all_film_impulses(particles, edges, memory, True)
+
+
 @inline
-def sum_rates(i, particles, edges, memory):
+def _sum_rates(i, particles, edges, memory):
     """Sum the resistances of the films of particle i over its mass, those of far films apart."""
     near = far = 0.0
     for place in places_of(i, edges):
@@ -44,40 +63,10 @@ def sum_rates(i, particles, edges, memory):
 
 
 @part
-def _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
-    """Impulses of the far films that change much within their step."""
-    for k in prange(edges.near, edges.between_particles):
-        if memory.hard[k]:
-            film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-
-
-@part
-def _apply(particles, edges, memory):
-    """Give every particle the impulses of its far films."""
-    for i in prange(particles.owned):
-        impulse = NOTHING
-        for place in places_of(i, edges):
-            k, sign = edge_role(edges.incident[place])
-            if is_far(k, edges):
-                impulse = plus(impulse, times(sign, at(memory.impulse, k)))
-        put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
-
-
-@serial
-def far_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
-    """Give the particles the impulses of their far films.
-
-    step  for which they are given: several steps of the run [s]
-    """
-    far_impulses(edges.near, edges.between_particles, particles, edges, memory, cutoff_ratio, step)
-    _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-    _apply(particles, edges, memory)
-
-
-@part
 def _sum_all_rates(particles, edges, memory):
+    """Sum the resistances of the films of all particles."""
     for i in prange(particles.owned):
-        sum_rates(i, particles, edges, memory)
+        _sum_rates(i, particles, edges, memory)
 
 
 @serial

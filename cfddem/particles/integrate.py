@@ -162,7 +162,7 @@ def sum_forces(particles, edges, memory, gravity, far, step):
 def film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
     """Give the particles the impulses of their films, where those of bridges follow."""
     find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-    apply_all_film_impulses(particles, edges, memory)
+    apply_all_film_impulses(particles, edges, memory, False)
 
 
 @serial

@@ -64,13 +64,15 @@ def kick(i, particles, step):
 
 
 @inline
-def apply_film_impulses(i, particles, edges, memory):
-    """Give particle i the impulses of its films."""
-    impulse = (0.0, 0.0, 0.0)
+def apply_film_impulses(i, particles, edges, memory, far):
+    """Give particle i the impulses of its films: of the far ones (`far_films`), or of all others."""
+    impulse = NOTHING
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
-        if FAR and is_far(k, edges):
-            break  # those of far films have been given
+        if FAR and is_far(k, edges) != far:
+            if not far:
+                break  # far pairs come last
+            continue
         impulse = plus(impulse, times(sign, at(memory.impulse, k)))
     put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
 
@@ -102,10 +104,10 @@ def kick_particles(particles, step):
 
 
 @part
-def apply_all_film_impulses(particles, edges, memory):
-    """Give every particle the impulses of its films, before bridges act on what these leave."""
+def apply_all_film_impulses(particles, edges, memory, far):
+    """Give every particle the impulses of its far films, or of all others, before what acts on the velocities left."""
     for i in prange(particles.owned):
-        apply_film_impulses(i, particles, edges, memory)
+        apply_film_impulses(i, particles, edges, memory, far)
 
 
 @part
@@ -116,7 +118,7 @@ def drift_particles(particles, edges, memory, free, step, origin):
         far = 0.0
         for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             if DRIFTING and not BRIDGE:
-                apply_film_impulses(i, particles, edges, memory)
+                apply_film_impulses(i, particles, edges, memory, False)
             far = larger(far, drift(i, particles, free, step, origin))
         farthest[chunk] = far
     largest = 0.0

@@ -51,6 +51,11 @@ class Preflight:
         severities = {each.severity for each in self.issues}
         return "error" if "error" in severities else "warning" if "warning" in severities else "ok"
 
+    @property
+    def to_act_on(self) -> tuple[Issue, ...]:
+        """Errors and warnings; notes need no action."""
+        return tuple(each for each in self.issues if each.severity != "note")
+
     def with_errors(self, found: Iterable[Issue]) -> Preflight:
         """The result with further errors."""
         return replace(self, issues=(*found, *self.issues))

@@ -44,9 +44,8 @@ def run_case(
                        or, with overwrite, a run.json that is not that of a run
     """
     folder = Path(folder)
-    for issue in refuse_errors(case).issues:
-        if issue.severity != "note":
-            print("\n".join(issue.lines()), file=sys.stderr)
+    for issue in refuse_errors(case).to_act_on:
+        print("\n".join(issue.lines()), file=sys.stderr)
     if overwrite and (folder / "run.json").exists():
         _delete_run(folder)
     with notebook_line() if in_notebook() else live_line() as line:

@@ -73,8 +73,8 @@ def bed(
 ) -> ParticleSolver:
     """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges.
 
-    motions    that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
-    reach      of films over the reduced radius
+    motions         that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
+    reach           of films over the reduced radius
     far_film_steps  in which films of pairs that cannot touch act once
     """
     centres, (width, depth) = positions(count)
@@ -109,16 +109,16 @@ def bench(
 ) -> dict[str, Any]:
     """Million particle-steps a second on this machine, and that of LAMMPS where it is installed.
 
-    count    particles: 1 000, 10 000, 100 000 or 1 000 000
-    threads  of both codes
-    film     with the film of water; the same bed without films is a peer
-    bridges  with a liquid bridge on every contact, of a film of 0.2 % of the diameter; the bed without is a peer
-    rounds   measurements of each code, taken in turn; their medians count
-    steps    of one measurement
-    full     with films that resist sliding and rolling, too; the bed with normal films is a further peer
+    count           particles: 1 000, 10 000, 100 000 or 1 000 000
+    threads         of both codes
+    film            with the film of water; the same bed without films is a peer
+    bridges         with a liquid bridge on every contact, of a film of 0.2 % of the diameter; the bed without is a peer
+    rounds          measurements of each code, taken in turn; their medians count
+    steps           of one measurement
+    full            with films that resist sliding and rolling, too; the bed with normal films is a further peer
     far_film_steps  films of pairs that cannot touch act once in this many steps
-    returns  what was run, the medians, the speed over that of each LAMMPS style or why it did not run (`lammps`), and
-             the bytes that a step must move with the share of the memory speed that this is
+    returns         what was run, the medians, the speed over that of each LAMMPS style or why it did not run
+                    (`lammps`), and the bytes that a step must move with the share of the memory speed that this is
     """
     steps = steps or max(20, 20_000_000 // count)
     bandwidth = triad(threads)

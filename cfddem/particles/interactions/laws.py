@@ -44,7 +44,7 @@ class Laws(NamedTuple):
                           :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
     film_motions          motions that films resist: along the line of centres ("normal"), and sliding and rolling
                           ("full"), and twisting ("full_twist")
-    far_film_steps             films of pairs that cannot touch before the next list act once in this many steps
+    far_film_steps        films of pairs that cannot touch before the next list act once in this many steps
     bridge                laws of liquid bridges, where particles carry liquid
     """
 

@@ -133,7 +133,8 @@ def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: fl
         return nothing, nothing
     count = np.zeros(particles.count, np.int64)
     _list_pieces(particles, walls, cutoff_ratio, skin, count, nothing, nothing, False)
-    begin, end = np.cumsum(count) - count, np.cumsum(count) - count
+    begin = np.cumsum(count) - count
+    end = begin.copy()
     first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))
     _list_pieces(particles, walls, cutoff_ratio, skin, end, first, second, True)
     if len(walls.cell_member):
@@ -141,7 +142,16 @@ def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: fl
     return first, second
 
 
-def _list_pieces(particles, walls, cutoff_ratio, skin, count, first, second, fill):  # type: ignore[no-untyped-def]
+def _list_pieces(
+    particles: Particles,
+    walls: Walls,
+    cutoff_ratio: float,
+    skin: float,
+    count: np.ndarray,
+    first: np.ndarray,
+    second: np.ndarray,
+    fill: bool,
+) -> None:
     """Count the pieces near each particle, or write them from `count` on."""
     _list_single(particles.view, flat(walls), cutoff_ratio, skin, count, first, second, fill)
     if len(walls.cell_member):  # the search in cells is compiled only where there are meshes
