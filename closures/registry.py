@@ -39,7 +39,7 @@ class Law:
         return tuple(signature(self.function).parameters)
 
     def outside(self, **arguments: float) -> list[str]:
-        """Names of the arguments outside their fitted range."""
+        """Names of the arguments outside their range."""
         return [name for name, (low, high) in self.ranges.items() if not low <= arguments[name] <= high]
 
     def _repr_markdown_(self) -> str:
@@ -49,12 +49,12 @@ class Law:
         parts = [f"**{self.name}** ({self.kind.replace('_', ' ')}): {' '.join(text.split(chr(10) * 2)[0].split())}"]
         parts += [f"$${' '.join(equation[1].split())}$$"] if equation else []
         parts += [f"Arguments: {', '.join(f'`{name}`' for name in self.arguments)}"]
-        parts += [f"Range: {self.fitted_for}"] if self.ranges else []
+        parts += [f"Range: {self.range_in_words}"] if self.ranges else []
         return "\n\n".join([*parts, f"Source: {self.reference}"])
 
     @property
-    def fitted_for(self) -> str:
-        """The fitted ranges as text: `reynolds 0.01 to 300, voidage 0.5 to 0.9`."""
+    def range_in_words(self) -> str:
+        """The ranges as text: `reynolds 0.01 to 300, voidage 0.5 to 0.9`."""
         return ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in self.ranges.items())
 
 

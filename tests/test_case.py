@@ -188,6 +188,14 @@ def test_a_key_without_its_table_is_completed() -> None:
         overrides(["height=3"])
 
 
+def test_a_file_on_the_command_line_lies_relative_to_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert overrides(["compare.bed.file=b.csv"]) == {"compare.bed.file": str(tmp_path / "b.csv")}
+    assert overrides(['wall.0.file="/data/cone.stl"']) == {"wall.0.file": "/data/cone.stl"}
+
+
 def test_an_installed_package_can_provide_a_drag_law(monkeypatch: pytest.MonkeyPatch) -> None:
     from types import SimpleNamespace
 

@@ -30,7 +30,7 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
         assert not re.search(r"\\|\bfrac|varepsilon|:func:|``", text), text
         assert " ".join(law.reference.split()[:2]) in text
     done = call("explain", "di_felice", "--plot", str(tmp_path / "law.png"))
-    assert "fitted for voidage from 0.4 to 1" in done.out
+    assert "range of voidage: 0.4 to 1" in done.out
     assert (tmp_path / "law.png").stat().st_size > 10_000
     assert json.loads(call("explain", "wen-yu", "--json").out)["kind"] == "drag"
     drags = call("explain", "drag").out

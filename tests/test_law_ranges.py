@@ -61,7 +61,7 @@ def test_a_law_of_agitation_is_not_fitted_with_further_forces(further: dict[str,
 def test_several_arguments_are_one_sentence() -> None:
     case = Case.from_text(TEXT, "bed.toml", {"bed.fixed": True, "bed.start": "poured", "laws.drag": "tenneti"})
     (found,) = (each for each in preflight(case).issues if each.key == "laws.drag")
-    assert "fitted to reynolds 0 to 300 and voidage 0.5 to 1, but the bed has 579 and 0.42" in found.reason
+    assert "is for reynolds 0 to 300 and voidage 0.5 to 1, but the bed has 579 and 0.42" in found.reason
 
 
 def test_a_law_of_single_spheres_is_not_compared_with_in_a_dense_bed() -> None:

@@ -108,7 +108,7 @@ def test_warnings_of_ranges_drifts_and_short_windows(tmp_path: Path) -> None:
     said = "\n".join(each for group in steady["advice"].values() for each in group)
     assert not steady["warnings"] and "the bed as a whole is inside" in said and "cfddem explain" not in said
     assert (
-        "the drag law di_felice was evaluated outside of its fitted range in 10 % of its uses (800000 times): voidage"
+        "the drag law di_felice was evaluated outside of its range in 10 % of its uses (800000 times): voidage"
         in said
     )
     assert "not stationary" not in said
@@ -232,7 +232,7 @@ def test_the_page_is_self_contained(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for expected in (
         "Richardson-Zaki",
         "stationary",
-        "outside of its fitted range in 10 %",
+        "outside of its range in 10 %",
         "momentum imbalance",
         "62.5 %",
     ):

@@ -151,7 +151,7 @@ def weight_over_floor(case: Case) -> float | None:
 
 
 def _outside_range(law: str, **arguments: float) -> str:
-    """Arguments that lie outside of the fitted range of a law, in words; empty if there are none."""
+    """Arguments that lie outside of the range of a law, in words; empty if there are none."""
     ranges = REGISTRY["bed"][law].ranges
     return "; ".join(
         f"{name} {value:.3g} is outside of {ranges[name][0]:g} to {ranges[name][1]:g}"

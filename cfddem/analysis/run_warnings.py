@@ -21,7 +21,7 @@ REMEDY = "choose a law with a wider range (cfddem explain)"
 INSTALL = "install what the run has used, or keep to what was measured in it"
 FINISH = "finish the run before you use its means"
 LONGER = "run longer, or average over another window"
-LAWS = "check the laws: they were used outside of their fitted ranges"
+LAWS = "check the laws: they were used outside of their ranges"
 COMPARE = "treat these comparisons with care: the published law is outside of its range"
 CASE = "check the case: before the run, it had these warnings"
 NOTE = "for information: no action is needed"
@@ -130,14 +130,14 @@ def _missing_laws(case: Case) -> Found:
 
 
 def _range_warnings(run: Run, case: Case) -> Found:
-    """How often laws were evaluated outside of their fitted ranges in the whole run."""
+    """How often laws were evaluated outside of their ranges in the whole run."""
     evaluations = last_value(run, "fluid_steps") * float(run.history.get("particle_count", np.zeros(1)).mean())
     drag, agitation, pair_laws = case.laws.drag_law, case.agitation, list(case.laws.pair_laws.values())
     if pair_laws:
         if outside := last_value(run, "out_of_range_count"):
             laws = [law for law in (drag, *pair_laws) if law is not None and law.ranges]
-            ranges = "; ".join(f"{law.name} {law.fitted_for}" for law in laws)
-            text = f"laws were evaluated outside of their fitted ranges {outside} times: {ranges}"
+            ranges = "; ".join(f"{law.name} {law.range_in_words}" for law in laws)
+            text = f"laws were evaluated outside of their ranges {outside} times: {ranges}"
             yield LAWS, f"{text}{_effect(case)}; {REMEDY}"
     elif drag is not None:
         outside = last_value(run, "out_of_range_count")
@@ -174,7 +174,7 @@ def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float 
         part = outside / evaluations
         uses = f"{percent(part)} of its uses" if part < ALL else "all of its uses"
         what = (
-            f"was evaluated outside of its fitted range in {uses} ({outside} times): {law.fitted_for}{effect}; {REMEDY}"
+            f"was evaluated outside of its range in {uses} ({outside} times): {law.range_in_words}{effect}; {REMEDY}"
         )
         yield LAWS, f"the {kind} {law.name} {what}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import tomllib
 from collections.abc import Sequence
 from importlib.resources import files
@@ -64,13 +65,15 @@ def find_case(name: Path | None) -> Path:
 
 
 def overrides(given: Sequence[str]) -> dict[str, Any]:
-    """Values of `key=value` texts by full key."""
+    """Values of `key=value` texts by full key; a file lies relative to the current folder, as in any command."""
     values: dict[str, Any] = {}
     for each in given:
-        key, equals, value = each.partition("=")
+        key, equals, text = each.partition("=")
         if not equals or not key:
             raise InputError("--set", each, "key=value, such as bed.inlet_velocity=0.06")
-        values[full_key(key)] = read_value(value)
+        key, value = full_key(key), read_value(text)
+        is_file = key.endswith(".file") and isinstance(value, str)
+        values[key] = os.path.abspath(value) if is_file else value
     return values
 
 

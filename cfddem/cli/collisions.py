@@ -46,6 +46,8 @@ def _collide(
 collide = command(
     immersed_pair.collide,
     units={
+        "velocity": "m/s",
+        "viscosity": "Pa s",
         "rebound_angle_striker": "deg",
         "rebound_angle_relative": "deg",
         "minimum_gap": "m",

@@ -138,7 +138,7 @@ def page(law: Law) -> list[str]:
     if law.kind == CONTACT_LAW:
         out += _contact_lines(contact_named(law.name))
     for name, (low, high) in law.ranges.items():
-        out.append(f"fitted for {name} from {low:g} to {high:g}")
+        out.append(f"range of {name}: {low:g} to {high:g}")
     out += textwrap.wrap(f"reference: {law.reference}", WIDTH, subsequent_indent="  ")
     return out
 
@@ -182,7 +182,7 @@ def listing(known: Mapping[str, Mapping[str, Law]]) -> list[str]:
             out[-1] = "  " + re.sub(r"\.{2,}(?= )", lambda dots: " " * len(dots[0]), out[-1], count=1)
             if law.ranges:
                 out += textwrap.wrap(
-                    f"for {law.fitted_for}", WIDTH, initial_indent=" " * 39, subsequent_indent=" " * 43
+                    f"for {law.range_in_words}", WIDTH, initial_indent=" " * 39, subsequent_indent=" " * 43
                 )
     return out[1:]
 

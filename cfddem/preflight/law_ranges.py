@@ -89,7 +89,7 @@ def outside(law: Law, state: Mapping[str, float], diameter_ratios: Sequence[floa
         if not low <= value <= high:
             ranges.append(f"{name} {low:g} to {high:g}")
             values.append(f"{value:.3g}")
-    return f"{law.name} was fitted to {' and '.join(ranges)}, but the bed has {' and '.join(values)}" if ranges else ""
+    return f"{law.name} is for {' and '.join(ranges)}, but the bed has {' and '.join(values)}" if ranges else ""
 
 
 def ignores_voidage(law: Law) -> bool:

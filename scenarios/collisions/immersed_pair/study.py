@@ -62,6 +62,8 @@ class Collision:
     """Result of a collision. Rebound speeds are taken where the pair leaves the film, at h = h_co."""
 
     stokes: float  # of the normal approach at h_co [-]; infinite when dry
+    velocity: float  # of the normal approach at h_co [m/s]
+    viscosity: float  # of the fluid [Pa s]
     outcome: str  # "no_touch", "touch_no_rebound" or "rebound"
     restitution: float  # normal speed out over in [-]
     restitution_tangential: float  # tangential speed out over in [-]; NaN head-on
@@ -328,6 +330,8 @@ def _result(
     mechanism = deformed if minimum_gap > row["roughness_gap"] else "roughness"
     return Collision(
         stokes=setting.speed / setting.film_speed if laws.film else math.inf,
+        velocity=setting.speed,
+        viscosity=setting.viscosity,
         outcome=outcome,
         restitution=restitution,
         restitution_tangential=sideways / setting.tangential_speed if setting.tangential_speed > 0.0 else math.nan,
