@@ -108,8 +108,7 @@ def test_warnings_of_ranges_drifts_and_short_windows(tmp_path: Path) -> None:
     said = "\n".join(each for group in steady["advice"].values() for each in group)
     assert not steady["warnings"] and "the bed as a whole is inside" in said and "cfddem explain" not in said
     assert (
-        "the drag law di_felice was evaluated outside of its range in 10 % of its uses (800000 times): voidage"
-        in said
+        "the drag law di_felice was evaluated outside of its range in 10 % of its uses (800000 times): voidage" in said
     )
     assert "not stationary" not in said
     drifting = report(made_up(tmp_path / "drifts", trend=5e-3))

@@ -133,3 +133,8 @@ def test_the_command_prints_json() -> None:
     done = cfddem("wet-pair", "--stokes", "2", "--angle", "45", "--json")
     result = json.loads(done.stdout)
     assert (result["outcome"], round(result["restitution"], 3)) == ("bounce", 0.527)
+
+
+def test_a_pair_that_comes_to_rest_is_followed_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    assert collide_wet(0.7999999999999999, 15.0, "static", "zero").restitution == 0.0
+    assert not recwarn.list

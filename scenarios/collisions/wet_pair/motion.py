@@ -68,20 +68,22 @@ def follow(pair: Pair, laws: BridgeLaws, angle: float, duration: float) -> Motio
     unit = pair.film / pair.speed
     choices = laws.choices()
     slopes, active = specialise(rates, choices), specialise(activity, choices)
-    found = solve_ivp(
-        lambda _, state: slopes(state, pair),
-        (0.0, duration / unit),
-        state,
-        METHOD,
-        events=[
-            event(lambda _, state: state[GAP] - 1.0, 1),
-            event(lambda _, state: abs(state[ANGLE]) - 2.0 * math.pi, 1),
-            event(lambda _, state: active(state, pair) - STILL, -1),
-        ],
-        rtol=RELATIVE,
-        atol=ABSOLUTE,
-        first_step=min(1e-3, duration / unit),
-    )
+    # a pair almost at rest is tried with ever longer steps; one whose end is not a number is made again, shorter
+    with np.errstate(invalid="ignore", over="ignore"):
+        found = solve_ivp(
+            lambda _, state: slopes(state, pair),
+            (0.0, duration / unit),
+            state,
+            METHOD,
+            events=[
+                event(lambda _, state: state[GAP] - 1.0, 1),
+                event(lambda _, state: abs(state[ANGLE]) - 2.0 * math.pi, 1),
+                event(lambda _, state: active(state, pair) - STILL, -1),
+            ],
+            rtol=RELATIVE,
+            atol=ABSOLUTE,
+            first_step=min(1e-3, duration / unit),
+        )
     if found.status < 0:
         raise RunFailed(f"the pair cannot be followed beyond t = {found.t[-1] * unit:.6g} s: {found.message}")
     gap, turned, approach, turning, spin, _ = found.y
