@@ -30,7 +30,16 @@ from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_b
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.beds.spouted_bed import bed as spout
 from scenarios.beds.spouted_bed import profiles
-from scenarios.validation.beds.refinement import Means, RefinementBed, compared, gas, liquid, variants
+from scenarios.validation.beds.refinement import (
+    Means,
+    RefinementBed,
+    compared,
+    gas,
+    instantaneous_drops,
+    liquid,
+    placed,
+    variants,
+)
 from scenarios.validation.beds.study import frequency, growing
 
 
@@ -205,6 +214,22 @@ def test_a_larger_deviation_is_seen() -> None:
     rows = compared("bed", means(2.0), means(1.0), gusty=True)
     assert [row.verdict for row in rows] == ["holds", "holds", "FAILS"]
     assert rows[2].value == pytest.approx(2.0, rel=1e-9)
+
+
+def test_the_same_particles_in_finer_cells() -> None:
+    """Every particle keeps its velocity, whatever its row; a bed that falls into the gas meets a larger pressure."""
+    case = gas().case.with_(**{"bed.count": 1300, "column.width": 0.0144, "column.height": 0.0432})
+    packed = Simulation(case).particles
+    order = np.random.default_rng(1).permutation(1300)
+    at_rest = {"position": packed.position[order], "velocity": np.zeros((1300, 3))}
+    falling = at_rest | {"velocity": np.stack([order * 0.0, order * 0.0, -10.0 * at_rest["position"][:, 2]], axis=1)}
+    finer = placed(case, falling, 1.5)
+    assert finer.fluid is not None and finer.fluid.grid.cells == (6, 1, 18)
+    assert np.array_equal(finer.particles.velocity[:, 2], -10.0 * finer.particles.position[:, 2])
+    run = SimpleNamespace(times=np.array([0.0, 1.0]), particles=lambda snapshot: (at_rest, falling)[snapshot])
+    drops = [instantaneous_drops(case, run, -1.0, factor) for factor in (1.0, 1.5)]  # type: ignore[arg-type]
+    assert drops[1] == pytest.approx(drops[0], rel=0.05)
+    assert drops[0][1] > 1.1 * drops[0][0]
 
 
 def test_bubbles_that_do_not_grow_fail() -> None:

@@ -2,6 +2,9 @@
 
 The width of the filter kernel and all physical parameters are kept. Runs with stiffer contacts use the shorter step and
 are compared with the run that only has the shorter step.
+
+A bed that slugs is an oscillator: a small change of the drag changes its amplitude much. The particles of its snapshots
+are therefore also put into finer cells, which shows the error of the cells without that of the motion.
 """
 
 from __future__ import annotations
@@ -17,12 +20,21 @@ from cfddem.analysis.series import Average, block_average
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run as Written
+from cfddem.io.reading import open_run
+from cfddem.run.history import pressure_drop
+from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed.study import alginate
 from scenarios.validation.kept_runs import finished
 from scenarios.validation.table import Progress, Row
 
 LIMIT = 0.05
 """Largest relative change of a converged mean."""
+
+FINER = 1.5
+"""Factor by which cells are finer."""
+
+INSTANT, STEPS = 2e-5, 12
+"""Fluid step [s], and their number, in which the gas flow adapts to given particles; these move by 0.1 mm."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +76,6 @@ def variants(case: Case) -> dict[str, tuple[dict[str, Any], str]]:
     """Changes to a case by name, and the name of the run that each is compared with."""
     step = case.run.particle_step
     assert step is not None
-    finer = tuple(width if width >= whole else width / 1.5 for width, whole in zip(_edges(case), case.column.size))
     stiffer = {
         f"material.{name}.contact_modulus": 4.0 * each.contact_modulus
         for name, each in case.material.items()
@@ -73,10 +84,15 @@ def variants(case: Case) -> dict[str, tuple[dict[str, Any], str]]:
     half = {"run.particle_step": 0.5 * step}
     return {
         "as it is": ({}, ""),
-        "cells finer by 1.5": ({"column.cell": finer}, "as it is"),
+        "cells finer by 1.5": ({"column.cell": finer_cells(case, FINER)}, "as it is"),
         "half the particle step": (half, "as it is"),
         "four times the contact modulus": (stiffer | half, "half the particle step"),
     }
+
+
+def finer_cells(case: Case, factor: float) -> tuple[float, ...]:
+    """Edges of cells that are finer by a factor, except across a column one cell thick [m]."""
+    return tuple(edge if edge >= whole else edge / factor for edge, whole in zip(_edges(case), case.column.size))
 
 
 def _edges(case: Case) -> tuple[float, float, float]:
@@ -90,12 +106,59 @@ def refined(folder: Path, progress: Progress) -> list[Row]:
     for name, bed in (("liquid bed", liquid()), ("slugging gas bed", gas())):
         found: dict[str, Means] = {}
         for change, (changes, other) in variants(bed.case).items():
-            home = f"refinement_{name}_{change}".replace(" ", "_")
             limits = {"run.until": bed.until, "run.average_from": bed.averaged_from}
-            found[change] = means(finished(bed.case, folder, home, progress, changes | limits), bed.averaged_from)
+            found[change] = means(
+                finished(bed.case, folder, _home(name, change), progress, changes | limits), bed.averaged_from
+            )
             if other:
                 rows += compared(f"{name}, {change}", found[change], found[other], gusty=name != "liquid bed")
+    progress("particles of the slugging gas bed in finer cells")
+    return [*rows, *same_particles(gas(), open_run(folder / _home("slugging gas bed", "as it is")))]
+
+
+def _home(name: str, change: str) -> str:
+    """Folder of a run."""
+    return f"refinement_{name}_{change}".replace(" ", "_")
+
+
+def same_particles(bed: RefinementBed, run: Written) -> list[Row]:
+    """Ratios of the pressure drop, and of its deviation, of the particles of the snapshots in finer and finer cells."""
+    factors = (1.0, FINER, 2.0 * FINER)
+    drops = [instantaneous_drops(bed.case, run, bed.averaged_from, factor) for factor in factors]
+    rows = []
+    for factor, coarser, finer, coarse in zip(factors[1:], factors, drops[1:], drops):
+        name = f"slugging gas bed, same particles in cells finer by {factor:g}"
+        other = "those of the case" if coarser == 1.0 else f"cells finer by {coarser:g}"
+        for quantity, ratio in (
+            ("pressure drop", finer.mean() / coarse.mean()),
+            ("standard deviation of the pressure", finer.std() / coarse.std()),
+        ):
+            note = f"{len(finer)} snapshots"
+            rows.append(Row(f"{name}: {quantity} over that in {other}", float(ratio), 1.0, LIMIT, note=note))
     return rows
+
+
+def instantaneous_drops(case: Case, run: Written, begin: float, factor: float) -> np.ndarray:
+    """Pressure drop over the particles of every snapshot from a time on [s], in cells that are finer by a factor."""
+    drops = []
+    for place in np.flatnonzero(run.times > begin):
+        simulation = placed(case, run.particles(int(place)), factor)
+        simulation.until(STEPS * INSTANT)
+        drops.append(pressure_drop(simulation))
+    return np.array(drops)
+
+
+def placed(case: Case, particles: Mapping[str, np.ndarray], factor: float) -> Simulation:
+    """The particles of a snapshot in cells that are finer by a factor; the gas is not in balance with them yet."""
+    changes = {
+        "column.cell": finer_cells(case, factor),
+        "bed.count": None,
+        "bed.positions": particles["position"].tolist(),
+        "run.fluid_step": INSTANT,
+    }
+    simulation = Simulation(case.with_(**changes))
+    simulation.particles.velocity[:] = particles["velocity"][simulation.particles.id]
+    return simulation
 
 
 def means(run: Written, begin: float) -> Means:
