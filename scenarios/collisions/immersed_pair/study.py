@@ -219,10 +219,7 @@ class Bodies(NamedTuple):
 
 
 def _speed_and_viscosity(
-    bodies: Bodies,
-    velocity: float | None,
-    viscosity: float | None,
-    stokes: float | None,
+    bodies: Bodies, velocity: float | None, viscosity: float | None, stokes: float | None
 ) -> tuple[float, float]:
     """Speed and viscosity, from any two of the three given values."""
     given = {"velocity": velocity, "viscosity": viscosity, "stokes": stokes}
