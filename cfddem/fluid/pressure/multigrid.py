@@ -22,7 +22,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +32,9 @@ from numpy.typing import NDArray
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import RunFailed
+from cfddem.backend.law_set import specialise
 from cfddem.fluid.grid import Array, Grid, layers
-from cfddem.fluid.pressure.multigrid_loops import apply, descend, prolong, restrict, smooth
+from cfddem.fluid.pressure.multigrid_loops import apply, descend, prolong, residual, restrict, smooth
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 STRONG = 0.3
@@ -60,6 +63,7 @@ class Level:
         self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
         self.sums, self.rows = np.zeros(self.shape[0]), np.zeros(self.shape[::2])  # of each plane a sum, and a row
         self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
+        self.small = self.x.size < SMALL
 
     @property
     def coefficients(self) -> tuple[Array, Array, Array, Array]:
@@ -80,6 +84,33 @@ class Level:
             self.diagonal[layers(d, -1)] += a[layers(d, 0)]
         self.inverse.fill(0.0)
         np.divide(1.0, self.diagonal, out=self.inverse, where=self.diagonal > 0.0)
+
+    def loop(self, template: Any) -> Any:
+        """A loop as it runs over the cells of this level: on all threads, or on one if they are few."""
+        return _compiled(template, not self.small and use_threads(None) > 1)
+
+    def sweep(self, sweeps: int, backward: bool) -> None:
+        """Relax all cells so many times."""
+        system = self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows
+        self.loop(smooth)(*system, sweeps, backward)
+
+    def take_residual(self) -> None:
+        """Compute the residual."""
+        self.loop(residual)(self.x, self.b, self.ax, self.ay, self.az, self.diagonal, self.image)
+
+    def restrict_to(self, coarse: Level) -> None:
+        """Write the right-hand side of the coarser grid."""
+        self.take_residual()
+        self.loop(restrict)(self.image, self.factors, self.shift, self.rows, coarse.b)
+
+    def correct_by(self, coarse: Level) -> None:
+        """Add the correction of the coarser grid."""
+        self.loop(prolong)(coarse.x, self.factors, self.shift, self.rows, self.x)
+
+
+@cache
+def _compiled(template: Any, threads: bool) -> Any:
+    return specialise(template, {}, threads)
 
 
 def coarsen(level: Level, fine: Sequence[Array], coarse: Sequence[Array], whole: tuple[int, int, int]) -> None:
@@ -185,7 +216,7 @@ class PressureEquation:
             self.direction *= product / before
             self.direction += finest.x
             length = product / self._apply_to_direction()
-            descend(length, self.direction, finest.image, x, self.residual, finest.sums)
+            finest.loop(descend)(length, self.direction, finest.image, x, self.residual, finest.sums)
             left = self.communicator.largest(finest.sums)
             iterations += 1
         self._remove_means(x)
@@ -197,38 +228,28 @@ class PressureEquation:
 
     def _apply_to_direction(self) -> float:
         """Write the image L d of the search direction d; returns d.L d."""
-        finest = self.finest
-        apply(self.direction, finest.ax, finest.ay, finest.az, finest.diagonal, finest.image, finest.sums)
-        return float(self.communicator.sum(finest.sums))
+        self._apply(self.finest)
+        return float(self.communicator.sum(self.finest.sums))
+
+    def _apply(self, level: Level) -> None:
+        """Write the image of the search direction, and its product with the direction in each plane."""
+        system = level.ax, level.ay, level.az, level.diagonal
+        level.loop(apply)(self.direction, *system, level.image, level.rows, level.sums)
 
     def _cycle(self, depth: int) -> None:
-        """One V-cycle, on one thread from the first small level down."""
-        threads = use_threads(None)
-        if threads > 1 and self.levels[depth].x.size < SMALL:
-            use_threads(1)
-            try:
-                self._cycle_here(depth)
-            finally:
-                use_threads(threads)
-        else:
-            self._cycle_here(depth)
-
-    def _cycle_here(self, depth: int) -> None:
-        """Sweep forward, correct from the coarser grid, sweep backward."""
+        """One V-cycle: sweep forward, correct from the coarser grid, sweep backward."""
         level = self.levels[depth]
-        system = (level.x, level.b, level.ax, level.ay, level.az, level.inverse, level.rows)
         level.x.fill(0.0)
         if depth == len(self.levels) - 1:
-            smooth(*system, 15, False)
-            smooth(*system, 15, True)
+            level.sweep(15, backward=False)
+            level.sweep(15, backward=True)
             return
         coarse = self.levels[depth + 1]
-        smooth(*system, SWEEPS, False)
-        apply(level.x, level.ax, level.ay, level.az, level.diagonal, level.image, level.sums)
-        restrict(level.b, level.image, level.factors, level.shift, coarse.b)
+        level.sweep(SWEEPS, backward=False)
+        level.restrict_to(coarse)
         self._cycle(depth + 1)
-        prolong(coarse.x, level.factors, level.shift, level.x)
-        smooth(*system, SWEEPS, True)
+        level.correct_by(coarse)
+        level.sweep(SWEEPS, backward=True)
 
     def _remove_means(self, values: Array) -> None:
         if self.closed_regions is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cfddem.backend.compile import prange, serial, threaded, vector_inline
+from cfddem.backend.compile import either, inline, prange, serial, vector_inline
 from cfddem.fluid.halo import neighbours
 
 
@@ -35,7 +35,7 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
             here[i] = new[i] if (i & 1) == parity else here[i]
 
 
-@threaded
+@either
 def smooth_colour(x, b, ax, ay, az, inverse, rows, colour, backward):
     """Relax the cells of one colour in place; rows (nz, nx) are overwritten."""
     nz = x.shape[0]
@@ -82,50 +82,98 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
         out[i] -= west[i] * here[left] + west[right] * here[right]
 
 
-@threaded
-def restrict(b, image, factors, shift, coarse_b):
-    """Residual b - image of a level, summed over the cells that make one coarse cell.
+@either
+def residual(x, b, ax, ay, az, diagonal, left):
+    """left = b - L x."""
+    for k in prange(x.shape[0]):
+        for j in range(x.shape[1]):
+            _apply_row(k, j, x, ax, ay, az, diagonal, left[k, j])
+            _subtract_from(b[k, j], left[k, j])
+
+
+@vector_inline
+def _subtract_from(whole, row):
+    """row = whole - row"""
+    for i in range(row.size):
+        row[i] = whole[i] - row[i]
+
+
+@vector_inline
+def _add(values, row):
+    """row += values"""
+    for i in range(row.size):
+        row[i] += values[i]
+
+
+@inline
+def _cells_in(coarse, factor, shift, count):
+    """First cell of those in a coarse cell along an axis, and the one after the last, among so many cells."""
+    first = coarse * factor - shift
+    return max(first, 0), min(first + factor, count)
+
+
+@either
+def restrict(values, factors, shift, rows, coarse):
+    """Sum the values of a level over the cells that make one coarse cell; rows are overwritten.
 
     shift  along x, y, z; cell k lies in the coarse cell (k + shift) // factor
     """
-    nz, ny, nx = b.shape
-    fx, fy, fz = factors[0], factors[1], factors[2]
-    for kc in prange(coarse_b.shape[0]):
-        for jc in range(coarse_b.shape[1]):
-            for ic in range(coarse_b.shape[2]):
-                total = 0.0
-                for k in range(max(kc * fz - shift[2], 0), min(kc * fz - shift[2] + fz, nz)):
-                    for j in range(max(jc * fy - shift[1], 0), min(jc * fy - shift[1] + fy, ny)):
-                        for i in range(max(ic * fx - shift[0], 0), min(ic * fx - shift[0] + fx, nx)):
-                            total += b[k, j, i] - image[k, j, i]
-                coarse_b[kc, jc, ic] = total
+    nz, ny, nx = values.shape
+    for kc in prange(coarse.shape[0]):
+        total = rows[kc]
+        first_plane, end_plane = _cells_in(kc, factors[2], shift[2], nz)
+        for jc in range(coarse.shape[1]):
+            first_row, end_row = _cells_in(jc, factors[1], shift[1], ny)
+            total[:] = 0.0
+            for k in range(first_plane, end_plane):
+                for j in range(first_row, end_row):
+                    _add(values[k, j], total)
+            for ic in range(coarse.shape[2]):
+                first, end = _cells_in(ic, factors[0], shift[0], nx)
+                coarse[kc, jc, ic] = 0.0
+                for i in range(first, end):
+                    coarse[kc, jc, ic] += total[i]
 
 
-@threaded
-def prolong(coarse_x, factors, shift, x):
-    """Add the coarse correction to every cell below it; `shift` as of `restrict`."""
+@either
+def prolong(coarse_x, factors, shift, rows, x):
+    """Add the coarse correction to every cell below it; `shift` as of `restrict`; rows are overwritten."""
     nz, ny, nx = x.shape
-    for k in prange(nz):
-        for j in range(ny):
-            source = coarse_x[(k + shift[2]) // factors[2], (j + shift[1]) // factors[1]]
+    for kc in prange(coarse_x.shape[0]):
+        correction = rows[kc]
+        first_plane, end_plane = _cells_in(kc, factors[2], shift[2], nz)
+        for jc in range(coarse_x.shape[1]):
+            first_row, end_row = _cells_in(jc, factors[1], shift[1], ny)
             for i in range(nx):
-                x[k, j, i] += source[(i + shift[0]) // factors[0]]
+                correction[i] = coarse_x[kc, jc, (i + shift[0]) // factors[0]]
+            for k in range(first_plane, end_plane):
+                for j in range(first_row, end_row):
+                    _add(correction, x[k, j])
 
 
-@threaded
-def apply(x, ax, ay, az, diagonal, out, sums):
-    """out = L x; sums[k] is the part of x.Lx in plane k."""
+@either
+def apply(x, ax, ay, az, diagonal, out, rows, sums):
+    """out = L x; sums[k] is the part of x.Lx in plane k, summed first over y and then over x; rows are overwritten."""
     for k in prange(x.shape[0]):
-        total = 0.0
+        products = rows[k]
+        products[:] = 0.0
         for j in range(x.shape[1]):
-            row = out[k, j]
-            _apply_row(k, j, x, ax, ay, az, diagonal, row)
-            for i in range(row.size):
-                total += x[k, j, i] * row[i]
+            _apply_row(k, j, x, ax, ay, az, diagonal, out[k, j])
+            _add_products(x[k, j], out[k, j], products)
+        total = 0.0
+        for i in range(products.size):
+            total += products[i]
         sums[k] = total
 
 
-@threaded
+@vector_inline
+def _add_products(a, b, row):
+    """row += a b"""
+    for i in range(row.size):
+        row[i] += a[i] * b[i]
+
+
+@either
 def descend(length, direction, image, x, residual, largest):
     """x += length direction, residual -= length image; largest[k] is the largest residual in plane k."""
     for k in prange(x.shape[0]):

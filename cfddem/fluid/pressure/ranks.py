@@ -17,8 +17,8 @@ from cfddem.backend.communicator import Communicator
 from cfddem.fluid.block import Block
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
-from cfddem.fluid.pressure.multigrid import SWEEPS, Level, PressureEquation, coarsen, hierarchy
-from cfddem.fluid.pressure.multigrid_loops import apply, colour_of, prolong, restrict, smooth_colour
+from cfddem.fluid.pressure.multigrid import Level, PressureEquation, coarsen, hierarchy
+from cfddem.fluid.pressure.multigrid_loops import colour_of, smooth_colour
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 SMALL = 5_000
@@ -99,31 +99,25 @@ class SharedLevel(Level):
         super().take_diagonal()
         self.without_ghosts(self.inverse)
 
-    def sweep(self, backward: bool) -> None:
-        """Relax all cells of all ranks."""
-        for half in range(2 * SWEEPS):
+    def sweep(self, sweeps: int, backward: bool) -> None:
+        """Relax all cells of all ranks so many times."""
+        relax = self.loop(smooth_colour)
+        for half in range(2 * sweeps):
             colour = (colour_of(half, backward) + self.first + 1) % 2  # arrays begin at the layer before the first
-            smooth_colour(self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows, colour, backward)
+            relax(self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows, colour, backward)
             self.fill(self.x)
 
-    def restrict_to(self, coarse: Level) -> None:
-        """Write the right-hand side of the coarser grid."""
-        apply(self.x, self.ax, self.ay, self.az, self.diagonal, self.image, self.sums)
-        self.take_residual_of_neighbours()
-        restrict(self.b, self.image, self.factors, self.shift, coarse.b)
-
-    def take_residual_of_neighbours(self) -> None:
-        """Write the residual of the ghosts to their right-hand side, for coarse cells that hold cells of two ranks."""
+    def take_residual(self) -> None:
+        """Compute the residual; that of ghosts too, for coarse cells that hold cells of two ranks."""
+        super().take_residual()
         self.without_ghosts(self.image)
-        self.without_ghosts(self.b)
         if not self.straddled:
             return
-        below, ends, above = layers(self.axis, 0), layers(self.axis, [0, 1, -2, -1]), layers(self.axis, -1)
-        residual = self.b[ends] - self.image[ends]
-        self.fill(residual)
-        self.b[below] = residual[below]
+        ends, above = self.image[layers(self.axis, [0, 1, -2, -1])], layers(self.axis, -1)
+        self.fill(ends)
+        self.image[layers(self.axis, 0)] = ends[layers(self.axis, 0)]
         if self.stop < self.starts[-1]:  # the last coarse cell may have one fine cell only
-            self.b[above] = residual[above]
+            self.image[above] = ends[above]
 
     def gather_to(self, whole: Level, values: Array, target: Array) -> None:
         """Copy the cells of all ranks into an array of the same grid that every rank has."""
@@ -203,25 +197,17 @@ class SharedPressureEquation(PressureEquation):
         """See `PressureEquation._apply_to_direction`; the ghosts of the direction are current."""
         finest = self.finest
         assert isinstance(finest, SharedLevel)
-        apply(self.direction, finest.ax, finest.ay, finest.az, finest.diagonal, finest.image, finest.sums)
+        self._apply(finest)
         finest.without_ghosts(finest.image)
         return float(self.communicator.sum(np.einsum("kji,kji->k", self.direction, finest.image)))
 
-    def _cycle_here(self, depth: int) -> None:
-        """See `PressureEquation._cycle_here`."""
-        level = self.levels[depth]
-        if not isinstance(level, SharedLevel):
-            super()._cycle_here(depth)
+    def _cycle(self, depth: int) -> None:
+        """See `PressureEquation._cycle`; the coarsest level of which ranks have parts is solved as a whole."""
+        if depth != self._shared - 1:
+            super()._cycle(depth)
             return
-        coarse = self.levels[depth + 1]
-        if depth == self._shared - 1:
-            level.gather_to(coarse, level.b, coarse.b)
-            self._cycle(depth + 1)
-            level.take_from(coarse)
-            return
-        level.x.fill(0.0)
-        level.sweep(backward=False)
-        level.restrict_to(coarse)
-        self._cycle(depth + 1)
-        prolong(coarse.x, level.factors, level.shift, level.x)
-        level.sweep(backward=True)
+        level, whole = self.levels[depth], self.levels[depth + 1]
+        assert isinstance(level, SharedLevel)
+        level.gather_to(whole, level.b, whole.b)
+        super()._cycle(depth + 1)
+        level.take_from(whole)
