@@ -7,9 +7,10 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from cfddem.backend.compile import serial
+from cfddem.backend.compile import prange, threaded, use_threads
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.run import warmup
@@ -33,23 +34,31 @@ def test_a_machine_that_has_run_a_fluid_is_not_new(monkeypatch: pytest.MonkeyPat
     assert warmup.is_new()
 
 
-@serial
-def compiled(number: float) -> float:
-    return 2.0 * number
+@threaded
+def compiled(numbers: np.ndarray) -> None:
+    for n in prange(len(numbers)):
+        numbers[n] *= 2.0
 
 
-@serial
-def never_called(number: float) -> float:
-    return 3.0 * number
+@threaded
+def never_called(numbers: np.ndarray) -> None:
+    for n in prange(len(numbers)):
+        numbers[n] *= 3.0
 
 
-def test_the_loop_that_is_sought_in_the_cache_may_have_any_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its name in the cache follows from the function."""
-    compiled(1.0)
-    monkeypatch.setattr(warmup, "transport", compiled)
-    assert not warmup.is_new()
-    monkeypatch.setattr(warmup, "transport", never_called)
-    assert warmup.is_new()
+@pytest.mark.parametrize("threads", [1, use_threads(None)])
+def test_the_loop_that_is_sought_in_the_cache_may_have_any_name(threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its name in the cache follows from the function, and from whether it runs on one thread."""
+    before = use_threads(None)
+    use_threads(threads)
+    try:
+        compiled(np.ones(2))
+        monkeypatch.setattr(warmup, "transport", compiled)
+        assert not warmup.is_new()
+        monkeypatch.setattr(warmup, "transport", never_called)
+        assert warmup.is_new()
+    finally:
+        use_threads(before)
 
 
 def test_the_other_process_rehearses_the_case_it_reads() -> None:

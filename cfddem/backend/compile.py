@@ -1,7 +1,8 @@
 """How a loop is compiled, cached and threaded.
 
     serial         a loop; the machine code is kept between runs
-    threaded       a loop over `prange` that runs on all threads; kept between runs
+    threaded       a loop over `prange` that runs on all threads; kept between runs. For one thread it is compiled
+                   without them, in a third of the time
     either         a loop over `prange` for one thread, or for all where `law_set.specialise` compiles it so; kept
     part           a loop over `prange` that is part of a larger one, and is kept with that; for threads as `either`
     threaded_part  the same, on all threads
@@ -20,7 +21,8 @@ import gc
 import os
 import sys
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import FunctionType
 from typing import Any
 
 from numba import get_num_threads, njit, prange, set_num_threads
@@ -78,9 +80,32 @@ def serial(function: Callable[..., Any]) -> Any:
     return _marked(kept_on_disk(njit(error_model="numpy")(function)), serial)
 
 
+class Threaded:
+    """A loop over `prange`, compiled when it is first called on one thread, and when it is first called on several.
+
+    function  the loop
+
+    one, all  as it is compiled for one thread, and for all
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.py_func, self.__name__ = function, function.__name__
+        self.one = kept_on_disk(njit(error_model="numpy")(renamed(function, f"{function.__name__}_on_one_thread")))
+        self.all = kept_on_disk(njit(error_model="numpy", parallel=True)(function))
+
+    @property
+    def in_use(self) -> Any:
+        """The loop as it is compiled for the threads in use."""
+        return self.one if get_num_threads() == 1 else self.all
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the loop on the threads in use."""
+        return self.in_use(*arguments)
+
+
 def threaded(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` that runs on all threads; kept on disk."""
-    return _marked(kept_on_disk(njit(error_model="numpy", parallel=True)(function)), threaded)
+    return _marked(Threaded(function), threaded)
 
 
 def either(function: Callable[..., Any]) -> Any:
@@ -121,6 +146,17 @@ def inline(function: Callable[..., Any]) -> Any:
 def fused(function: Callable[..., Any]) -> Any:
     """Compile a small helper as `inline` does, where a product and a sum may be one instruction."""
     return _marked(njit(**_INLINE, fastmath={"contract"})(function), fused)
+
+
+def renamed(function: FunctionType, name: str, bound: Mapping[str, Any] | None = None) -> FunctionType:
+    """A copy of a function, which the cache on disk tells from it by its name.
+
+    bound  other values that the copy finds under some names
+    """
+    names = {**function.__globals__, **bound} if bound else function.__globals__
+    twin = FunctionType(function.__code__, names, name, function.__defaults__, function.__closure__)
+    twin.__qualname__, twin.__module__, twin.__doc__ = name, function.__module__, function.__doc__
+    return twin
 
 
 def _marked(compiled: Any, how: Callable[..., Any]) -> Any:

@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 from numba import float64
 
-from cfddem.backend.compile import either, inline, part, threaded, threaded_part, vector_part
+from cfddem.backend.compile import either, inline, part, renamed, threaded, threaded_part, vector_part
 from cfddem.backend.errors import InputError
 from closures.check import first_cause
 from closures.compiled import is_exposed
@@ -100,7 +100,7 @@ class _Specialiser:
             return template
         tag = _digest([how.__name__, *(f"{name}={fingerprint(bound[name])}" for name in sorted(bound))])
         if (plain, tag) not in _COPIES:
-            made = how(_twin(plain, bound, f"{plain.__name__}_{tag}"))
+            made = how(renamed(plain, f"{plain.__name__}_{tag}", bound))
             made.tag = tag
             _COPIES[plain, tag] = made
         return _COPIES[plain, tag]
@@ -129,7 +129,7 @@ def _compiled_law(law: FunctionType, mark: str) -> Any:
         for name in _names(law.__code__)
         if isinstance(value := law.__globals__.get(name), FunctionType) and value is not law and not is_exposed(value)
     }
-    twin = _twin(law, helpers, law.__name__)
+    twin = renamed(law, law.__name__, helpers)
     twin.__module__ = __name__
     return inline(twin)
 
@@ -246,13 +246,6 @@ def _plain(function: Any) -> FunctionType:
 
 def _is_compiled(value: Any) -> bool:
     return hasattr(value, "compiled_as")
-
-
-def _twin(plain: FunctionType, bound: Mapping[str, Any], name: str) -> FunctionType:
-    """A copy of a function that finds other values under some names; the cache on disk tells copies apart by name."""
-    twin = FunctionType(plain.__code__, {**plain.__globals__, **bound}, name, plain.__defaults__, plain.__closure__)
-    twin.__qualname__, twin.__module__, twin.__doc__ = name, plain.__module__, plain.__doc__
-    return twin
 
 
 def _digest(parts: Any) -> str:

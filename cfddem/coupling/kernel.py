@@ -46,7 +46,7 @@ SLAB = 4
 class Stencil(NamedTuple):
     """Cells on which particles deposit: for each of their equal pieces a cell and the seven beside, above and behind.
 
-    A layer of cells around the grid takes part, see :meth:`cfddem.coupling.reach.Reach.collecting`.
+    A layer of cells around the grid takes part, see :class:`cfddem.coupling.reach.Homes`.
     """
 
     first: np.ndarray  # (N, pieces) uint32, flat index of the lowest of the eight cells
@@ -98,8 +98,7 @@ class FilterKernel:
         self._cells, (_, ny, nx) = self.reach.shape[::-1], self.reach.shape
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
         self._corners = np.array(corners, np.uint32)
-        self._collecting = self.reach.collecting()
-        self._spreading = self._collecting.T.tocsr()
+        self._homes = self.reach.homes()
         self._gates = _gates(grid, self.halo)
         self.sweeps, self.strength = self._diffusion()
 
@@ -141,21 +140,30 @@ class FilterKernel:
 
     def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx)."""
-        values = np.ascontiguousarray(values)
-        by_cell = np.zeros((self._collecting.shape[1], values.shape[1]))
-        loops.deposit(cell_map.order, cell_map.start, values, *cell_map.stencil, self._corners, by_cell)
-        fields = np.ascontiguousarray((self._collecting @ by_cell).T)
-        return self.reach.collected(fields.reshape(-1, *self.reach.shape))
+        values, homes, shape = np.ascontiguousarray(values), self._homes, self.reach.shape
+        deposits = np.zeros((len(homes.of_layered), values.shape[1]))
+        loops.deposit(cell_map.order, cell_map.start, values, *cell_map.stencil, self._corners, deposits)
+        fields = np.empty((values.shape[1], *shape))
+        loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
+        return self.reach.collected(fields)
 
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
-        count = len(fields)
-        columns = -(-count // loops.FOUR) * loops.FOUR
-        values = np.empty((len(stencil.first), columns))
-        by_cell = np.zeros((self._collecting.shape[0], columns))
-        by_cell[:, :count] = self.reach.spread(fields).reshape(count, -1).T
-        loops.gather(*stencil, self._corners, self._spreading @ by_cell, values)
-        return values[:, :count]
+        values = np.empty((len(stencil.first), len(fields)))
+        loops.gather(*stencil, self._corners, self._layered(fields), values)
+        return values
+
+    def gather_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, fields: Array) -> Array:
+        """As `gather`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
+        values = np.empty((len(now.first), len(fields)))
+        loops.gather_over_steps(*earlier, *last, *now, self._corners, self._layered(fields), values)
+        return values
+
+    def _layered(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
+        layered = np.empty((len(self._homes.of_layered), len(fields)))
+        loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
+        return layered
 
     def smooth(self, fields: Array) -> Array:
         """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""

@@ -8,11 +8,8 @@ import numpy as np
 
 from cfddem.backend.compile import inline, prange, serial, threaded
 
-FOUR = 4
-"""Components of a cell that are gathered together."""
-
 CORNERS = 8
-"""Cells on which a particle deposits, or a piece of it."""
+"""Cells on which a particle deposits, or a piece of it. They are counted along x first, then y, then z."""
 
 
 @inline
@@ -50,13 +47,6 @@ def stencils(position, radius, offsets, linear, origin, inverse, cells, first, s
             shares[n, s, 0], shares[n, s, 1], shares[n, s, 2] = a, b, c
 
 
-@inline
-def _weight(corner, a, b, c):
-    """Weight of one of the eight cells that a piece touches, counted along x first, then y, then z."""
-    up, back, right = corner >> 2, corner >> 1 & 1, corner & 1
-    return (c if up else 1.0 - c) * ((b if back else 1.0 - b) * (a if right else 1.0 - a))
-
-
 @serial
 def sort_into_slabs(position, origin, inverse, thickness, order, start):
     """Sort rows of particles into slabs of `thickness` cell layers, and find the first place of each slab."""
@@ -73,11 +63,57 @@ def sort_into_slabs(position, origin, inverse, thickness, order, start):
         free[slab[n]] += 1
 
 
+@inline
+def _weight(corner, a, b, c):
+    """Weight of one of the eight cells that a piece touches."""
+    up, back, right = corner >> 2, corner >> 1 & 1, corner & 1
+    return (c if up else 1.0 - c) * ((b if back else 1.0 - b) * (a if right else 1.0 - a))
+
+
+@inline
+def _cells(first, corners):
+    """Flat indices of the cells of a piece; corners as of `deposit`."""
+    return (
+        first + corners[0], first + corners[1], first + corners[2], first + corners[3],
+        first + corners[4], first + corners[5], first + corners[6], first + corners[7],
+    )  # fmt: skip
+
+
+@inline
+def _weights(n, s, shares):
+    """Weights of the cells of piece s of particle n."""
+    a, b, c = shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
+    return (
+        _weight(0, a, b, c), _weight(1, a, b, c), _weight(2, a, b, c), _weight(3, a, b, c),
+        _weight(4, a, b, c), _weight(5, a, b, c), _weight(6, a, b, c), _weight(7, a, b, c),
+    )  # fmt: skip
+
+
+@inline
+def _plus(a, factor, b):
+    """a + factor b, cell by cell."""
+    return (
+        a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2], a[3] + factor * b[3],
+        a[4] + factor * b[4], a[5] + factor * b[5], a[6] + factor * b[6], a[7] + factor * b[7],
+    )  # fmt: skip
+
+
+@inline
+def _mean(weights, cells, fields, m):
+    """Weighted mean of component m of the cells."""
+    return (
+        weights[0] * fields[cells[0], m] + weights[1] * fields[cells[1], m]
+        + weights[2] * fields[cells[2], m] + weights[3] * fields[cells[3], m]
+        + weights[4] * fields[cells[4], m] + weights[5] * fields[cells[5], m]
+        + weights[6] * fields[cells[6], m] + weights[7] * fields[cells[7], m]
+    )  # fmt: skip
+
+
 @threaded
 def deposit(order, start, values, first, shares, corners, fields):
     """Add values (N, m) to fields (cells, m): even slabs together, then odd ones.
 
-    corners  distance of the eight cells from the first in flat arrays; unsigned, since no index counts from the end
+    corners  distance of the cells from the first in flat arrays; unsigned, since no index counts from the end
     """
     slabs = len(start) - 1
     for phase in range(2):
@@ -99,25 +135,62 @@ def _deposit_one(n, values, first, shares, corners, fields):
 
 
 @threaded
-def gather(first, shares, corners, fields, values):
-    """Weighted mean around every particle, with the weights of `_deposit_one`: fields (cells, m) to values (N, m).
+def collect(order, begins, deposits, fields):
+    """Sums over the deposits (n, m) that each cell receives, in order: fields (m, cells)."""
+    for cell in prange(len(begins) - 1):
+        for m in range(fields.shape[0]):
+            total = 0.0
+            for place in range(begins[cell], begins[cell + 1]):
+                total += deposits[order[place], m]
+            fields[m, cell] = total
 
-    m is a multiple of FOUR.
-    """
+
+@threaded
+def spread(homes, fields, layered):
+    """Values of the home of every cell: fields (m, cells) to layered (n, m); the adjoint of `collect`."""
+    for cell in prange(len(homes)):
+        for m in range(fields.shape[0]):
+            layered[cell, m] = fields[m, homes[cell]]
+
+
+@threaded
+def gather(first, shares, corners, fields, values):
+    """Weighted mean around every particle, with the weights of `deposit`: fields (cells, m) to values (N, m)."""
     part = 1.0 / first.shape[1]
     for n in prange(len(values)):
-        for m in range(0, values.shape[1], FOUR):
-            p, q, r, t = 0.0, 0.0, 0.0, 0.0
-            for s in range(first.shape[1]):
-                cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
-                for corner in range(CORNERS):
-                    weight, here = _weight(corner, a, b, c), fields[cell + corners[corner], m : m + FOUR]
-                    p += weight * here[0]
-                    q += weight * here[1]
-                    r += weight * here[2]
-                    t += weight * here[3]
-            out = values[n, m : m + FOUR]
-            out[0], out[1], out[2], out[3] = part * p, part * q, part * r, part * t
+        for m in range(values.shape[1]):
+            values[n, m] = 0.0
+        for s in range(first.shape[1]):
+            _add_mean(n, part, _weights(n, s, shares), _cells(first[n, s], corners), fields, values)
+
+
+@inline
+def _add_mean(n, share, weights, cells, fields, values):
+    """Add a share of the weighted means of all components; two by two, which is faster than one by one."""
+    count = values.shape[1]
+    for m in range(0, count - 1, 2):
+        values[n, m] += share * _mean(weights, cells, fields, m)
+        values[n, m + 1] += share * _mean(weights, cells, fields, m + 1)
+    if count % 2:
+        values[n, count - 1] += share * _mean(weights, cells, fields, count - 1)
+
+
+@threaded
+def gather_over_steps(earlier, shares_earlier, last, shares_last, now, shares_now, corners, fields, values):
+    """As `gather`, the mean of particles at three places, with the weights 1/4, 1/2 and 1/4."""
+    quarter = 0.25 / now.shape[1]
+    for n in prange(len(values)):
+        for m in range(values.shape[1]):
+            values[n, m] = 0.0
+        for s in range(now.shape[1]):
+            old, mid, new = _weights(n, s, shares_earlier), _weights(n, s, shares_last), _weights(n, s, shares_now)
+            if earlier[n, s] == last[n, s] and last[n, s] == now[n, s]:  # mostly so; then cells are read once
+                together = _plus(_plus(old, 2.0, mid), 1.0, new)
+                _add_mean(n, quarter, together, _cells(now[n, s], corners), fields, values)
+            else:
+                _add_mean(n, quarter, old, _cells(earlier[n, s], corners), fields, values)
+                _add_mean(n, 2.0 * quarter, mid, _cells(last[n, s], corners), fields, values)
+                _add_mean(n, quarter, new, _cells(now[n, s], corners), fields, values)
 
 
 @threaded

@@ -6,10 +6,10 @@ In a run of one process these are the cells of the grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
-from scipy.sparse import csr_array
 
 from cfddem.backend.errors import RunFailed
 from cfddem.fluid.block import THINNEST
@@ -18,6 +18,18 @@ from cfddem.fluid.grid import Array, Grid
 LAYERS = THINNEST
 """Layers of ghosts beyond a border. A particle may lie half a cell less beyond its rank's cells: it moves until the
 next neighbour list, and is mapped where it was two fluid steps ago."""
+
+
+class Homes(NamedTuple):
+    """Cells that receive what is deposited on the cells and on a layer around them; flat indices.
+
+    A cell receives its own, then those of solid cells to which it is the nearest open one, and of ghosts that take
+    its value. This is the order of the sum, on any number of ranks.
+    """
+
+    of_layered: np.ndarray  # (n,) home of each of the cells and of the layer
+    order: np.ndarray  # (n,) cells and layer, sorted by home
+    begins: np.ndarray  # (cells + 1,) first place of each home in `order`
 
 
 class Reach:
@@ -38,19 +50,14 @@ class Reach:
         self.shape = (nz, ny, nx)
         self.origin = np.array(grid.origin) - self._ghosts * np.array(grid.spacing)
 
-    def collecting(self) -> csr_array:
-        """Matrix that brings deposits on the cells and a layer around them to the cells that receive them (n, m) [-].
-
-        A cell receives its own, then those of solid cells to which it is the nearest open one, and of ghosts that take
-        its value. The order of a row is that of the sum, on any number of ranks.
-        """
+    def homes(self) -> Homes:
+        """Homes of the cells and of the layer around them."""
         homes = self._homes()
         layered = np.arange(homes.size).reshape([n + 2 for n in self.shape])
         own = layered[1:-1, 1:-1, 1:-1].ravel()
         strays = layered.ravel() != own[homes]
         order = np.lexsort((strays, homes))
-        begins = np.searchsorted(homes[order], np.arange(own.size + 1))
-        return csr_array((np.ones(homes.size), order, begins), shape=(own.size, homes.size))
+        return Homes(homes, order, np.searchsorted(homes[order], np.arange(own.size + 1)))
 
     def _homes(self) -> np.ndarray:
         """Cell that receives the deposit on each of the cells and of a layer around them; flat indices."""

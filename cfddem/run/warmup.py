@@ -15,14 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.compile import use_threads
 from cfddem.case.schema import Case
 from cfddem.fluid.momentum import transport
 from closures.compiled import cache_folder
 
 
 def is_new() -> bool:
-    """Whether the loops of the fluid are missing in the cache; one of them is checked."""
-    return not _is_cached(transport)
+    """Whether the loops of the fluid are missing in the cache for the threads in use; one of them is checked."""
+    return not _is_cached(transport.in_use)
 
 
 def _is_cached(loop: Any) -> bool:
@@ -44,7 +45,7 @@ def warmup(case: Case) -> Iterator[None]:
         return
     process = subprocess.Popen(
         [sys.executable, "-m", "cfddem.run.warmup"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL, env={**os.environ, "NUMBA_NUM_THREADS": str(use_threads(None))},
     )  # fmt: skip
     try:
         assert process.stdin is not None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap, Stencil
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -40,16 +39,14 @@ class PressureForce:
         The fluid has used the voidage of the last three steps with the weights 1/4, 1/2 and 1/4. The gradient is
         gathered from the places of these three steps with the same weights.
         """
-        force = np.zeros((particles.count, 3))
-        if self.fields:
-            kernel, gradient = self.kernel, self.kernel.smooth(self.fluid.cell_pressure_gradient())
-            if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
-                self._known = []  # rows have changed
-            last, earlier = (
-                self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER))
-            )
-            gathered = (kernel.gather(stencil, gradient) for stencil in (earlier, last, cell_map.stencil))
-            _weighted(cell_map.volume, *gathered, force)
+        if not self.fields:
+            return np.zeros((particles.count, 3))
+        gradient = self.kernel.smooth(self.fluid.cell_pressure_gradient())
+        if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
+            self._known = []  # rows have changed
+        last, earlier = (self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER)))
+        force = self.kernel.gather_over_steps(earlier, last, cell_map.stencil, gradient)
+        force *= -cell_map.volume[:, None]
         return force
 
     def _stencil(self, particles: Particles, n: int, name: str) -> Stencil:
@@ -64,11 +61,3 @@ class PressureForce:
             particles.earlier_mapped_position = particles.mapped_position
             particles.mapped_position = cell_map.position
             self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()
-
-
-@threaded
-def _weighted(volume, earlier, last, now, force):
-    """Force (N, 3) [N] of the pressure gradients [Pa/m] gathered from three places."""
-    for n in prange(len(volume)):
-        for d in range(3):
-            force[n, d] = -volume[n] * (0.25 * earlier[n, d] + 0.5 * last[n, d] + 0.25 * now[n, d])

@@ -22,7 +22,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -30,9 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.backend.communicator import SERIAL, Communicator
-from cfddem.backend.compile import use_threads
+from cfddem.backend.compile import Threaded
 from cfddem.backend.errors import RunFailed
-from cfddem.backend.law_set import specialise
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.pressure.multigrid_loops import apply, descend, prolong, residual, restrict, smooth
 from cfddem.fluid.pressure.regions import ClosedRegions
@@ -85,14 +83,18 @@ class Level:
         self.inverse.fill(0.0)
         np.divide(1.0, self.diagonal, out=self.inverse, where=self.diagonal > 0.0)
 
-    def loop(self, template: Any) -> Any:
+    def loop(self, loop: Threaded) -> Any:
         """A loop as it runs over the cells of this level: on all threads, or on one if they are few."""
-        return _compiled(template, not self.small and use_threads(None) > 1)
+        return loop.one if self.small else loop
 
     def sweep(self, sweeps: int, backward: bool) -> None:
         """Relax all cells so many times."""
+        self.relax(int(backward), 2 * sweeps, backward)
+
+    def relax(self, colour: int, halves: int, backward: bool) -> None:
+        """Make so many halves of sweeps, beginning with a colour."""
         system = self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows
-        self.loop(smooth)(*system, sweeps, backward)
+        self.loop(smooth)(*system, colour, halves, backward)
 
     def take_residual(self) -> None:
         """Compute the residual."""
@@ -106,11 +108,6 @@ class Level:
     def correct_by(self, coarse: Level) -> None:
         """Add the correction of the coarser grid."""
         self.loop(prolong)(coarse.x, self.factors, self.shift, self.rows, self.x)
-
-
-@cache
-def _compiled(template: Any, threads: bool) -> Any:
-    return specialise(template, {}, threads)
 
 
 def coarsen(level: Level, fine: Sequence[Array], coarse: Sequence[Array], whole: tuple[int, int, int]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cfddem.backend.compile import either, inline, prange, serial, vector_inline
+from cfddem.backend.compile import inline, prange, threaded, vector_inline
 from cfddem.fluid.halo import neighbours
 
 
@@ -35,31 +35,23 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
             here[i] = new[i] if (i & 1) == parity else here[i]
 
 
-@either
-def smooth_colour(x, b, ax, ay, az, inverse, rows, colour, backward):
-    """Relax the cells of one colour in place; rows (nz, nx) are overwritten."""
+@threaded
+def smooth(x, b, ax, ay, az, inverse, rows, first, halves, backward):
+    """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten.
+
+    first   colour of the first half of a sweep
+    halves  number of halves, of both colours in turn
+    """
     nz = x.shape[0]
     # Of an odd number of planes the last has the colour of the first, its neighbour if periodic: it goes alone.
     together = nz - (nz & 1)
-    for part in range(2):
-        alone = (part == 0) == backward
-        begin, end = (together, nz) if alone else (0, together)
-        if begin < end:
-            for k in prange(begin, end):
-                _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, rows[k])
-
-
-@serial
-def colour_of(half, backward):
-    """Colour that is relaxed in a half of a sweep."""
-    return (half + 1) & 1 if backward else half & 1
-
-
-@serial
-def smooth(x, b, ax, ay, az, inverse, rows, sweeps, backward):
-    """Gauss-Seidel by colours in place; backward is the exact transpose of forward; rows (nz, nx) are overwritten."""
-    for half in range(2 * sweeps):
-        smooth_colour(x, b, ax, ay, az, inverse, rows, colour_of(half, backward), backward)
+    for half in range(halves):
+        for part in range(2):
+            alone = (part == 0) == backward
+            begin, end = (together, nz) if alone else (0, together)
+            if begin < end:
+                for k in prange(begin, end):
+                    _relax_plane(k, first + half, backward, x, b, ax, ay, az, inverse, rows[k])
 
 
 @vector_inline
@@ -82,7 +74,7 @@ def _apply_row(k, j, x, ax, ay, az, diagonal, out):
         out[i] -= west[i] * here[left] + west[right] * here[right]
 
 
-@either
+@threaded
 def residual(x, b, ax, ay, az, diagonal, left):
     """left = b - L x."""
     for k in prange(x.shape[0]):
@@ -112,7 +104,7 @@ def _cells_in(coarse, factor, shift, count):
     return max(first, 0), min(first + factor, count)
 
 
-@either
+@threaded
 def restrict(values, factors, shift, rows, coarse):
     """Sum the values of a level over the cells that make one coarse cell; rows are overwritten.
 
@@ -135,7 +127,7 @@ def restrict(values, factors, shift, rows, coarse):
                     coarse[kc, jc, ic] += total[i]
 
 
-@either
+@threaded
 def prolong(coarse_x, factors, shift, rows, x):
     """Add the coarse correction to every cell below it; `shift` as of `restrict`; rows are overwritten."""
     nz, ny, nx = x.shape
@@ -151,7 +143,7 @@ def prolong(coarse_x, factors, shift, rows, x):
                     _add(correction, x[k, j])
 
 
-@either
+@threaded
 def apply(x, ax, ay, az, diagonal, out, rows, sums):
     """out = L x; sums[k] is the part of x.Lx in plane k, summed first over y and then over x; rows are overwritten."""
     for k in prange(x.shape[0]):
@@ -173,7 +165,7 @@ def _add_products(a, b, row):
         row[i] += a[i] * b[i]
 
 
-@either
+@threaded
 def descend(length, direction, image, x, residual, largest):
     """x += length direction, residual -= length image; largest[k] is the largest residual in plane k."""
     for k in prange(x.shape[0]):

@@ -18,7 +18,6 @@ from cfddem.fluid.block import Block
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure.multigrid import Level, PressureEquation, coarsen, hierarchy
-from cfddem.fluid.pressure.multigrid_loops import colour_of, smooth_colour
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 SMALL = 5_000
@@ -101,10 +100,9 @@ class SharedLevel(Level):
 
     def sweep(self, sweeps: int, backward: bool) -> None:
         """Relax all cells of all ranks so many times."""
-        relax = self.loop(smooth_colour)
         for half in range(2 * sweeps):
-            colour = (colour_of(half, backward) + self.first + 1) % 2  # arrays begin at the layer before the first
-            relax(self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows, colour, backward)
+            # arrays begin at the layer before the first
+            self.relax(int(backward) + half + self.first + 1, 1, backward)
             self.fill(self.x)
 
     def take_residual(self) -> None:
