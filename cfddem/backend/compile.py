@@ -88,7 +88,7 @@ class Threaded:
     one, all  as it is compiled for one thread, and for all
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Any) -> None:
         self.py_func, self.__name__ = function, function.__name__
         self.one = kept_on_disk(njit(error_model="numpy")(renamed(function, f"{function.__name__}_on_one_thread")))
         self.all = kept_on_disk(njit(error_model="numpy", parallel=True)(function))

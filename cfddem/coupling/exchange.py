@@ -12,6 +12,7 @@ forces are explicit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -139,23 +140,17 @@ class Exchange:
         drag = self.drag.conductance(particles, flow) if around is None else around.conductance
         if self.wall_drag is not None:
             beside = self.wall_drag.terms(particles, flow.slip)
-            drag, transverse = drag + beside.conductance, transverse + beside.force
+            drag, transverse = drag + beside.conductance, _sum([transverse, beside.force])
         if self.history is not None:
             history = self.history.terms(particles, flow, drag, inertia(particles), step, last_step)
         not_seen = _not_seen(flow, drag, agitation, history)
         conductance = drag if history is None else drag + history.conductance
         implicit = self.momentum.prepare(particles, cell_map, flow, step, not_seen, conductance)
-        explicit = self.added_mass or self.lift or self.viscous_stress or history is not None or self.wall_drag
-        source = None
-        if explicit or (agitation is not None and agitation.force is not None):
-            lost = deferred - added - transverse
-            for each in (agitation, history):
-                if each is not None and each.force is not None:
-                    lost = lost - each.force
-            source = self._source(cell_map, lost)
-        return CouplingTerms(
-            cell_map, flow, drag, implicit, transverse + added, heavier, 1.0 - solid, source, agitation, history
-        )
+        on_particles = [added, transverse, *(each.force for each in (agitation, history) if each is not None)]
+        lost = _sum([deferred, *(-force for force in on_particles if force is not None)])
+        source = None if lost is None else self._source(cell_map, lost)
+        explicit = _sum([transverse, added])
+        return CouplingTerms(cell_map, flow, drag, implicit, explicit, heavier, 1.0 - solid, source, agitation, history)
 
     def apply(self, particles: Particles, terms: CouplingTerms, gravity: Array) -> FluidForces:
         """Store in `particles.applied` the force on every particle until the next fluid step; returns its parts.
@@ -176,17 +171,16 @@ class Exchange:
             agitation=terms.fluctuating_force,
             history=history,
         )
-        _replace(particles.applied, forces, particles.force)
+        _replace(particles.applied, tuple(force for force in forces if force is not None), particles.force)
         self.pressure.store(particles, cell_map)
         self.added_mass.store(particles, terms.flow.slip)
         if self.torque and fluid.viscous:
             gained = turn_with_fluid(particles, vorticity_at(fluid, self.kernel, cell_map), fluid.density, step)
             self.spin_work = fluid.communicator.sum(gained)
         if self.self_disturbance is not None and fluid.viscous:
+            on_slip = drag if history is None else drag + history
             screening = terms.drag * terms.flow.others / (fluid.density * terms.flow.voidage)
-            self.self_disturbance.advance(
-                particles, cell_map, terms.flow.slip, drag + history, screening, fluid.density, step
-            )
+            self.self_disturbance.advance(particles, cell_map, terms.flow.slip, on_slip, screening, fluid.density, step)
         return forces
 
     def solid_fraction(self, particles: Particles) -> Array:
@@ -253,27 +247,27 @@ class Exchange:
         flow = flow._replace(reynolds=scale * speed / np.maximum(particles.viscosity, 1e-300))
         return Neighbourhood(cell_map, flow, mean_slip, self.drag.conductance(particles, flow), solid)
 
-    def _transverse_force(self, particles: Particles, cell_map: ParticleCellMap, slip: Array) -> Array:
-        """Viscous stress and lift on every particle (N, 3) [N]."""
-        fluid, force = self.fluid, np.zeros_like(slip)
+    def _transverse_force(self, particles: Particles, cell_map: ParticleCellMap, slip: Array) -> Array | None:
+        """Viscous stress and lift on every particle (N, 3) [N]; None without them."""
+        fluid, forces = self.fluid, []
         if self.viscous_stress:
-            force += viscous_force(fluid, self.kernel, cell_map)
+            forces.append(viscous_force(fluid, self.kernel, cell_map))
         if self.lift and fluid.viscous:
             curl = vorticity_at(fluid, self.kernel, cell_map)
-            force += lift_force(slip, curl, particles.spin, particles.radius, fluid.density, particles.viscosity)
-        return force
+            forces.append(lift_force(slip, curl, particles.spin, particles.radius, fluid.density, particles.viscosity))
+        return _sum(forces)
 
     def _added_mass(
         self, particles: Particles, cell_map: ParticleCellMap, flow: SampledFlow, step: float
-    ) -> tuple[Array, Array, Array]:
-        """Change of the added mass (N,) [kg], and two forces (N, 3) [N].
+    ) -> tuple[Array, Array | None, Array | None]:
+        """Change of the added mass (N,) [kg], and two forces (N, 3) [N]; None without them.
 
         On the fluid acts, one step late, what the particles lost to their added mass; on the particles the acceleration
         of the fluid, and its opposite on the fluid.
         """
         added_mass, last_step = self.added_mass, self.momentum.last_step
         if not added_mass or last_step == 0.0:
-            none = np.zeros((particles.count, 3))
+            none = np.zeros((particles.count, 3)) if added_mass else None
             return added_mass.update(particles, flow.voidage), none, none
         deferred = added_mass.deferred_momentum(particles)
         heavier = added_mass.update(particles, flow.voidage)
@@ -282,13 +276,15 @@ class Exchange:
         force = added_mass.force(particles, flow, passing, weight, last_step)
         return heavier, added_mass.hand_over(particles, deferred, weight) / step, force
 
-    def _drag_and_history(self, particles: Particles, terms: CouplingTerms, received: Array) -> tuple[Array, Array]:
-        """Drag and history force on every particle (N, 3), (N, 3) [N].
+    def _drag_and_history(
+        self, particles: Particles, terms: CouplingTerms, received: Array
+    ) -> tuple[Array, Array | None]:
+        """Drag and history force on every particle (N, 3), (N, 3) [N]; None for no history force.
 
         received  from the implicit transfer (N, 3) [N]
         """
         if self.history is None or terms.history is None:
-            return received, np.zeros_like(received)
+            return received, None
         of_slip = received
         if terms.agitation is not None:
             of_slip = received - terms.drag[:, None] * terms.agitation.velocity
@@ -300,6 +296,12 @@ class Exchange:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
         source = self.kernel.smooth(self.kernel.deposit(cell_map, force)) / self.fluid.grid.cell_volume
         return np.ascontiguousarray(np.moveaxis(source, 0, -1))
+
+
+def _sum(forces: Sequence[Array | None]) -> Array | None:
+    """Sum of the forces that there are; None without any."""
+    present = [force for force in forces if force is not None]
+    return sum(present[1:], present[0]) if present else None
 
 
 @threaded

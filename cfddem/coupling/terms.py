@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from cfddem.coupling.forces.agitation import AgitationTerms
 from cfddem.coupling.forces.history import HistoryTerms
 from cfddem.coupling.kernel import ParticleCellMap
@@ -21,7 +19,7 @@ class CouplingTerms(NamedTuple):
     flow: SampledFlow
     drag: Array  # conductance of the drag, with that of wall drag along the slip (N,) [kg/s]
     implicit: ImplicitCoefficients  # of drag and history force
-    explicit: Array  # lift, viscous stress, added mass, wall drag across the slip (N, 3) [N]
+    explicit: Array | None  # lift, viscous stress, added mass, wall drag across the slip (N, 3) [N]
     added: Array  # change of the added mass of every particle at the start of the step (N,) [kg]
     voidage: Array  # of the cells (nz, ny, nx)
     source: Array | None  # force on the fluid (nz, ny, nx, 3) [N/m3]
@@ -34,10 +32,9 @@ class CouplingTerms(NamedTuple):
         return self.implicit.step
 
     @property
-    def fluctuating_force(self) -> Array:
+    def fluctuating_force(self) -> Array | None:
         """Explicit force of agitation on every particle (N, 3) [N]."""
-        force = None if self.agitation is None else self.agitation.force
-        return np.zeros_like(self.explicit) if force is None else force
+        return None if self.agitation is None else self.agitation.force
 
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
@@ -46,11 +43,11 @@ class CouplingTerms(NamedTuple):
 
 
 class FluidForces(NamedTuple):
-    """Forces of the fluid on every particle, constant over a fluid step (N, 3) [N]."""
+    """Forces of the fluid on every particle, constant over a fluid step (N, 3) [N]; None for those that a run lacks."""
 
     drag: Array
-    pressure: Array  # of model A, without buoyancy
+    pressure: Array | None  # of model A, without buoyancy
     weight: Array  # less buoyancy
-    explicit: Array  # lift, viscous stress, added mass, wall drag across the slip
-    agitation: Array  # by the acceleration of the fluctuation, or the fluctuating force; without that in the drag
-    history: Array
+    explicit: Array | None  # lift, viscous stress, added mass, wall drag across the slip
+    agitation: Array | None  # by the acceleration of the fluctuation, or the fluctuating force; not that in the drag
+    history: Array | None

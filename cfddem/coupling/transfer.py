@@ -109,11 +109,11 @@ class Transfer:
         kernel, value = self.kernel, _columns(particles[self.value])
         if conductance is None:
             conductance = self.conductance(particles, flow)
-        disturbance, capacity = _or_zero(disturbance, value), self.capacity(particles)
+        disturbance = _or_zero(disturbance, value)
         implicit, target = np.empty(particles.count), np.empty(value.shape)
         carried = np.empty((particles.count, 1 + value.shape[1]))
         _implicit_coefficients(
-            conductance, capacity, self._other(particles, capacity), value, disturbance, step,
+            conductance, self.capacity(particles), value, disturbance, *self._last(particles, value), step,
             implicit, target, carried,
         )  # fmt: skip
         cells = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
@@ -136,15 +136,11 @@ class Transfer:
         self.last_step = sent.step
         return rate
 
-    def _other(self, particles: Particles, capacity: Array) -> Array:
-        """Mean over the step before of everything but this transfer (N, m)."""
-        value = _columns(particles[self.value])
-        if self.last_step == 0.0:
-            return _or_zero(None if self.source is None else self.source(particles), value)
-        before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
-        other = np.empty(value.shape)
-        _mean_other(value, before, received, capacity, self.last_step, other)
-        return other
+    def _last(self, particles: Particles, value: Array) -> tuple[Array, Array, float]:
+        """Value before the last step (N, m), what it received (N, m) and the length of that step [s]."""
+        if self.last_step == 0.0:  # as if the source of the first step had acted for a second
+            return value, -_or_zero(None if self.source is None else self.source(particles), value), 1.0
+        return _columns(particles[self.before]), _columns(particles[self.received[0]]), self.last_step
 
 
 @cache
@@ -163,16 +159,24 @@ def _or_zero(values: Array | None, like: Array) -> Array:
 
 
 @threaded
-def _implicit_coefficients(conductance, capacity, other, value, disturbance, step, implicit, target, carried):
-    """b*, v*, and what each particle deposits: b* and b* v* (N, 1 + m)."""
+def _implicit_coefficients(
+    conductance, capacity, value, disturbance, before, received, last_step, step, implicit, target, carried
+):  # fmt: skip
+    """b*, v*, and what each particle deposits: b* and b* v* (N, 1 + m).
+
+    f is the change of the quantity over the last step, less what the transfer gave, per time; held values change
+    nothing.
+    """
     for n in prange(len(conductance)):
-        inverse = 1.0 / capacity[n]
+        inverse, held = 1.0 / capacity[n], not math.isfinite(capacity[n])
         stiffness = step * conductance[n] * inverse
         theta = implicitness(stiffness)
         implicit[n] = conductance[n] / (1.0 + theta * stiffness)
         carried[n, 0] = implicit[n]
         for d in range(value.shape[1]):
-            target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other[n, d]
+            gained = 0.0 if held else capacity[n] * (value[n, d] - before[n, d])
+            other = (gained - received[n, d]) / last_step
+            target[n, d] = value[n, d] + disturbance[n, d] + theta * step * inverse * other
             carried[n, 1 + d] = implicit[n] * target[n, d]
 
 
@@ -188,12 +192,3 @@ def _receive(gathered, implicit, target, step, value, rate, before, received):
             rate[n, d] = implicit[n] * (gathered[n, components + d] - gathered[n, d] * target[n, d])
             before[n, d] = value[n, d]
             received[n, d] = step * rate[n, d]
-
-
-@threaded
-def _mean_other(value, before, received, capacity, last_step, other):
-    """Change of the quantity over the last step, less what the transfer gave, per time; held values change nothing."""
-    for n in prange(len(value)):
-        for d in range(value.shape[1]):
-            gained = capacity[n] * (value[n, d] - before[n, d]) if math.isfinite(capacity[n]) else 0.0
-            other[n, d] = (gained - received[n, d]) / last_step

@@ -78,7 +78,7 @@ class CouplingWork:
         particles[FLUCTUATING.name][:] = self._on_fluid.fluctuating
         self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
         for field, force in zip(FORCES, forces):
-            particles[field.name][:] = force
+            particles[field.name][:] = 0.0 if force is None else force
         particles.pressure_before = self._pressure_at(particles)
 
     def end(self, particles: Particles) -> ParticleWork:
@@ -116,7 +116,7 @@ class CouplingWork:
             return terms.step * float(fluid.communicator.sum(force * acting))
 
         drag, history, explicit, fluctuating = received, 0.0, 0.0, np.zeros_like(received)
-        if terms.history is not None:
+        if terms.history is not None and forces.history is not None:
             drag, explicit = forces.drag, work(terms.history.force)
             history = work(forces.history - terms.history.force)
         if terms.agitation is not None:

@@ -35,36 +35,51 @@ class Drag:
         self.name = "" if law is None else law.name
         if law is not None:
             factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
-            self._loop = specialise(_factors, {"drag_factor": factor})
+            self._loop = specialise(_conductances, {"drag_factor": factor})
         ranges = {} if law is None else law.ranges
         self._ranges = tuple(ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
-        factor = np.zeros(particles.count)
-        if self._loop is not None:
-            self.outside += int(self._loop(flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges, factor))
-            self._require_drag(flow, factor)
-        conductance: Array = 6.0 * math.pi * particles.viscosity * particles.radius * flow.voidage * factor
-        return conductance / flow.voidage if self.model == "B" else conductance
+        if self._loop is None:
+            return np.zeros(particles.count)
+        conductance = np.empty(particles.count)
+        outside, wrong = self._loop(
+            particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges,
+            self.model == "B", conductance,
+        )  # fmt: skip
+        self.outside += int(outside)
+        if wrong:
+            self._refuse(particles, flow, conductance)
+        return conductance
 
-    def _require_drag(self, flow: SampledFlow, factor: Array) -> None:
+    def _refuse(self, particles: Particles, flow: SampledFlow, conductance: Array) -> None:
         """Refuse a law that pushes a particle against the flow or is not finite; a flow that is not finite is no fault
         of the law."""
-        wrong = ~((factor >= 0.0) & (factor < np.inf)) & np.isfinite(flow.reynolds) & np.isfinite(flow.voidage)
+        wrong = (
+            ~((conductance >= 0.0) & (conductance < np.inf)) & np.isfinite(flow.reynolds) & np.isfinite(flow.voidage)
+        )
         if wrong.any():  # local: every rank has its own particles
             n = int(np.argmax(wrong))  # local: the first on this rank
-            at = f"it is {factor[n]:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
+            share = 1.0 if self.model == "B" else flow.voidage[n]
+            factor = conductance[n] / (6.0 * math.pi * particles.viscosity[n] * particles.radius[n] * share)
+            at = f"it is {factor:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
             raise InputError("laws.drag", self.name, "a law that is finite and not negative", at)
 
 
 @threaded
-def _factors(reynolds, voidage, ratio, numbers, voidages, ratios, factor):
-    """Drag factor of every particle; returns how many are outside the range of the law."""
-    outside = 0
+def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, model_b, conductance):
+    """Drag over slip of every particle; returns how many flows are outside the range of the law, and how many numbers
+    are negative or not finite."""
+    outside = wrong = 0
     for n in prange(len(reynolds)):
-        factor[n] = drag_factor(reynolds[n], voidage[n], ratio[n])
+        factor = drag_factor(reynolds[n], voidage[n], ratio[n])
+        conductance[n] = factor
         beyond = reynolds[n] < numbers[0] or reynolds[n] > numbers[1]
         beyond = beyond or voidage[n] < voidages[0] or voidage[n] > voidages[1]
         outside += 1 if beyond or ratio[n] < ratios[0] or ratio[n] > ratios[1] else 0
-    return outside
+        wrong += 0 if factor >= 0.0 and factor < math.inf else 1
+    # In the same loop the compiler would evaluate all branches of a law.
+    for n in prange(len(reynolds)):
+        conductance[n] *= 6.0 * math.pi * viscosity[n] * radius[n] * (1.0 if model_b else voidage[n])
+    return outside, wrong

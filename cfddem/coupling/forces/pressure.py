@@ -33,14 +33,14 @@ class PressureForce:
         self._known: list[ParticleCellMap] = []  # of the last step and the one before
         self._known_ids = np.zeros(0, np.int64)  # of the particles in the rows of these maps
 
-    def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array:
-        """Force on every particle (N, 3) [N], after the step of the fluid.
+    def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array | None:
+        """Force on every particle (N, 3) [N], after the step of the fluid; None in model B.
 
         The fluid has used the voidage of the last three steps with the weights 1/4, 1/2 and 1/4. The gradient is
         gathered from the places of these three steps with the same weights.
         """
         if not self.fields:
-            return np.zeros((particles.count, 3))
+            return None
         gradient = self.kernel.smooth(self.fluid.cell_pressure_gradient())
         if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
             self._known = []  # rows have changed
