@@ -166,7 +166,7 @@ class Exchange:
         forces = FluidForces(
             drag=drag,
             pressure=self.pressure.force(particles, cell_map),
-            weight=excess_mass[:, None] * gravity,
+            weight=np.stack([excess_mass * along for along in gravity], axis=1),
             explicit=terms.explicit,
             agitation=terms.fluctuating_force,
             history=history,

@@ -137,7 +137,7 @@ class FluidSolver(FluidBudgets):
         self.boundaries.set_inlets(self.time + step, fields.other_voidage)
 
         # First stage: carried by the old flux, and stored with the voidage that agrees with that flux.
-        self._store_with(self.grid.inner(fields.other_voidage) - step * fields.owned("voidage_rate"))
+        self._set_cells(fields.stored_voidage, fields.owned("other_voidage") - step * fields.owned("voidage_rate"))
         self._find_explicit_force(fields.velocity, fields.mean_voidage, fields.start_force)
         self._predict(fields.stage_velocity, step, weight=0.0)
         scale = self._flux_scale(step)
@@ -145,7 +145,7 @@ class FluidSolver(FluidBudgets):
         iterations = [self._project(fields.stage_velocity, fields.other_voidage, loose * scale, scale, fresh=True)]
 
         # Second stage: the average of start and end; again while drag is stiff and the end still moves.
-        self._store_with(self.mean_voidage)
+        np.copyto(fields.stored_voidage, fields.mean_voidage)
         tight = self.tolerance * scale
         for passes in range(1, self.passes + 1):
             self._find_explicit_force(fields.stage_velocity, fields.other_voidage, fields.stage_force)
@@ -162,7 +162,7 @@ class FluidSolver(FluidBudgets):
         """Rate of change, mean and centre of the voidage of this step; returns the voidage at its end (nz, ny, nx)."""
         fields, old = self.fields, self.voidage
         new = old if voidage is None else checked_voidage(self.grid, voidage, self.communicator)
-        self._set_cells(fields.new_voidage_rate, (new - old) / step * self.open_cells)
+        fields.owned("new_voidage_rate")[:] = (new - old) / step * self.open_cells
         self._set_cells(fields.other_voidage, 0.5 * (old + new))
         np.add(fields.mean_voidage, fields.other_voidage, out=fields.centred_voidage)
         np.multiply(fields.centred_voidage, 0.5, out=fields.centred_voidage)
@@ -190,10 +190,6 @@ class FluidSolver(FluidBudgets):
         """Write the cells of a padded field, and fill its ghosts."""
         self.grid.inner(padded)[:] = cells
         self.boundaries.halo.fill(padded)
-
-    def _store_with(self, voidage: Array) -> None:
-        """Set the voidage (nz, ny, nx) that is stored with the old velocity."""
-        self._set_cells(self.fields.stored_voidage, voidage)
 
     def _find_explicit_force(self, velocity: Array, voidage: Array, force: Array) -> None:
         """Write convection and viscous stress on the faces [N/m3]."""
@@ -243,7 +239,7 @@ class FluidSolver(FluidBudgets):
         fields.swap("velocity", "other_velocity")
         fields.swap("mean_voidage", "other_voidage")
         fields.swap("voidage_rate", "new_voidage_rate")
-        self._set_cells(fields.voidage, voidage)
+        self.voidage[:] = voidage
         self.time += step
         self.last_step = step
 
@@ -299,9 +295,9 @@ class FluidSolver(FluidBudgets):
             earlier = checked_voidage(self.grid, before, self.communicator)
             mean = 0.5 * (new + earlier)
             rate = (new - earlier) / step * self.open_cells
-        self._set_cells(self.fields.voidage, new)
+        self.voidage[:] = new
         self._set_cells(self.fields.mean_voidage, mean)
-        self._set_cells(self.fields.voidage_rate, rate)
+        self.fields.owned("voidage_rate")[:] = rate
 
     def add_voidage(self, change: Array) -> None:
         """Change the voidage now, without a flow: particles that enter take the place of fluid, which leaves with them.
@@ -309,7 +305,7 @@ class FluidSolver(FluidBudgets):
         change  (nz, ny, nx) [-]
         """
         voidage = np.minimum(self.voidage + change, 1.0)  # where all particles leave a cell, up to rounding
-        self._set_cells(self.fields.voidage, checked_voidage(self.grid, voidage, self.communicator))
+        self.voidage[:] = checked_voidage(self.grid, voidage, self.communicator)
 
     def set_velocity(self, velocity: Sequence[Any]) -> None:
         """Start from a velocity, corrected by the smallest potential flow that makes it satisfy continuity.

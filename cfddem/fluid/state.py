@@ -142,7 +142,7 @@ class FluidState:
         self.fields.restore(stored)
         self.time = float(stored["time"])
         fields, halo = self.fields, self.boundaries.halo
-        for cells in (fields.voidage, fields.mean_voidage, fields.voidage_rate, fields.viscosity):
+        for cells in (fields.mean_voidage, fields.viscosity):
             halo.fill(cells)
         self.boundaries.fill_pressure(fields.pressure)
         self.boundaries.set_inlets(self.time, fields.mean_voidage)

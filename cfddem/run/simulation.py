@@ -10,6 +10,7 @@ import numpy as np
 
 from cfddem.backend import html
 from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.memory import keep_freed_memory
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.particles.state import Particles, particles_in
@@ -53,6 +54,7 @@ class Simulation:
         state: dict[str, Any] | None = None,
         communicator: Communicator = SERIAL,
     ) -> None:
+        keep_freed_memory()
         self.case, self.gravity, self.communicator = case, np.array(case.laws.gravity), communicator
         self.callbacks, fields = list(callbacks), [*fields, *_fields_of(case)]
         particles = None if state is None else particles_in(state["particles"]["particles"])

@@ -46,7 +46,8 @@ class PressureForce:
             self._known = []  # rows have changed
         last, earlier = (self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER)))
         force = self.kernel.gather_over_steps(earlier, last, cell_map.stencil, gradient)
-        force *= -cell_map.volume[:, None]
+        for along in force.T:
+            along *= -cell_map.volume
         return force
 
     def _stencil(self, particles: Particles, n: int, name: str) -> Stencil:

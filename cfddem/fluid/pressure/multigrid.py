@@ -31,8 +31,17 @@ from numpy.typing import NDArray
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import Threaded
 from cfddem.backend.errors import RunFailed
-from cfddem.fluid.grid import Array, Grid, layers
-from cfddem.fluid.pressure.multigrid_loops import apply, descend, prolong, residual, restrict, smooth
+from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.pressure.multigrid_loops import (
+    apply,
+    coarsen,
+    descend,
+    prolong,
+    residual,
+    restrict,
+    smooth,
+    take_diagonal,
+)
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 STRONG = 0.3
@@ -70,18 +79,18 @@ class Level:
 
     def coarsen_from(self, fine: Level) -> None:
         """Compute the coefficients from those of the finer grid."""
-        coarsen(fine, fine.coefficients, self.coefficients, self.shape)
+        self._coarsen(fine, fine.coefficients, self.coefficients, self.shape)
+
+    def _coarsen(self, fine: Level, of_fine: Sequence[Array], of_coarse: Sequence[Array], whole: Sequence[int]) -> None:
+        """Write coefficients from those of the fine cells; whole is the shape of the grid of all ranks."""
+        # A coefficient falls with the distance that it spans: to the next cell, or to the side with a known pressure.
+        farther = fine.factors[fine.outlets].min(initial=2)  # local: three directions
+        coupled = np.array(whole[::-1]) > 1  # a single cell is its own periodic neighbour
+        self.loop(coarsen)(*of_fine, fine.factors, farther, coupled, *of_coarse)
 
     def take_diagonal(self) -> None:
         """Compute the diagonal and its inverse, zero in solid cells."""
-        np.add(self.ax, self.ay, out=self.diagonal)
-        self.diagonal += self.az
-        self.diagonal += self.anchor
-        for d, a in enumerate((self.ax, self.ay, self.az)):
-            self.diagonal[layers(d, slice(-1))] += a[layers(d, slice(1, None))]
-            self.diagonal[layers(d, -1)] += a[layers(d, 0)]
-        self.inverse.fill(0.0)
-        np.divide(1.0, self.diagonal, out=self.inverse, where=self.diagonal > 0.0)
+        self.loop(take_diagonal)(*self.coefficients, self.diagonal, self.inverse)
 
     def loop(self, loop: Threaded) -> Any:
         """A loop as it runs over the cells of this level: on all threads, or on one if they are few."""
@@ -108,38 +117,6 @@ class Level:
     def correct_by(self, coarse: Level) -> None:
         """Add the correction of the coarser grid."""
         self.loop(prolong)(coarse.x, self.factors, self.shift, self.rows, self.x)
-
-
-def coarsen(level: Level, fine: Sequence[Array], coarse: Sequence[Array], whole: tuple[int, int, int]) -> None:
-    """Write the coefficients along x, y, z and the anchors of coarse cells from those of the fine cells in them.
-
-    A coefficient falls with the distance that it spans: to the next cell, or to the side with a known pressure.
-
-    level  the finer level
-    whole  shape of the coarse grid of all ranks
-    """
-    factors = level.factors
-    for d in range(3):
-        if whole[2 - d] == 1:
-            continue  # a single cell is its own periodic neighbour: no coupling is left
-        kept = fine[d][layers(d, slice(None, None, factors[d]))]
-        for e in range(3):
-            if e != d and factors[e] == 2:
-                kept = _pairs(kept, 2 - e)
-        np.multiply(kept, 1.0 / factors[d], out=coarse[d])
-    held = fine[3]
-    for d in range(3):
-        held = _pairs(held, 2 - d) if factors[d] == 2 else held
-    farther = factors[level.outlets].min(initial=2)  # local: three directions
-    np.multiply(held, 1.0 / farther, out=coarse[3])
-
-
-def _pairs(values: Array, axis: int) -> Array:
-    """Sums of neighbours two by two along an axis; an odd last one stands alone."""
-    total: Array = values[layers(2 - axis, slice(0, None, 2))].copy()
-    odd = values[layers(2 - axis, slice(1, None, 2))]
-    total[layers(2 - axis, slice(odd.shape[axis]))] += odd
-    return total
 
 
 class PressureEquation:

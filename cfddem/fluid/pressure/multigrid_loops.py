@@ -6,6 +6,57 @@ from cfddem.backend.compile import inline, prange, threaded, vector_inline
 from cfddem.fluid.halo import neighbours
 
 
+@inline
+def _cells_in(coarse, factor, shift, count):
+    """First cell of those in a coarse cell along an axis, and the one after the last, among so many cells."""
+    first = coarse * factor - shift
+    return max(first, 0), min(first + factor, count)
+
+
+@threaded
+def coarsen(ax, ay, az, anchor, factors, farther, coupled, coarse_ax, coarse_ay, coarse_az, coarse_anchor):
+    """Coefficients and anchors of coarse cells: sums of the fine ones, divided by how much farther they reach.
+
+    farther  how much the side with a known pressure is away, in fine cells
+    coupled  (3,) whether there are several coarse cells along x, y, z
+    """
+    nz, ny, nx = ax.shape
+    for kc in prange(coarse_ax.shape[0]):
+        first_plane, end_plane = _cells_in(kc, factors[2], 0, nz)
+        for jc in range(coarse_ax.shape[1]):
+            first_row, end_row = _cells_in(jc, factors[1], 0, ny)
+            for ic in range(coarse_ax.shape[2]):
+                first, end = _cells_in(ic, factors[0], 0, nx)
+                west = south = below = held = 0.0
+                for k in range(first_plane, end_plane):
+                    for j in range(first_row, end_row):
+                        west += ax[k, j, first]
+                        for i in range(first, end):
+                            south += ay[k, j, i] if j == first_row else 0.0
+                            below += az[k, j, i] if k == first_plane else 0.0
+                            held += anchor[k, j, i]
+                coarse_ax[kc, jc, ic] = west / factors[0] if coupled[0] else 0.0
+                coarse_ay[kc, jc, ic] = south / factors[1] if coupled[1] else 0.0
+                coarse_az[kc, jc, ic] = below / factors[2] if coupled[2] else 0.0
+                coarse_anchor[kc, jc, ic] = held / farther
+
+
+@threaded
+def take_diagonal(ax, ay, az, anchor, diagonal, inverse):
+    """Diagonal of L and its inverse, zero in solid cells."""
+    nz, ny, nx = ax.shape
+    for k in prange(nz):
+        above = neighbours(k, nz)[1]
+        for j in range(ny):
+            back = neighbours(j, ny)[1]
+            for i in range(nx):
+                right = neighbours(i, nx)[1]
+                total = ax[k, j, i] + ay[k, j, i] + az[k, j, i] + anchor[k, j, i]
+                total = total + ax[k, j, right] + ay[k, back, i] + az[above, j, i]
+                diagonal[k, j, i] = total
+                inverse[k, j, i] = 1.0 / total if total > 0.0 else 0.0
+
+
 @vector_inline
 def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
     """Relax the cells of one colour in a plane; whole rows are computed, which vectorises, and half is kept."""
@@ -95,13 +146,6 @@ def _add(values, row):
     """row += values"""
     for i in range(row.size):
         row[i] += values[i]
-
-
-@inline
-def _cells_in(coarse, factor, shift, count):
-    """First cell of those in a coarse cell along an axis, and the one after the last, among so many cells."""
-    first = coarse * factor - shift
-    return max(first, 0), min(first + factor, count)
 
 
 @threaded

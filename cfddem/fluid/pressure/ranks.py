@@ -17,7 +17,7 @@ from cfddem.backend.communicator import Communicator
 from cfddem.fluid.block import Block
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
-from cfddem.fluid.pressure.multigrid import Level, PressureEquation, coarsen, hierarchy
+from cfddem.fluid.pressure.multigrid import Level, PressureEquation, hierarchy
 from cfddem.fluid.pressure.regions import ClosedRegions
 
 SMALL = 5_000
@@ -89,7 +89,7 @@ class SharedLevel(Level):
         begin, end = self.first * factor, min(self.stop * factor, int(fine.starts[-1]))
         inside = layers(self.axis, slice(begin - fine.first + 1, end - fine.first + 1))
         below = [values[inside] for values in fine.coefficients]
-        coarsen(fine, below, [self.own(values) for values in self.coefficients], self.whole)
+        self._coarsen(fine, below, [self.own(values) for values in self.coefficients], self.whole)
         for values in self.coefficients:
             self.fill(values)
 
