@@ -7,7 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
+import numpy as np
 import pytest
+
+from cfddem.backend.compile import prange, threaded, use_threads
 
 LOOPS = {"liquid-bed": 39, "gas-bed": 36, "settling": 38, "wet-bed": 45}
 """Most compiled loops of a case; helpers within them do not count."""
@@ -59,3 +63,23 @@ def test_loops_use_the_widest_vectors_of_the_processor() -> None:
     if config.CPU_NAME or not processor.get_host_cpu_features().get("avx512f"):  # type: ignore[attr-defined]
         pytest.skip("needs a processor with AVX-512, and no choice by the user")
     assert config.CPU_FEATURES.endswith("-prefer-256-bit")  # type: ignore[attr-defined]
+
+
+@threaded
+def counted(numbers: np.ndarray) -> None:
+    for n in prange(len(numbers)):
+        numbers[n] += 1.0
+
+
+def test_a_loop_is_compiled_for_all_threads_when_it_first_runs_on_several() -> None:
+    numbers, before = np.zeros(3), use_threads(None)
+    use_threads(1)
+    counted(numbers)
+    assert counted.one.signatures and not counted.all.signatures
+    if numba.config.NUMBA_NUM_THREADS == 1:  # type: ignore[attr-defined]
+        pytest.skip("needs two threads")
+    use_threads(2)
+    counted(numbers)
+    use_threads(before)
+    assert counted.all.signatures
+    assert (numbers == 2.0).all()

@@ -50,20 +50,17 @@ class Drag:
         )  # fmt: skip
         self.outside += int(outside)
         if wrong:
-            self._refuse(particles, flow, conductance)
+            share = 1.0 if self.model == "B" else flow.voidage
+            self._require_drag(flow, conductance / (6.0 * math.pi * particles.viscosity * particles.radius * share))
         return conductance
 
-    def _refuse(self, particles: Particles, flow: SampledFlow, conductance: Array) -> None:
+    def _require_drag(self, flow: SampledFlow, factor: Array) -> None:
         """Refuse a law that pushes a particle against the flow or is not finite; a flow that is not finite is no fault
         of the law."""
-        wrong = (
-            ~((conductance >= 0.0) & (conductance < np.inf)) & np.isfinite(flow.reynolds) & np.isfinite(flow.voidage)
-        )
+        wrong = ~((factor >= 0.0) & (factor < np.inf)) & np.isfinite(flow.reynolds) & np.isfinite(flow.voidage)
         if wrong.any():  # local: every rank has its own particles
             n = int(np.argmax(wrong))  # local: the first on this rank
-            share = 1.0 if self.model == "B" else flow.voidage[n]
-            factor = conductance[n] / (6.0 * math.pi * particles.viscosity[n] * particles.radius[n] * share)
-            at = f"it is {factor:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
+            at = f"it is {factor[n]:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
             raise InputError("laws.drag", self.name, "a law that is finite and not negative", at)
 
 
