@@ -75,6 +75,21 @@ def test_gathering_is_the_adjoint_of_spreading() -> None:
     assert there == pytest.approx(back, rel=1e-12)
 
 
+@pytest.mark.parametrize("mapping", MAPPINGS)
+def test_three_steps_are_gathered_together_as_one_by_one(mapping: str) -> None:
+    """Particles that stay among the same cells, and particles that do not."""
+    grid = Grid((8, 7, 13), SPACING)
+    kernel = FilterKernel(grid, (True, False, True), mapping=mapping)
+    places, radius = cloud(grid.size)
+    random = np.random.default_rng(3)
+    moved = [kernel.wrapped(places + random.normal(size=places.shape) * way) for way in (0.01, 1e-4, 0.0)]
+    stencils, field = [kernel.stencil(each, radius) for each in moved], random.normal(size=(3, *grid.shape))
+    same = (stencils[0].first == stencils[2].first).all(axis=1) & (stencils[1].first == stencils[2].first).all(axis=1)
+    assert 0 < same.sum() < len(same)
+    one_by_one = sum(share * kernel.gather(each, field) for share, each in zip((0.25, 0.5, 0.25), stencils))
+    assert kernel.gather_over_steps(*stencils, field) == pytest.approx(one_by_one, rel=1e-12, abs=1e-14)
+
+
 def test_width_of_the_kernel_does_not_depend_on_the_cell() -> None:
     """Second moment of the deposited volume of one sphere, averaged over its place in the cell."""
     widths = []
