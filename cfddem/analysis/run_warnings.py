@@ -173,9 +173,7 @@ def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float 
     if evaluations and outside > share * evaluations:
         part = outside / evaluations
         uses = f"{percent(part)} of its uses" if part < ALL else "all of its uses"
-        what = (
-            f"was evaluated outside of its range in {uses} ({outside} times): {law.range_in_words}{effect}; {REMEDY}"
-        )
+        what = f"was evaluated outside of its range in {uses} ({outside} times): {law.range_in_words}{effect}; {REMEDY}"
         yield LAWS, f"the {kind} {law.name} {what}"
 
 
