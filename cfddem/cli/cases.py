@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 CASE = "case file or gallery name; default: the only TOML file here"
 SET = "KEY=VALUE that replaces a value of the case; may be repeated"
-THREADS = "number of threads; default: all processors"
+THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
 LOG = "file for progress, one line per history row"
@@ -170,10 +170,11 @@ def run(
     from cfddem.backend.compile import use_threads
     from cfddem.run.progress import live_line
     from cfddem.run.runner import Run
+    from cfddem.run.threads import threads_for
     from cfddem.run.warmup import warmup
 
     if communicator.size == 1:
-        use_threads(threads)
+        use_threads(threads_for(described) if threads is None else threads)
     with live_line(log, communicator.rank == 0) as line:
         text = None if set else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
@@ -230,7 +231,9 @@ def resume(
     from cfddem.backend.compile import use_threads
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
+    from cfddem.run.resuming import case_to_continue
     from cfddem.run.runner import Run
+    from cfddem.run.threads import threads_for
 
     folder, communicator = folder or newest_run(Path()), on_ranks(ranks, threads)
     if until is None and (before := open_run(folder)).status == "finished":
@@ -238,7 +241,8 @@ def resume(
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
         return
     if communicator.size == 1:
-        use_threads(threads)
+        case = case_to_continue(folder, None, until)
+        use_threads(threads_for(case) if threads is None else threads)
     with live_line(log, communicator.rank == 0) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
