@@ -216,6 +216,7 @@ def test_a_larger_deviation_is_seen() -> None:
     assert rows[2].value == pytest.approx(2.0, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_particles_in_finer_cells() -> None:
     """Every particle keeps its velocity, whatever its row; a bed that falls into the gas meets a larger pressure."""
     case = gas().case.with_(**{"bed.count": 1300, "column.width": 0.0144, "column.height": 0.0432})

@@ -81,8 +81,8 @@ def exit_code(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
     return 0
 
 
-LONG = {"averages", "layers", "user-law", "contact-law", "wet-particles", "cluster", "walls"}
-"""Pages with many laws, each of which is compiled."""
+LONG = {"averages", "cluster", "contact-law", "layers", "measure", "report", "user-law", "walls", "wet-particles"}
+"""Pages with many loops to compile."""
 
 
 def is_long(page: Path) -> bool:

@@ -58,7 +58,8 @@ def by_id(run: ParticleSolver) -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("film", "steps"), [(False, 10_000), (True, 2000), pytest.param(True, 10_000, marks=pytest.mark.slow)]
+    ("film", "steps"),
+    [(False, 10_000), *(pytest.param(True, steps, marks=pytest.mark.slow) for steps in (2000, 10_000))],
 )
 def test_bits_do_not_depend_on_the_number_of_threads(film: bool, steps: int) -> None:
     """Positions, velocities, spins and forces on one and on two threads are equal bit for bit."""

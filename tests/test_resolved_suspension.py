@@ -56,6 +56,7 @@ def test_density_ratios_from_just_above_one_are_stable(one_thread, ratio):
     assert np.abs(suspension.velocity).max() < 0.2
 
 
+@pytest.mark.slow
 def test_creeping_drag_of_a_cubic_array(one_thread):
     factor = verification.cubic_array(0.216, diameter=12.0, viscosity=0.1)
     assert abs(factor / verification.ZICK_HOMSY[0.216] - 1.0) < 0.03
@@ -81,6 +82,7 @@ def test_the_bits_do_not_depend_on_threads():
     assert np.array_equal(found[0].velocity, found[1].velocity)
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_from_its_file_to_the_same_bits(one_thread, tmp_path: Path):
     whole = matrix.Kept(prepare(SMALL))
     whole.series.sample(whole.suspension, 10)

@@ -168,6 +168,7 @@ def test_the_first_step_of_a_run_resumed_from_its_start_is_the_same() -> None:
     assert np.array_equal(whole.fluid.fields.velocity, resumed.fluid.fields.velocity)
 
 
+@pytest.mark.slow
 def test_resuming_with_another_thread_count_is_bit_for_bit(tmp_path: Path) -> None:
     """More than a thousand particles, so that loops are threaded: started on one thread, resumed on two."""
     text = TINY.replace("width = 0.012", "width = 0.018").replace("height = 0.018", "height = 0.048")
