@@ -9,7 +9,7 @@ from cfddem.case.feeds import fed_count
 from cfddem.case.schema import Case
 
 FEW_PARTICLES, FEW_CELLS = 5_000, 20_000
-"""Up to so many particles and cells, a second thread gains nothing: a bed of 1 600 beads takes 1.3 times as long on two."""
+"""Up to so many particles and cells, a second thread gains nothing; 1 600 beads take 1.3 times as long on two."""
 
 
 def threads_for(case: Case) -> int | None:
