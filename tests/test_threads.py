@@ -1,4 +1,4 @@
-"""The number of threads of a run for which the user gives none."""
+"""The number of threads of a run."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from cfddem.run.threads import threads_for
     ],
 )
 def test_small_cases_take_one_thread(name: str, changes: dict[str, float], expected: int | None) -> None:
-    assert threads_for(Case.from_toml(gallery()[name], changes)) == expected
+    assert threads_for(Case.from_toml(gallery()[name], changes), None) == expected
 
 
 def test_what_the_user_asks_for_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

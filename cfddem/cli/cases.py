@@ -174,7 +174,7 @@ def run(
     from cfddem.run.warmup import warmup
 
     if communicator.size == 1:
-        use_threads(threads_for(described) if threads is None else threads)
+        use_threads(threads_for(described, threads))
     with live_line(log, communicator.rank == 0) as line:
         text = None if set else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
@@ -241,8 +241,7 @@ def resume(
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
         return
     if communicator.size == 1:
-        case = case_to_continue(folder, None, until)
-        use_threads(threads_for(case) if threads is None else threads)
+        use_threads(threads_for(case_to_continue(folder, None, until), threads))
     with live_line(log, communicator.rank == 0) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:

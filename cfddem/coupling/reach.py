@@ -52,14 +52,14 @@ class Reach:
 
     def homes(self) -> Homes:
         """Homes of the cells and of the layer around them."""
-        homes = self._homes()
+        homes = self._home_of_each()
         layered = np.arange(homes.size).reshape([n + 2 for n in self.shape])
         own = layered[1:-1, 1:-1, 1:-1].ravel()
         strays = layered.ravel() != own[homes]
         order = np.lexsort((strays, homes))
         return Homes(homes, order, np.searchsorted(homes[order], np.arange(own.size + 1)))
 
-    def _homes(self) -> np.ndarray:
+    def _home_of_each(self) -> np.ndarray:
         """Cell that receives the deposit on each of the cells and of a layer around them; flat indices."""
         whole, counts = self.grid.whole, self.grid.whole.cells
         lines = []
