@@ -105,7 +105,7 @@ class NeighbourLists:
             age, self.listed_at = steps - self.listed_at, steps
             if self._is_tuned and age > 0:
                 room = 0.5 * min(self.box) - (2.0 + 0.5 * reach_ratio) * largest
-                self.skin = tuned(self.skin, age, self._mean_radius, self.many, room)
+                self.skin = tuned(self.skin, age, self._mean_radius, room)
         reach = pair_reach(largest, reach_ratio, self.skin)
         old_row = np.append(old_row, self.ghosts.renew(particles, reach, self.box))
         roughness = float(self.table["roughness_gap"].max())  # local: every rank has the table

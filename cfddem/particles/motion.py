@@ -26,7 +26,7 @@ def gather_forces(i, particles, edges, memory, gravity, near, far):
                 break  # far pairs come last
             far_resistance += memory.resistance[k]
             continue
-        if BRIDGE and memory.bridge_film[k] > 0.0:
+        if BRIDGE:  # zero without a bridge, which costs less than to look
             load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))
         if FILM:

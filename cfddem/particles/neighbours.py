@@ -176,7 +176,7 @@ def bin_particles(position: np.ndarray, radius: np.ndarray, cutoff_ratio: float,
         kinds, size_class = np.unique(size_class, return_inverse=True)
         largest = np.array([radius[size_class == kind].max() for kind in range(len(kinds))])  # local: cells
     periodic = np.isfinite(box)
-    bottom, top = position.min(axis=0), position.max(axis=0)  # local: cells of this rank
+    bottom, top = (np.array([each(axis) for axis in position.T]) for each in (np.min, np.max))  # local: of this rank
     low = np.where(periodic, 0.0, bottom)
     span = np.where(periodic, box, np.maximum(top - low, smallest))
     wanted = 2.0 * largest + 0.5 * cutoff_ratio * largest + skin
@@ -305,7 +305,7 @@ def locality_order(position: np.ndarray, width: float) -> np.ndarray:
     width     of a cell [m]
     returns   (N,) int32
     """
-    low = position.min(axis=0)  # local: the order of rows concerns this rank
+    low = np.array([axis.min() for axis in position.T])  # local: the order of rows concerns this rank
     cell = np.minimum(((position - low) / width).astype(np.int64), (1 << 20) - 1)
     key, most = np.zeros(len(position), np.int64), int(cell.max())  # local: likewise
     for bit in range(most.bit_length()):

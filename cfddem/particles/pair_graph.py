@@ -172,13 +172,13 @@ HOME = 13
 
 
 _LAST, _1, _2 = np.uint64(3 * 26), np.uint64(1), np.uint64(2)
+_IMAGES = np.moveaxis(np.indices((3, 3, 3)), 0, -1).reshape(27, 3) - 1.0
 
 
 def shifts(box: np.ndarray) -> np.ndarray:
     """Shift of the separation of a pair for each of its 27 images (27, 3) [m]."""
-    whole = np.where(np.isfinite(box), box, 0.0)
-    steps = np.arange(-1.0, 2.0)
-    return np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(27, 3) * whole
+    whole: np.ndarray = np.where(np.isfinite(box), box, 0.0)
+    return _IMAGES * whole
 
 
 def make_edges(

@@ -10,7 +10,7 @@ from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, spee
 from cfddem.particles.interactions.film import clamp_speed
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
 from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_INERTIA, BRIDGE_SLIDING, WALLS, bridge_impulses
-from cfddem.particles.pair_graph import edge_role, geometry
+from cfddem.particles.pair_graph import edge_role, geometry, places_of
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
 from closures.film_impact import pair_added_mass
 
@@ -38,7 +38,7 @@ def wall_impulses(particles, edges, memory, shift, p, step):
     for k in prange(edges.between_particles, len(edges.first)):
         if memory.bridge_resistance[k] > 0.0:
             bridge_impulse(k, particles, edges, memory, shift, p, step)
-        elif memory.bridge_film[k] > 0.0:
+        else:
             no_impulse(k, memory)
 
 
@@ -132,11 +132,10 @@ def apply_bridge_impulses(particles, edges, memory):
     """Give every particle the impulses of its bridges."""
     for i in prange(particles.owned):
         impulse, couple = NOTHING, NOTHING
-        for place in range(edges.start[i], edges.start[i + 1]):
+        for place in places_of(i, edges):
             k, sign = edge_role(edges.incident[place])
-            if memory.bridge_resistance[k] > 0.0:
-                impulse = plus(impulse, times(sign, at(memory.bridge_impulse, k)))
-                couple = plus(couple, at(memory.bridge_couple, k))
+            impulse = plus(impulse, times(sign, at(memory.bridge_impulse, k)))
+            couple = plus(couple, at(memory.bridge_couple, k))
         gain = times(particles.inverse_mass[i], impulse)
         put(particles.velocity, i, plus(at(particles.velocity, i), gain))
         gain = times(particles.inverse_inertia[i] * particles.radius[i], couple)
