@@ -51,7 +51,8 @@ def gather_forces(i, particles, edges, memory, gravity, near, far):
         particles.slip_rate[i] = particles.inverse_mass[i] * shear_load
         particles.turn_rate[i] = particles.inverse_inertia[i] * shear_load
     if BRIDGE:
-        particles.bridge_load[i] = load
+        particles.bridge_rate[i] = particles.inverse_mass[i] * load
+        particles.bridge_turn_rate[i] = particles.radius[i] * particles.radius[i] * particles.inverse_inertia[i] * load
 
 
 @inline

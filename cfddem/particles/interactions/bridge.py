@@ -42,7 +42,11 @@ LIQUID = Field(
 PARTICLE_FIELDS = (
     LIQUID,
     Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
-    Field("bridge_load", "kg/s", halo=("bridge",), meaning="resistance of all bridges of the particle"),
+    Field("bridge_rate", "1/s", halo=("bridge",), meaning="resistance of all bridges of the particle over its mass"),
+    Field(
+        "bridge_turn_rate", "1/s", halo=("bridge",),
+        meaning="resistance of all bridges times the square of the radius over the moment of inertia",
+    ),
     Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),
     Field("bridges_change", role="scratch", dtype=bool, meaning="bridges of the particle form or break in this step"),
     Field("bridges_formed", dtype=np.int64, meaning="bridges that have formed, counted by the lower id"),
@@ -56,6 +60,8 @@ FIELDS = (
     Field("bridge_gap", "m", role="memory", meaning="minimum gap of the bridge"),
     Field("bridge_accounted", "m", role="memory", meaning="gap up to which the impulse of the bridge has been given"),
     Field("bridge_resistance", "kg/s", role="memory", meaning="resistance of the bridge; 0 where it has none"),
+    Field("bridge_distance", "m", role="memory", meaning="between the centres of two particles at present"),
+    Field("bridge_normal", "1", 3, "memory", meaning="direction from the second particle to the first"),
     Field("closed_along", "kg/s", role="memory", meaning="resistance along the line of centres below h_min"),
     Field("closed_across", "kg/s", role="memory", meaning="resistance of the bridge to sliding below h_min"),
     Field("bridge_force", "N", 3, "memory", meaning="pull of the bridge on the first body"),
@@ -164,18 +170,18 @@ def renew_bridge(k, particles, edges, memory, shift, p):
     separation, distance, gap = geometry(k, particles, edges, shift)
     reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
     state = bridge_state(k, gap, reduced_radius, memory, p)
-    renew_resistance(k, particles, edges, memory, shift, p)
+    renew_resistance(k, state, memory)
     if BRIDGE_PULL:
         put(memory.bridge_force, k, times(-bridge_pull(state) / distance, separation))
 
 
 @inline
-def renew_resistance(k, particles, edges, memory, shift, p):
+def renew_resistance(k, state, memory):
     """Resistance of the bridge of edge k at the present positions."""
-    _, _, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    state = bridge_state(k, gap, reduced_radius, memory, p)
-    memory.bridge_resistance[k] = resistance_along(state) + resistance_across(state)
+    if state.gap < held_gap(state):
+        memory.bridge_resistance[k] = memory.closed_along[k] + memory.closed_across[k]
+    else:
+        memory.bridge_resistance[k] = resistance_along(state) + resistance_across(state)
 
 
 @inline

@@ -136,8 +136,9 @@ def _open_changes(particles, edges, memory, shift, p):
 @inline
 def _open_change(k, particles, edges, memory, shift, p):
     """See `_open_changes`, for edge k."""
-    renew_resistance(k, particles, edges, memory, shift, p)
     _, _, gap = geometry(k, particles, edges, shift)
+    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    renew_resistance(k, bridge_state(k, gap, reduced_radius, memory, p), memory)
     memory.bridge_change[k] = _change(k, gap, 0.0, particles, edges, memory, shift, p)
 
 
@@ -185,6 +186,7 @@ def _move_bridge(memory, k, to):
     """Let the bridge of edge k continue at another piece of the same wall."""
     memory.bridge_film[to], memory.bridge_volume[to] = memory.bridge_film[k], memory.bridge_volume[k]
     memory.bridge_gap[to], memory.bridge_accounted[to] = memory.bridge_gap[k], memory.bridge_accounted[k]
+    memory.closed_along[to], memory.closed_across[to] = memory.closed_along[k], memory.closed_across[k]
     if BRIDGE_INERTIA:
         memory.bridge_impact_speed[to] = memory.bridge_impact_speed[k]
     put(memory.bridge_impulse, to, at(memory.bridge_impulse, k))
@@ -251,8 +253,8 @@ def _fill(k, particles, edges, memory, walls, shift, p):
     memory.bridge_volume[k], memory.bridge_film[k] = volume, film
     memory.bridge_gap[k] = max(glass, n.minimum_gap)
     memory.bridge_accounted[k] = gap
+    find_closed(k, reduced_radius, memory, p)
     if k < edges.between_particles:
-        find_closed(k, reduced_radius, memory, p)
         renew_bridge(k, particles, edges, memory, shift, p)
 
 

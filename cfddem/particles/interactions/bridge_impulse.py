@@ -6,6 +6,7 @@ import math
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.interactions.bridge import bridge_state, capillary_number_of, numbers_of, resistance_across
+from cfddem.particles.interactions.bridge_loops import closed_speed, shared_masses
 from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, speed_after_bridge
 from cfddem.particles.interactions.film import clamp_speed
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
@@ -56,16 +57,10 @@ def _rates(k, particles, edges, memory, lever):
     lever  arm of the impulse over the radius [-]
     """
     i, j = edges.first[k], edges.second[k]
-    load = particles.bridge_load[i] / memory.bridge_resistance[k]
-    arm = lever * particles.radius[i]
-    along = load * particles.inverse_mass[i]
-    across_it = along + load * arm * arm * particles.inverse_inertia[i]
+    rate, turn_rate = particles.bridge_rate[i], particles.bridge_turn_rate[i]
     if k < edges.between_particles:
-        load = particles.bridge_load[j] / memory.bridge_resistance[k]
-        arm = lever * particles.radius[j]
-        along += load * particles.inverse_mass[j]
-        across_it += load * (particles.inverse_mass[j] + arm * arm * particles.inverse_inertia[j])
-    return along, across_it
+        rate, turn_rate = rate + particles.bridge_rate[j], turn_rate + particles.bridge_turn_rate[j]
+    return shared_masses(rate, turn_rate, lever, memory.bridge_resistance[k])
 
 
 @inline
@@ -105,9 +100,11 @@ def bridge_impulse(k, particles, edges, memory, shift, p, step):
     lever = distance / radii
     along, sideways = _rates(k, particles, edges, memory, lever)
 
+    floor, accounted = held_gap(state), memory.bridge_accounted[k]
     if BRIDGE_FILM:
-        new_speed = speed_after_bridge(speed, state, memory.bridge_accounted[k], step, along)
-        new_speed = clamp_speed(new_speed, speed)
+        new_speed = closed_speed(speed, memory.closed_along[k], accounted - gap, step, along)
+        if max(gap, gap + step * new_speed, accounted) >= floor:
+            new_speed = clamp_speed(speed_after_bridge(speed, state, accounted, step, along), speed)
     by_film = (new_speed - speed) / along
     if BRIDGE_INERTIA:
         inverse_mass = pair_mass_and_radius(k, particles, edges)[1]
@@ -118,7 +115,8 @@ def bridge_impulse(k, particles, edges, memory, shift, p, step):
     impulse = times(by_film, normal)
     couple = NOTHING
     if BRIDGE_SLIDING:
-        resistance = resistance_across(at_gap(state, gap + 0.5 * step * new_speed))
+        middle = gap + 0.5 * step * new_speed
+        resistance = memory.closed_across[k] if middle < floor else resistance_across(at_gap(state, middle))
         slip = minus(across(velocity, normal), times(lever, cross(turning, normal)))
         drag = times(math.expm1(-step * resistance * sideways) / sideways, slip)
         impulse = plus(impulse, drag)

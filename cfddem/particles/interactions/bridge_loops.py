@@ -21,7 +21,7 @@ from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times
 
 WetParticles = namedtuple(
-    "WetParticles", "position velocity spin radius inverse_mass inverse_inertia film_thickness bridge_load"
+    "WetParticles", "position velocity spin radius film_thickness bridge_rate bridge_turn_rate"
 )
 """Arrays of the particles that loops over bridges read."""
 
@@ -40,11 +40,36 @@ def decayed(x):
 
 
 @inline
+def shared_masses(rate, turn_rate, lever, resistance):
+    """Inverse masses that both bodies give a bridge, along and across the line of centres [1/kg].
+
+    rate, turn_rate  of both bodies together, see `bridge_rate` and `bridge_turn_rate` [1/s]
+    lever            arm of the impulse over the radius [-]
+    """
+    share = 1.0 / resistance
+    along = rate * share
+    return along, along + lever * lever * (turn_rate * share)
+
+
+@inline
+def closed_speed(speed, resistance, given, step, inverse_mass):
+    """Rate of the gap after a step in which the resistance does not depend on it [m/s].
+
+    given         change of the gap for which the impulse has been given before [m]
+    inverse_mass  of the mass that both bodies give the bridge [1/kg]
+    """
+    total = speed + inverse_mass * (resistance * given)
+    return clamp_speed(total / (1.0 + step * inverse_mass * resistance), speed)
+
+
+@inline
 def pair_bridge(n, particles, edges, memory, shift, p):
     """Pull of the bridge of a pair, its resistance if it is closed, and whether one forms."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+    memory.bridge_distance[k] = distance
+    put(memory.bridge_normal, k, times(1.0 / distance, separation))
     gap, reduced_radius = distance - radii, particles.radius[i] * particles.radius[j] / radii
     state = bridge_state(k, gap, reduced_radius, memory, p)
     film = particles.film_thickness[i] + particles.film_thickness[j]
@@ -64,26 +89,20 @@ def pair_bridge_impulse(n, particles, edges, memory, shift, step):
     """Impulse of the bridge of a pair that stays closed in this step; marks the others."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
-    normal = times(1.0 / distance, separation)
+    normal, distance = at(memory.bridge_normal, k), memory.bridge_distance[k]
+    radii = particles.radius[i] + particles.radius[j]
     gap, lever = distance - radii, distance / radii
     resistance = memory.bridge_resistance[k]
     resists = resistance > 0.0
     velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
-    load, other_load = particles.bridge_load[i] / resistance, particles.bridge_load[j] / resistance
-    arm, other_arm = lever * particles.radius[i], lever * particles.radius[j]
-    along = load * particles.inverse_mass[i]
-    sideways = along + load * arm * arm * particles.inverse_inertia[i]
-    along += other_load * particles.inverse_mass[j]
-    turned = particles.inverse_mass[j] + other_arm * other_arm * particles.inverse_inertia[j]
-    sideways += other_load * turned
+    rate = particles.bridge_rate[i] + particles.bridge_rate[j]
+    turn_rate = particles.bridge_turn_rate[i] + particles.bridge_turn_rate[j]
+    along, sideways = shared_masses(rate, turn_rate, lever, resistance)
 
     speed = new_speed = dot(velocity, normal)
     accounted = memory.bridge_accounted[k]
     if BRIDGE_FILM:
-        given = accounted - gap
-        total = speed + along * (memory.closed_along[k] * given)
-        new_speed = clamp_speed(total / (1.0 + step * along * memory.closed_along[k]), speed)
+        new_speed = closed_speed(speed, memory.closed_along[k], accounted - gap, step, along)
     end = gap + step * new_speed
     impulse = times((new_speed - speed) / along, normal)
     couple, short = NOTHING, True

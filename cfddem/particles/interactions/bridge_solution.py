@@ -108,17 +108,24 @@ def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
     guess = total / (1.0 + step * inverse_mass * slope)
     if abs(step * guess) < STILL * held and (gap > floor) == (gap + step * guess > floor):
         return guess
+    middle = gap + 0.5 * step * guess
+    if middle > floor:
+        guess = total / (1.0 + step * inverse_mass * _resistance(state, middle))
     low, high = min(total, 0.0), max(total, 0.0)
     for _ in range(100):
         excess = guess + inverse_mass * resistance_integral(state, gap, step * guess, floor) - total
-        if abs(excess) <= 1e-13 * (abs(total) + abs(guess)):
+        allowed = 1e-13 * (abs(total) + abs(guess))
+        if abs(excess) <= allowed:
             return guess
         end = gap + step * guess
         slope = _resistance(state, max(end, floor)) if CUT_CONSTANT or end > floor else 0.0
         following, low, high = next_guess(guess, excess, 1.0 + step * inverse_mass * slope, low, high)
-        if following == guess:
-            return guess
+        change = abs(following - guess)
         guess = following
+        # what Newton's step leaves, of second order: a resistance A/h changes by step * change / h of itself
+        left = step * inverse_mass * slope * change * (step * change / end)
+        if change == 0.0 or (end > floor and left <= 0.1 * allowed):
+            return guess
     return guess
 
 
