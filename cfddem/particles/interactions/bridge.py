@@ -44,7 +44,9 @@ PARTICLE_FIELDS = (
     Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
     Field("bridge_rate", "1/s", halo=("bridge",), meaning="resistance of all bridges of the particle over its mass"),
     Field(
-        "bridge_turn_rate", "1/s", halo=("bridge",),
+        "bridge_turn_rate",
+        "1/s",
+        halo=("bridge",),
         meaning="resistance of all bridges times the square of the radius over the moment of inertia",
     ),
     Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),

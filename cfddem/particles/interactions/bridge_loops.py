@@ -20,9 +20,7 @@ from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_PULL, BRIDGE
 from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times
 
-WetParticles = namedtuple(
-    "WetParticles", "position velocity spin radius film_thickness bridge_rate bridge_turn_rate"
-)
+WetParticles = namedtuple("WetParticles", "position velocity spin radius film_thickness bridge_rate bridge_turn_rate")
 """Arrays of the particles that loops over bridges read."""
 
 LARGEST_DECAY = 0.25
