@@ -50,6 +50,13 @@ def shared_masses(rate, turn_rate, lever, resistance):
 
 
 @inline
+def kept_place(k, particles, edges, memory):
+    """Separation of a pair at the present positions, its length, and the sum of the radii."""
+    radii = particles.radius[edges.first[k]] + particles.radius[edges.second[k]]
+    return at(memory.bridge_place, k), memory.bridge_distance[k], radii
+
+
+@inline
 def closed_speed(speed, resistance, given, step, inverse_mass):
     """Rate of the gap after a step in which the resistance does not depend on it [m/s].
 
@@ -66,8 +73,8 @@ def pair_bridge(n, particles, edges, memory, shift, p):
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+    put(memory.bridge_place, k, separation)
     memory.bridge_distance[k] = distance
-    put(memory.bridge_normal, k, times(1.0 / distance, separation))
     gap, reduced_radius = distance - radii, particles.radius[i] * particles.radius[j] / radii
     state = bridge_state(k, gap, reduced_radius, memory, p)
     film = particles.film_thickness[i] + particles.film_thickness[j]
@@ -87,8 +94,8 @@ def pair_bridge_impulse(n, particles, edges, memory, shift, step):
     """Impulse of the bridge of a pair that stays closed in this step; marks the others."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    normal, distance = at(memory.bridge_normal, k), memory.bridge_distance[k]
-    radii = particles.radius[i] + particles.radius[j]
+    separation, distance, radii = kept_place(k, particles, edges, memory)
+    normal = times(1.0 / distance, separation)
     gap, lever = distance - radii, distance / radii
     resistance = memory.bridge_resistance[k]
     resists = resistance > 0.0

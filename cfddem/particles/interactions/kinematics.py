@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cfddem.backend.compile import inline
-from cfddem.particles.pair_graph import geometry, of_two_spheres
+from cfddem.particles.pair_graph import geometry
 from cfddem.particles.vectors import at, minus, plus, times
 from cfddem.particles.walls.nearest_point import SURFACE, TURN, touched
 
@@ -31,11 +31,14 @@ class PairKinematics(NamedTuple):
 
 
 @inline
-def sphere_kinematics(k, particles, edges, shift, free):
-    """Kinematics of two spheres."""
+def sphere_kinematics(k, place, particles, edges, free):
+    """Kinematics of two spheres.
+
+    place  separation from the second to the first, its length, and the sum of the radii
+    """
     i, j = edges.first[k], edges.second[k]
     radius, spin, inverse_mass = particles.radius, particles.spin, particles.inverse_mass
-    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+    separation, distance, radii = place
     inverse_sum = 1.0 / radii
     relative = minus(at(particles.velocity, i), at(particles.velocity, j))
     rate = 1.0 / distance

@@ -15,7 +15,7 @@ import numpy as np
 from cfddem.backend.compile import inline, prange, vector_part
 from cfddem.backend.law_set import specialise, written
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.bridge_loops import WetParticles, pair_bridge, pair_bridge_impulse
+from cfddem.particles.interactions.bridge_loops import WetParticles, kept_place, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
 from cfddem.particles.interactions.film import film_impulse_short, renew_film
 from cfddem.particles.interactions.film_law import at_least
@@ -24,6 +24,7 @@ from cfddem.particles.interactions.rolling import resist_rolling
 from cfddem.particles.interactions.shear_film import pair_shear, renew_shear
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
+    BRIDGE,
     COUNT_FILM,
     FILM,
     ROLLING,
@@ -78,7 +79,8 @@ def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p,
     """Film and contact of one pair of particles."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    kinematics = sphere_kinematics(k, particles, edges, shift, free)
+    place = kept_place(k, particles, edges, memory) if BRIDGE else of_two_spheres(k, particles, edges, shift)
+    kinematics = sphere_kinematics(k, place, particles, edges, free)
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     if FILM:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
