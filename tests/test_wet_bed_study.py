@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -69,12 +71,38 @@ def test_all_states_advance_before_one_goes_further(tmp_path: Path, monkeypatch:
     assert [name for name, _ in pieces[:4]] == [f"{name}_1" for name in ANGLES]
     far = {name: max(until for piece, until in pieces if piece == name) for name, _ in pieces}
     assert far == {f"{name}_{seed}": 10.1 for name in ANGLES for seed in (1, 2, 3)} | {f"{n}_ramp": 4.6 for n in ANGLES}
-    asked: list[float] = []
-    monkeypatch.setattr(validation, "advanced", lambda case, folder, name, progress, until: asked.append(until))
+    asked: list[tuple[str, float]] = []
+    monkeypatch.setattr(validation, "advanced", lambda case, folder, name, progress, until: asked.append((name, until)))
+    monkeypatch.setattr(validation, "reached", lambda home: dict(asked).get(home.name, 0.0))
+    monkeypatch.setattr(validation, "table", lambda folder: [])
+    monkeypatch.setattr(validation, "use_threads", lambda count: count)
     study(tmp_path, lambda text: None, hours=-1.0)
     assert asked == []
     study(tmp_path, lambda text: None)
-    assert len(asked) == len(pieces)
+    assert asked == list(dict.fromkeys(pieces))
+
+
+HOLDS = """
+import sys, time
+from pathlib import Path
+from scenarios.validation.kept_runs import taken
+
+with taken(Path(sys.argv[1]), "dry_1"):
+    print("has it", flush=True)
+    time.sleep(60.0)
+"""
+
+
+def test_processes_share_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that another process has is left alone; the next one of the plan is advanced."""
+    asked: list[tuple[str, float]] = []
+    monkeypatch.setattr(validation, "advanced", lambda case, folder, name, progress, until: asked.append((name, until)))
+    with subprocess.Popen([sys.executable, "-c", HOLDS, tmp_path], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "has it\n"
+        assert validation.advance_one(tmp_path, lambda text: None)
+        process.kill()
+    assert validation.advance_one(tmp_path, lambda text: None)
+    assert asked == [("weak_1", 1.1), ("dry_1", 1.1)]
 
 
 def test_states_are_compared_over_the_same_times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

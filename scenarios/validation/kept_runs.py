@@ -6,11 +6,13 @@ A run is kept as its folder, and continued if it was interrupted; numbers are ke
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from cfddem.case.schema import Case
+from cfddem.io.file_lock import lock_file
 from cfddem.io.reading import Run as Written
 from cfddem.io.reading import open_run
 from cfddem.run.progress import Status
@@ -43,6 +45,14 @@ def advanced(case: Case, folder: Path, name: str, progress: Progress, until: flo
         Run.begin(case.with_(**{"run.until": until}), home, report=live, progress=progress).go()
     elif (run := open_run(home)).status != "finished" or run.times[-1] < until * (1.0 - 1e-9):
         Run.resume(home, until=max(until, float(run.times[-1])), report=live, progress=progress).go()
+
+
+@contextmanager
+def taken(folder: Path, name: str) -> Iterator[bool]:
+    """Whether this process has got a run for itself; it keeps it inside of the `with` block."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / f".{name}.lock").open("w", encoding="utf-8") as file:
+        yield lock_file(file)
 
 
 def kept(path: Path, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:

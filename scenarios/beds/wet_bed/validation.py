@@ -17,13 +17,14 @@ import numpy as np
 
 from cfddem.analysis.bubbles import find_bubbles
 from cfddem.analysis.series import block_average
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run as Written
 from cfddem.io.reading import open_run
 from scenarios.beds.defluidisation.study import layers, onsets
 from scenarios.beds.gas_bed.study import mueller
-from scenarios.validation.kept_runs import advanced
+from scenarios.validation.kept_runs import advanced, taken
 from scenarios.validation.table import Progress, Row
 
 ANGLES: dict[str, float | None] = {"dry": None, "weak": 85.0, "medium": 75.0, "strong": 60.0}
@@ -72,16 +73,27 @@ def state(name: str) -> Case:
 
 
 def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row]:
-    """Advance all runs, and return the table.
+    """Advance all runs on one thread, and return the table. Several processes may share the folder.
 
     hours  after which no further round of a run begins
     """
+    use_threads(1)
     end = monotonic() + 3600.0 * hours
-    for name, case, until in plan():
-        if monotonic() > end:
-            break
-        advanced(case, folder, name, progress, until)
+    while monotonic() <= end and advance_one(folder, progress):
+        pass
     return table(folder)
+
+
+def advance_one(folder: Path, progress: Progress) -> bool:
+    """Make the first piece of the plan that is left and whose run no other process has; False if there is none."""
+    for name, case, until in plan():
+        if is_there(folder / name, until):
+            continue
+        with taken(folder, name) as free:
+            if free and not is_there(folder / name, until):
+                advanced(case, folder, name, progress, until)
+                return True
+    return False
 
 
 def plan() -> Iterator[tuple[str, Case, float]]:
@@ -133,6 +145,11 @@ def windows(folder: Path) -> dict[str, dict[int, float]]:
         for name in far:
             ends.setdefault(name, {})[seed] = min(far.values())
     return ends
+
+
+def is_there(home: Path, until: float) -> bool:
+    """Whether a run has come to a time [s]."""
+    return reached(home) >= until * (1.0 - 1e-9)
 
 
 def reached(home: Path) -> float:
