@@ -196,6 +196,14 @@ def test_a_doubtful_liquid_gets_a_warning(given: dict[str, Any], key: str) -> No
     assert key in keys and key not in [each.key for each in preflight(made()).issues]
 
 
+def test_asperities_thicker_than_the_films_are_noted() -> None:
+    """The resistance to sliding ends where the films do; that of Pitois along the line of centres does not."""
+    said = {each.key: each for each in preflight(made(liquid__minimum_gap=3e-5)).issues}
+    assert said["liquid.minimum_gap"].severity == "note" and "sliding" in said["liquid.minimum_gap"].reason
+    keys = [each.key for each in preflight(made(liquid__minimum_gap=3e-5, liquid__tangential="none")).issues]
+    assert "liquid.minimum_gap" not in keys
+
+
 def test_adhesive_contacts_are_refused_with_bridges() -> None:
     wet = preflight(made(laws__contact="jkr", material__seed__surface_energy=0.05))
     assert ("laws.contact", "error") in [(each.key, each.severity) for each in wet.issues]

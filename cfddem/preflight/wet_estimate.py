@@ -118,12 +118,19 @@ def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
             "warning", "liquid", f"bridges in a fluid of {case.fluid.density:g} kg/m3, a liquid",
             "give the interfacial tension of the two liquids, which do not mix, or use a gas",
         )  # fmt: skip
-    if wet.volume > 0.0 and liquid.film in ("static", "deforming") and wet.minimum_gap >= 2.0 * wet.film:
-        yield Issue(
-            "warning", "liquid.minimum_gap", f"{wet.minimum_gap:.2g} m is at least both films together, "
-            f"{2.0 * wet.film:.2g} m: they do not resist", "use more liquid, or a smaller gap",
-        )  # fmt: skip
+    if wet.volume > 0.0 and wet.minimum_gap >= 2.0 * wet.film:
+        yield from _check_thin_films(liquid, wet)
     yield from _check_spray(case)
+
+
+def _check_thin_films(liquid: Liquid, wet: WetEstimate) -> Iterator[Issue]:
+    """Say what does not act where asperities keep the solids farther apart than the films are thick."""
+    gaps = f"{wet.minimum_gap:.2g} m is at least both films together, {2.0 * wet.film:.2g} m"
+    remedy = "use more liquid, or a smaller gap"
+    if liquid.film in ("static", "deforming"):
+        yield Issue("warning", "liquid.minimum_gap", f"{gaps}: they do not resist", remedy)
+    elif liquid.tangential != "none":
+        yield Issue("note", "liquid.minimum_gap", f"{gaps}: bridges do not resist sliding", f"if they should, {remedy}")
 
 
 def _effect(liquid: Liquid, wet: WetEstimate) -> str:
