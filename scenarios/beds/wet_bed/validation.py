@@ -8,13 +8,14 @@ be made at any time. Nothing is fitted and nothing was measured in this bed when
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.analysis.bubbles import find_bubbles
 from cfddem.analysis.series import block_average
 from cfddem.backend.compile import use_threads
@@ -24,6 +25,7 @@ from cfddem.io.reading import Run as Written
 from cfddem.io.reading import open_run
 from scenarios.beds.defluidisation.study import layers, onsets
 from scenarios.beds.gas_bed.study import mueller
+from scenarios.beds.wet_bed.figures import QUANTITIES, Estimate, Ramp, draw
 from scenarios.validation.kept_runs import advanced, taken
 from scenarios.validation.table import Progress, Row
 
@@ -48,8 +50,8 @@ OIL = {"viscosity": 5e-3, "surface_tension": 0.02, "liquid_fraction": 1e-3}
 UNITS = {"height": "m", "height_deviation": "m", "pressure_deviation": "Pa", "temperature": "m2/s2", "bubble": "m"}
 """Quantities of the table and their units."""
 
-Estimate = tuple[float, float]
-"""A mean and its standard error."""
+EXPECTED = {"bubble": 1.0, "pressure_deviation": 1.0, "temperature": -1.0}
+"""Whether experiments report that a quantity is larger (1) or smaller (-1) in wet beds than in dry ones."""
 
 
 class Means(NamedTuple):
@@ -110,6 +112,15 @@ def plan() -> Iterator[tuple[str, Case, float]]:
                 yield f"{name}_{seed}", _packing(name, seed), until
 
 
+def pull_over_weight(name: str) -> float:
+    """Pull of a bridge between touching particles over the weight of one."""
+    angle, case = ANGLES[name], state(name)
+    if angle is None:
+        return 0.0
+    weight = case.solid.density * math.pi / 6.0 * case.bed.diameter**3 * math.hypot(*case.laws.gravity)
+    return math.pi * case.bed.diameter * OIL["surface_tension"] * math.cos(math.radians(angle)) / weight
+
+
 def _packing(name: str, seed: int) -> Case:
     """One state with one packing."""
     return state(name).with_(**{"bed.seed": seed, "run.average_from": SETTLED})
@@ -119,7 +130,7 @@ def _packing(name: str, seed: int) -> Case:
 
 
 def table(folder: Path) -> list[Row]:
-    """The rows that the runs so far allow. States are compared over the same times."""
+    """The rows that the runs so far allow, and their figure. States are compared over the same times."""
     found: dict[str, list[Means]] = {}
     rows_of_states: list[Row] = []
     for name, ends in windows(folder).items():
@@ -128,7 +139,11 @@ def table(folder: Path) -> list[Row]:
         note = f"packings: {len(ends)} of {len(SEEDS)}; {ROUNDS[-1] - SETTLED:g} s of each are planned"
         rows_of_states.append(Row(f"{name}: simulated time in the means", averaged, unit="s", note=note))
         rows_of_states += rows(name, found[name])
-    onset = {name: minimum_fluidisation(name, folder) for name in ANGLES if reached(folder / f"{name}_ramp") > 1.0}
+    ramps = {name: falling(name, folder) for name in ANGLES if is_there(folder / f"{name}_ramp", RAMP[-1][0])}
+    onset = {name: ramp.onset for name, ramp in ramps.items()}
+    if "dry" in found and len(found) > 1:
+        ratios = {quantity: [over_dry(found, name, quantity) for name in found] for quantity, *_ in QUANTITIES}
+        draw(folder / "wet-beds.png", [pull_over_weight(each) for each in found], ratios, ramps)
     return [
         *rows_of_states,
         *(Row(f"{name}: minimum fluidisation on the way down", each, unit="m/s") for name, each in onset.items()),
@@ -170,20 +185,26 @@ def directions(found: dict[str, list[Means]], onset: dict[str, float]) -> list[R
     """Ratios to the dry bed, as logarithms: above 0 where they should rise, with their standard errors."""
     made = []
     for name in (each for each in found if each != "dry" and "dry" in found):
-        for quantity, sign in (("bubble", 1.0), ("pressure_deviation", 1.0), ("temperature", -1.0)):
-            wet, dry = (over_packings([getattr(run, quantity) for run in found[each]]) for each in (name, "dry"))
-            value = sign * math.log(wet[0] / dry[0])
-            error = math.hypot(wet[1] / wet[0], dry[1] / dry[0])
+        for quantity, sign in EXPECTED.items():
+            ratio, error = over_dry(found, name, quantity)
             word = "larger" if sign > 0.0 else "smaller"
             made.append(
                 Row(
-                    f"{name}: {quantity.replace('_', ' ')} {word} than dry, logarithm of the ratio", value,
-                    note=f"standard error {error:.2g}; experiments report above 0",
+                    f"{name}: {quantity.replace('_', ' ')} {word} than dry, logarithm of the ratio",
+                    sign * math.log(ratio),
+                    note=f"standard error {error / ratio:.2g}; experiments report above 0",
                 )
-            )  # fmt: skip
+            )
     for name in (each for each in onset if each != "dry" and "dry" in onset):
         made.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onset[name] / onset["dry"]))
     return made
+
+
+def over_dry(found: Mapping[str, Sequence[Means]], name: str, quantity: str) -> Estimate:
+    """Mean of a quantity in a state over that in the dry bed; 1 without error for the dry bed itself."""
+    wet, dry = (over_packings([getattr(run, quantity) for run in found[each]]) for each in (name, "dry"))
+    ratio = wet[0] / dry[0]
+    return ratio, 0.0 if name == "dry" else ratio * math.hypot(wet[1] / wet[0], dry[1] / dry[0])
 
 
 def over_packings(values: Sequence[Estimate]) -> Estimate:
@@ -248,10 +269,14 @@ def mean_bubble(run: Written, begin: float, end: float = math.inf) -> Estimate:
     return mean, float(np.sqrt(((cubes - mean * squares) ** 2).sum()) / squares.sum())
 
 
-def minimum_fluidisation(name: str, folder: Path) -> float:
-    """Velocity at which the pressure drop of the packed bed equals the weight, on the way down [m/s]; NaN if never."""
-    run = open_run(folder / f"{name}_ramp")
+def falling(name: str, folder: Path) -> Ramp:
+    """The part of a ramp in which the velocity falls, and where the pressure drop of the packed bed is the weight."""
+    run, case = open_run(folder / f"{name}_ramp"), state(name).with_(**{"bed.inlet_velocity": RAMP})
+    falls = run.history["time"] > RAMP[-2][0]
+    time, drop = (run.history[each][falls] for each in ("time", "pressure_drop"))
+    velocity = np.interp(time, *np.array(RAMP).T)
     try:
-        return onsets(state(name).with_(**{"bed.inlet_velocity": RAMP}), run.history, layers(run))[1].velocity
+        onset = onsets(case, run.history, layers(run))[1].velocity
     except InputError:
-        return math.nan
+        onset = math.nan
+    return Ramp(time, velocity, drop * case.column.floor_area / buoyant_weight(case), onset)
