@@ -130,7 +130,7 @@ def test_a_pair_alone_moves_along_its_exact_solution(film: Any, potential: str, 
     for _ in range(20):
         run.advance(step)
         assert constant() == pytest.approx(kept, abs=1e-9 * 0.3 + strength * 1e-11)
-    assert made.velocity[0, 0] >= 0.0
+    assert made.velocity[0, 0] >= -1e-15 * 0.3, "turned back by more than round-off of the first speed"
 
 
 def test_slow_wet_spheres_stay_together_and_fast_ones_part() -> None:
