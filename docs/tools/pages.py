@@ -288,11 +288,15 @@ def validation_table(name: str) -> str:
     if not path.exists():
         return f"*No table is stored; `cfddem validate {name}` writes it.*"
     report = json.loads(path.read_text())
+    noted = any(row["note"] for row in report["rows"])
     lines = ["| quantity | cfddem | reference | difference | limit | |", "|:--|--:|--:|--:|--:|:--|"]
+    if noted:
+        lines = [f"{line}{more}" for line, more in zip(lines, (" note |", ":--|"))]
     for row in report["rows"]:
         unit = "" if row["unit"] == "-" else f" [{row['unit']}]"
         numbers = (_short(row[key]) for key in ("value", "reference", "difference", "limit"))
-        lines.append(f"| {_plain(row['quantity'])}{unit} | {' | '.join(numbers)} | {row['verdict']} |")
+        note = f" {_plain(row['note'])} |" if noted else ""
+        lines.append(f"| {_plain(row['quantity'])}{unit} | {' | '.join(numbers)} | {row['verdict']} |{note}")
     judged = [row for row in report["rows"] if row["verdict"] != "report"]
     held = sum(row["verdict"] == "holds" for row in judged)
     lines += ["", f"{held} of {len(judged)} limits hold; {len(report['rows']) - len(judged)} rows have no limit."]
