@@ -13,7 +13,8 @@ import pytest
 from cfddem.preflight.summary import refuse_errors
 from scenarios.beds.wet_bed import validation
 from scenarios.beds.wet_bed.validation import (
-    ANGLES,
+    RAMPS,
+    STATES,
     Means,
     directions,
     over_packings,
@@ -27,10 +28,10 @@ from scenarios.beds.wet_bed.validation import (
 
 def test_the_pulls_of_the_states_are_as_their_names_say() -> None:
     """Bond numbers over the weight of a seed: 2 pi R sigma cos(theta) over it."""
-    dry, *wet = (state(name) for name in ANGLES)
+    dry, *wet = (state(name) for name in RAMPS)
     assert dry.liquid is None
     weight = 1000.0 * math.pi / 6.0 * 1.2e-3**3 * 9.81
-    for case, expected in zip(wet, (0.74, 2.19, 4.24)):
+    for case, expected in zip(wet, (0.74, 2.19, 4.24, 0.74)):
         assert case.liquid is not None and case.bed.count == 9240
         pull = 2.0 * math.pi * 0.6e-3 * 0.02 * math.cos(math.radians(case.liquid.contact_angle))
         assert pull / weight == pytest.approx(expected, rel=0.02)
@@ -47,8 +48,8 @@ def test_the_table_has_errors_and_ratios() -> None:
     assert over_packings([(2.0, 0.3)] * 3) == (2.0, 0.0)
     dry = [made_up(100.0, 1e-3)] * 3
     wet = [made_up(100.0 * each, 5e-4) for each in (1.9, 2.0, 2.1)]
-    found = {name: dry if name == "dry" else wet for name in ANGLES}
-    table = {row.quantity: row for row in directions(found, {name: 0.3 + 0.1 * (name != "dry") for name in ANGLES})}
+    found = {name: dry if name == "dry" else wet for name in STATES}
+    table = {row.quantity: row for row in directions(found, {name: 0.3 + 0.1 * (name != "dry") for name in STATES})}
     row = table["weak: pressure deviation larger than dry, logarithm of the ratio"]
     assert row.value == pytest.approx(math.log(2.0)) and "0.029" in row.note
     assert table["weak: temperature smaller than dry, logarithm of the ratio"].value == pytest.approx(math.log(2.0))
@@ -66,11 +67,12 @@ def test_the_table_of_one_packing_and_two_states_takes_errors_from_time() -> Non
 
 
 def test_all_states_advance_before_one_goes_further(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One packing in all states first; the whole plan has three packings of 10.1 s and a ramp in each state."""
+    """One packing in all states first; the whole plan has three packings of 10.1 s in each state, and the ramps."""
     pieces = [(name, until) for name, _, until in plan()]
-    assert [name for name, _ in pieces[:4]] == [f"{name}_1" for name in ANGLES]
+    assert [name for name, _ in pieces[:4]] == [f"{name}_1" for name in STATES]
     far = {name: max(until for piece, until in pieces if piece == name) for name, _ in pieces}
-    assert far == {f"{name}_{seed}": 10.1 for name in ANGLES for seed in (1, 2, 3)} | {f"{n}_ramp": 4.6 for n in ANGLES}
+    ramps = ["dry_ramp", "weak_ramp", "medium_ramp", "strong_ramp", "weak_1_oil_ramp"]
+    assert far == {f"{name}_{seed}": 10.1 for name in STATES for seed in (1, 2, 3)} | dict.fromkeys(ramps, 4.6)
     asked: list[tuple[str, float]] = []
     monkeypatch.setattr(validation, "advanced", lambda case, folder, name, progress, until: asked.append((name, until)))
     monkeypatch.setattr(validation, "reached", lambda home: dict(asked).get(home.name, 0.0))

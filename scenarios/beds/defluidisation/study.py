@@ -62,7 +62,7 @@ def onsets(case: Case, history: Mapping[str, np.ndarray], bed: Layers) -> tuple[
     turn = times[int(np.argmax(speeds))]
     ways = []
     for rising in (True, False):
-        packed = (share > PACKED[0]) & (share < PACKED[1]) & ((history["time"] < turn) == rising)
+        packed = _packed(share, (history["time"] < turn) == rising, rising)
         if packed.sum() < 4:
             raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
         begin, end = history["time"][packed][[0, -1]]
@@ -71,6 +71,17 @@ def onsets(case: Case, history: Mapping[str, np.ndarray], bed: Layers) -> tuple[
             raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
         ways.append(_onset(case, velocity[packed], share[packed], seen.mean(axis=0)))
     return ways[0], ways[1]
+
+
+def _packed(share: np.ndarray, inside: np.ndarray, rising: bool) -> np.ndarray:
+    """Rows of one branch before the bed is fluidised for the first time, or after it was for the last time.
+
+    Bubbles make the pressure drop of a fluidised bed fall below the weight for a moment.
+    """
+    places = np.arange(len(share))
+    fluidised = places[inside & (share >= PACKED[1])]
+    still = places < fluidised.min(initial=len(share)) if rising else places > fluidised.max(initial=-1)
+    return np.asarray(inside & still & (share > PACKED[0]))
 
 
 def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndarray) -> Onset:

@@ -1,13 +1,15 @@
 """Mueller's bed with liquid bridges: what they do to height, pressure, bubbles, agitation and minimum fluidisation.
 
-Four states that differ in the pull of their bridges only, each with three packings and one ramp. Runs are kept as
-folders: interrupted ones are continued, finished ones are not repeated. The runs advance in rounds, so that a table can
-be made at any time. Nothing is fitted and nothing was measured in this bed when wet: the rows are predictions.
+Four states that differ in the pull of their bridges only, each with three packings and one ramp; a fifth ramp has ten
+times the oil. Runs are kept as folders: interrupted ones are continued, finished ones are not repeated. The runs
+advance in rounds, so that a table can be made at any time. Nothing is fitted and nothing was measured in this bed when
+wet: the rows are predictions.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from time import monotonic
@@ -29,8 +31,19 @@ from scenarios.beds.wet_bed.figures import QUANTITIES, Estimate, Ramp, draw
 from scenarios.validation.kept_runs import advanced, taken
 from scenarios.validation.table import Progress, Row
 
-ANGLES: dict[str, float | None] = {"dry": None, "weak": 85.0, "medium": 75.0, "strong": 60.0}
-"""Contact angle of the oil by state [degrees]; the pulls are 0.7, 2.2 and 4.2 times the weight of a particle."""
+
+class Oil(NamedTuple):
+    """What the particles carry."""
+
+    contact_angle: float  # [degrees]
+    share: float = 1e-3  # of the volume of the particles
+
+
+STATES = {"dry": None, "weak": Oil(85.0), "medium": Oil(75.0), "strong": Oil(60.0)}
+"""Oil by state; the pulls are 0.7, 2.2 and 4.2 times the weight of a particle."""
+
+RAMPS = STATES | {"weak, 1 % oil": Oil(85.0, 1e-2)}
+"""States that are defluidised."""
 
 SEEDS = (1, 2, 3)
 SETTLED = 0.6
@@ -45,7 +58,11 @@ FEWEST = 0.4
 RAMP = [[0.0, 0.0066], [0.2, 0.66], [0.6, 0.66], [4.6, 0.05]]
 """Inlet velocity of a ramp: the bed is mixed, then slowly defluidised [s, m/s]."""
 
-OIL = {"viscosity": 5e-3, "surface_tension": 0.02, "liquid_fraction": 1e-3}
+VISCOSITY = 5e-3
+"""Of the oil [Pa s]."""
+
+SURFACE_TENSION = 0.02
+"""Of the oil [N/m]."""
 
 UNITS = {"height": "m", "height_deviation": "m", "pressure_deviation": "Pa", "temperature": "m2/s2", "bubble": "m"}
 """Quantities of the table and their units."""
@@ -65,13 +82,16 @@ class Means(NamedTuple):
 
 
 def state(name: str) -> Case:
-    """Mueller's bed in one of the states of `ANGLES`."""
-    angle, case = ANGLES[name], mueller()
+    """Mueller's bed in one of the states of `RAMPS`."""
+    oil, case = RAMPS[name], mueller()
     title = f"Mueller's bed, {name}"
-    if angle is None:
+    if oil is None:
         return case.with_(title=title)
     rough = {f"material.{each}.roughness": 1e-6 for each in case.material}
-    return case.with_(**rough, title=title, liquid=OIL | {"contact_angle": angle})
+    liquid = {"viscosity": VISCOSITY, "surface_tension": SURFACE_TENSION}
+    return case.with_(
+        **rough, title=title, liquid=liquid | {"contact_angle": oil.contact_angle, "liquid_fraction": oil.share}
+    )
 
 
 def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row]:
@@ -101,24 +121,33 @@ def advance_one(folder: Path, progress: Progress) -> bool:
 def plan() -> Iterator[tuple[str, Case, float]]:
     """Folder, case and end [s] of every piece of the study: one packing, then ramps, then the other packings."""
     for until in ROUNDS[:3]:
-        for name in ANGLES:
+        for name in STATES:
             yield f"{name}_1", _packing(name, 1), until
-    for name in ANGLES:
+    for name in RAMPS:
         changes: dict[str, Any] = {"bed.inlet_velocity": RAMP, "run.every": 0.05}
-        yield f"{name}_ramp", state(name).with_(**changes), RAMP[-1][0]
+        yield ramp_folder(name), state(name).with_(**changes), RAMP[-1][0]
     for seed in SEEDS:
         for until in ROUNDS:
-            for name in ANGLES:
+            for name in STATES:
                 yield f"{name}_{seed}", _packing(name, seed), until
+
+
+def ramp_folder(name: str) -> str:
+    """Name of the folder of the ramp of a state.
+
+    >>> ramp_folder("weak, 1 % oil")
+    'weak_1_oil_ramp'
+    """
+    return "_".join([*re.findall(r"\w+", name), "ramp"])
 
 
 def pull_over_weight(name: str) -> float:
     """Pull of a bridge between touching particles over the weight of one."""
-    angle, case = ANGLES[name], state(name)
-    if angle is None:
+    oil, case = RAMPS[name], state(name)
+    if oil is None:
         return 0.0
     weight = case.solid.density * math.pi / 6.0 * case.bed.diameter**3 * math.hypot(*case.laws.gravity)
-    return math.pi * case.bed.diameter * OIL["surface_tension"] * math.cos(math.radians(angle)) / weight
+    return math.pi * case.bed.diameter * SURFACE_TENSION * math.cos(math.radians(oil.contact_angle)) / weight
 
 
 def _packing(name: str, seed: int) -> Case:
@@ -139,7 +168,7 @@ def table(folder: Path) -> list[Row]:
         note = f"packings: {len(ends)} of {len(SEEDS)}; {ROUNDS[-1] - SETTLED:g} s of each are planned"
         rows_of_states.append(Row(f"{name}: simulated time in the means", averaged, unit="s", note=note))
         rows_of_states += rows(name, found[name])
-    ramps = {name: falling(name, folder) for name in ANGLES if is_there(folder / f"{name}_ramp", RAMP[-1][0])}
+    ramps = {name: falling(name, folder) for name in RAMPS if is_there(folder / ramp_folder(name), RAMP[-1][0])}
     onset = {name: ramp.onset for name, ramp in ramps.items()}
     if "dry" in found and len(found) > 1:
         ratios = {quantity: [over_dry(found, name, quantity) for name in found] for quantity, *_ in QUANTITIES}
@@ -155,7 +184,7 @@ def windows(folder: Path) -> dict[str, dict[int, float]]:
     """State -> packing -> end of the means [s], the same for all states that have come so far."""
     ends: dict[str, dict[int, float]] = {}
     for seed in SEEDS:
-        times = {name: reached(folder / f"{name}_{seed}") for name in ANGLES}
+        times = {name: reached(folder / f"{name}_{seed}") for name in STATES}
         far = {name: time for name, time in times.items() if time >= SETTLED + FEWEST}
         for name in far:
             ends.setdefault(name, {})[seed] = min(far.values())
@@ -271,7 +300,7 @@ def mean_bubble(run: Written, begin: float, end: float = math.inf) -> Estimate:
 
 def falling(name: str, folder: Path) -> Ramp:
     """The part of a ramp in which the velocity falls, and where the pressure drop of the packed bed is the weight."""
-    run, case = open_run(folder / f"{name}_ramp"), state(name).with_(**{"bed.inlet_velocity": RAMP})
+    run, case = open_run(folder / ramp_folder(name)), state(name).with_(**{"bed.inlet_velocity": RAMP})
     falls = run.history["time"] > RAMP[-2][0]
     time, drop = (run.history[each][falls] for each in ("time", "pressure_drop"))
     velocity = np.interp(time, *np.array(RAMP).T)
