@@ -76,8 +76,8 @@ def test_exponent_of_an_exact_power_law() -> None:
     assert exponent(known) == pytest.approx((3.2, 0.08), rel=1e-12)
 
 
-def test_onset_of_an_exact_bed_is_the_balance() -> None:
-    """Pressure drop by Ergun at voidage 0.42 up to the weight, then the weight: both branches give the balance."""
+def exact_ramp() -> tuple[Case, dict[str, np.ndarray], Layers, float]:
+    """Pressure drop by Ergun at voidage 0.42 up to the weight, then the weight; and the balance."""
     case = Case.from_toml(gallery()["defluidisation"], {"laws.drag": "ergun"})
     assert case.fluid is not None and not isinstance(case.bed.inlet_velocity, float)
     balance = fluidising_velocity(1.2e-3, 1000.0, case.fluid.density, case.fluid.viscosity, 0.42, ergun)
@@ -91,11 +91,25 @@ def test_onset_of_an_exact_bed_is_the_balance() -> None:
 
     weight = buoyant_weight(case) / case.column.floor_area
     drop = weight * np.minimum(pull(velocity) / pull(np.array([balance])), 1.0)
-    history = {"time": time, "pressure_drop": drop}
     bed = Layers(time[::10], np.tile([0.42, 0.42, 1.0], (30, 1)))
+    return case, {"time": time, "pressure_drop": drop}, bed, balance
+
+
+def test_onset_of_an_exact_bed_is_the_balance() -> None:
+    case, history, bed, balance = exact_ramp()
     for onset in onsets(case, history, bed):
         assert onset.balance == pytest.approx(balance, rel=1e-12)
         assert onset.velocity == pytest.approx(balance, rel=1e-6)
+
+
+def test_spikes_and_bubbles_do_not_move_an_onset() -> None:
+    """Single rows of noise in the packed bed, and a pressure drop that falls for a moment while the bed bubbles."""
+    case, history, bed, balance = exact_ramp()
+    drop, weight = history["pressure_drop"], buoyant_weight(case) / case.column.floor_area
+    drop[[2, 297]] = weight
+    drop[148:153] = 0.5 * weight
+    for onset in onsets(case, history, bed):
+        assert onset.velocity == pytest.approx(balance, rel=0.01)
 
 
 def test_drag_of_a_layered_bed_is_the_sum_over_its_layers() -> None:

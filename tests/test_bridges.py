@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 from wet_spheres import ANGLE, FILM, GRAIN, LIQUID, RADIUS, TENSION, bridged
 
+from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
+from cfddem.backend.law_set import specialise
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
+from cfddem.particles.interactions.bridge_solution import held_gap, resistance_integral, speed_after_bridge
 from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.interactions.slots import BridgeState
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
@@ -131,6 +135,29 @@ def test_a_pair_alone_moves_along_its_exact_solution(film: Any, potential: str, 
         run.advance(step)
         assert constant() == pytest.approx(kept, abs=1e-9 * 0.3 + strength * 1e-11)
     assert made.velocity[0, 0] >= -1e-15 * 0.3, "turned back by more than round-off of the first speed"
+
+
+@serial
+def _imbalance(speed, gap, film, step, inverse_mass, p):  # type: ignore[no-untyped-def]
+    """What the speed after a step leaves of its equation, over the speeds in it."""
+    state = BridgeState(gap, film, 0.0, 0.5 * RADIUS, 1e-7, 0.2, 0.0, 0.0, 0.0, p)
+    after = speed_after_bridge(speed, state, gap, step, inverse_mass)
+    given = inverse_mass * resistance_integral(state, gap, step * after, held_gap(state))
+    return abs(after + given - speed) / (abs(speed) + abs(after))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cut", ["constant", "zero"])
+def test_the_speed_after_a_step_solves_its_equation(cut: str) -> None:
+    """For any gap, speed, step and mass, also if the pair leaves its films within the step."""
+    run, _ = pair(0.3, film="deforming", pull="none", cut=cut, minimum_gap=1e-7, viscosity=0.2)
+    imbalance, draw = specialise(_imbalance, run.choices), np.random.default_rng(1)
+    worst = 0.0
+    for gap, speed, step, mass in 10.0 ** draw.uniform([-7.5, -6.0, -8.0, -8.0], [-4.5, 0.0, -3.0, -5.0], (5000, 4)):
+        for sign in (1.0, -1.0):
+            found = imbalance(sign * speed, gap, 2.0 * FILM, step, 1.0 / mass, run.laws.parameters)
+            worst = max(worst, found)
+    assert worst < 1e-9
 
 
 def test_slow_wet_spheres_stay_together_and_fast_ones_part() -> None:

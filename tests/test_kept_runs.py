@@ -11,7 +11,9 @@ from disturbed_runs import TINY
 from cfddem.case.schema import Case
 from cfddem.io.kept_files import holds_surfaces_of, keep_files
 from cfddem.run import runner
-from scenarios.validation.kept_runs import finished, kept
+from cfddem.run.runner import Run
+from scenarios.beds.wet_bed.validation import reached
+from scenarios.validation.kept_runs import advanced, finished, kept
 
 
 def test_a_run_reports_where_it_is_and_is_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -24,6 +26,16 @@ def test_a_run_reports_where_it_is_and_is_not_repeated(tmp_path: Path, monkeypat
     said.clear()
     assert finished(case, tmp_path, "run", said.append, {"bed.seed": 3}).steps[-1] == first.steps[-1]
     assert said == []
+
+
+def test_a_run_that_was_killed_before_its_first_snapshot_begins_again(tmp_path: Path) -> None:
+    case = Case.from_text(TINY.replace("until = 0.024", "until = 0.004"))
+    Run.begin(case, tmp_path / "run")
+    for each in (tmp_path / "run" / "data").iterdir():
+        each.unlink()
+    assert reached(tmp_path / "run") == 0.0
+    advanced(case, tmp_path, "run", lambda text: None, 0.004)
+    assert reached(tmp_path / "run") == pytest.approx(0.004)
 
 
 def test_another_surface_is_another_case(tmp_path: Path) -> None:

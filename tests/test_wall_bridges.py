@@ -17,7 +17,7 @@ from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
-from closures import capillary
+from closures import bridge, capillary, lubrication
 from closures.liquid_film import film_volume
 
 LAWS = replace(THIN, contact_angle=ANGLE, cut="zero")
@@ -126,6 +126,17 @@ def test_a_bridge_draws_a_disc_of_the_wall_and_returns_half() -> None:
     run.refresh()
     assert bridges.count == 0
     assert bridges.gained_by_walls == pytest.approx(0.5 * (own - drawn), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_a_dry_sphere_on_a_wet_wall_is_resisted_by_what_the_wall_gives() -> None:
+    """Below h_min, as Pitois' law has it there for the volume drawn from the wall."""
+    laws = replace(WET_WALLS, film="pitois", tangential="none", cut="constant", minimum_gap=5e-6)
+    run, bridges = above(Plane(), (0.0, 0.0, RADIUS + 2e-6), laws, film=0.0)
+    drawn = 0.5 * np.pi * RADIUS**2 * 1e-5
+    expected = lubrication.film_strength(laws.viscosity, RADIUS) * bridge.pitois_share(5e-6, RADIUS, drawn) / 5e-6
+    assert bridges.volume[0] == pytest.approx(drawn, rel=1e-12)
+    assert run.edges.bridge_resistance[0] == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.slow

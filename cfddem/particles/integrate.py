@@ -9,7 +9,7 @@ A step consists of these phases:
     far kick             of films between pairs that cannot touch, where they act once in several steps
     [halo: velocity, film rate]
     film impulses        of every pair, then of every particle
-    [halo: velocity, spin, load of bridges]
+    [halo: velocity, spin, rates of bridges]
     bridge impulses      likewise
     drift                new positions; walls move
     [halo: position, velocity, spin, thickness of the liquid]

@@ -43,8 +43,11 @@ def advanced(case: Case, folder: Path, name: str, progress: Progress, until: flo
 
     if not (home / "run.json").exists():
         Run.begin(case.with_(**{"run.until": until}), home, report=live, progress=progress).go()
-    elif (run := open_run(home)).status != "finished" or run.times[-1] < until * (1.0 - 1e-9):
-        Run.resume(home, until=max(until, float(run.times[-1])), report=live, progress=progress).go()
+        return
+    run = open_run(home)
+    reached = max(run.times.tolist(), default=0.0)
+    if run.status != "finished" or reached < until * (1.0 - 1e-9):
+        Run.resume(home, until=max(until, reached), report=live, progress=progress).go()
 
 
 @contextmanager

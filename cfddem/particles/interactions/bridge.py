@@ -62,8 +62,8 @@ FIELDS = (
     Field("bridge_gap", "m", role="memory", meaning="minimum gap of the bridge"),
     Field("bridge_accounted", "m", role="memory", meaning="gap up to which the impulse of the bridge has been given"),
     Field("bridge_resistance", "kg/s", role="memory", meaning="resistance of the bridge; 0 where it has none"),
-    Field("bridge_place", "m", 3, "memory", meaning="separation from the second particle to the first at present"),
-    Field("bridge_distance", "m", role="memory", meaning="its length"),
+    Field("bridge_separation", "m", 3, "memory", meaning="separation from the second particle to the first at present"),
+    Field("bridge_distance", "m", role="memory", meaning="distance of the centres at present"),
     Field("closed_along", "kg/s", role="memory", meaning="resistance along the line of centres below h_min"),
     Field("closed_across", "kg/s", role="memory", meaning="resistance of the bridge to sliding below h_min"),
     Field("bridge_force", "N", 3, "memory", meaning="pull of the bridge on the first body"),
@@ -179,7 +179,7 @@ def renew_bridge(k, particles, edges, memory, shift, p):
 
 @inline
 def renew_resistance(k, state, memory):
-    """Resistance of the bridge of edge k at the present positions."""
+    """Resistance of the bridge of edge k at the gap of `state`."""
     if state.gap < held_gap(state):
         memory.bridge_resistance[k] = memory.closed_along[k] + memory.closed_across[k]
     else:

@@ -6,7 +6,7 @@ import math
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.interactions.bridge import bridge_state, capillary_number_of, numbers_of, resistance_across
-from cfddem.particles.interactions.bridge_loops import closed_speed, shared_masses
+from cfddem.particles.interactions.bridge_loops import closed_speed, shared_inverse_masses
 from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, speed_after_bridge
 from cfddem.particles.interactions.film import clamp_speed
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
@@ -19,7 +19,7 @@ from closures.film_impact import pair_added_mass
 @serial
 def find_bridge_impulses(particles, edges, memory, shift, p, step):
     """Impulses of all bridges over the coming step."""
-    bridge_impulses(0, edges.between_particles, particles, edges, memory, shift, step)
+    bridge_impulses(0, edges.between_particles, particles, edges, memory, step)
     open_impulses(particles, edges, memory, shift, p, step)
     if WALLS:
         wall_impulses(particles, edges, memory, shift, p, step)
@@ -51,7 +51,7 @@ def no_impulse(k, memory):
 
 
 @inline
-def _rates(k, particles, edges, memory, lever):
+def _inverse_masses(k, particles, edges, memory, lever):
     """Inverse masses that both bodies give the bridge of edge k, along and across the line of centres [1/kg].
 
     lever  arm of the impulse over the radius [-]
@@ -60,7 +60,7 @@ def _rates(k, particles, edges, memory, lever):
     rate, turn_rate = particles.bridge_rate[i], particles.bridge_turn_rate[i]
     if k < edges.between_particles:
         rate, turn_rate = rate + particles.bridge_rate[j], turn_rate + particles.bridge_turn_rate[j]
-    return shared_masses(rate, turn_rate, lever, memory.bridge_resistance[k])
+    return shared_inverse_masses(rate, turn_rate, lever, memory.bridge_resistance[k])
 
 
 @inline
@@ -98,7 +98,7 @@ def bridge_impulse(k, particles, edges, memory, shift, p, step):
     if k < edges.between_particles:
         turning, radii = plus(turning, times(particles.radius[j], at(particles.spin, j))), radii + particles.radius[j]
     lever = distance / radii
-    along, sideways = _rates(k, particles, edges, memory, lever)
+    along, sideways = _inverse_masses(k, particles, edges, memory, lever)
 
     floor, accounted = held_gap(state), memory.bridge_accounted[k]
     if BRIDGE_FILM:
@@ -127,7 +127,7 @@ def bridge_impulse(k, particles, edges, memory, shift, p, step):
 
 @part
 def apply_bridge_impulses(particles, edges, memory):
-    """Give every particle the impulses of its bridges."""
+    """Give every particle the impulses of its bridges; edges whose bridge does not resist must hold zeros."""
     for i in prange(particles.owned):
         impulse, couple = NOTHING, NOTHING
         for place in places_of(i, edges):

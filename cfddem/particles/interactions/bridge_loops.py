@@ -38,7 +38,7 @@ def decayed(x):
 
 
 @inline
-def shared_masses(rate, turn_rate, lever, resistance):
+def shared_inverse_masses(rate, turn_rate, lever, resistance):
     """Inverse masses that both bodies give a bridge, along and across the line of centres [1/kg].
 
     rate, turn_rate  of both bodies together, see `bridge_rate` and `bridge_turn_rate` [1/s]
@@ -50,10 +50,10 @@ def shared_masses(rate, turn_rate, lever, resistance):
 
 
 @inline
-def kept_place(k, particles, edges, memory):
+def kept_separation(k, particles, edges, memory):
     """Separation of a pair at the present positions, its length, and the sum of the radii."""
     radii = particles.radius[edges.first[k]] + particles.radius[edges.second[k]]
-    return at(memory.bridge_place, k), memory.bridge_distance[k], radii
+    return at(memory.bridge_separation, k), memory.bridge_distance[k], radii
 
 
 @inline
@@ -73,7 +73,7 @@ def pair_bridge(n, particles, edges, memory, shift, p):
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     separation, distance, radii = of_two_spheres(k, particles, edges, shift)
-    put(memory.bridge_place, k, separation)
+    put(memory.bridge_separation, k, separation)
     memory.bridge_distance[k] = distance
     gap, reduced_radius = distance - radii, particles.radius[i] * particles.radius[j] / radii
     state = bridge_state(k, gap, reduced_radius, memory, p)
@@ -90,11 +90,11 @@ def pair_bridge(n, particles, edges, memory, shift, p):
 
 
 @inline
-def pair_bridge_impulse(n, particles, edges, memory, shift, step):
+def pair_bridge_impulse(n, particles, edges, memory, step):
     """Impulse of the bridge of a pair that stays closed in this step; marks the others."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation, distance, radii = kept_place(k, particles, edges, memory)
+    separation, distance, radii = kept_separation(k, particles, edges, memory)
     normal = times(1.0 / distance, separation)
     gap, lever = distance - radii, distance / radii
     resistance = memory.bridge_resistance[k]
@@ -102,7 +102,7 @@ def pair_bridge_impulse(n, particles, edges, memory, shift, step):
     velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
     rate = particles.bridge_rate[i] + particles.bridge_rate[j]
     turn_rate = particles.bridge_turn_rate[i] + particles.bridge_turn_rate[j]
-    along, sideways = shared_masses(rate, turn_rate, lever, resistance)
+    along, sideways = shared_inverse_masses(rate, turn_rate, lever, resistance)
 
     speed = new_speed = dot(velocity, normal)
     accounted = memory.bridge_accounted[k]
@@ -115,10 +115,10 @@ def pair_bridge_impulse(n, particles, edges, memory, shift, step):
         turning = plus(
             times(particles.radius[i], at(particles.spin, i)), times(particles.radius[j], at(particles.spin, j))
         )
-        rate = step * memory.closed_across[k]
-        short = rate * sideways < LARGEST_DECAY
+        per_slip = step * memory.closed_across[k]
+        short = per_slip * sideways < LARGEST_DECAY
         slip = minus(across(velocity, normal), times(lever, cross(turning, normal)))
-        drag = times(rate * decayed(rate * sideways), slip)
+        drag = times(per_slip * decayed(per_slip * sideways), slip)
         impulse = plus(impulse, drag)
         couple = times(-lever, cross(normal, drag))
     floor = max(memory.bridge_gap[k], SMALLEST_GAP)

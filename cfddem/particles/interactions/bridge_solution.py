@@ -90,23 +90,28 @@ def resistance_integral(state, a, change, floor):
 
 
 @inline
+def _cut_resistance(state, gap, floor):
+    """Resistance at a gap, cut below h_min."""
+    return _resistance(state, max(gap, floor)) if CUT_CONSTANT or gap >= floor else 0.0
+
+
+@inline
 def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
     """Rate of the gap after a step in which only the bridge acts.
 
     Solves u1 + I(h, h + u1 dt) / m = u0 + I(h, ha) / m by Newton's method, kept between 0 and the speed without
-    resistance; I is the integral of the resistance.
+    resistance; I is the integral of the resistance. It ends where the equation holds to round-off, as computed or by a
+    bound on what the last change leaves, for resistances that rise or fall all the way between two guesses.
 
     accounted_gap  ha, gap up to which the impulse has been given [m]
     inverse_mass   1/m of the mass that the pair gives this bridge [1/kg]
     """
     gap, floor = state.gap, held_gap(state)
-    held = max(gap, floor)
     total = speed
     if accounted_gap != gap:
         total += inverse_mass * resistance_integral(state, gap, accounted_gap - gap, floor)
-    slope = _resistance(state, held) if CUT_CONSTANT or gap >= floor else 0.0
-    guess = total / (1.0 + step * inverse_mass * slope)
-    if abs(step * guess) < STILL * held and (gap > floor) == (gap + step * guess > floor):
+    guess = total / (1.0 + step * inverse_mass * _cut_resistance(state, gap, floor))
+    if abs(step * guess) < STILL * max(gap, floor) and (gap > floor) == (gap + step * guess > floor):
         return guess
     middle = gap + 0.5 * step * guess
     if middle > floor:
@@ -118,13 +123,14 @@ def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
         if abs(excess) <= allowed:
             return guess
         end = gap + step * guess
-        slope = _resistance(state, max(end, floor)) if CUT_CONSTANT or end > floor else 0.0
-        following, low, high = next_guess(guess, excess, 1.0 + step * inverse_mass * slope, low, high)
-        change = abs(following - guess)
+        resistance = _cut_resistance(state, end, floor)
+        slope = 1.0 + step * inverse_mass * resistance
+        following, low, high = next_guess(guess, excess, slope, low, high)
+        change, new_end = following - guess, gap + step * following
         guess = following
-        # what Newton's step leaves, of second order: a resistance A/h changes by step * change / h of itself
-        left = step * inverse_mass * slope * change * (step * change / end)
-        if change == 0.0 or (end > floor and left <= 0.1 * allowed):
+        bend = step * inverse_mass * abs(_cut_resistance(state, new_end, floor) - resistance)
+        jumps = not CUT_CONSTANT and (end >= floor) != (new_end >= floor)
+        if change == 0.0 or (not jumps and abs(excess + slope * change) + bend * abs(change) <= allowed):
             return guess
     return guess
 

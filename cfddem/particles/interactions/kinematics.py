@@ -31,14 +31,14 @@ class PairKinematics(NamedTuple):
 
 
 @inline
-def sphere_kinematics(k, place, particles, edges, free):
+def sphere_kinematics(k, apart, particles, edges, free):
     """Kinematics of two spheres.
 
-    place  separation from the second to the first, its length, and the sum of the radii
+    apart  separation from the second to the first, its length, and the sum of the radii
     """
     i, j = edges.first[k], edges.second[k]
     radius, spin, inverse_mass = particles.radius, particles.spin, particles.inverse_mass
-    separation, distance, radii = place
+    separation, distance, radii = apart
     inverse_sum = 1.0 / radii
     relative = minus(at(particles.velocity, i), at(particles.velocity, j))
     rate = 1.0 / distance

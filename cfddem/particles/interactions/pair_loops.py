@@ -15,7 +15,7 @@ import numpy as np
 from cfddem.backend.compile import inline, prange, vector_part
 from cfddem.backend.law_set import specialise, written
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.bridge_loops import WetParticles, kept_place, pair_bridge, pair_bridge_impulse
+from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
 from cfddem.particles.interactions.film import film_impulse_short, renew_film
 from cfddem.particles.interactions.film_law import at_least
@@ -79,8 +79,8 @@ def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p,
     """Film and contact of one pair of particles."""
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    place = kept_place(k, particles, edges, memory) if BRIDGE else of_two_spheres(k, particles, edges, shift)
-    kinematics = sphere_kinematics(k, place, particles, edges, free)
+    apart = kept_separation(k, particles, edges, memory) if BRIDGE else of_two_spheres(k, particles, edges, shift)
+    kinematics = sphere_kinematics(k, apart, particles, edges, free)
     row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
     if FILM:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
@@ -163,7 +163,7 @@ LOOPS: dict[str, PairLoop] = {
     "far_impulses": PairLoop(far_impulse, "cutoff_ratio, step", FarParticles, "FAR"),
     "shear_impulses": PairLoop(pair_shear, "step", ShearParticles, "SHEAR"),
     "pair_bridges": PairLoop(pair_bridge, "shift, p", WetParticles, "BRIDGE"),
-    "bridge_impulses": PairLoop(pair_bridge_impulse, "shift, step", WetParticles, "BRIDGE"),
+    "bridge_impulses": PairLoop(pair_bridge_impulse, "step", WetParticles, "BRIDGE"),
 }
 """Slot -> loop over pairs."""
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.errors import InputError
-from cfddem.particles.interactions.bridge import FLAT, numbers_of
+from cfddem.particles.interactions.bridge import FLAT, find_closed, numbers_of
 from cfddem.particles.interactions.slots import WALL_LIQUID, returned_share
 from cfddem.particles.walls.nearest_point import FOOT, Walls, carried_back, touched
 
@@ -133,6 +133,7 @@ def transfer_wall_liquid(particles, edges, memory, walls, p):
         if memory.bridge_change[k] > 0:
             drawn = min(n.wall_share * math.pi * radius * radius * there / area, there)
             memory.bridge_volume[k] += drawn
+            find_closed(k, radius, memory, p)  # of the whole volume; the reduced radius is the particle's
             walls.patch_liquid[row] = there - drawn
         else:
             volume = memory.bridge_volume[k]

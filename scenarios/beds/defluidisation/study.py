@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.backend.errors import InputError
@@ -47,41 +48,43 @@ def layers(run: Written) -> Layers:
 
 
 def onsets(case: Case, history: Mapping[str, np.ndarray], bed: Layers) -> tuple[Onset, Onset]:
-    """Minimum fluidisation on the way up and on the way down.
+    """Minimum fluidisation on the way up and on the way down; arguments as of `onset`."""
+    return onset(case, history, bed, rising=True), onset(case, history, bed, rising=False)
+
+
+def onset(case: Case, history: Mapping[str, np.ndarray], bed: Layers, *, rising: bool) -> Onset:
+    """Minimum fluidisation on one branch of a ramp.
 
     case     whose inlet velocity is a list of [time, velocity] that rises and falls
     history  of its run
-    bed      its voidage profiles, at least one with a packed bed on each branch
+    bed      its voidage profiles, at least one with a packed bed on the branch
+    rising   the way up, else the way down
     """
     inlet = case.bed.inlet_velocity
     if isinstance(inlet, float):
         raise InputError("bed.inlet_velocity", inlet, "a list of [time, velocity] that rises and falls")
     times, speeds = np.array(inlet).T
-    velocity = np.interp(history["time"], times, speeds)
     share = history["pressure_drop"] * case.column.floor_area / buoyant_weight(case)
-    turn = times[int(np.argmax(speeds))]
-    ways = []
-    for rising in (True, False):
-        packed = _packed(share, (history["time"] < turn) == rising, rising)
-        if packed.sum() < 4:
-            raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
-        begin, end = history["time"][packed][[0, -1]]
-        seen = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
-        if len(seen) == 0:
-            raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
-        ways.append(_onset(case, velocity[packed], share[packed], seen.mean(axis=0)))
-    return ways[0], ways[1]
+    packed = _packed(share, (history["time"] < times[int(np.argmax(speeds))]) == rising, rising)
+    if packed.sum() < 4:
+        raise InputError("history", int(packed.sum()), "at least 4 rows with a packed bed", "record more often")
+    begin, end = history["time"][packed][[0, -1]]
+    seen = bed.voidage[(bed.time >= begin) & (bed.time <= end)]
+    if len(seen) == 0:
+        raise InputError("snapshots", 0, "at least 1 with a packed bed", "write more often")
+    velocity = np.interp(history["time"], times, speeds)
+    return _onset(case, velocity[packed], share[packed], seen.mean(axis=0))
 
 
-def _packed(share: np.ndarray, inside: np.ndarray, rising: bool) -> np.ndarray:
+def _packed(share: np.ndarray, branch: np.ndarray, rising: bool) -> np.ndarray:
     """Rows of one branch before the bed is fluidised for the first time, or after it was for the last time.
 
-    Bubbles make the pressure drop of a fluidised bed fall below the weight for a moment.
+    Bubbles make the pressure drop of a fluidised bed fall below the weight for a moment; a single row says nothing.
     """
-    places = np.arange(len(share))
-    fluidised = places[inside & (share >= PACKED[1])]
+    places, steady = np.arange(len(share)), median_filter(share, 5, mode="nearest")
+    fluidised = places[branch & (steady >= PACKED[1])]
     still = places < fluidised.min(initial=len(share)) if rising else places > fluidised.max(initial=-1)
-    return np.asarray(inside & still & (share > PACKED[0]))
+    return np.asarray(branch & still & (steady > PACKED[0]))
 
 
 def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndarray) -> Onset:

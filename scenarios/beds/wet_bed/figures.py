@@ -31,6 +31,7 @@ class Ramp(NamedTuple):
     velocity: np.ndarray  # (n,) superficial [m/s]
     share: np.ndarray  # (n,) pressure drop over the weight
     onset: float  # minimum fluidisation [m/s]; NaN if not found
+    note: str = ""  # why it was not found
 
 
 def draw(
@@ -58,5 +59,6 @@ def draw(
         right.plot(velocity, share, label=name, **style)
         right.plot([ramp.onset], [1.0], "o", color=style["color"], markersize=7.0)
     label(right, "gas velocity", "m/s", "pressure drop over weight", "-", "While the velocity falls")
-    legend(right)
+    if ramps:
+        legend(right)
     save(figure, path)

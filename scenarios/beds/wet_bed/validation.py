@@ -25,7 +25,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run as Written
 from cfddem.io.reading import open_run
-from scenarios.beds.defluidisation.study import layers, onsets
+from scenarios.beds.defluidisation.study import layers, onset
 from scenarios.beds.gas_bed.study import mueller
 from scenarios.beds.wet_bed.figures import QUANTITIES, Estimate, Ramp, draw
 from scenarios.validation.kept_runs import advanced, taken
@@ -97,6 +97,8 @@ def state(name: str) -> Case:
 def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row]:
     """Advance all runs on one thread, and return the table. Several processes may share the folder.
 
+    From then on, this process runs on one thread.
+
     hours  after which no further round of a run begins
     """
     use_threads(1)
@@ -109,8 +111,6 @@ def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row
 def advance_one(folder: Path, progress: Progress) -> bool:
     """Make the first piece of the plan that is left and whose run no other process has; False if there is none."""
     for name, case, until in plan():
-        if is_there(folder / name, until):
-            continue
         with taken(folder, name) as free:
             if free and not is_there(folder / name, until):
                 advanced(case, folder, name, progress, until)
@@ -169,14 +169,16 @@ def table(folder: Path) -> list[Row]:
         rows_of_states.append(Row(f"{name}: simulated time in the means", averaged, unit="s", note=note))
         rows_of_states += rows(name, found[name])
     ramps = {name: falling(name, folder) for name in RAMPS if is_there(folder / ramp_folder(name), RAMP[-1][0])}
-    onset = {name: ramp.onset for name, ramp in ramps.items()}
     if "dry" in found and len(found) > 1:
         ratios = {quantity: [over_dry(found, name, quantity) for name in found] for quantity, *_ in QUANTITIES}
         draw(folder / "wet-beds.png", [pull_over_weight(each) for each in found], ratios, ramps)
     return [
         *rows_of_states,
-        *(Row(f"{name}: minimum fluidisation on the way down", each, unit="m/s") for name, each in onset.items()),
-        *directions(found, onset),
+        *(
+            Row(f"{name}: minimum fluidisation on the way down", ramp.onset, unit="m/s", note=ramp.note)
+            for name, ramp in ramps.items()
+        ),
+        *directions(found, {name: ramp.onset for name, ramp in ramps.items()}),
     ]
 
 
@@ -197,8 +199,9 @@ def is_there(home: Path, until: float) -> bool:
 
 
 def reached(home: Path) -> float:
-    """Time up to which a run has been written [s]; 0 without one."""
-    return float(open_run(home).times[-1]) if (home / "run.json").exists() else 0.0
+    """Time up to which a run has been written [s]; 0 without one or without a snapshot."""
+    times = open_run(home).times.tolist() if (home / "run.json").exists() else []
+    return max(times, default=0.0)
 
 
 def rows(name: str, runs: Sequence[Means]) -> list[Row]:
@@ -210,7 +213,7 @@ def rows(name: str, runs: Sequence[Means]) -> list[Row]:
     return made
 
 
-def directions(found: dict[str, list[Means]], onset: dict[str, float]) -> list[Row]:
+def directions(found: dict[str, list[Means]], onsets: dict[str, float]) -> list[Row]:
     """Ratios to the dry bed, as logarithms: above 0 where they should rise, with their standard errors."""
     made = []
     for name in (each for each in found if each != "dry" and "dry" in found):
@@ -224,8 +227,8 @@ def directions(found: dict[str, list[Means]], onset: dict[str, float]) -> list[R
                     note=f"standard error {error / ratio:.2g}; experiments report above 0",
                 )
             )
-    for name in (each for each in onset if each != "dry" and "dry" in onset):
-        made.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onset[name] / onset["dry"]))
+    for name in (each for each in onsets if each != "dry" and "dry" in onsets):
+        made.append(Row(f"{name}: minimum fluidisation over that of the dry bed", onsets[name] / onsets["dry"]))
     return made
 
 
@@ -304,8 +307,8 @@ def falling(name: str, folder: Path) -> Ramp:
     falls = run.history["time"] > RAMP[-2][0]
     time, drop = (run.history[each][falls] for each in ("time", "pressure_drop"))
     velocity = np.interp(time, *np.array(RAMP).T)
+    share = drop * case.column.floor_area / buoyant_weight(case)
     try:
-        onset = onsets(case, run.history, layers(run))[1].velocity
-    except InputError:
-        onset = math.nan
-    return Ramp(time, velocity, drop * case.column.floor_area / buoyant_weight(case), onset)
+        return Ramp(time, velocity, share, onset(case, run.history, layers(run), rising=False).velocity)
+    except InputError as missing:
+        return Ramp(time, velocity, share, math.nan, str(missing))
