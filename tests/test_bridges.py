@@ -16,6 +16,7 @@ from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_solution import held_gap, resistance_integral, speed_after_bridge
 from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.slots import BridgeState
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles
@@ -256,6 +257,15 @@ def test_a_bridge_without_liquid_does_not_pull(pull: str, gap: float) -> None:
     assert (run.particles.force[:, 1:] == 0.0).all()
     assert run.edges.bridge_force[0] == pytest.approx(np.zeros(3), abs=0.0)
     assert getattr(capillary_pull, f"{pull}_energy")(TENSION, ANGLE, RADIUS, 0.0, gap) == 0.0
+
+
+def test_a_run_after_another_has_its_bridges() -> None:
+    """What a bridge remembers, its resistance below h_min for instance, is that of its laws."""
+    run, bridges = pair(0.0, FILM)
+    again = ParticleSolver(run.particles, run.table, laws=run.laws, after=run)
+    assert again.bridges is not None and again.bridges.volume.tolist() == bridges.volume.tolist()
+    with pytest.raises(InputError, match="same liquid bridges"):
+        ParticleSolver(run.particles, run.table, laws=Laws(bridge=BridgeLaws(viscosity=3.0)), after=run)
 
 
 @pytest.mark.slow

@@ -113,6 +113,29 @@ def test_states_are_compared_over_the_same_times(tmp_path: Path, monkeypatch: py
     assert windows(tmp_path) == {"dry": {1: 1.6}, "weak": {1: 1.6}}
 
 
+def test_a_bed_at_rest_is_in_no_mean(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The means of a packing end when it comes to rest; the table says when. One that hardly moved is left out."""
+    ends, asked = {f"{name}_{seed}": 10.1 for name in STATES for seed in (1, 2)}, []
+    rests = {"strong_1": 5.0, "strong_2": 0.7}
+
+    def averaged(run: str, begin: float, end: float) -> Means:
+        asked.append((run, begin, end))
+        return made_up(100.0, 1e-3)
+
+    monkeypatch.setattr(validation, "reached", lambda home: ends.get(home.name, 0.0))
+    monkeypatch.setattr(validation, "open_run", lambda home: home.name)
+    monkeypatch.setattr(validation, "rest", lambda run, case: rests.get(run, math.inf))
+    monkeypatch.setattr(validation, "means", averaged)
+    table = {row.quantity: row.value for row in validation.table(tmp_path)}
+    assert [end for run, begin, end in asked if run == "strong_1"] == [5.0] and ("dry_2", 0.6, 10.1) in asked
+    assert "strong_2" not in [run for run, *_ in asked] and (tmp_path / "wet-beds.png").exists()
+    assert {key: table[key] for key in table if "rest" in key} == {
+        "strong: packing 1 comes to rest after": 5.0,
+        "strong: packing 2 comes to rest after": 0.7,
+    }
+    assert table["strong: simulated time in the means"] == pytest.approx(4.4)
+
+
 def test_errors_in_time_are_those_of_a_known_series() -> None:
     """Independent normal values: the error of their deviation is deviation / sqrt(2 n)."""
     values = np.random.default_rng(1).normal(5.0, 2.0, 4000)

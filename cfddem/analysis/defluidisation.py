@@ -7,6 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cfddem.analysis.bed_laws import weight_over_floor
+from cfddem.case.schema import Case
+from cfddem.io.reading import Run
+from cfddem.preflight.bed_estimate import estimate_bed
+
 Series = NDArray[np.float64]
 
 CARRIED = 0.8
@@ -45,6 +50,20 @@ class Defluidisation:
         reasons = " and ".join(filter(None, signs))
         held = f"; the largest agglomerate holds {100.0 * self.largest_share:.0f} % of the particles"
         return f"defluidised from t = {self.time:.3g} s on: {reasons}{held}"
+
+
+def defluidisation_of(run: Run, case: Case) -> Defluidisation | None:
+    """Defluidisation of a wet bed at a velocity that fluidises it dry; None if it is fluidised at the end, or dry."""
+    weight, history = weight_over_floor(case), run.history
+    if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:
+        return None
+    inlet, time = case.bed.inlet_velocity, history["time"]
+    speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
+    return defluidisation(
+        time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
+        speed - estimate_bed(case).onset,
+    )  # fmt: skip
 
 
 def defluidisation(

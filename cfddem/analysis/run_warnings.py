@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.bed_laws import weight_over_floor
-from cfddem.analysis.defluidisation import defluidisation
+from cfddem.analysis.defluidisation import defluidisation_of
 from cfddem.case.schema import Case
 from cfddem.io.reading import Run
 from cfddem.preflight import law_ranges
@@ -80,16 +79,7 @@ def warnings_of(
 
 def _defluidised(run: Run, case: Case) -> Found:
     """A wet bed that has come to rest, or lets the gas pass, at a velocity that fluidises the dry bed."""
-    weight, history = weight_over_floor(case), run.history
-    if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:
-        return
-    inlet, time = case.bed.inlet_velocity, history["time"]
-    speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
-    largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
-    found = defluidisation(
-        time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
-        speed - estimate_bed(case).onset,
-    )  # fmt: skip
+    found = defluidisation_of(run, case)
     if found is not None:
         yield STATE, str(found)
 

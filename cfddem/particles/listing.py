@@ -11,6 +11,7 @@ from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
 from cfddem.particles.ghosts import Divided, Slabs, Whole
+from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.neighbours import list_edges, locality_order, pair_reach, wrap
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.skin import FIRST_SKIN, tuned
@@ -136,18 +137,20 @@ class NeighbourLists:
         self.listed_at = int(state["listed_at"])
 
 
-def rows_before(particles: Particles, earlier: Any, films: bool) -> tuple[np.ndarray, Edges | None]:
+def rows_before(particles: Particles, earlier: Any, laws: Laws) -> tuple[np.ndarray, Edges | None]:
     """Row of each particle in an earlier run (N,), and the list of that run; -1 and None without one.
 
-    films  this run has films, so that the earlier one must have them too
+    laws  of this run: the earlier one must have films if this has, and the same liquid bridges
     """
     if earlier is None:
         return np.full(particles.count, -1, np.int32), None
     then, now = np.argsort(earlier.particles.id), np.argsort(particles.id)
     if earlier.particles.id[then].tolist() != particles.id[now].tolist():
         raise InputError("after", None, "a run over the same particles", "ids differ")
-    if "resistance" not in earlier.edges and films:
+    if "resistance" not in earlier.edges and laws.film:
         raise InputError("after", None, "a run with films, as this one")
+    if laws.bridge not in (None, earlier.laws.bridge):
+        raise InputError("after", None, "a run with the same liquid bridges", "what bridges remember depends on them")
     old_row = np.empty(len(now), np.int32)
     old_row[now] = then
     return old_row, earlier.edges

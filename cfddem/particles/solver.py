@@ -124,9 +124,7 @@ class ParticleSolver:
         self.particles = self.lists.own(particles)
         self._reach = self._find_reach()  # of the list, over R* [-]
         self._take_list(
-            self.lists.first(
-                self.particles, self.walls, self._reach, *rows_before(self.particles, after, self.laws.film)
-            )
+            self.lists.first(self.particles, self.walls, self._reach, *rows_before(self.particles, after, self.laws))
         )
         self._outside = 0
         self.refresh()

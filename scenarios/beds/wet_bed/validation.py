@@ -19,6 +19,7 @@ import numpy as np
 
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.analysis.bubbles import find_bubbles
+from cfddem.analysis.defluidisation import defluidisation_of
 from cfddem.analysis.series import block_average
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
@@ -159,15 +160,24 @@ def _packing(name: str, seed: int) -> Case:
 
 
 def table(folder: Path) -> list[Row]:
-    """The rows that the runs so far allow, and their figure. States are compared over the same times."""
+    """The rows that the runs so far allow, and their figure.
+
+    States are compared over the same times, but a bed that comes to rest only as long as it moves.
+    """
     found: dict[str, list[Means]] = {}
     rows_of_states: list[Row] = []
     for name, ends in windows(folder).items():
-        found[name] = [means(open_run(folder / f"{name}_{seed}"), SETTLED, end) for seed, end in ends.items()]
-        averaged = sum(end - SETTLED for end in ends.values())
-        note = f"packings: {len(ends)} of {len(SEEDS)}; {ROUNDS[-1] - SETTLED:g} s of each are planned"
+        runs = {seed: open_run(folder / f"{name}_{seed}") for seed in ends}
+        moving = while_moving(ends, rests := {seed: rest(run, _packing(name, seed)) for seed, run in runs.items()})
+        averaged = sum(end - SETTLED for end in moving.values())
+        note = f"packings: {len(moving)} of {len(SEEDS)}; {ROUNDS[-1] - SETTLED:g} s of each are planned"
         rows_of_states.append(Row(f"{name}: simulated time in the means", averaged, unit="s", note=note))
-        rows_of_states += rows(name, found[name])
+        for seed, time in rests.items():
+            if math.isfinite(time):
+                rows_of_states.append(Row(f"{name}: packing {seed} comes to rest after", time, unit="s"))
+        if moving:
+            found[name] = [means(runs[seed], SETTLED, end) for seed, end in moving.items()]
+            rows_of_states += rows(name, found[name])
     ramps = {name: falling(name, folder) for name in RAMPS if is_there(folder / ramp_folder(name), RAMP[-1][0])}
     if "dry" in found and len(found) > 1:
         ratios = {quantity: [over_dry(found, name, quantity) for name in found] for quantity, *_ in QUANTITIES}
@@ -191,6 +201,22 @@ def windows(folder: Path) -> dict[str, dict[int, float]]:
         for name in far:
             ends.setdefault(name, {})[seed] = min(far.values())
     return ends
+
+
+def rest(run: Written, case: Case) -> float:
+    """Time from which on a wet bed is not fluidised [s]; infinite if it is at the end."""
+    found = defluidisation_of(run, case)
+    return math.inf if found is None else found.time
+
+
+def while_moving(ends: Mapping[int, float], rests: Mapping[int, float]) -> dict[int, float]:
+    """Packing -> end of the means [s]: at the latest when it comes to rest; without those that never moved for long.
+
+    >>> while_moving({1: 10.1, 2: 10.1, 3: 10.1}, {1: 5.0, 2: math.inf, 3: 0.7})
+    {1: 5.0, 2: 10.1}
+    """
+    moving = {seed: min(end, rests[seed]) for seed, end in ends.items()}
+    return {seed: end for seed, end in moving.items() if end >= SETTLED + FEWEST}
 
 
 def is_there(home: Path, until: float) -> bool:
