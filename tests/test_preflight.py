@@ -225,7 +225,7 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ({"laws.drag": "schiller_naumann"}, "warning", "laws.drag", "is for single spheres"),
         ({"laws.lift": True}, "warning", "laws.lift", "lift is 0.42 % of the drag"),
         ({"laws.agitation": "free_spheres"}, "note", "laws.agitation", "changes bed heights by up to 2 %"),
-        ({}, "warning", "laws.agitation", "although it is for reynolds 25 to 130 and the bed has 57"),
+        ({}, "warning", "laws.agitation", "(free_spheres is for reynolds 25 to 130, but the bed has 579)"),
         ({"fluid.viscosity": 0.0}, "error", "fluid.viscosity", "drag laws need a viscosity above 0"),
         ({"laws.gravity": [0, 0, 9.81]}, "error", "laws.gravity", "is not negative"),
         ({"column.width": 40.0, "column.cell": 0.16, "bed.count": 1_000_000_000}, "error", "bed.count", "GB of memory"),

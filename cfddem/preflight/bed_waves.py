@@ -225,10 +225,8 @@ def check_waves(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     wavelength, wave = found.fastest(found.bed)
     grown = found.amplification(wave)
     if grown > math.exp(WARN_AT):
-        beyond = (
-            outside(law_of(free_spheres), state_of(case, bed)).removeprefix("free_spheres ").replace(", but", " and")
-        )
-        beyond = f", although it {beyond}" if beyond else ""
+        beyond = outside(law_of(free_spheres), state_of(case, bed))
+        beyond = f" ({beyond})" if beyond else ""
         fold = plain(float(f"{grown:.2g}"))
         yield Issue(
             "warning", "laws.agitation",
