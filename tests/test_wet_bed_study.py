@@ -38,20 +38,28 @@ def test_the_pulls_of_the_states_are_as_their_names_say() -> None:
         refuse_errors(case)
 
 
-def made_up(pressure: float, temperature: float) -> Means:
+def made_up(pressure: float, temperature: float, time: float = 10.0) -> Means:
     """Means with an error in time of 2 %."""
     values = 0.05, 0.01, pressure, temperature, 0.01
-    return Means(*((each, 0.02 * each) for each in values))
+    return Means(time, *((each, 0.02 * each) for each in values))
+
+
+def test_packings_count_by_their_times_and_never_agree_better_than_in_time() -> None:
+    alike = over_packings([made_up(100.0, 1e-3)] * 4, "pressure_deviation")
+    assert alike == pytest.approx((100.0, 2.0 / math.sqrt(4.0)))
+    apart = over_packings([made_up(each, 1e-3) for each in (90.0, 100.0, 110.0)], "pressure_deviation")
+    assert apart == pytest.approx((100.0, 10.0 / math.sqrt(3.0)))
+    short = over_packings([made_up(100.0, 1e-3), made_up(200.0, 1e-3, time=0.1)], "pressure_deviation")
+    assert short[0] == pytest.approx(100.0 + 100.0 * 0.1 / 10.1) and short[1] == pytest.approx(2.0, rel=0.02)
 
 
 def test_the_table_has_errors_and_ratios() -> None:
-    assert over_packings([(2.0, 0.3)] * 3) == (2.0, 0.0)
     dry = [made_up(100.0, 1e-3)] * 3
     wet = [made_up(100.0 * each, 5e-4) for each in (1.9, 2.0, 2.1)]
     found = {name: dry if name == "dry" else wet for name in STATES}
     table = {row.quantity: row for row in directions(found, {name: 0.3 + 0.1 * (name != "dry") for name in STATES})}
     row = table["weak: pressure deviation larger than dry, logarithm of the ratio"]
-    assert row.value == pytest.approx(math.log(2.0)) and "0.029" in row.note
+    assert row.value == pytest.approx(math.log(2.0)) and "0.031" in row.note
     assert table["weak: temperature smaller than dry, logarithm of the ratio"].value == pytest.approx(math.log(2.0))
     assert table["strong: minimum fluidisation over that of the dry bed"].value == pytest.approx(4.0 / 3.0)
     assert [row.unit for row in rows("dry", dry)] == ["m", "m", "Pa", "m2/s2", "m"]

@@ -75,6 +75,7 @@ EXPECTED = {"bubble": 1.0, "pressure_deviation": 1.0, "temperature": -1.0}
 class Means(NamedTuple):
     """Means of one run, each with the standard error that follows from its own variation in time."""
 
+    time: float  # that was averaged [s]
     height: Estimate  # [m]
     height_deviation: Estimate  # in time [m]
     pressure_deviation: Estimate  # in time [Pa]
@@ -234,7 +235,7 @@ def rows(name: str, runs: Sequence[Means]) -> list[Row]:
     """Means over the packings, with the standard error of their mean."""
     made = []
     for quantity, unit in UNITS.items():
-        mean, error = over_packings([getattr(each, quantity) for each in runs])
+        mean, error = over_packings(runs, quantity)
         made.append(Row(f"{name}: {quantity.replace('_', ' ')}", mean, unit=unit, note=f"standard error {error:.2g}"))
     return made
 
@@ -260,23 +261,23 @@ def directions(found: dict[str, list[Means]], onsets: dict[str, float]) -> list[
 
 def over_dry(found: Mapping[str, Sequence[Means]], name: str, quantity: str) -> Estimate:
     """Mean of a quantity in a state over that in the dry bed; 1 without error for the dry bed itself."""
-    wet, dry = (over_packings([getattr(run, quantity) for run in found[each]]) for each in (name, "dry"))
+    wet, dry = (over_packings(found[each], quantity) for each in (name, "dry"))
     ratio = wet[0] / dry[0]
     return ratio, 0.0 if name == "dry" else ratio * math.hypot(wet[1] / wet[0], dry[1] / dry[0])
 
 
-def over_packings(values: Sequence[Estimate]) -> Estimate:
-    """Mean over packings and its standard error; of a single packing, that by its variation in time.
+def over_packings(runs: Sequence[Means], quantity: str) -> Estimate:
+    """Mean over packings, weighted by their times, and its standard error.
 
-    >>> over_packings([(1.0, 0.1), (2.0, 0.1), (3.0, 0.1)])
-    (2.0, 0.5773502691896258)
-    >>> over_packings([(1.0, 0.1)])
-    (1.0, 0.1)
+    The error is that by the scatter of the packings or that by their variation in time, whichever is larger: two or
+    three packings may agree by chance.
     """
-    if len(values) == 1:
-        return values[0]
-    each = [mean for mean, _ in values]
-    return float(np.mean(each)), float(np.std(each, ddof=1) / math.sqrt(len(each)))
+    times = np.array([run.time for run in runs])
+    values, errors = np.array([getattr(run, quantity) for run in runs]).T
+    shares, count = times / times.sum(), len(runs)
+    mean = float(shares @ values)
+    scatter = math.sqrt(count / (count - 1)) * np.linalg.norm(shares * (values - mean)) if count > 1 else 0.0
+    return mean, float(max(scatter, np.linalg.norm(shares * errors)))
 
 
 # ---------------------------------------------------------------- one run
@@ -287,6 +288,7 @@ def means(run: Written, begin: float, end: float = math.inf) -> Means:
     inside = (run.history["time"] >= begin) & (run.history["time"] <= end * (1.0 + 1e-9))
     history = {name: column[inside] for name, column in run.history.items()}
     return Means(
+        float(np.ptp(history["time"])),
         _mean(history["bed_height"]),
         _deviation(history["bed_height"]),
         _deviation(history["pressure_drop"]),
