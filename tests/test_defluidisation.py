@@ -52,3 +52,12 @@ def test_a_bed_that_never_moved_is_found() -> None:
 def test_a_short_dip_at_the_end_is_no_defluidisation() -> None:
     dip = np.where(TIME > 1.9, 0.5, WAVES)
     assert defluidisation(TIME, dip, MOTION, SHARE, BLOWN) is None
+
+
+def test_the_less_a_bed_moves_at_the_end_the_sooner_it_counts_as_at_rest() -> None:
+    def ending(begin: float, temperature: float) -> object:
+        return defluidisation(TIME, WAVES, np.where(begin > TIME, MOTION, temperature), SHARE, BLOWN)
+
+    assert ending(1.7, 1e-9) is not None
+    assert ending(1.7, 5e-5) is None and ending(1.4, 5e-5) is not None
+    assert ending(1.9, 1e-9) is None

@@ -31,6 +31,9 @@ SMOOTHED = 0.05
 LASTING = 4
 """Averages that a bed must fail one after the other, up to the end."""
 
+LASTING_STILL = 2
+"""The same for a bed in which hardly anything moves: bubbling beds make no such pauses."""
+
 
 @dataclass(frozen=True)
 class Defluidisation:
@@ -87,9 +90,10 @@ def defluidisation(
     if len(rows) < 4 * width or rows[-1] != len(time) - 1:
         return None
     load, motion, least = (_averaged(series[rows], width) for series in (carried, temperature, NEVER_MOVED * excess**2))
-    rests, passed = (motion < STILL * np.maximum.accumulate(motion)) | (motion < least), load < CARRIED
+    still, passed = motion < least, load < CARRIED
+    rests = (motion < STILL * np.maximum.accumulate(motion)) | still
     failed = rests | passed
-    if not failed[-LASTING * width :].all():
+    if not (failed[-LASTING * width :].all() or still[-LASTING_STILL * width :].all()):
         return None
     first = len(failed) - int(np.argmin(failed[::-1])) if not failed.all() else 0
     row = rows[first]
