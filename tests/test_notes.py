@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -74,16 +75,20 @@ def test_values_in_other_units_are_found_in_gallery_cases(
 
 
 def test_a_report_says_that_a_spray_misses_the_particles(tmp_path: Path) -> None:
-    spray = (
-        "[liquid]\nviscosity = 5e-3\nsurface_tension = 0.07\nthickness = 1e-6\n"
-        "[spray]\nrate = 1e-8\ndrop_volume = 1e-13\nnozzle = [0.01, 0.01, 0.05]\nangle = 40.0\nlength = 0.02\n[run]"
-    )
-    for missed, warned in ((9e-9, True), (1e-10, False)):
+    zones = {
+        "nozzle": "nozzle = [0.01, 0.01, 0.05]\nangle = 40.0\nlength = 0.02",
+        "corner": 'zone = "box"\ncorner = [0.0, 0.0, 0.05]\nsize = [0.02, 0.02, 0.01]',
+    }
+    for (key, zone), (missed, warned) in product(zones.items(), ((9e-9, True), (1e-10, False))):
+        spray = (
+            "[liquid]\nviscosity = 5e-3\nsurface_tension = 0.07\nthickness = 1e-6\n"
+            f"[spray]\nrate = 1e-8\ndrop_volume = 1e-13\n{zone}\n[run]"
+        )
         folder = made_up(
-            tmp_path / f"{missed}", BED.replace("[run]", spray), liquid_missed=missed, liquid_sprayed=1e-8 - missed
+            tmp_path / f"{key}{missed}", BED.replace("[run]", spray), liquid_missed=missed, liquid_sprayed=1e-8 - missed
         )
         said = [each for each in report(folder)["warnings"] if "found no particle in its zone" in each]
-        assert [each.startswith("90 % of the spray") for each in said] == [True] * warned
+        assert [each.startswith("90 % of the spray") and f"spray.{key}" in each for each in said] == [True] * warned
 
 
 def test_a_value_of_a_case_cannot_be_set_and_a_key_is_found_by_its_nearest_name() -> None:

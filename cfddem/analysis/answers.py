@@ -238,8 +238,9 @@ def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, st
         return ("particles at rest", moving, None) if at_rest else ("particles in motion", moving, None)
     share, error = drop["mean"] / weight, 100.0 * drop["error"] / weight
     spread = f" +- {error:.1f}" if error >= 0.05 else ""
-    carried = f"the flow carries {100.0 * share:.1f}{spread} % of the buoyant weight"
-    when = " at the end" * bool(drop.get("inlet_changes"))
+    changes = bool(drop.get("inlet_changes"))
+    carried = f"the flow carries {100.0 * share:.1f}{spread} % of the buoyant weight" + " on average" * changes
+    when = " at the end" * changes
     ratio = f"the inlet velocity{when} is {bed.inlet / bed.onset:.2g} times that of minimum fluidisation"
     lying = measures["wall_load"]["mean"] > LYING * weight if "wall_load" in measures else share < 1.0 - LYING
     if at_rest and lying and bed.inlet > bed.onset:

@@ -60,7 +60,7 @@ def warnings_of(
     for action, text in (
         *_status_warnings(run),
         *_defluidised(run, case),
-        *_spray_missed(run),
+        *_spray_missed(run, case),
         *_series_warnings(case, measures),
         *_missing_laws(case),
         *(
@@ -84,14 +84,15 @@ def _defluidised(run: Run, case: Case) -> Found:
         yield STATE, str(found)
 
 
-def _spray_missed(run: Run) -> Found:
+def _spray_missed(run: Run, case: Case) -> Found:
     """A spray that finds few particles in its zone."""
     history, none = run.history, np.zeros(1)
     missed, landed = (history.get(name, none)[-1] for name in ("liquid_missed", "liquid_sprayed"))
     if missed > MISSED * (missed + landed):
         share = percent(missed / (missed + landed))
-        remedy = "move spray.nozzle nearer to the bed, or give a longer zone"
-        yield STATE, f"{share} of the spray found no particle in its zone: {remedy}"
+        box = case.spray is not None and case.spray.zone == "box"
+        remedy = "move spray.corner to the bed" if box else "move spray.nozzle nearer to the bed"
+        yield STATE, f"{share} of the spray found no particle in its zone: {remedy}, or give a larger zone"
 
 
 def last_value(run: Run, name: str) -> int:

@@ -24,6 +24,9 @@ AMOUNTS = ("thickness", "volume_per_particle", "liquid_fraction")
 SAME_VISCOSITY = 0.01
 """A liquid fluid whose viscosity is that of the liquid within this is the same liquid [-]."""
 
+ROUND_OFF = 1e-9
+"""Share of the size of the column by which a spray zone may leave it: a corner and an edge need not sum exactly [-]."""
+
 
 class Liquid(Checked):
     """Liquid on the particles: it forms bridges between particles and at walls."""
@@ -186,8 +189,9 @@ def _alike(one: float, other: float) -> bool:
 def _check_zone(spray: Spray, size: Point, round_column: bool) -> None:
     """Refuse a spray zone outside the column."""
     for name, place in zip(_KEYS[spray.zone], spray.extremes):
-        inside = all(0.0 <= each <= length for each, length in zip(place.tolist(), size))
-        if round_column and math.hypot(place[0] - 0.5 * size[0], place[1] - 0.5 * size[0]) > 0.5 * size[0]:
+        margin = ROUND_OFF * max(size)
+        inside = all(-margin <= each <= length + margin for each, length in zip(place.tolist(), size))
+        if round_column and math.hypot(place[0] - 0.5 * size[0], place[1] - 0.5 * size[0]) > 0.5 * size[0] + margin:
             inside = False
         if not inside:
             where = ", ".join(f"{each:.4g}" for each in place)
