@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from cfddem.preflight.summary import refuse_errors
+from cfddem.run.simulation import Simulation
+from cfddem.run.wet_measures import spray_zone_share
 from scenarios.beds.coating import bed, coating, distribution
 
 RUN = SimpleNamespace(
@@ -30,6 +32,16 @@ def test_the_case_begins_dry_and_sprays_into_the_column() -> None:
     sprayed = case.spray.rate * (case.run.until - case.spray.begin)
     solid = case.bed.count * np.pi / 6.0 * case.bed.diameter**3
     assert sprayed / solid == pytest.approx(1e-3, rel=0.02)
+
+
+def test_the_share_in_the_spray_zone_is_measured_from_the_start() -> None:
+    """Drops that begin later do not change where the particles are."""
+    case = bed().with_(**{"spray.nozzle": [0.025, 0.005, 0.060]})
+    simulation = Simulation(case)
+    assert simulation.spray is not None
+    inside = simulation.spray.zone(simulation.owned.position)
+    assert 0 < inside.sum() < case.bed.count
+    assert spray_zone_share(simulation) == inside.mean()
 
 
 def test_coating_of_a_snapshot() -> None:

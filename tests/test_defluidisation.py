@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from made_up_run import BED, made_up
 
-from cfddem.analysis.defluidisation import defluidisation
+from cfddem.analysis.defluidisation import defluidisation, defluidisation_of
+from cfddem.case.schema import Case
+from cfddem.io.reading import open_run
 
 TIME = np.linspace(0.0, 2.0, 201)
 SHARE = np.linspace(0.0, 1.0, 201)
@@ -61,3 +66,12 @@ def test_the_less_a_bed_moves_at_the_end_the_sooner_it_counts_as_at_rest() -> No
     assert ending(1.7, 1e-9) is not None
     assert ending(1.7, 5e-5) is None and ending(1.4, 5e-5) is not None
     assert ending(1.9, 1e-9) is None
+
+
+def test_a_bed_that_no_liquid_joins_is_not_held_by_liquid(tmp_path: Path) -> None:
+    liquid = "[liquid]\nviscosity = 5e-3\nsurface_tension = 0.07\nthickness = 1e-6\n[run]"
+    text = BED.replace("[run]", liquid)
+    for largest, held in ((1.0, False), (50.0, True)):
+        still = {"granular_temperature": 1e-12, "particle_count": 100.0, "largest_agglomerate": largest}
+        run = open_run(made_up(tmp_path / str(largest), text, **still))
+        assert (defluidisation_of(run, Case.from_text(text)) is not None) == held

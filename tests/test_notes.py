@@ -65,6 +65,8 @@ def test_a_long_run_with_hard_contacts_is_told_the_modulus_that_saves_time() -> 
         ("liquid-bed", {"run.history_every": 10.0}, "run.history_every", "leaves no means"),
         ("hopper", {"wall.0.radius": 0.002}, "wall.0.radius", "an opening of 0.004 m is narrower than a particle"),
         ("coating", {"run.until": 0.1}, "spray.begin", "nothing is sprayed"),
+        ("coating", {"spray.drop_volume": 1e-22}, "spray.drop_volume", "makes 8.2e+13 drops, more than 1e+09"),
+        ("wet-bed", {"liquid.liquid_fraction": 1.5}, "liquid.liquid_fraction", "is more liquid than solid"),
     ],
 )  # fmt: skip
 def test_values_in_other_units_are_found_in_gallery_cases(

@@ -32,10 +32,14 @@ def sizes(belongs: Numbers) -> Numbers:
 def size_distribution(belongs: Numbers) -> tuple[Numbers, Numbers]:
     """The sizes that occur, and how many agglomerates have each (k,), (k,).
 
-    >>> [each.tolist() for each in size_distribution(np.array([0, 0, 1, 0, 2]))]
+    belongs  of :func:`~cfddem.particles.agglomerates.agglomerates`, or the field `agglomerate` of a snapshot, whose
+             numbers have gaps
+
+    >>> [each.tolist() for each in size_distribution(np.array([0, 0, 7, 0, 9]))]
     [[1, 3], [2, 1]]
     """
-    return np.unique(sizes(belongs), return_counts=True)
+    _, found = np.unique(belongs, return_counts=True)
+    return np.unique(found, return_counts=True)
 
 
 def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:

@@ -62,10 +62,11 @@ def defluidisation_of(run: Run, case: Case) -> Defluidisation | None:
         return None
     inlet, time = case.bed.inlet_velocity, history["time"]
     speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    joined = history["largest_agglomerate"] > 1.0  # before a spray begins, no liquid holds the particles
     largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
     return defluidisation(
         time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
-        speed - estimate_bed(case).onset,
+        np.where(joined, speed - estimate_bed(case).onset, 0.0),
     )  # fmt: skip
 
 

@@ -117,6 +117,6 @@ def _many_colours() -> Any:
     import matplotlib as mpl
     from matplotlib.colors import ListedColormap
 
-    hues = mpl.colormaps["plasma"](np.linspace(0.0, 0.95, 256))
+    hues = mpl.colormaps["plasma"](np.linspace(0.15, 0.95, 256))
     hues[: int(256 * SINGLE)] = (0.78, 0.78, 0.78, 1.0)
     return ListedColormap(hues)

@@ -25,6 +25,9 @@ PENDULAR, WILLETT = 0.1, 1e-3
 CONTENT = 0.1
 """Volume of liquid over that of the particles above which the pores fill and bridges merge [-]."""
 
+DROPS = 1e9
+"""Drops in a run above which landing them takes hours, and those of one time step may exceed the memory."""
+
 
 @dataclass(frozen=True)
 class WetEstimate:
@@ -98,7 +101,12 @@ def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
         return
     key = "liquid." + next((name for name in ("volume_per_particle", "liquid_fraction") if getattr(liquid, name)),
                            "thickness")  # fmt: skip
-    if wet.volume_ratio > PENDULAR or wet.content > CONTENT:
+    if wet.content > 1.0:
+        yield Issue(
+            "error", key, f"{100.0 * wet.content:.3g} % of the volume of the particles is more liquid than solid, "
+            f"in films of {wet.film:.2g} m", "use less liquid; films are micrometres thick",
+        )  # fmt: skip
+    elif wet.volume_ratio > PENDULAR or wet.content > CONTENT:
         yield Issue(
             "warning", key, f"bridges of {wet.volume_ratio:.2g} R^3 and {100.0 * wet.content:.3g} % of liquid merge, "
             f"but the laws hold for single bridges below {PENDULAR:g} R^3", "use less liquid",
@@ -160,6 +168,12 @@ def _check_spray(case: Case) -> Iterator[Issue]:
         yield Issue(
             "warning", "spray.drop_volume", f"{spray.drop_volume:.2g} m3 is more than is sprayed in all, "
             f"{spray.rate * duration:.2g} m3: no drop lands", "use smaller drops; a drop of 0.1 mm has 5e-13 m3",
+        )  # fmt: skip
+    drops = spray.rate * duration / spray.drop_volume
+    if drops > DROPS:
+        yield Issue(
+            "error", "spray.drop_volume", f"{spray.drop_volume:.2g} m3 makes {drops:.2g} drops, more than {DROPS:.0e}",
+            "use larger drops; a drop of 0.1 mm has 5e-13 m3",
         )  # fmt: skip
 
 

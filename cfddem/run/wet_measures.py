@@ -93,8 +93,9 @@ def agglomerated_share(simulation: Simulation) -> float:
 
 def spray_zone_share(simulation: Simulation) -> float:
     """Share of the particles in the spray zone."""
-    owned, total = simulation.owned, simulation.communicator.sum
-    return float(total(owned.zone_inside) / max(total([owned.count]), 1))
+    owned, total, spray = simulation.owned, simulation.communicator.sum, simulation.spray
+    assert spray is not None  # a measure of cases with a spray
+    return float(total(spray.zone(owned.position)) / max(total([owned.count]), 1))
 
 
 def spray_residence_time(simulation: Simulation) -> float:

@@ -111,7 +111,7 @@ def tumble(
     progress          called with the completed fraction of the run
     returns           :class:`Tumbling`
     """
-    _check(film_spread, capillary_number=capillary_number, until=until, film=film)
+    _check(film_spread, capillary_number=capillary_number, count=count, until=until, film=film)
     surface_tension = viscosity * max(shear_rate, 1.0) * diameter / capillary_number
     thickness = film * (1.0 + film_spread * np.random.default_rng(seed).uniform(-1.0, 1.0, count))
     liquid = BridgeLaws(viscosity, surface_tension, math.radians(contact_angle))
