@@ -66,7 +66,10 @@ def test_a_run_goes_on_where_the_folder_holds_one(case: Path) -> None:
     for _ in range(2):
         done = cfddem(*short, folder=case.parent)
         assert done.returncode == 0, done.stderr
+        assert "differs" not in done.stderr
     assert len(list((case.parent / "bed" / "data").iterdir())) == 3
+    done = cfddem(*short, "--set", "bed.seed=7", folder=case.parent)
+    assert done.returncode == 0 and "warning: bed.seed: the case given differs from that of bed" in done.stderr
 
 
 @pytest.mark.skipif(find_spec("distributed") is None, reason="needs dask: pip install 'cfddem[cluster]'")

@@ -41,7 +41,7 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
     results = [report(folder) for folder in folders]
     runs = [open_run(folder) for folder in folders]
     keys = changed([case_of(run) for run in runs])
-    keys = {key: files for key, files in keys.items() if not _same_files(key, files)} | _changed_laws(runs)
+    keys |= _changed_laws(runs)
     numbers = [_numbers(result) for result in results]
     measures = {}
     for name, first in numbers[0].items():
@@ -99,11 +99,15 @@ def run_names(folders: Sequence[Path], keys: Mapping[str, Sequence[Any]]) -> lis
 
 
 def changed(cases: Sequence[Case]) -> dict[str, list[Any]]:
-    """Keys whose values differ, with the value of each case; None where a case lacks the key."""
+    """Keys whose values differ, with the value of each case; None where a case lacks the key.
+
+    Copies of one file do not differ.
+    """
     flat = [dict(_values(case.model_dump(mode="json", fallback=_law_name), "")) for case in cases]
     keys = dict.fromkeys(key for each in flat for key in each)
     rows = {key: [each.get(key) for each in flat] for key in keys}
-    return {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
+    differ = {key: values for key, values in rows.items() if any(value != values[0] for value in values)}
+    return {key: values for key, values in differ.items() if not _same_files(key, values)}
 
 
 def _same_files(key: str, files: Sequence[Any]) -> bool:

@@ -158,14 +158,16 @@ def run(
 
     path = find_case(case)
     folder = output or Path(f"{path.stem}-run")
-    if go_on and (folder / "run.json").exists():
-        resume(folder, threads=threads, ranks=ranks, log=log)
-        return
     from cfddem.case.schema import Case
     from cfddem.case.toml_text import read_text
 
     described = Case.from_toml(path, overrides(set or []))
     communicator = on_ranks(ranks, threads)
+    if go_on and (folder / "run.json").exists():
+        if communicator.rank == 0:
+            _warn_of_another_case(described, folder)
+        resume(folder, threads=threads, ranks=ranks, log=log)
+        return
     _refuse_or_warn(described, communicator)
     from cfddem.backend.compile import use_threads
     from cfddem.run.progress import live_line
@@ -184,6 +186,21 @@ def run(
         prepared.go()
     if communicator.rank == 0:
         _print_report(folder)
+
+
+def _warn_of_another_case(described: Case, folder: Path) -> None:
+    """Say where a case differs from that of the run that is resumed instead."""
+    from cfddem.analysis.comparison import changed
+    from cfddem.case.schema import Case
+
+    keys = list(changed([Case.from_toml(folder / "case.toml"), described]))
+    if keys:
+        more = f" and {len(keys) - 3} more" * (len(keys) > 3)
+        print(
+            f"cfddem: warning: {', '.join(keys[:3])}{more}: the case given differs from that of {folder}, which goes "
+            "on with its own; for the case given, choose another folder",
+            file=sys.stderr,
+        )
 
 
 def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
