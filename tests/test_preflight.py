@@ -346,7 +346,7 @@ def test_json_holds_the_whole_result() -> None:
         ({"bed.diameter": 1e12}, "bed.diameter"),
         ({"material.glass.density": 1e300}, "material.glass.density"),
         ({"bed.count": 10**400}, "bed.count"),
-        ({"column.height": 1e-300, "bed.start": "suspended"}, "column.cell"),
+        ({"column.height": 1e-300, "bed.start": "suspended"}, "column.height"),
         ({"fluid.viscosity": 1e300}, "fluid.viscosity"),
     ],
     ids=["diameter", "density", "count", "height", "viscosity"],

@@ -59,13 +59,14 @@ def input_error(
     failure  what pydantic reports
     model    class that was to be made
     values   raw values
-    more     further errors, found elsewhere
+    more     further errors, found elsewhere; not told where a table is missing
     place    location of a key, such as "bed.toml:14: "
     """
-    reported = _by_key(failure, values)
+    reported, whole_tables = _without_moved_keys(_by_key(failure, values), values, model)
     found = [(key, _one(key, several, model)) for key, several in itertools.islice(reported.items(), MOST)]
     errors = []
-    for key, error in [*found, *(((), error) for error in more)]:
+    others = () if whole_tables else (((), error) for error in more)  # which follow from a missing table
+    for key, error in [*whole_tables, *found, *others]:
         beyond = error.field.removeprefix(dotted(key)).strip(".")  # a section names a key of its own
         rest = [int(part) if part.isdecimal() else part for part in beyond.split(".")] if beyond else []
         whole = (*key, *rest)
@@ -80,6 +81,43 @@ def _by_key(failure: ValidationError, values: Any) -> dict[Key, list[Any]]:
     for each in failure.errors(include_url=False):
         found.setdefault(_key(each["loc"], values, each["type"]), []).append(each)
     return found
+
+
+def _without_moved_keys(
+    reported: dict[Key, list[Any]], values: Any, model: type[BaseModel]
+) -> tuple[dict[Key, list[Any]], list[tuple[Key, InputError]]]:
+    """Reports without the keys of a table whose header is missing, and one error for each such table.
+
+    Without its header, all keys of a table belong to the table above, which knows none of them.
+    """
+    unknown: dict[Key, list[str]] = {}
+    for key, several in reported.items():
+        if key and several[0]["type"] == "extra_forbidden":
+            unknown.setdefault(key[:-1], []).append(str(key[-1]))
+    errors: list[tuple[Key, InputError]] = []
+    for table, words in unknown.items():
+        homes = [each for each in model.model_fields if _has_all(model.model_fields[each], words)]
+        missing = [each for each in homes if isinstance(values, Mapping) and each not in values]
+        home = next(iter(missing or (each for each in homes if "." in _header(each, model.model_fields[each]))), None)
+        if home is None or len(words) < 2:
+            continue
+        first, header = (*table, words[0]), _header(home, model.model_fields[home])
+        limit = f"below a line {header}, as {', '.join(words[1:MOST])} after it"
+        errors.append((first, InputError(dotted(first), None, limit, "the line is missing")))
+        moved = {(home,), *((*table, word) for word in words)}
+        reported = {key: several for key, several in reported.items() if key not in moved}
+    return reported, errors
+
+
+def _has_all(field: FieldInfo, words: Iterable[str]) -> bool:
+    """Whether a table has all of some keys."""
+    return any(all(word in each.model_fields for word in words) for each in sections_of(field))
+
+
+def _header(name: str, field: FieldInfo) -> str:
+    """The line that begins a table, such as [bed], [material.NAME] or [[wall]]."""
+    text = str(field.annotation).lower()
+    return f"[[{name}]]" if text.startswith("tuple") else f"[{name}{'.NAME' * text.count('dict[')}]"
 
 
 def _key(place: tuple[str | int, ...], values: Any, kind: str) -> Key:

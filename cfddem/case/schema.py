@@ -334,10 +334,14 @@ def _unknown_materials(known: list[str], beds: Mapping[str, str | None], column:
     for key, name in beds.items():
         if name is None and len(known) > 1:
             yield InputError(f"{key}.material", None, f"given, {nearest('', known)}")
+    uses: dict[str, list[str]] = {}
     for key, name in {**beds, "column": column}.items():
         if name is not None and name not in known:
-            remedy = "every material is a table [material.NAME]"
-            yield InputError(f"{key}.material", shown(name), nearest(name, known), remedy)
+            uses.setdefault(name, []).append(key)
+    for name, keys in uses.items():
+        others = f"; {len(keys) - 1} more keys name it, too" if len(keys) > 1 else ""
+        remedy = f"every material is a table [material.NAME]{others}"
+        yield InputError(f"{keys[0]}.material", shown(name), nearest(name, known), remedy)
 
 
 def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -> list[InputError]:

@@ -55,9 +55,9 @@ def plain(value: float) -> str:
 
 
 def percent(part: float) -> str:
-    """A part as per cent, without a power of ten.
+    """A part as per cent, without a power of ten below a million.
 
     >>> percent(0.0204), percent(1.44)
     ('2.04 %', '144 %')
     """
-    return f"{100.0 * part:.3g} %" if part < 1.0 else f"{100.0 * part:.0f} %"
+    return f"{100.0 * part:.3g} %" if part < 1.0 or part > 1e4 else f"{100.0 * part:.0f} %"

@@ -86,7 +86,7 @@ def outside(law: Law, state: Mapping[str, float], diameter_ratios: Sequence[floa
     ranges, values = [], []
     for name, value in (*state.items(), *(("diameter_ratio", each) for each in diameter_ratios)):
         low, high = law.ranges.get(name, (-math.inf, math.inf))
-        if not low <= value <= high:
+        if value < low or value > high:  # a value that is not known, NaN, is neither
             ranges.append(f"{name} {low:g} to {high:g}")
             values.append(f"{value:.3g}")
     return f"{law.name} is for {' and '.join(ranges)}, but the bed has {' and '.join(values)}" if ranges else ""

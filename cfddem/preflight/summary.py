@@ -28,6 +28,9 @@ from cfddem.preflight.own_laws import check_own_laws
 from cfddem.preflight.step_estimate import estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
 
+LARGEST, SMALLEST = 1e20, 1e-30
+"""Magnitudes of values of a case beyond which estimates overflow, or say nothing; 0 and seeds are free."""
+
 _EXTREME, _UNITS = "too large or too small for the correlations", "give all values in SI units: m, kg, s, Pa"
 
 
@@ -116,6 +119,9 @@ def _preflight(case: Case, title: str) -> Preflight:
     if case.laws.missing:
         words = "; ".join(f"law {name} is not installed here: no prediction" for name in case.laws.missing.values())
         return Preflight(title, (), (Issue("warning", "laws", words, "install the package that provides it"),))
+    key, value = most_extreme(case)
+    if not SMALLEST <= abs(value) <= LARGEST:
+        return Preflight(title, (), (Issue("error", key, f"{value:g} is {_EXTREME}", _UNITS),))
     own = list(check_own_laws(case))
     if any(each.severity == "error" for each in own):
         return Preflight(title, (), tuple(own))
@@ -163,7 +169,9 @@ def most_extreme(case: Case) -> tuple[str, float]:
     ... ))
     ('material.glass.density', 1e+300)
     """
-    numbers = [each for each in _numbers(case.model_dump(), ()) if each[1] != 0.0]
+    numbers = [
+        (key, value) for key, value in _numbers(case.model_dump(), ()) if value != 0.0 and not key.endswith("seed")
+    ]
     return max(numbers, key=lambda each: abs(math.log10(abs(each[1]))))
 
 
@@ -174,7 +182,8 @@ def _numbers(values: Any, key: tuple[str, ...]) -> Iterator[tuple[str, float]]:
             yield from _numbers(each, (*key, str(name)))
     elif isinstance(values, list | tuple):
         for number, each in enumerate(values):
-            yield from _numbers(each, (*key, str(number)) if isinstance(each, Mapping) else key)
+            if not (isinstance(each, float) and abs(each) < SMALLEST):  # a component is 0 up to rounding
+                yield from _numbers(each, (*key, str(number)) if isinstance(each, Mapping) else key)
     elif isinstance(values, int | float) and not isinstance(values, bool):
         yield ".".join(key), float(values) if abs(values) < 10**308 else math.inf
 
