@@ -162,7 +162,7 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
             "column.cell",
             "0.004 m is 1.3 times the diameter; averages over cells below 2",
         ),
-        ({"column.cell": 0.003}, "error", "column.cell", "0.00307692 m fits 13 times"),
+        ({"column.cell": 0.003}, "error", "column.cell", "0.00666667 m fits along x, y and z"),
         ({"column.cell": 0.00025}, "warning", "column.cell", "of the kernel width"),
         ({"column.cell": 0.0005}, "warning", "column.cell", "of the kernel width"),
         ({"fluid.density": 0.997}, "warning", "fluid.density", "that of a gas"),

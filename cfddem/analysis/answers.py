@@ -138,7 +138,7 @@ def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) 
 
 def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
     """Bed height, and the heights that published expansion laws give for the same particles."""
-    if "bed_height" not in measures or case.particle_count == 1:
+    if "bed_height" not in measures or case.is_one_sphere:
         return
     height = measures["bed_height"]
     verdict = ""
@@ -230,7 +230,7 @@ def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, st
         return "fixed bed", "the particles do not move", None
     weight = weight_over_floor(case)
     flows = case.fluid is not None and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
-    if case.particle_count == 1:
+    if case.is_one_sphere:
         return ("sphere at rest", moving, None) if at_rest and not flows else ("sphere in motion", moving, None)
     drop = measures.get("pressure_drop")
     bed = estimate_bed(case) if drop is None else _bed_at_end(case, drop)

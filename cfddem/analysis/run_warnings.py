@@ -170,7 +170,7 @@ def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float 
 
 def _series_warnings(case: Case, measures: dict[str, Any]) -> Found:
     """Series without a stationary mean, or without an error."""
-    left_out = ("bed_height",) if case.particle_count == 1 else ()  # a sphere that falls is no bed
+    left_out = ("bed_height",) if case.is_one_sphere else ()  # a sphere that falls is no bed
     unsteady = [name for name, each in measures.items() if each["stationary"] is False and name not in left_out]
     drifting = [name.replace("_", " ") for name in unsteady]
     if drifting:

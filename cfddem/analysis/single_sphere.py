@@ -27,7 +27,7 @@ def compared_with_drag_law(run: Run, case: Case) -> Iterator[tuple[str, float, f
     deviation from the equation of motion. Speeds are relative to the mean of the fluid, up to the first contact.
     """
     drag, fluid, law = case.laws.drag_function(), case.fluid, case.laws.drag_law
-    if case.particle_count != 1 or case.bed.fixed or fluid is None or law is None or drag is None:
+    if not case.is_one_sphere or case.bed.fixed or fluid is None or law is None or drag is None:
         return
     density, gravity = case.solid_density, np.array(case.laws.gravity)
     strength = math.hypot(*gravity)

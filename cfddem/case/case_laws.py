@@ -77,8 +77,8 @@ class CaseLaws(Checked):
     wall_drag: Literal["none", "nearest", "all"] = Field(
         "none",
         description="extra drag of a single sphere beside the nearest wall or all walls, by Brenner and by Goldman, "
-        "Cox and Brenner, less what the films apply; prefer nearest: in a box, all lets measured spheres fall at 0.73 to "
-        "0.89 of their largest speed, nearest within 2.5 %",
+        "Cox and Brenner, less what the films apply; prefer nearest: in a box, all lets measured spheres fall at 0.73 "
+        "to 0.89 of their largest speed, nearest within 2.5 %",
     )
     lift: bool = Field(False, description="Saffman-Mei shear lift and Magnus spin lift")
     torque: bool = Field(False, description="hydrodynamic torque against spin relative to the fluid")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -139,6 +139,21 @@ def pair_overrides(
         for first, row in pairs.items()
         for second, pair in row.items()
     }
+
+
+def unknown_materials(known: list[str], beds: Mapping[str, str | None], column: str | None) -> Iterator[InputError]:
+    """Errors for material names without a [material.NAME] table; `beds` holds the name used under each key."""
+    for key, name in beds.items():
+        if name is None and len(known) > 1:
+            yield InputError(f"{key}.material", None, f"given, {nearest('', known)}")
+    uses: dict[str, list[str]] = {}
+    for key, name in {**beds, "column": column}.items():
+        if name is not None and name not in known:
+            uses.setdefault(name, []).append(key)
+    for name, keys in uses.items():
+        others = f"; {len(keys) - 1} more keys name it, too" if len(keys) > 1 else ""
+        remedy = f"every material is a table [material.NAME]{others}"
+        yield InputError(f"{keys[0]}.material", shown(name), nearest(name, known), remedy)
 
 
 def check_pairs(materials: Mapping[str, Material], pairs: Mapping[str, Mapping[str, MaterialPair]]) -> None:

@@ -7,13 +7,13 @@ walls, boundaries, particles and solvers from it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-from cfddem.backend.errors import InputError, nearest, shown
+from cfddem.backend.errors import InputError
 from cfddem.backend.law_choice import chosen
 from cfddem.case.bed import AT_RANDOM, POURED_SOLID_FRACTION, Bed, Name, Point, Positive, Species
 from cfddem.case.case_laws import AgitationFactors, CaseLaws
@@ -21,8 +21,9 @@ from cfddem.case.compare import CaseData, with_files_of
 from cfddem.case.feeds import CaseFeed, CaseOutlet, refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
 from cfddem.case.liquid import Liquid, Spray, check_wet
-from cfddem.case.materials import Checked, Fluid, Material, Materials, Pairs, check_pairs
+from cfddem.case.materials import Checked, Fluid, Material, Materials, Pairs, check_pairs, unknown_materials
 from cfddem.case.toml_text import parse, read_text, set_value
+from cfddem.case.vessel import vessel_of
 from cfddem.case.walls import CaseWall
 from closures.agitation import SHARES, TIMES, free_spheres
 from closures.kinds import BUILT_IN
@@ -145,7 +146,7 @@ class Case(Checked):
     @model_validator(mode="after")
     def _material_names_exist(self) -> Case:
         named = {f"bed.species.{name}": each.material for name, each in self.bed.species.items()}
-        for error in _unknown_materials(list(self.material), named or {"bed": self.bed.material}, self.column.material):
+        for error in unknown_materials(list(self.material), named or {"bed": self.bed.material}, self.column.material):
             raise error
         check_pairs(self.material, self.pair)
         refuse_wrong_equipment(self)
@@ -194,7 +195,9 @@ class Case(Checked):
         bed = self.bed
         if bed.height is None:
             return {name: each.count or len(bed.positions) for name, each in self.species.items()}
-        solids = POURED_SOLID_FRACTION * self.column.floor_area * bed.height
+        vessel = vessel_of(self)
+        volume = self.column.floor_area * bed.height if vessel is None else vessel.below(bed.height)
+        solids = POURED_SOLID_FRACTION * volume
         shares = bed.species_volumes(solids) or dict.fromkeys(self.species, solids)
         return {name: int(shares[name] / each.mean_volume) for name, each in self.species.items()}
 
@@ -266,6 +269,11 @@ class Case(Checked):
         return sum(self.counts.values())
 
     @property
+    def is_one_sphere(self) -> bool:
+        """Whether there is one particle in the whole run: none enter."""
+        return self.particle_count == 1 and not self.feed
+
+    @property
     def reference_speed(self) -> float:
         """Highest collision speed to expect [m/s].
 
@@ -329,21 +337,6 @@ class Case(Checked):
         return Case(**values)
 
 
-def _unknown_materials(known: list[str], beds: Mapping[str, str | None], column: str | None) -> Iterator[InputError]:
-    """Errors for material names without a [material.NAME] table; `beds` holds the name used under each key."""
-    for key, name in beds.items():
-        if name is None and len(known) > 1:
-            yield InputError(f"{key}.material", None, f"given, {nearest('', known)}")
-    uses: dict[str, list[str]] = {}
-    for key, name in {**beds, "column": column}.items():
-        if name is not None and name not in known:
-            uses.setdefault(name, []).append(key)
-    for name, keys in uses.items():
-        others = f"; {len(keys) - 1} more keys name it, too" if len(keys) > 1 else ""
-        remedy = f"every material is a table [material.NAME]{others}"
-        yield InputError(f"{keys[0]}.material", shown(name), nearest(name, known), remedy)
-
-
 def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -> list[InputError]:
     """Errors for unknown material names in raw values, where other errors prevent the case from being made."""
     if any(each["loc"] == () for each in failure.errors()):
@@ -361,4 +354,4 @@ def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -
     beds = {dotted([key]): name for key, name in named.items() if isinstance(name, str | None)}
     walls = column.get("material")
     names = [dotted([each]) for each in known]
-    return list(_unknown_materials(names, beds, walls if isinstance(walls, str) else None))
+    return list(unknown_materials(names, beds, walls if isinstance(walls, str) else None))

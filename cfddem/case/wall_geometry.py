@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import os
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,6 @@ from numpy.typing import NDArray
 from cfddem.backend.errors import InputError
 from cfddem.case.walls import CaseWall
 from cfddem.particles.walls.stl import read_stl
-
-if TYPE_CHECKING:
-    from cfddem.case.schema import Case
 
 Array = NDArray[np.float64]
 
@@ -49,6 +45,19 @@ def is_closed(corners: Array) -> bool:
     edges = edges[edges[:, 0] != edges[:, 1]]
     _, count = np.unique(edges, axis=0, return_counts=True)
     return bool((count % 2 == 0).all())
+
+
+@lru_cache(maxsize=8)
+def _closed(file: str, scale: float, place: tuple[float, float, float], written: tuple[int, int]) -> bool:
+    return is_closed(_triangles(file, scale, place, written))
+
+
+def encloses(wall: CaseWall) -> bool:
+    """Whether a surface from a file is closed.
+
+    errors  InputError if the file cannot be read
+    """
+    return _closed(wall.file or "", wall.scale, wall.point, stamp(wall))
 
 
 def extent(wall: CaseWall) -> Array | None:
@@ -132,60 +141,54 @@ def inside_surface(corners: Array, points: Array) -> NDArray[np.bool_]:
     shift = 1e-6 * np.linalg.norm(high - low) * np.array([0.0, 0.618, 0.414])
     odd, near = np.zeros(len(points), bool), np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
     lines, line = np.unique(points[near][:, 1:] + shift[1:], axis=0, return_inverse=True)
-    x = points[near][:, 0]
-    order = np.argsort(lines[:, 0], kind="stable")
-    crossings: dict[int, list[float]] = {}
-    for a, b, c in corners:
-        box = np.array([a[1:], b[1:], c[1:]])
-        first, last = np.searchsorted(lines[order, 0], (box[:, 0].min(), box[:, 0].max()))
-        for n in order[first:last]:
-            if not box[:, 1].min() <= lines[n, 1] <= box[:, 1].max():
-                continue
-            weights = _weights(box, lines[n])
-            if weights is not None:
-                crossings.setdefault(int(n), []).append(float(weights @ np.array([a[0], b[0], c[0]])))
-    for place, (own, number) in enumerate(zip(x, line.reshape(-1))):
-        odd[near[place]] = sum(each > own for each in crossings.get(int(number), ())) % 2 == 1
+    line = line.reshape(-1)
+    crossed, at = _crossings(corners, lines)
+    # along each line, in the order of x: how many crossings are beyond a point
+    every, x = np.concatenate([crossed, line]), np.concatenate([at, points[near][:, 0]])
+    is_point = np.arange(len(every)) >= len(crossed)
+    order = np.lexsort((is_point, x, every))
+    so_far = np.empty(len(every), int)
+    so_far[order] = np.cumsum(~is_point[order])
+    upto = np.cumsum(np.bincount(crossed, minlength=len(lines)))
+    odd[near] = (upto[line] - so_far[is_point]) % 2 == 1
     return odd
 
 
-def _weights(triangle: Array, point: Array) -> Array | None:
-    """Weights of the corners of a triangle in the plane (3, 2) at a point (2,); None outside."""
-    (ay, az), (by, bz), (cy, cz) = triangle
-    area = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
-    if area == 0.0:
-        return None
-    of_b = ((point[0] - ay) * (cz - az) - (point[1] - az) * (cy - ay)) / area
-    of_c = ((by - ay) * (point[1] - az) - (bz - az) * (point[0] - ay)) / area
-    weights = np.array([1.0 - of_b - of_c, of_b, of_c])
-    return weights if (weights >= 0.0).all() else None
+MOST_PAIRS = 1_000_000
+"""Pairs of triangles and lines that are computed together."""
 
 
-VESSEL = 0.5
-"""Share of the column from which a closed surface is taken for a vessel, whose particles are inside [-]."""
+def _crossings(corners: Array, lines: Array) -> tuple[NDArray[np.int64], Array]:
+    """Where lines along x cross triangles: number of the line and x of each crossing.
 
-
-def on_the_wrong_side(case: Case, wall: CaseWall, positions: Array) -> tuple[int, str] | None:
-    """The first particle on the wrong side of a closed surface, and what is wrong; None if there is none.
-
-    Particles belong inside a surface whose outside is solid or that encloses most of the column, outside one whose
-    inside is solid, and to one side of any other.
-
-    positions  of the particles (N, 3) [m]
+    corners  of the triangles (T, 3, 3)
+    lines    their y and z (L, 2), sorted by y
     """
-    if wall.shape != "surface" or not len(positions) or not is_closed(corners := triangles(wall)):
-        return None
-    inside = inside_surface(corners, positions)
-    wanted = enclosed_volume(corners) > VESSEL * float(np.prod(case.column.size))
-    wanted = wanted or bool(2 * np.count_nonzero(inside) > len(inside))
-    if case.fluid is not None and wall.solid != "none":
-        wanted = wall.solid == "outside"
-    wrong = np.flatnonzero(inside != wanted)
-    if not len(wrong):
-        return None
-    place = ", ".join(f"{each:.4g}" for each in positions[wrong[0]])
-    others = f", and so are {len(wrong) - 1} more" if len(wrong) > 1 else ""
-    return int(wrong[0]), f"at ({place}) m it is {'outside' if wanted else 'inside'}{others}"
+    low, high = corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1)
+    first, last = np.searchsorted(lines[:, 0], low), np.searchsorted(lines[:, 0], high)
+    ends = np.cumsum(last - first)
+    numbers, places, begin = [np.zeros(0, np.int64)], [np.zeros(0)], 0
+    while begin < len(corners):
+        done = ends[begin - 1] if begin else 0
+        end = max(begin + 1, int(np.searchsorted(ends, done + MOST_PAIRS)))
+        count = (last - first)[begin:end]
+        triangle = np.repeat(np.arange(begin, begin + len(count)), count)
+        number = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count) + first[triangle]
+        z = lines[number, 1]
+        beside = (z >= corners[triangle, :, 2].min(axis=1)) & (z <= corners[triangle, :, 2].max(axis=1))
+        triangle, number = triangle[beside], number[beside]
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners[triangle].transpose(1, 2, 0)
+        y, z = lines[number].T
+        area = (by - ay) * (cz - az) - (bz - az) * (cy - ay)
+        with np.errstate(divide="ignore", invalid="ignore"):  # a triangle along the lines has no area, and no weights
+            of_b = ((y - ay) * (cz - az) - (z - az) * (cy - ay)) / area
+            of_c = ((by - ay) * (z - az) - (bz - az) * (y - ay)) / area
+            of_a = 1.0 - of_b - of_c
+            inside = (of_a >= 0.0) & (of_b >= 0.0) & (of_c >= 0.0) & (area != 0.0)
+            numbers.append(number[inside])
+            places.append((of_a * ax + of_b * bx + of_c * cx)[inside])
+        begin = end
+    return np.concatenate(numbers), np.concatenate(places)
 
 
 def enclosed_volume(corners: Array) -> float:

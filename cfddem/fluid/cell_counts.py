@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -24,11 +25,55 @@ def cell_counts(size: Sequence[float], cell: float | Sequence[float]) -> tuple[i
         raise InputError("grid.cell", tuple(widths), "positive, in m")
     counts = np.maximum(np.rint(lengths / widths), 1.0)
     for name, length, width, count in zip("xyz", lengths, widths, counts):
-        if abs(count * width - length) > 1e-6 * length:
-            raise InputError(
-                "grid.cell",
-                float(width),
-                f"a whole fraction of the box, {length:g} m along {name}",
-                f"{length / count:.6g} m fits {int(count)} times",
-            )
+        if abs(count * width - length) > FIT * length:
+            limit = f"a whole fraction of the box, {length:g} m along {name}"
+            raise InputError("grid.cell", float(width), limit, suggested_cells(lengths.tolist(), widths.tolist()))
     return int(counts[0]), int(counts[1]), int(counts[2])
+
+
+FIT = 1e-6
+"""Largest difference between the length of a box and that of its cells, over the length [-]."""
+
+FARTHEST, FINEST = 2.0, 1000
+"""Ratio of a cube to single edges beyond which the edges are suggested; most cells along an edge that are tried."""
+
+
+def suggested_cells(
+    lengths: Sequence[float], widths: Sequence[float], suits: Callable[[float], bool] = lambda _: True
+) -> str:
+    """The cell nearest to a given one that fits a box along x, y and z, in words; three edges where no cube is near.
+
+    lengths, widths  edges of the box and of the cell (3,) [m]
+    suits            whether an edge may be suggested
+
+    >>> suggested_cells((0.2, 0.12, 0.2), (0.0075, 0.0075, 0.0075))
+    '0.008 m fits along x, y and z'
+    >>> suggested_cells((0.2, 0.1234567, 0.2), (0.0075, 0.0075, 0.0075))
+    '[0.00740741, 0.00771604, 0.00740741] m fits'
+    """
+    edges = [_nearest_edge(length, width, suits) for length, width in zip(lengths, widths)]
+    wanted, shortest = min(map(float, edges)), min(lengths)
+    if max(widths) <= min(widths) * (1.0 + FIT):
+        counts = range(1, math.ceil(min(FARTHEST * shortest / wanted, FINEST)) + 1)
+        cubes = [edge for edge in (shortest / each for each in counts) if _fits(edge, lengths) and suits(edge)]
+        nearest = min(cubes, key=lambda each: abs(math.log(each / wanted)), default=0.0)
+        if wanted / FARTHEST <= nearest <= wanted * FARTHEST:
+            return f"{_short(nearest, lengths)} m fits along x, y and z"
+    return f"[{', '.join(edges)}] m fits"
+
+
+def _nearest_edge(length: float, width: float, suits: Callable[[float], bool]) -> str:
+    """The edge of a cell nearest to a given one, or the next larger one that suits, which fits a length."""
+    most = max(round(min(length / width, FINEST)), 1)
+    count = next((each for each in range(most, 0, -1) if suits(length / each)), most)
+    return _short(length / count, (length,))
+
+
+def _fits(width: float, lengths: Sequence[float]) -> bool:
+    return all(abs(round(each / width) * width - each) <= FIT * each and each >= 0.5 * width for each in lengths)
+
+
+def _short(width: float, lengths: Sequence[float]) -> str:
+    """A width with as few digits as fit the lengths."""
+    texts = (f"{width:.{digits}g}" for digits in range(2, 17))
+    return next((text for text in texts if _fits(float(text), lengths)), repr(width))

@@ -8,8 +8,12 @@ from dataclasses import dataclass
 
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
+from cfddem.case.vessel import Vessel, vessel_of
 from cfddem.preflight.mixture import bed_drag
 from closures import balance, drag_single, numbers
+
+EXPANSIONS = 20
+"""Most repetitions until velocity and height of a bed in a vessel fit each other."""
 
 
 @dataclass(frozen=True)
@@ -18,9 +22,9 @@ class BedEstimate:
 
     count: int
     solid_volume: float  # total particle volume [m3]
-    weight: float  # buoyant weight over the floor area [Pa]
+    weight: float  # buoyant weight over the floor area, or over the mean cross-section of the bed in a vessel [Pa]
     archimedes: float
-    inlet: float  # mean superficial velocity over the floor, highest in time [m/s]
+    inlet: float  # mean superficial velocity over that area, highest in time [m/s]
     reynolds: float  # with the superficial velocity; without inflow, with the terminal velocity
     onset: float  # minimum fluidisation velocity u_mf by the drag law, at the voidage of a poured bed [m/s]
     terminal: float  # terminal velocity u_t of a single particle of the slowest species [m/s]
@@ -29,31 +33,42 @@ class BedEstimate:
     height: float  # in the flow [m]
     pressure_drop: float  # [Pa]
     drag_factor: float  # F at this voidage
-
-    @property
-    def poured_height(self) -> float:
-        """Height of the bed at rest [m]."""
-        return self.height * (1.0 - self.voidage) / POURED_SOLID_FRACTION
+    poured_height: float  # of the bed at rest [m]
 
 
 def estimate_bed(case: Case) -> BedEstimate:
     """Estimate the bed of a case.
 
     The bed is packed below minimum fluidisation. Above it, a liquid bed expands to the voidage at which drag
-    balances the buoyant weight; for a gas bed, which bubbles, the voidage of the poured bed is returned.
+    balances the buoyant weight; for a gas bed, which bubbles, the voidage of the poured bed is returned. In a vessel
+    that walls form, velocity and weight are over the mean cross-section of the bed.
     """
-    diameter, floor = case.bed.diameter, case.column.floor_area
+    vessel, solids = vessel_of(case), sum(case.volumes.values())
+    if vessel is None:
+        return _estimate(case, case.column.floor_area, None)
+    height = vessel.height_of(solids / POURED_SOLID_FRACTION)
+    for _ in range(EXPANSIONS):
+        bed = _estimate(case, vessel.below(height) / height, vessel)
+        if abs(bed.height - height) <= 1e-3 * height:
+            break
+        height = bed.height
+    return bed
+
+
+def _estimate(case: Case, floor: float, vessel: Vessel | None) -> BedEstimate:
+    """The bed over a cross-section [m2], that of the column or the mean one of a bed in a vessel."""
+    diameter = case.bed.diameter
     count, solids, density = case.particle_count, sum(case.volumes.values()), case.solid_density
     packed, nan = 1.0 - POURED_SOLID_FRACTION, math.nan
-    poured = solids / (floor * POURED_SOLID_FRACTION)
+    poured = _height(solids, POURED_SOLID_FRACTION, floor, vessel)
     gravity, fluid = math.hypot(*case.laws.gravity), case.fluid
     if fluid is None:
         weight = solids * density * gravity / floor
-        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, nan, packed, poured, nan, nan)
+        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, nan, packed, poured, nan, nan, poured)
     weight = solids * abs(density - fluid.density) * gravity / floor
-    inlet = mean_inlet_velocity(case)
+    inlet = mean_inlet_velocity(case) * (1.0 if vessel is None else vessel.floor / floor)
     if fluid.viscosity == 0.0:
-        return BedEstimate(count, solids, weight, nan, inlet, nan, nan, nan, nan, packed, poured, nan, nan)
+        return BedEstimate(count, solids, weight, nan, inlet, nan, nan, nan, nan, packed, poured, nan, nan, poured)
     number = abs(numbers.archimedes(diameter, density, fluid.density, fluid.viscosity, gravity))
     scale = fluid.viscosity / (fluid.density * diameter)
     drag = bed_drag(case)
@@ -68,21 +83,49 @@ def estimate_bed(case: Case) -> BedEstimate:
     reynolds = (inlet or terminal) / scale
     voidage = packed
     if case.bed.start != "poured" and (case.bed.fixed or inlet == 0.0):
-        voidage = 1.0 - solids / (floor * case.column.height)
+        space = floor * case.column.height if vessel is None else float(vessel.volumes[-1])
+        voidage = 1.0 - solids / space
     elif case.bed.fixed:
         voidage = packed
     elif inlet > 0.0 and number > 0.0 and fluid.is_liquid:
         voidage = balance.voidage_in_balance(number, inlet / scale, drag, packed)
-    height = case.column.height if voidage >= 1.0 else solids / (floor * (1.0 - voidage))
-    drop, fits = weight, 0.0 < voidage <= 1.0  # the voidage is negative where the particles do not fit
-    if fits and (case.bed.fixed or inlet < onset):
-        flow = inlet, diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)
-        drop = balance.pressure_gradient(*flow, drag) * height
+    height = case.column.height if voidage >= 1.0 else _height(solids, 1.0 - voidage, floor, vessel)
+    fits = 0.0 < voidage <= 1.0  # the voidage is negative where the particles do not fit
+    drop = _pressure_drop(case, inlet, onset, weight, voidage, height, floor, vessel) if fits else weight
     factor = drag(reynolds, voidage) if fits else nan
     return BedEstimate(
         count, solids, weight, number, inlet, reynolds, onset, terminal, _terminal_by_law(case, gravity),
-        voidage, height, drop, factor,
+        voidage, height, drop, factor, poured,
     )  # fmt: skip
+
+
+def _height(solids: float, fraction: float, floor: float, vessel: Vessel | None) -> float:
+    """Height of a bed of a solid fraction [m]."""
+    return solids / (floor * fraction) if vessel is None else vessel.height_of(solids / fraction)
+
+
+def _pressure_drop(
+    case: Case, inlet: float, onset: float, weight: float, voidage: float, height: float, floor: float,
+    vessel: Vessel | None,
+) -> float:  # fmt: skip
+    """Pressure drop of the bed [Pa]: the weight of a bed that the flow carries, the drag law of one that is packed.
+
+    In a vessel, each level that is wider than the floor has less drag, and carries no more than its weight.
+    """
+    fluid, drag = case.fluid, bed_drag(case)
+    assert fluid is not None
+
+    def gradient(velocity: float) -> float:
+        flow = case.bed.diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)
+        return balance.pressure_gradient(velocity, *flow, drag) if velocity > 0.0 else 0.0
+
+    if vessel is None:
+        return gradient(inlet) * height if case.bed.fixed or inlet < onset else weight
+    most = math.inf if case.bed.fixed else weight / height
+    if not case.bed.fixed and fluid.is_liquid and inlet >= onset:
+        return weight
+    thickness, areas = vessel.layers(height)
+    return float(sum(dz * min(gradient(inlet * floor / area), most) for dz, area in zip(thickness, areas)))
 
 
 def bubbles(case: Case, bed: BedEstimate) -> bool:
@@ -114,5 +157,6 @@ def mean_inlet_velocity(case: Case) -> float:
         return inlet
     width, depth, _ = column.size
     opening = 0.25 * math.pi * jet.width**2 if jet.round else min(jet.width, width) * min(jet.depth or depth, depth)
-    share = min(1.0, opening / column.floor_area)
+    vessel = vessel_of(case)
+    share = min(1.0, opening / (column.floor_area if vessel is None else vessel.floor))
     return (1.0 - share) * inlet + share * jet.velocity

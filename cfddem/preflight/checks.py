@@ -16,7 +16,7 @@ from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_part
 from cfddem.preflight.issue import ORDER, Issue, Severity, percent, plain, rounded_up
 from cfddem.preflight.law_ranges import check_ranges
 from cfddem.preflight.step_estimate import StepEstimate, estimate_steps
-from cfddem.preflight.unit_checks import check_length, check_units
+from cfddem.preflight.unit_checks import check_length, check_scales, check_units
 from cfddem.preflight.wall_checks import check_walls_and_feeds
 from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 
@@ -47,11 +47,18 @@ def find_issues(
     steps: StepEstimate,
     cost: CostEstimate,
 ) -> list[Issue]:
-    """All errors and warnings of a case, errors first; a particle larger than the column hides all others."""
+    """All errors and warnings of a case, errors first.
+
+    A particle larger than the column, and a surface in mm that lies outside of it, hide all others.
+    """
     too_large = list(check_particle_size(case))
     if too_large:
         return check_length(case, refused=True) or too_large
+    scales = list(check_scales(case))
+    if any(each.severity == "error" for each in scales):
+        return scales
     found = [
+        *scales,
         *check_units(case),
         *check_bed_size(case, bed),
         *check_positions(case),
@@ -88,7 +95,7 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
     presses = causes["the weight of the bed"] > SOFT_OVERLAP and not carried
     severity: Severity = "error" if part > LARGEST_OVERLAP else "warning"
     effect = f"the limit is {percent(SOFT_OVERLAP)}"
-    if case.particle_count == 1 and severity == "warning":
+    if case.is_one_sphere and severity == "warning":
         severity, effect = "note", "a single particle meets walls only"
     elif part <= NOTED_OVERLAP and not presses:
         severity, effect = "note", "overlaps of 2 to 4 % change mean heights by up to about 1.5 %"
@@ -112,7 +119,7 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
 def check_stiffness(case: Case, bed: BedEstimate, collision: CollisionEstimate, cost: CostEstimate) -> Iterator[Issue]:
     """Tell that a long run has contacts much stiffer than it needs."""
     species = case.species[collision.species]
-    if case.bed.fixed or case.particle_count == 1 or case.run.particle_step is not None or cost.seconds < LONG_RUN:
+    if case.bed.fixed or case.is_one_sphere or case.run.particle_step is not None or cost.seconds < LONG_RUN:
         return
     solid, needed = case.material_of(species), needed_modulus(case, collision)
     if not 0.0 < needed < 0.1 * (solid.contact_modulus or solid.youngs_modulus):

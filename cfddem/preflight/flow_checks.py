@@ -8,9 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from cfddem.case.schema import Case
+from cfddem.fluid.cell_counts import suggested_cells
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.geometry_checks import bed_key
-from cfddem.preflight.issue import Issue, plain, rounded_up
+from cfddem.preflight.issue import Issue, plain
 from cfddem.preflight.step_estimate import StepEstimate
 from cfddem.preflight.unit_checks import unit_of_velocity
 
@@ -40,7 +41,29 @@ def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
     """Check that the filter kernel is wide enough for a particle, and the cells not needlessly small."""
     assert steps.cells is not None
     spacing = [length / count for length, count in zip(case.column.size, steps.cells) if count > 1]
-    smallest, diameter = min(spacing, default=min(case.column.size)), case.bed.largest_diameter
+    yield from _check_smallest_cell(case, min(spacing, default=min(case.column.size)))
+
+
+def suggested_cell(case: Case, wanted: float | None = None) -> str:
+    """A cell that fits the column along x, y and z and that the check does not object to, in words.
+
+    wanted  size that it should have; default: that of the case [m]
+    """
+    given = case.column.cell if isinstance(case.column.cell, tuple) else (case.column.cell,) * 3
+    widths = given if wanted is None else (wanted,) * 3
+    return suggested_cells(case.column.size, widths, lambda edge: not any(_check_smallest_cell(case, edge, False)))
+
+
+def _check_smallest_cell(case: Case, smallest: float, suggests: bool = True) -> Iterator[Issue]:
+    """Check the smallest edge of a cell [m] against the kernel and the particles.
+
+    suggests  whether the remedy names a cell of the column
+    """
+    diameter = case.bed.largest_diameter
+
+    def cells(wanted: float) -> str:
+        return suggested_cell(case, wanted) if suggests else ""
+
     divided, kernel = case.laws.mapping == "divided", case.laws.kernel_width * diameter
     own = 0.0 if divided else 1.0 / math.sqrt(6.0)
     sphere = diameter / math.sqrt(20.0) if divided else 0.0
@@ -50,26 +73,26 @@ def check_kernel(case: Case, steps: StepEstimate) -> Iterator[Issue]:
         yield Issue(
             "error" if width < SMALLEST_KERNEL else "warning", "column.cell",
             f"{smallest:.3g} m distributes a particle over {width:.2g} diameters; use at least {NARROW_KERNEL:g}",
-            f"use cells of {3.0 * diameter:.2g} m, or laws.kernel_width = 1.5",
+            f"use larger cells ({cells(3.0 * diameter)}), or laws.kernel_width = 1.5",
         )  # fmt: skip
     elif smallest < FEWEST_DIAMETERS * case.bed.diameter * (1.0 - 1e-9):
         yield Issue(
             "warning", "column.cell",
             f"{smallest:.3g} m is {smallest / case.bed.diameter:.2g} times the diameter; averages over cells below "
             f"{FEWEST_DIAMETERS:g} diameters have no meaning",
-            f"use cells of {rounded_up(FEWEST_DIAMETERS * case.bed.diameter):.2g} m or more",
+            f"use larger cells: {cells(FEWEST_DIAMETERS * case.bed.diameter)}",
         )  # fmt: skip
     if kernel > FINEST * smallest:
         yield Issue(
             "warning", "column.cell",
             f"{smallest:.3g} m is less than 1/{FINEST:g} of the kernel width {kernel:.3g} m, which costs time",
-            f"use cells of {2.0 * diameter:.2g} m or more", False,
+            f"use larger cells: {cells(2.0 * diameter)}", False,
         )  # fmt: skip
 
 
 def check_cells(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[Issue]:
     """Check that a fluidised bed is several cells high, and its column several cells wide."""
-    if case.particle_count == 1 or case.bed.positions or case.wall or not bed.inlet > bed.onset:
+    if case.is_one_sphere or case.bed.positions or case.wall or not bed.inlet > bed.onset:
         return
     assert steps.cells is not None
     cells, high = max(steps.cells[:2]), bed.height / case.column.height * steps.cells[2]

@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import on_the_wrong_side
+from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, vessel_of
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue, Severity
 
@@ -44,7 +44,9 @@ def check_particle_size(case: Case) -> Iterator[Issue]:
 def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check that the particles fit into the column at the start, and the expanded bed below the lid."""
     column, diameter, start = case.column, case.bed.largest_diameter, case.bed.start
-    fraction = bed.solid_volume / (column.floor_area * column.height)
+    vessel = vessel_of(case)
+    volume = column.floor_area * column.height if vessel is None else float(vessel.volumes[-1])
+    fraction = bed.solid_volume / volume
     limit = SUSPENDED_SOLID_FRACTION if start == "suspended" else POURED_SOLID_FRACTION
     remedy = f"at most {int(bed.count / fraction * limit)} of these particles fit; use fewer, or a higher column"
     count = bed_key(case, "count")
@@ -75,7 +77,10 @@ def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 
 
 def check_positions(case: Case) -> Iterator[Issue]:
-    """Check that given positions lie in the column and apart from each other."""
+    """Check that particles start on the right side of surfaces, given positions in the column and apart."""
+    with suppress(InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
+        if (wrong := start_behind_a_surface(case)) is not None:
+            yield Issue("error", *wrong)
     positions = np.array(case.bed.positions, float).reshape(-1, 3)
     if not len(positions):
         return
@@ -93,10 +98,11 @@ def check_positions(case: Case) -> Iterator[Issue]:
             f"the column extends from 0 to {case.column.size} m",
         )  # fmt: skip
     for number, wall in enumerate(case.wall):
-        with suppress(InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
-            if (found := on_the_wrong_side(case, wall, positions)) is not None:
-                reason = f"wall.{number}.file = {wall.file!r} is closed, and {found[1]}"
-                yield Issue("error", f"bed.positions.{found[0]}", reason, "move it to the other side of the surface")
+        with suppress(InputError, OSError, ValueError):
+            if (found := on_the_wrong_side(case, number, positions)) is not None:
+                row, why, remedy = found
+                reason = f"wall.{number}.file = {wall.file!r} is closed, and {why}"
+                yield Issue("error", f"bed.positions.{row}", reason, remedy)
     overlap, rows = _largest_overlap(positions, case.bed.diameter)
     if overlap > LARGEST_INITIAL_OVERLAP:
         yield Issue(

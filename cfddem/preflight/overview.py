@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from cfddem.backend.errors import InputError
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
+from cfddem.case.vessel import vessel_of
 from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.preflight.bed_estimate import BedEstimate, bubbles
@@ -53,7 +54,7 @@ def overview(
         *_species(case, bed),
         *_collisions_and_film(case, collision),
         *_bridges(wet),
-        *_equipment(case),
+        *_equipment(case, bed),
         *_time_scales(case, bed, steps),
         *_expected(case, bed),
         *_cost(cost),
@@ -146,7 +147,7 @@ def _bridges(wet: WetEstimate | None) -> Iterator[Row]:
     yield Row(group, "viscous time", wet.relaxation_time, "s", "of a pair at the minimum gap")
 
 
-def _equipment(case: Case) -> Iterator[Row]:
+def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
     group = "walls and feeds"
     for number, wall in enumerate(case.wall):
         if wall.shape == "surface":
@@ -161,6 +162,9 @@ def _equipment(case: Case) -> Iterator[Row]:
             yield Row(
                 group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid"
             )
+    if (vessel := vessel_of(case)) is not None:
+        yield Row(group, "cross-section at the floor", vessel.floor, "m2", "that walls leave open")
+        yield Row(group, "cross-section at the bed surface", vessel.area_at(bed.height), "m2")
     if case.feed:
         yield Row(group, "particles at the end, at most", case.particle_count + fed_count(case))
 
@@ -212,13 +216,12 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, "bed voidage", bed.voidage)
         if bed.inlet:
             packed, law = case.bed.fixed or bed.inlet < bed.onset, bed_drag(case).__name__
-            yield Row(
-                group, "pressure drop", bed.pressure_drop, "Pa", law if packed else "buoyant weight over the floor area"
-            )
-            if packed and law != "ergun" and case.fluid is not None:
+            area = "the floor area" if vessel_of(case) is None else "the mean cross-section of the bed"
+            yield Row(group, "pressure drop", bed.pressure_drop, "Pa", law if packed else f"buoyant weight over {area}")
+            if packed and vessel_of(case) is None and law != "ergun" and case.fluid is not None:
                 flow = bed.inlet, case.bed.diameter, case.fluid.density, case.fluid.viscosity, bed.voidage
                 yield Row(group, "pressure drop, Ergun", ergun_gradient(*flow) * bed.height, "Pa")
-    elif case.bed.start == "poured" and not case.wall:
+    elif case.bed.start == "poured" and (not case.wall or vessel_of(case) is not None):
         yield Row(group, "bed height", bed.height, "m", "poured")
 
 

@@ -21,6 +21,7 @@ from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
 from cfddem.preflight.cost_estimate import estimate_cost
+from cfddem.preflight.flow_checks import suggested_cell
 from cfddem.preflight.geometry_checks import fits
 from cfddem.preflight.issue import ORDER, WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
@@ -138,7 +139,8 @@ def _preflight(case: Case, title: str) -> Preflight:
     except InputError as failure:
         reason = f"{'' if failure.value is None else f'{failure.value!r} '}must be {failure.limit}"
         key = failure.field.replace("grid.", "column.")
-        return Preflight(title, (), (Issue("error", key, reason, failure.remedy or "change it"),))
+        remedy = suggested_cell(case) if key == "column.cell" else failure.remedy or "change it"
+        return Preflight(title, (), (Issue("error", key, reason, remedy),))
     except (ArithmeticError, ValueError):
         key, value = most_extreme(case)
         return Preflight(title, (), (Issue("error", key, f"{value:g} is {_EXTREME}", _UNITS),))

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import triangles
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.geometry_checks import bed_key, fits
 from cfddem.preflight.issue import Issue, percent
@@ -19,6 +23,9 @@ solids are denser than the fourth [kg/m3] and stiffer than the last [Pa].
 LARGE_TENSION, ROUGH = 3.0, 0.05
 """Surface tension above that of every liquid, molten metals included [N/m]; roughness over the diameter of a particle
 above which the surface is no longer that of a sphere [-]."""
+
+LARGE_SURFACE, FITTING = 30.0, 3.0
+"""Size of a surface over that of the column above which its file may be in mm, if it is in mm below the second [-]."""
 
 LARGE_PARTICLE, VISCOUS_LIQUID = 0.1, 0.1
 """Diameter [m] and viscosity [Pa s] from which values may have been given in mm and mPa s."""
@@ -43,6 +50,30 @@ def unit_of_velocity(case: Case, bed: BedEstimate) -> str:
     if bed.onset < 1e-3 * bed.inlet < bed.terminal:
         return f"is it in mm/s? {1e-3 * bed.inlet:.3g} m/s fluidises the bed"
     return ""
+
+
+def check_scales(case: Case) -> Iterator[Issue]:
+    """Check that no surface file is so large that it may be in mm; an error where none of it lies in the column."""
+    size = np.array(case.column.size)
+    for number, wall in enumerate(case.wall):
+        if wall.shape != "surface" or wall.scale != 1.0:
+            continue
+        try:
+            corners = triangles(wall)
+        except (InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
+            continue
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        times = float((high - low).max() / size.max())
+        if not LARGE_SURFACE < times < 1e3 * FITTING:
+            continue
+        near = ((corners.min(axis=1) <= size) & (corners.max(axis=1) >= 0.0)).all(axis=1)
+        ends = " to ".join(f"({', '.join(f'{each:.4g}' for each in corner)})" for corner in (low, high))
+        where = "is" if near.any() else "lies outside the column and is"
+        yield Issue(
+            "warning" if near.any() else "error", f"wall.{number}.scale",
+            f"the surface, from {ends} m, {where} {times:.3g} times as large; is the file in millimetres?",
+            "scale = 0.001 reads it in mm",
+        )  # fmt: skip
 
 
 def check_units(case: Case) -> Iterator[Issue]:

@@ -26,7 +26,7 @@ from cfddem.case.wall_geometry import (
 )
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cell_counts import cell_counts
-from cfddem.preflight.issue import Issue, Severity
+from cfddem.preflight.issue import Issue, Severity, percent
 
 MANY_TRIANGLES, MOST_TRIANGLES, LARGEST_FILE = 200_000, 2_000_000, 1_000_000_000
 """Triangles of a surface above which preparation is slow, and above which it is refused; largest file [byte]."""
@@ -39,6 +39,10 @@ LOOSE = 0.3
 
 MOST_CELLS = 5_000_000
 """Cells above which the pre-run check does not look for those that walls close."""
+
+MOST_LEAKS, BETWEEN, LEAKS = 200_000, 8, 0.25
+"""Cells above which the check does not look for walls thinner than a cell, places between the centres of two cells
+at which it looks, and the share of a wall that may let the fluid pass without a warning [-]."""
 
 SAMPLES, MOSTLY = 400, 0.5
 """Places tried in the box of a feed, and share of them that must be free of walls [-]."""
@@ -176,6 +180,12 @@ def _check_cells(case: Case) -> Iterator[Issue]:
                 "warning", f"wall.{number}.solid", "the wall closes no cell: the fluid passes through it",
                 'use cells smaller than the wall is thick, or set solid = "none"',
             )  # fmt: skip
+        elif (share := leaking_share(case, case.wall[number], closed)) > LEAKS:
+            yield Issue(
+                "warning", f"wall.{number}.solid",
+                f"the wall is thinner than a cell: fluid passes through {percent(share)} of it",
+                "use cells of half its thickness, or a thicker wall",
+            )  # fmt: skip
     together = reduce(np.logical_or, closed.values(), np.zeros((1, 1, 1), bool))
     if together.all():
         yield Issue("error", "wall", "the walls close all cells to the fluid", 'check solid: "inside" or "outside"')
@@ -197,6 +207,29 @@ def closed_cells(case: Case) -> dict[int, np.ndarray]:
             with suppress(InputError, OSError):  # a surface that cannot be read, or is open, is reported elsewhere
                 closed[number] = solid_part(wall, centres.reshape(-1, 3)).reshape(x.shape)
     return closed
+
+
+def leaking_share(case: Case, wall: CaseWall, closed: dict[int, np.ndarray]) -> float:
+    """Share of a wall that lies between two open cells, so that the fluid passes, in the worst direction [-].
+
+    closed  cells that each wall closes
+    """
+    own = reduce(np.logical_or, closed.values())
+    shape = own.shape[::-1]
+    if own.size > MOST_LEAKS:
+        return 0.0
+    steps = np.array(case.column.size) / shape
+    centres = np.stack(np.meshgrid(*(np.arange(n) + 0.5 for n in shape), indexing="ij"), axis=-1) * steps
+    is_open, worst = ~own.transpose(2, 1, 0), 0.0
+    for axis in range(3):
+        here, there = (np.take(is_open, range(k, shape[axis] - 1 + k), axis) for k in (0, 1))
+        starts = np.take(centres, range(shape[axis] - 1), axis)[here & there]
+        within = np.zeros(len(starts), bool)
+        for part in (np.arange(BETWEEN) + 0.5) / BETWEEN:
+            within |= solid_part(wall, starts + part * steps * np.eye(3)[axis])
+        leaking, stopped = float(within.sum()), 0.5 * float((here ^ there).sum())  # a line enters and leaves the wall
+        worst = max(worst, leaking / max(leaking + stopped, 1.0))
+    return worst
 
 
 def _is_periodic(case: Case) -> bool:

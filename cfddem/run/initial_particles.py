@@ -12,7 +12,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.liquid import Liquid
 from cfddem.case.particle_properties import ParticleProperties, particle_properties
 from cfddem.case.schema import Case
-from cfddem.case.wall_geometry import on_the_wrong_side
+from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, start_box
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import clear_of_walls, loose_places
@@ -43,10 +43,13 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     """The particles of a case at the start."""
     bed, properties = case.bed, particle_properties(case)
     diameters = properties.diameter
+    if (wrong := start_behind_a_surface(case)) is not None:
+        key, reason, remedy = wrong
+        raise InputError(key, None, f"changed: {reason}", remedy)
     if bed.start == "poured":
         with _box_named_as_in(case):
             spheres = poured_bed(
-                table, diameters, properties.density, walls, *_filling_box(case),
+                table, diameters, properties.density, walls, *start_box(case),
                 box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
                 gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
                 at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
@@ -152,18 +155,16 @@ def _must_be_apart(made: Particles, walls: Sequence[Wall], of_column: int) -> No
 
 def _must_be_on_one_side(case: Case, position: Array) -> None:
     """Refuse particles on the wrong side of a closed surface."""
-    for number, wall in enumerate(case.wall):
-        if (found := on_the_wrong_side(case, wall, position)) is not None:
-            row, why = found
+    for number in range(len(case.wall)):
+        if (found := on_the_wrong_side(case, number, position)) is not None:
+            row, why, remedy = found
             limit = f"on the other side of the closed surface of wall.{number}.file"
-            raise InputError(
-                f"position of particle {row}", None, limit, f"{why}; set bed.start_corner and bed.start_size"
-            )
+            raise InputError(f"position of particle {row}", None, limit, f"{why}; {remedy}")
 
 
 def _spread_evenly(case: Case, properties: ParticleProperties, walls: Sequence[Wall]) -> Array:
     """Places of particles of unequal size: a loose filling, stretched to the height of the column (N, 3) [m]."""
-    corner, size = _filling_box(case)
+    corner, size = start_box(case)
     places = loose_places(properties.diameter, walls, corner, size, case.bed.seed, _layer(case, properties))
     top, largest = float((places[:, 2] + 0.5 * properties.diameter).max()), float(properties.diameter.max())
     if top > size[2]:
@@ -184,18 +185,6 @@ def _must_be_inside(position: Array, size: tuple[float, float, float]) -> None:
     if outside.any():
         row = int(np.argmax(outside))
         raise InputError(f"position of particle {row}", position[row].tolist(), f"inside the column, 0 to {size} m")
-
-
-def _filling_box(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Corner and size of the box that particles are poured into [m]."""
-    if case.bed.start_corner is not None and case.bed.start_size is not None:
-        return case.bed.start_corner, case.bed.start_size
-    width, depth, height = case.column.size
-    if case.column.shape == "box":
-        return (0.0, 0.0, 0.0), (width, depth, height)
-    side = width / math.sqrt(2.0)
-    corner = 0.5 * (width - side)
-    return (corner, corner, 0.0), (side, side, height)
 
 
 def periodic_directions(case: Case) -> tuple[bool, bool, bool]:
