@@ -100,6 +100,8 @@ def test_a_slow_bead_sticks() -> None:
         ({"flip": 1.5}, "flip"),
         ({"cavitation": 1e5}, "cavitation"),
         ({"diameter": math.inf}, "diameter"),
+        ({"domain": 0.1, "velocity": 0.3}, r"domain = 0.1: must be at least 0\.\d+ for this bead"),
+        ({"domain": 0.7, "cells": 10}, "domain"),
     ],
     ids=lambda value: str(value),
 )

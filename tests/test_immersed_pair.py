@@ -21,6 +21,7 @@ from cfddem.backend.errors import InputError, UnstableStep
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from closures import restitution, timescales
+from scenarios.collisions.bouncing_sphere.study import bounce
 from scenarios.collisions.immersed_pair import MATERIALS, Collision, collide
 from scenarios.validation.table import numbers, reference
 
@@ -340,3 +341,20 @@ def test_a_wrong_file_of_rebounds_is_one_line(
     (tmp_path / "points.csv").write_text(text)
     done = call("collide", "--velocity", "0.1", "--data", "points.csv")
     assert (done.code, done.err.count("\n")) == (2, 1) and said in done.err, done.err
+
+
+@pytest.mark.parametrize("against", ["sphere", "wall"])
+def test_a_pair_is_followed_beyond_its_neighbour_list(against: Any) -> None:
+    """It parts by more than the list reaches, without a force, at the speed at which it has left the film."""
+    result = collide(GLASS, viscosity=0.001, velocity=0.5, until=0.1, against=against)
+    assert result.gap[-1] > 12.7e-3
+    assert result.time[-1] == pytest.approx(0.1, rel=1e-6)
+    assert result.history["normal_speed"][-1] == pytest.approx(result.restitution * 0.5, rel=1e-3)
+
+
+def test_a_sphere_that_falls_back_onto_its_wall_finds_it_again() -> None:
+    """The bouncing sphere without forces of the fluid leaves the list of its wall, and comes back."""
+    time, gap = bounce(0.12, ())
+    after = gap[time > 0.0]
+    assert np.isfinite(gap).all() and after.max() > 1e-3
+    assert after[-1] < 1e-5

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from example_case import TEXT
 
-from cfddem.backend.errors import InputError
+from cfddem.backend.errors import InputError, RunFailed, RunStopped
 from cfddem.case.materials import Material
+from cfddem.case.schema import Case
 from cfddem.particles.initial.filling import loose_places
 from cfddem.particles.initial.packing import from_table
 from cfddem.particles.initial.pouring import AT_REST, poured_bed
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
+from cfddem.run.initial_particles import in_the_box
+from cfddem.run.runner import Run
 
 GRAIN = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.7, friction=0.3)
 DIAMETER = 1e-3
@@ -58,3 +64,51 @@ def test_walls_that_move_later_are_at_rest_while_a_bed_is_poured() -> None:
     belt: list[Wall] = [Plane(velocity=(1.0, 0.0, 0.0)), CUP[1]]
     bed = poured_bed(pair_table([GRAIN]), np.full(30, DIAMETER), 2500.0, belt, AROUND, SIZE, seed=1)
     assert not bed.run.walls.velocity.any()
+
+
+def test_a_shallow_bed_on_a_wide_floor_comes_to_rest() -> None:
+    """Nothing slows a sphere that rolls on a flat floor; particles that roll in balance do not keep a bed from rest."""
+    width = 14 * DIAMETER
+    sides: list[Wall] = [Plane(), Plane(normal=(1.0, 0.0, 0.0)), Plane(normal=(0.0, 1.0, 0.0))]
+    sides += [
+        Plane(point=(width, 0.0, 0.0), normal=(-1.0, 0.0, 0.0)),
+        Plane(point=(0.0, width, 0.0), normal=(0.0, -1.0, 0.0)),
+    ]
+    bed = poured_bed(
+        pair_table([GRAIN]), np.full(120, DIAMETER), 2500.0, sides, (0.0, 0.0, 0.0), (width, width, 0.02), seed=1
+    )
+    assert bed.energy < AT_REST
+    assert bed.particles.position[:, 2].max() < 2.0 * DIAMETER
+
+
+def test_a_bed_that_does_not_rest_names_what_a_case_can_change() -> None:
+    with pytest.raises(RunFailed) as refused:
+        poured_bed(pair_table([GRAIN]), np.full(200, DIAMETER), 2500.0, CUP, AROUND, SIZE, seed=1, patience=0.5)
+    message = str(refused.value)
+    assert "limit 1e-07" in message and "laws.rolling_resistance" in message and "bed.start" in message
+    assert "patience" not in message
+
+
+def test_particles_poured_across_a_periodic_side_are_brought_back() -> None:
+    """A position beyond a periodic side, be it by round-off, is the same place within the column."""
+    case = Case.from_text(TEXT).with_(**{"column.sides": "periodic"})
+    width = case.column.width
+    places = np.array([[-5.8e-8, 0.5 * width, 1e-3], [1.25 * width, width, 2e-3], [0.3 * width, -0.0, 3e-3]])
+    inside = in_the_box(places, case)
+    assert ((inside >= 0.0) & (inside <= width)).all()
+    assert np.allclose(
+        inside, [[width - 5.8e-8, 0.5 * width, 1e-3], [0.25 * width, 0.0, 2e-3], [0.3 * width, 0.0, 3e-3]]
+    )
+    assert np.array_equal(in_the_box(places, Case.from_text(TEXT)), places)
+
+
+def test_ctrl_c_while_a_bed_is_poured_leaves_a_message_and_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cfddem.run.build.particles_of", interrupted)
+    with pytest.raises(RunStopped, match="before the first step: nothing is kept; the same command begins anew"):
+        Run.begin(Case.from_text(TEXT), tmp_path / "run")
+    assert not (tmp_path / "run").exists()

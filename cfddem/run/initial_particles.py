@@ -67,6 +67,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
         places = _spread_evenly(case, properties, walls)
     else:
         places = _suspended(len(diameters), float(diameters.max()), case, walls)
+    places = in_the_box(places, case)
     made = make_bodies(
         places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
         material=properties.material,
@@ -178,6 +179,13 @@ def _spread_evenly(case: Case, properties: ParticleProperties, walls: Sequence[W
 
 def _layer(case: Case, properties: ParticleProperties) -> np.ndarray | None:
     return properties.species if case.bed.arrangement == "layers" else None
+
+
+def in_the_box(places: Array, case: Case) -> Array:
+    """The places, brought back into the column along its periodic directions (N, 3) [m]."""
+    periodic, size = np.array(periodic_directions(case)), np.array(case.column.size)
+    inside: Array = places - periodic * size * np.floor(places / size)
+    return inside
 
 
 def _must_be_inside(position: Array, size: tuple[float, float, float]) -> None:

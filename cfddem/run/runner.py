@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import signal
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -115,7 +116,8 @@ class Run:
         communicator.by_first(lambda: _prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
         wall = Stopwatch()
-        simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
+        with _no_empty_folder(folder):
+            simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
         wall.count("preparation")  # initial packing, loading of compiled loops
         simulation.wall.seconds |= wall.seconds
         grid = None if simulation.fluid is None else simulation.fluid.grid.whole
@@ -342,6 +344,21 @@ def _prepare_folder(folder: Path, text: str, case: Case) -> None:
     require_no_foreign_files(folder)
     make_folder(folder)
     keep_files(case, folder)
+
+
+@contextmanager
+def _no_empty_folder(folder: Path) -> Iterator[None]:
+    """Remove the folder of a run that ends while it is prepared, unless it holds files."""
+    try:
+        yield
+    except BaseException as failure:
+        with suppress(OSError):
+            (folder / "data").rmdir()
+            folder.rmdir()
+        if isinstance(failure, KeyboardInterrupt):
+            message = "stopped by SIGINT before the first step: nothing is kept; the same command begins anew"
+            raise RunStopped(message, signal.SIGINT) from None
+        raise
 
 
 def quantities_of(simulation: Simulation) -> Quantities:

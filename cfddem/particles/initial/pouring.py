@@ -31,6 +31,10 @@ _STIFFER = 8.0
 _STEPS_BETWEEN_STOPS = (5, 7, 11, 13)
 """Steps between two stops of particles that move against their force; unequal, so as not to follow an oscillation."""
 
+ROLLING, _ROLLS = 10.0, 1e-3
+"""After this many times of a fall, particles that gain less than this share of the power of their weight are stopped,
+too: nothing else slows a sphere that rolls on a flat floor."""
+
 NEARLY_AT_REST = 1e-4
 """Share of the energy that may be left if a fluid stirs the bed anyway; a few particles may still roll."""
 
@@ -87,7 +91,7 @@ def poured_bed(
     gravity       along -z [m/s2]
     laws          of the later run
     at_rest       largest remaining share of the energy of the fall
-    patience      longest time, over the time of a fall from the top
+    patience      longest time, over the time of a fall from the top, or through the width if that is longer
     progress      called from time to time with the time and the remaining share of the energy
 
     Raises RunFailed if the bed does not come to rest in time.
@@ -110,8 +114,10 @@ def poured_bed(
         box=box,
         check_steps=False,  # steps follow the time_scales here
     )
-    pouring = _Pouring(run, float(np.sum(spheres.mass * gravity * (places[:, 2] - corner[2]))), gravity, height)
-    pouring.patience, pouring.progress, pouring.at_rest = patience, progress, at_rest
+    pouring = _Pouring(
+        run, float(np.sum(spheres.mass * gravity * (places[:, 2] - corner[2]))), gravity, height, patience
+    )
+    pouring.progress, pouring.at_rest = progress, at_rest
     pouring.fall()
     pouring.calm()
     while soft < 1.0:
@@ -130,13 +136,15 @@ def poured_bed(
 class _Pouring:
     """The stages of pouring: fall, calm, release."""
 
-    patience = 50.0
     at_rest = AT_REST
     progress: Progress | None = None
 
-    def __init__(self, run: ParticleSolver, brought: float, gravity: float, height: float) -> None:
+    def __init__(self, run: ParticleSolver, brought: float, gravity: float, height: float, patience: float) -> None:
         self.run, self.brought, self.gravity = run, brought, gravity
         self.fall_time = math.sqrt(2.0 * height / gravity)
+        # in a shallow bed particles take longer to roll to their places than to fall
+        reach = max(height, *np.ptp(run.particles.position[:, :2], axis=0))
+        self.longest = patience * math.sqrt(2.0 * reach / gravity)
         self.time = 0.0
         self.slow = 0.1 * math.sqrt(gravity * float(run.particles.radius.min()))
 
@@ -145,15 +153,12 @@ class _Pouring:
 
         step    [s]
         steps   number of steps
-        errors  RunFailed if the particles still move after `patience` fall times
+        errors  RunFailed if the particles still move after the longest time
         """
         self.run.advance(step, steps)
         self.time += steps * step
-        if self.time > self.patience * self.fall_time:
-            raise RunFailed(
-                f"the bed still holds {self.left:.2g} of its energy after {self.time:.3g} s (limit {self.at_rest:g}); "
-                "raise patience, or use a material with more friction or less restitution"
-            )
+        if self.time > self.longest:
+            raise RunFailed(_not_at_rest(self.run, self.left, self.time, self.at_rest))
 
     @property
     def left(self) -> float:
@@ -180,7 +185,11 @@ class _Pouring:
             step = 0.7 * self.run.time_scales(self.slow).limit
             for steps in 6 * _STEPS_BETWEEN_STOPS:
                 self.go(step, steps)
-                back = (made.velocity * made.force + made.spin * made.torque).sum(axis=1) < 0.0
+                power = (made.velocity * made.force + made.spin * made.torque).sum(axis=1)
+                back = power < 0.0
+                if self.time > ROLLING * self.fall_time:
+                    speed = np.linalg.norm(made.velocity, axis=1) + made.radius * np.linalg.norm(made.spin, axis=1)
+                    back |= power < _ROLLS * self.gravity * made.mass * speed
                 made.velocity[back] = 0.0
                 made.spin[back] = 0.0
             self.report_progress()
@@ -197,6 +206,18 @@ class _Pouring:
             most = max(most, self.left)
         self.report_progress()
         return most
+
+
+def _not_at_rest(run: ParticleSolver, left: float, time: float, limit: float) -> str:
+    """What to say of a bed that does not come to rest in time, and what a case can change."""
+    moving = int(np.argmax((run.particles.velocity**2).sum(axis=1)))
+    place = ", ".join(f"{each:.3g}" for each in run.particles.position[moving])
+    share = (unbalanced(run) > _UNBALANCED).mean()
+    return (
+        f"the poured bed is not at rest after {time:.3g} s: it holds {left:.2g} of the energy of its fall (limit "
+        f"{limit:g}), {share:.2%} of the particles are out of balance, the fastest one at ({place}) m;\n"
+        'raise friction or lower restitution of its material, set laws.rolling_resistance, or bed.start = "suspended"'
+    )
 
 
 def unbalanced(run: ParticleSolver) -> np.ndarray:
@@ -300,7 +321,4 @@ def pour(
             progress(run.time, left)
         if run.time > fall and left < AT_REST:
             return run
-    raise RunFailed(
-        f"the bed still holds {left:.2g} of its energy after {run.time:.3g} s (limit {AT_REST:g}); "
-        "raise patience, or use a material with more friction or less restitution"
-    )
+    raise RunFailed(_not_at_rest(run, left, run.time, AT_REST))

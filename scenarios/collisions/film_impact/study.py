@@ -83,7 +83,7 @@ def impact(
     cavitation          lowest pressure of the liquid, below 0, such as -1e5; without it, it holds any suction [Pa]
     wetted_share        guess of the wetted radius over sqrt(D (film - gap)) instead of the tracked one, for comparison
     wetted_missing      share of its volume that the outermost wetted column may lack
-    domain              width of the domain, over the usual one
+    domain              width of the domain, over the usual one; from about 0.8 on
     flip                share of its own velocity that a liquid particle keeps
     particles_per_side  of a cell, along radius and height
     courant             cells that the liquid may cross in a step
@@ -136,8 +136,12 @@ def _tension(sigma: float, angle: float) -> Tension | None:
 
 def grid_for(diameter: float, film: float, cells: int, domain: float = 1.0) -> Grid:
     """The grid of an impact: 1.1 times the widest wetted radius and ten cells wide, five films high."""
-    dx = film / cells
-    width = 1.1 * math.sqrt(2.0 * diameter * film) + 10.0 * dx
+    dx, wetted = film / cells, math.sqrt(2.0 * diameter * film)
+    width = 1.1 * wetted + 10.0 * dx
+    least = (wetted + dx) / width
+    if domain < least:  # the bead would fill the domain and leave the liquid no surface
+        limit = f"at least {math.ceil(1e3 * least) / 1e3:g} for this bead, film and number of cells"
+        raise InputError("domain", domain, limit, "the wetted radius must fit into it")
     return Grid(math.ceil(domain * width / dx), 5 * cells, dx)
 
 

@@ -162,7 +162,8 @@ def follow(
             near = moment.gap < 4.0 * minimum_gap + 2.0 * setting.speed * setting.impact_step
             advance(setting.impact_step, 1 if near else 25)
         else:
-            advance(min(_step(moment, minimum_gap, setting, cutoff, turn), longest))
+            left = math.inf if until is None else until - simulation.time
+            advance(min(_step(moment, minimum_gap, setting, cutoff, turn), longest, left))
     none = np.zeros(3)  # forces of the fluid are known from the first step on
     columns = {name: np.array([row.get(name, none) for row in rows]) for name in rows[-1]}
     return columns | {"touched": np.array(touched)}
@@ -171,13 +172,15 @@ def follow(
 def _moments(
     simulation: ParticleSolver, rows: list[dict[str, Any]], fluid: StillFluid | None
 ) -> Iterator[tuple[_Moment, float]]:
+    listed = simulation.edges.minimum_gap
+    begins_with = float(listed[0])  # where a pair that has left the neighbour list begins anew
     while simulation.steps < MOST_STEPS:
-        moment = _look(simulation)
+        moment, listed = _look(simulation), simulation.edges.minimum_gap
         last = rows[-1]
         if simulation.time > last["time"]:
             moment = replace(moment, rate=(moment.gap - last["gap"]) / (simulation.time - last["time"]))
         rows.append(_row(simulation, moment, fluid))
-        yield moment, float(simulation.edges.minimum_gap[0])
+        yield moment, float(listed[0]) if len(listed) else begins_with
     raise RunFailed(
         f"the pair neither separates nor halts within {MOST_STEPS} steps: gap {moment.gap:.3g} m, "
         f"speed {moment.speed:.3g} m/s at t = {simulation.time:.3g} s; try a larger step_fraction"

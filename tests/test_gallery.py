@@ -1,0 +1,51 @@
+"""Every case of the gallery starts, runs, reports and draws, as a user would try it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import call
+
+from cfddem.case.gallery import gallery
+from cfddem.case.schema import Case
+
+SHARE = 5
+"""The plain test takes a fifth of the particles."""
+
+
+def try_out(name: str, folder: Path, overrides: dict[str, Any]) -> None:
+    """Run a few fluid steps, report and draw."""
+    end = Case.from_toml(gallery()[name]).run.until
+    times = {"until": 2e-3 * end, "every": 1e-3 * end, "history_every": 5e-4 * end, "average_from": 1e-3 * end}
+    settings = {**{f"run.{key}": value for key, value in times.items()}, **overrides}
+    words = [word for key, value in settings.items() for word in ("--set", f"{key}={value!r}")]
+    made = call("run", name, "-o", str(folder / "run"), *words)
+    assert made.code == 0, made.err
+    reported = call("report", str(folder / "run"), "-o", str(folder / "report.html"))
+    assert reported.code == 0, reported.err
+    assert "finished" in reported.out.splitlines()[0]
+    drawn = call("view", str(folder / "run"), "-o", str(folder / "picture.png"))
+    assert drawn.code == 0, drawn.err
+    assert (folder / "picture.png").stat().st_size > 10_000
+    assert (folder / "report.html").stat().st_size > 10_000
+
+
+def fewer(case: Case) -> dict[str, Any]:
+    """Overrides of a case with a fifth of its particles."""
+    bed = case.bed
+    if bed.positions:
+        return {}
+    return {"bed.height": bed.height / SHARE} if bed.height else {"bed.count": (bed.count or 0) // SHARE}
+
+
+@pytest.mark.parametrize("name", gallery())
+def test_a_fifth_of_every_gallery_case_starts_reports_and_draws(name: str, tmp_path: Path) -> None:
+    try_out(name, tmp_path, fewer(Case.from_toml(gallery()[name])))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", gallery())
+def test_every_gallery_case_starts_reports_and_draws(name: str, tmp_path: Path) -> None:
+    try_out(name, tmp_path, {})
