@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import RunFailed
+from cfddem.backend.launch import python_command
 
 REMEDY = "on Debian or Ubuntu install the missing libraries: apt-get install -y --no-install-recommends libegl1 libgl1"
 
@@ -51,7 +51,7 @@ def why_not() -> str | None:
     for kind in kinds:
         environment = os.environ | ({_WINDOW: kind} if kind else {})
         try:
-            tried = subprocess.run([sys.executable, "-c", _PROBE], env=environment, capture_output=True, timeout=120)
+            tried = subprocess.run(python_command("-c", _PROBE), env=environment, capture_output=True, timeout=120)
         except subprocess.TimeoutExpired:
             continue
         if tried.returncode == 0:

@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.backend.launch import safe_workers
+from cfddem.backend.working_folder import ignore_settings_files
 from cfddem.case.compare import Points, points_of
 from cfddem.case.gallery import full_key, read_value
 from cfddem.case.schema import Case
@@ -157,7 +159,8 @@ def on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
     """Outcomes as runs end, several runs at a time."""
     from joblib import Parallel, delayed
 
-    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
+    with safe_workers():
+        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
 
 
 def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
@@ -205,6 +208,7 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> 
     from cfddem.run.runner import Run
 
     begun, kept = time.monotonic(), False
+    ignore_settings_files()  # by a worker, too, so that it compiles the same loops
     try:
         if one_thread:
             use_threads(1)
