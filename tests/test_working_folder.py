@@ -153,8 +153,11 @@ def test_damaged_settings_of_other_packages_in_the_working_folder_disturb_no_com
     folder = made_up(tmp_path / "run", rows=101)
     for name in ("matplotlibrc", ".numba_config.yaml"):
         (folder / name).write_bytes(b"\xff{[" * 9)
-    done = execute(Trap(folder, tmp_path / "mark"), script(), "report .", PYTHONPATH=str(HOME))
+    trap, where = Trap(folder, tmp_path / "mark"), {"PYTHONPATH": str(HOME)}
+    done = execute(trap, script(), "report .", **where)
     assert (done.returncode, done.stderr) == (0, "")
+    again = "import cfddem, pyvista, numba; numba.core.config.reload_config(); print('as ever')"
+    assert execute(trap, python_command("-c", again), "", **where).stdout == "as ever\n"
 
 
 def test_python_m_cfddem_imports_no_pyvista_of_the_working_folder(tmp_path: Path) -> None:

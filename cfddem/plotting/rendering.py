@@ -21,6 +21,7 @@ REMEDY = "on Debian or Ubuntu install the missing libraries: apt-get install -y 
 
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 _PROBE = """
+import cfddem
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere())

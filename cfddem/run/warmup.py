@@ -17,7 +17,6 @@ import numpy as np
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.launch import python_command
-from cfddem.backend.working_folder import ignore_settings_files
 from cfddem.case.schema import Case
 from cfddem.fluid.momentum import transport
 from closures.compiled import cache_folder
@@ -78,5 +77,4 @@ def warm_up(case: Case) -> None:
 
 
 if __name__ == "__main__":
-    ignore_settings_files()
     warm_up(Case.from_text(sys.stdin.read()))
