@@ -12,7 +12,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.io.damage import damage_named, opened, require_about, require_columns
 from cfddem.io.file_lock import lock_file
-from cfddem.io.files import disk_error, reason, require_format
+from cfddem.io.files import disk_error, reason, require_format, require_no_links
 from cfddem.io.index import POINTS, Layout, Snapshot
 
 FORMAT = 2
@@ -26,6 +26,9 @@ NUMBERED = re.compile(r"\d{8}\.h5")
 
 OWN_FILES = ("case.toml", "data", "surfaces", "measured")
 """What a run that was killed before it wrote any data leaves in its folder, beside hidden files."""
+
+WRITTEN = (*RUN_FILES, *OWN_FILES, ".lock")
+"""Everything that a run writes in its folder."""
 
 MOST_NAMED = 6
 """Most files or runs that an error names."""
@@ -144,8 +147,9 @@ def require_no_foreign_files(folder: Path) -> None:
 def make_folder(folder: Path) -> None:
     """Create the folder of a run.
 
-    errors  InputError with the reason if this is not possible
+    errors  InputError with the reason if this is not possible, or for a link in it
     """
+    require_no_links(folder, WRITTEN)
     try:
         (folder / "data").mkdir(parents=True, exist_ok=True)
     except OSError as failure:
@@ -155,11 +159,12 @@ def make_folder(folder: Path) -> None:
 def lock(folder: Path) -> Any:
     """Lock a run for this process; the lock ends with the process, however it ends.
 
-    errors  InputError if another process holds the lock
+    errors  InputError if another process holds the lock, or for a link in the folder
     """
+    require_no_links(folder, WRITTEN)
     path = folder / ".lock"
     try:
-        file = path.open("w", encoding="utf-8")
+        file = path.open("a", encoding="utf-8")
     except OSError as failure:
         raise disk_error("write", path, failure) from failure
     if not lock_file(file):

@@ -19,10 +19,10 @@ from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
 from cfddem.backend.launch import safe_workers
-from cfddem.backend.working_folder import ignore_settings_files
 from cfddem.case.compare import Points, points_of
 from cfddem.case.gallery import full_key, read_value
 from cfddem.case.schema import Case
+from cfddem.io.files import require_no_links
 from cfddem.io.kept_files import holds_surfaces_of, text_with_kept_files
 from cfddem.io.quantities import shown_unit
 from cfddem.preflight.summary import preflight
@@ -149,6 +149,7 @@ def make_output(output: Path) -> None:
     if output.exists() and not output.is_dir():
         raise InputError("output", str(output), "a folder", "a file of that name exists")
     output.mkdir(parents=True, exist_ok=True)
+    require_no_links(output)
 
 
 _Work = list[tuple[Case, dict[str, Any], Path, bool]]
@@ -208,7 +209,6 @@ def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> 
     from cfddem.run.runner import Run
 
     begun, kept = time.monotonic(), False
-    ignore_settings_files()  # by a worker, too, so that it compiles the same loops
     try:
         if one_thread:
             use_threads(1)
