@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import Any
+
+if sys.flags.safe_path:  # as in every process that a command starts
+    from cfddem.backend.working_folder import ignore_settings_files
+
+    ignore_settings_files()
 
 __version__ = "0.1.0"
 

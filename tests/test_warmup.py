@@ -75,7 +75,7 @@ def test_the_other_process_is_given_the_case_and_stopped(monkeypatch: pytest.Mon
     stand_in = "import pathlib, sys, time; pathlib.Path(sys.argv[1]).write_text(sys.stdin.read()); time.sleep(60)"
 
     def watched(words: list[str], **more: object) -> subprocess.Popen[bytes]:
-        assert words == [sys.executable, "-m", "cfddem.run.warmup"]
+        assert words == [sys.executable, "-P", "-m", "cfddem.run.warmup"]
         started.append(start([sys.executable, "-c", stand_in, str(tmp_path / "case.toml")], **more))
         return started[-1]
 

@@ -1,4 +1,4 @@
-"""Processes of a run: how many an MPI launcher has started, and how to start them. Nothing here imports MPI."""
+"""Processes: how those of Python are started, and how many an MPI launcher has started. Nothing here imports MPI."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -20,6 +21,29 @@ TERMINAL = "CFDDEM_TERMINAL"
 """Set where ranks were started from a terminal, which they do not see themselves."""
 
 INSTALL = "pip install 'cfddem[cluster]', or build mpi4py against the MPI of the machine"
+
+
+def python_command(*words: str) -> list[str]:
+    """The command line of another process of this Python; code in the working folder is not imported (`-P`).
+
+    words  such as `-m` and the name of a module
+    """
+    return [sys.executable, "-P", *words]
+
+
+@contextmanager
+def safe_workers() -> Iterator[None]:
+    """Processes of Python that a library starts inside the block import no code in the working folder, either."""
+    name = "PYTHONSAFEPATH"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 def launched() -> int:

@@ -14,6 +14,7 @@ from cyclopts import App, CycloptsError, Group
 from cfddem import __version__
 from cfddem.backend.errors import CfddemError
 from cfddem.backend.launch import several_ranks
+from cfddem.backend.working_folder import ignore_settings_files
 from cfddem.cli import calibration, cases, information, results, validation
 from cfddem.cli.ranks import end_together
 
@@ -76,6 +77,7 @@ def main() -> None:
         for stream in (sys.stdout, sys.stderr):
             getattr(stream, "reconfigure", lambda **_: None)(errors="replace")
     try:
+        ignore_settings_files()
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning  # type: ignore[assignment]
             app(sys.argv[1:], exit_on_error=False, print_error=False)

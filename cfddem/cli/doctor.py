@@ -6,7 +6,6 @@ import os
 import platform
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -112,7 +111,7 @@ def _processes(quick: bool) -> Answer:
     if find_spec("mpi4py") is None:
         return Answer("processes", True, f"one; for runs on several ranks: {launch.INSTALL}")
     try:
-        command = launch.launch_command(2, [sys.executable, "-m", "cfddem.cli.ranks_trial"])
+        command = launch.launch_command(2, launch.python_command("-m", "cfddem.cli.ranks_trial"))
     except InputError as failure:
         return Answer("processes", False, str(failure))
     if quick:

@@ -10,7 +10,7 @@ from typing import NoReturn
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
-from cfddem.backend.launch import TERMINAL, communicator, launch_command, launched, require_mpi4py
+from cfddem.backend.launch import TERMINAL, communicator, launch_command, launched, python_command, require_mpi4py
 
 PATIENCE = 3.0
 """How long a rank that fails waits for the others to fail too, before it ends them [s]."""
@@ -47,7 +47,7 @@ def _start(ranks: int, threads: int | None) -> NoReturn:
     os.environ.setdefault("NUMBA_NUM_THREADS", str(threads or 1))
     if sys.stderr.isatty():
         os.environ[TERMINAL] = "1"
-    command = launch_command(ranks, [sys.executable, "-m", "cfddem", *sys.argv[1:]])
+    command = launch_command(ranks, python_command("-m", "cfddem", *sys.argv[1:]))
     sys.stdout.flush()
     os.execv(command[0], command)
 

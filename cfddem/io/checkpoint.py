@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.io.damage import ArrayFile, memory, opened
 from cfddem.io.files import disk_error, hdf5_in_memory, reason, require_format, write_whole
 
 FORMAT = 4
@@ -79,7 +80,8 @@ def newest(folder: Path) -> dict[str, Any]:
         fault = _fault(path)
         if fault is None:
             _require_format(path)
-            return _get_all(path)
+            with opened(path, "delete it; the previous one is used then") as data:
+                return _get(data.file, data)
         _log.warning("%s: %s; using the previous checkpoint", path, fault)
     raise RunFailed(f"{home}: all checkpoints are damaged ({len(found)}); delete the folder and run the case again")
 
@@ -92,6 +94,8 @@ def _files(home: Path) -> list[Path]:
 def _fault(path: Path) -> str | None:
     """Why a checkpoint is damaged; None if it is not."""
     try:
+        if path.stat().st_size > memory():
+            return "damaged, larger than the memory of this machine"
         content = path.read_bytes()
     except OSError as failure:
         return reason(failure)
@@ -140,22 +144,14 @@ def _put(group: Any, values: Mapping[str, Any], where: str) -> None:
                 raise InputError(here, type(value).__name__, "an array, number, text, flag, list or dict") from None
 
 
-def _get_all(path: Path) -> dict[str, Any]:
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        return _get(file)
-
-
-def _get(group: Any) -> dict[str, Any]:
+def _get(group: Any, data: ArrayFile) -> dict[str, Any]:
     import h5py
 
     values: dict[str, Any] = {}
     for name, each in group.items():
         if isinstance(each, h5py.Group):
-            values[name] = _get(each)
-        elif "json" in each.attrs:
-            values[name] = json.loads(each[()])
+            values[name] = _get(each, data)
         else:
-            values[name] = each[()]
+            data.require_size(each)
+            values[name] = json.loads(each[()]) if "json" in each.attrs else each[()]
     return values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,8 +15,14 @@ from cfddem.backend.errors import CfddemError, RunFailed
 VECTORS = ("position", "velocity", "spin", "force")
 """Particle fields with three components."""
 
-_UNREADABLE = (OSError, KeyError, IndexError, RuntimeError, TypeError, ValueError, AttributeError)
-"""What h5py raises for damaged files; the kind of the damage decides which."""
+MOST_COMPRESSED = 1032
+"""Most bytes that one byte of a file can stand for. It is the limit of deflate, by which snapshots are compressed
+(zlib.net/zlib_tech.html, maximum compression factor)."""
+
+_UNREADABLE = (
+    OSError, KeyError, IndexError, RuntimeError, TypeError, ValueError, AttributeError, MemoryError, OverflowError,
+)  # fmt: skip
+"""What h5py and json raise for damaged files; the kind of the damage decides which."""
 
 
 @contextmanager
@@ -31,6 +38,57 @@ def damage_named(path: Path, remedy: str = "move the file elsewhere and retry") 
     except _UNREADABLE as damage:
         what = " ".join(str(damage).split())[:200]
         raise RunFailed(f"{path}: the file is damaged ({what}); {remedy}") from damage
+
+
+def memory() -> float:
+    """Memory of this machine [byte]; infinite where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):  # Windows has no such call
+        return float("inf")
+
+
+class ArrayFile:
+    """An open HDF5 file of a run. Arrays are read only as long as their sizes fit the size of the file."""
+
+    def __init__(self, path: Path, file: Any) -> None:
+        self.file = file
+        size, most = path.stat().st_size, memory()
+        self._limit = min(MOST_COMPRESSED * size, most)
+        self._why = f"a file of {size:.4g} bytes holds" if self._limit < most else "the memory of this machine holds"
+        self._used = 0
+
+    def require_size(self, dataset: Any) -> None:
+        """Refuse an array that, with all others that were read, is larger than the file can hold.
+
+        errors  ValueError
+        """
+        self._used += dataset.nbytes
+        if self._used > self._limit:
+            name, shape = dataset.name.lstrip("/"), " x ".join(map(str, dataset.shape))
+            raise ValueError(
+                f"{name} has {shape} values, {self._used:.3g} bytes; {self._why} at most {self._limit:.3g}"
+            )
+
+    def read(self, dataset: Any, rows: Any = ()) -> np.ndarray:
+        """The values of an array, or some of its rows.
+
+        errors  ValueError if it is too large
+        """
+        self.require_size(dataset)
+        return np.asarray(dataset[rows])
+
+
+@contextmanager
+def opened(path: Path, remedy: str = "move the file elsewhere and retry") -> Iterator[ArrayFile]:
+    """An open HDF5 file of a run; every read of such a file begins here.
+
+    errors  RunFailed, one line, if it cannot be read
+    """
+    import h5py
+
+    with damage_named(path, remedy), h5py.File(path, "r") as file:
+        yield ArrayFile(path, file)
 
 
 def require_about(about: Any) -> None:

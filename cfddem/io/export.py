@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.io.files import require_no_links
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import Run, open_run
 
@@ -41,7 +42,10 @@ def export(
             raise InputError("snapshot", each, f"from 0 to {count - 1}, or -1 for the last")
     places = [each % count for each in places]
     library = _library({"vtu": "meshio", "csv": "pandas", "netcdf": "xarray"}[kind])
+    if output is None:
+        require_no_links(Path(), [home.name])
     home.mkdir(parents=True, exist_ok=True)
+    require_no_links(home)
     return {"vtu": _vtu, "csv": _csv, "netcdf": _netcdf}[kind](run, home, places, library)
 
 

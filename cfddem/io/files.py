@@ -8,6 +8,7 @@ from __future__ import annotations
 import errno
 import io
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,8 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
     """
     fresh = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL}")
     try:
-        with fresh.open("wb") as file:
+        fresh.unlink(missing_ok=True)
+        with fresh.open("xb") as file:  # never through a link of that name
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -79,6 +81,18 @@ def require_folder(output: Path | None) -> None:
     """
     if output is not None and not output.parent.is_dir():
         raise InputError("output", str(output), "a file in an existing folder", f"create {output.parent} first")
+
+
+def require_no_links(folder: Path, names: Iterable[str] | None = None) -> None:
+    """Refuse links in a folder that is to be written: what is written or deleted there would be so elsewhere.
+
+    names   of the members that are written; all if None
+    errors  InputError
+    """
+    members = (folder / name for name in names) if names is not None else folder.glob("*")
+    for path in members:
+        if path.is_symlink():
+            raise InputError(f"{path}", None, "no link", f"it leads to {os.readlink(path)!r}; put a copy in its place")
 
 
 def remove_partial(folder: Path) -> None:

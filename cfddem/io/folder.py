@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, RunFailed
-from cfddem.io.damage import damage_named, require_about, require_columns
+from cfddem.backend.errors import InputError
+from cfddem.io.damage import damage_named, opened, require_about, require_columns
 from cfddem.io.file_lock import lock_file
-from cfddem.io.files import disk_error, reason, require_format
+from cfddem.io.files import disk_error, reason, require_format, require_no_links
 from cfddem.io.index import POINTS, Layout, Snapshot
 
 FORMAT = 2
@@ -20,8 +21,14 @@ FORMAT = 2
 RUN_FILES = ("run.json", "run.vtkhdf", "history.h5", "checkpoint")
 """A folder that holds one of these files holds a run."""
 
+NUMBERED = re.compile(r"\d{8}\.h5")
+"""Name of a snapshot."""
+
 OWN_FILES = ("case.toml", "data", "surfaces", "measured")
 """What a run that was killed before it wrote any data leaves in its folder, beside hidden files."""
+
+WRITTEN = (*RUN_FILES, *OWN_FILES, ".lock")
+"""Everything that a run writes in its folder."""
 
 MOST_NAMED = 6
 """Most files or runs that an error names."""
@@ -35,10 +42,9 @@ def read_about(folder: Path) -> dict[str, Any]:
 
     errors  InputError if the folder holds no run or a run of another format; RunFailed if the file is damaged
     """
-    path = folder / "run.json"
+    path, remedy = folder / "run.json", "restore it, the snapshots are in data/"
     try:
-        about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        found = int(about["format"])
+        text = path.read_bytes()
     except NotADirectoryError:
         raise InputError("folder", str(folder), "a run folder", "it is a file") from None
     except FileNotFoundError:
@@ -49,10 +55,11 @@ def read_about(folder: Path) -> dict[str, Any]:
         raise InputError("folder", str(folder), "a run folder", why) from None
     except OSError as failure:
         raise disk_error("read", path, failure) from failure
-    except (ValueError, KeyError, TypeError, OverflowError) as damage:
-        raise RunFailed(f"{path}: the file is damaged ({damage}); restore it, the snapshots are in data/") from damage
+    with damage_named(path, remedy):
+        about: dict[str, Any] = json.loads(text)
+        found = int(about["format"])
     require_format(path, found, FORMAT, folder)
-    with damage_named(path, "restore it, the snapshots are in data/"):
+    with damage_named(path, remedy):
         require_about(about)
     return about
 
@@ -66,7 +73,7 @@ def scan(folder: Path) -> tuple[list[Snapshot], Layout | None]:
     """All snapshots of a run, read from the data files, and their layout."""
     found: list[Snapshot] = []
     layout = None
-    for path in sorted((folder / "data").glob("*.h5")):
+    for path in sorted(each for each in (folder / "data").glob("*.h5") if NUMBERED.fullmatch(each.name)):
         snapshot, layout = read_snapshot_header(path)
         found.append(snapshot)
     return found, layout
@@ -77,13 +84,14 @@ def read_snapshot_header(path: Path) -> tuple[Snapshot, Layout]:
 
     errors  RunFailed if the file is damaged
     """
-    import h5py
-
-    with damage_named(path), h5py.File(path, "r") as file:
-        particles = file.get("particles", {})
+    with opened(path) as data:
+        file = data.file
+        fluid, particles = file.get("fluid", {}), file.get("particles", {})
+        for each in (*fluid.values(), *particles.values()):
+            data.require_size(each)
         count = len(particles[POINTS]) if POINTS in particles else 0
         snapshot = Snapshot(path.name, float(file.attrs["time"]), int(file.attrs["step"]), count)
-        return snapshot, Layout.of(file.get("fluid", {}), particles)
+        return snapshot, Layout.of(fluid, particles)
 
 
 def read_columns(path: Path) -> dict[str, np.ndarray]:
@@ -91,12 +99,10 @@ def read_columns(path: Path) -> dict[str, np.ndarray]:
 
     errors  RunFailed if the file is damaged
     """
-    import h5py
-
     if not path.exists():
         return {}
-    with damage_named(path), h5py.File(path, "r") as file:
-        columns = {name: each[:] for name, each in file.items()}
+    with opened(path) as data:
+        columns = {name: data.read(each) for name, each in data.file.items()}
         require_columns(columns)
         if columns and "time" not in columns:
             raise ValueError("it has no column time")
@@ -141,8 +147,9 @@ def require_no_foreign_files(folder: Path) -> None:
 def make_folder(folder: Path) -> None:
     """Create the folder of a run.
 
-    errors  InputError with the reason if this is not possible
+    errors  InputError with the reason if this is not possible, or for a link in it
     """
+    require_no_links(folder, WRITTEN)
     try:
         (folder / "data").mkdir(parents=True, exist_ok=True)
     except OSError as failure:
@@ -152,11 +159,12 @@ def make_folder(folder: Path) -> None:
 def lock(folder: Path) -> Any:
     """Lock a run for this process; the lock ends with the process, however it ends.
 
-    errors  InputError if another process holds the lock
+    errors  InputError if another process holds the lock, or for a link in the folder
     """
+    require_no_links(folder, WRITTEN)
     path = folder / ".lock"
     try:
-        file = path.open("w", encoding="utf-8")
+        file = path.open("a", encoding="utf-8")
     except OSError as failure:
         raise disk_error("write", path, failure) from failure
     if not lock_file(file):

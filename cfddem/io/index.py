@@ -11,11 +11,13 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.io.damage import opened
 from cfddem.io.files import hdf5_in_memory
 from cfddem.io.quantities import TIME, Quantities, Quantity, declared
 
@@ -117,11 +119,15 @@ def index(
     return image.getvalue()
 
 
-def listed(file: Any) -> list[Snapshot]:
-    """The snapshots in an open index."""
-    table = file["snapshots"]
-    columns = (table[name][:].tolist() for name in ("name", "time", "step", "particles"))
-    return [Snapshot(name.decode(), time, step, count) for name, time, step, count in zip(*columns)]
+def listed(path: Path) -> list[Snapshot]:
+    """The snapshots in the index of a run.
+
+    errors  RunFailed if the file is missing or damaged
+    """
+    with opened(path) as data:
+        table = data.file["snapshots"]
+        columns = [data.read(table[name]).tolist() for name in ("name", "time", "step", "particles")]
+        return [Snapshot(name.decode(), time, step, count) for name, time, step, count in zip(*columns)]
 
 
 def describe(dataset: Any, quantity: Quantity) -> None:

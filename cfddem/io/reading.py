@@ -8,7 +8,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
@@ -18,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfddem.backend import html
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError, RunFailed, nearest
 from cfddem.case.toml_text import read_text
-from cfddem.io.damage import damage_named, require_cells, require_columns, require_particles
-from cfddem.io.folder import AVERAGES_FROM, read_about, read_columns, read_snapshot_header
+from cfddem.io.damage import ArrayFile, opened, require_cells, require_columns, require_particles
+from cfddem.io.folder import AVERAGES_FROM, NUMBERED, read_about, read_columns, read_snapshot_header
 from cfddem.io.index import GridBox, Snapshot, field_name, listed
 from cfddem.io.quantities import Quantity, from_json, shown_unit
 
@@ -30,7 +29,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("cfddem")
 
-_NUMBERED = re.compile(r"\d{8}\.h5")
+MOST_MISSING = 1000
+"""Largest ratio of missing snapshots to those in the folder; beyond it a number is no number of a snapshot."""
 
 _SHOWN = ("time", "bed_height", "bed_voidage", "pressure_drop", "largest_speed", "contact_count", "particle_count")
 """Columns of the history that a notebook shows."""
@@ -167,15 +167,15 @@ class Run:
     def fluid(self, name: str, snapshot: int = -1) -> np.ndarray:
         """A fluid field (nz, ny, nx) or (nz, ny, nx, 3) of one snapshot."""
         self._require_name(name, self.fluid_fields, "fluid")
-        with self._opened(snapshot) as file:
-            values = np.asarray(file[f"fluid/{name}"][0])
+        with self._opened(snapshot) as data:
+            values = data.read(data.file[f"fluid/{name}"], 0)
             require_cells(values, name, self.grid.shape if self.grid is not None else (0, 0, 0))
             return values
 
     def particles(self, snapshot: int = -1) -> dict[str, np.ndarray]:
         """All particle fields of one snapshot, one row per particle, in the order of ids."""
-        with self._opened(snapshot) as file:
-            fields = {field_name(name): np.asarray(each[:]) for name, each in file.get("particles", {}).items()}
+        with self._opened(snapshot) as data:
+            fields = {field_name(name): data.read(each) for name, each in data.file.get("particles", {}).items()}
             require_particles(fields)
             return fields
 
@@ -187,13 +187,14 @@ class Run:
         self._require_name("id", self.particle_fields, "particles")
         rows: dict[str, list[Any]] = {"time": []}
         for place, time in enumerate(self.times):
-            with self._opened(place) as file:
-                group = file["particles"]
-                at = int(np.searchsorted(group["id"][:], particle))
-                if at < len(group["id"]) and group["id"][at] == particle:
+            with self._opened(place) as data:
+                group = data.file["particles"]
+                ids = data.read(group["id"])
+                at = int(np.searchsorted(ids, particle))
+                if at < len(ids) and ids[at] == particle:
                     rows["time"].append(time)
                     for name, each in group.items():
-                        rows.setdefault(field_name(name), []).append(each[at])
+                        rows.setdefault(field_name(name), []).append(data.read(each, at))
         if not rows["time"]:
             raise InputError("particle", particle, "the id of a particle in this run")
         return {name: np.array(values) for name, values in rows.items()}
@@ -214,8 +215,8 @@ class Run:
 
     def collisions_of(self, snapshot: int) -> dict[str, np.ndarray]:
         """The collisions that were completed between the previous snapshot and this one; empty without a record."""
-        with self._opened(snapshot) as file:
-            columns = {name: each[:] for name, each in file.get("collisions", {}).items()}
+        with self._opened(snapshot) as data:
+            columns = {name: data.read(each) for name, each in data.file.get("collisions", {}).items()}
             require_columns({name: each for name, each in columns.items() if name != "place"})
             return columns
 
@@ -247,34 +248,34 @@ class Run:
 
         Snapshots are numbered without a gap, so a gap is a loss.
         """
-        present = {path.name for path in (self.folder / "data").glob("*.h5") if _NUMBERED.fullmatch(path.name)}
-        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf") if _NUMBERED.fullmatch(each.name)}
+        present = {path.name for path in (self.folder / "data").glob("*.h5") if NUMBERED.fullmatch(path.name)}
+        known = {each.name: each for each in _indexed(self.folder / "run.vtkhdf") if NUMBERED.fullmatch(each.name)}
         found = [
             known[name] if name in known else read_snapshot_header(self.folder / "data" / name)[0]
             for name in sorted(present)
         ]
         last = max((int(name[:8]) for name in {*present, *known}), default=-1)
+        if last > MOST_MISSING * (len(found) + MOST_MISSING):
+            limit = f"the folder has {len(found)} snapshots; move a file that is not of this run elsewhere"
+            raise RunFailed(f"{self.folder / 'data'}: there is no snapshot {last:08d}.h5, as {limit}")
         return found, [name for name in (f"{k:08d}.h5" for k in range(last + 1)) if name not in present]
 
     @cached_property
     def _names(self) -> dict[str, list[str]]:
         if not self.snapshots:
             return {"fluid": [], "particles": []}
-        with self._opened(-1) as file:
-            return {block: sorted(map(field_name, file.get(block, {}))) for block in ("fluid", "particles")}
+        with self._opened(-1) as data:
+            return {block: sorted(map(field_name, data.file.get(block, {}))) for block in ("fluid", "particles")}
 
     @contextmanager
-    def _opened(self, snapshot: int) -> Iterator[Any]:
+    def _opened(self, snapshot: int) -> Iterator[ArrayFile]:
         """The open file of a snapshot."""
-        import h5py
-
         if not self.snapshots:
             raise InputError("folder", str(self.folder), "a run with a snapshot", "the run ended before its first one")
         if not -len(self.snapshots) <= snapshot < len(self.snapshots):
             raise InputError("snapshot", snapshot, f"from 0 to {len(self.snapshots) - 1}, or -1 for the last")
-        path = self.folder / "data" / self.snapshots[snapshot].name
-        with damage_named(path), h5py.File(path, "r") as file:
-            yield file
+        with opened(self.folder / "data" / self.snapshots[snapshot].name) as data:
+            yield data
 
     def _require_name(self, name: str, known: list[str], where: str) -> None:
         if name not in known:
@@ -283,10 +284,7 @@ class Run:
 
 def _indexed(path: Path) -> list[Snapshot]:
     """The snapshots in the index; none if it is missing or unreadable, since every snapshot can be read by itself."""
-    import h5py
-
     try:
-        with h5py.File(path, "r") as file:
-            return listed(file)
-    except (OSError, KeyError, IndexError, RuntimeError, TypeError, ValueError, AttributeError):
+        return listed(path)
+    except RunFailed:
         return []

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import base64
 import io
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 
 if TYPE_CHECKING:
@@ -211,11 +211,10 @@ def save(figure: Figure, path: Path, dots_per_inch: int = 160) -> None:
     """Write a PNG atomically."""
     import matplotlib as mpl
 
-    path = Path(path)
-    fresh = path.with_name(f".{os.getpid()}-{path.name}")
+    image = io.BytesIO()
     with mpl.rc_context(_STYLE):
-        figure.savefig(fresh, format="png", dpi=dots_per_inch, facecolor="white")
-    os.replace(fresh, path)
+        figure.savefig(image, format="png", dpi=dots_per_inch, facecolor="white")
+    write_whole(Path(path), image.getbuffer())
 
 
 def encoded(figure: Figure, dots_per_inch: int = 110) -> str:

@@ -75,6 +75,7 @@ def movie(
     examined = sorted(set(np.linspace(0, count - 1, min(count, _MOST_EXAMINED)).astype(int).tolist()))
     stage = Stage.of(run, examined, show, colour, cut)
     fresh = output.with_name(f".{output.stem}{PARTIAL}{output.suffix}")
+    fresh.unlink(missing_ok=True)
     try:
         (_write_gif if output.suffix.lower() == ".gif" else _write_mp4)(fresh, stage.frames(), frames_per_second)
         fresh.replace(output)

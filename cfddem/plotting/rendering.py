@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -16,11 +15,13 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import RunFailed
+from cfddem.backend.launch import python_command
 
 REMEDY = "on Debian or Ubuntu install the missing libraries: apt-get install -y --no-install-recommends libegl1 libgl1"
 
 _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 _PROBE = """
+import cfddem
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere())
@@ -51,7 +52,7 @@ def why_not() -> str | None:
     for kind in kinds:
         environment = os.environ | ({_WINDOW: kind} if kind else {})
         try:
-            tried = subprocess.run([sys.executable, "-c", _PROBE], env=environment, capture_output=True, timeout=120)
+            tried = subprocess.run(python_command("-c", _PROBE), env=environment, capture_output=True, timeout=120)
         except subprocess.TimeoutExpired:
             continue
         if tried.returncode == 0:

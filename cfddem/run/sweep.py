@@ -18,9 +18,11 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.backend.launch import safe_workers
 from cfddem.case.compare import Points, points_of
 from cfddem.case.gallery import full_key, read_value
 from cfddem.case.schema import Case
+from cfddem.io.files import require_no_links
 from cfddem.io.kept_files import holds_surfaces_of, text_with_kept_files
 from cfddem.io.quantities import shown_unit
 from cfddem.preflight.summary import preflight
@@ -147,6 +149,7 @@ def make_output(output: Path) -> None:
     if output.exists() and not output.is_dir():
         raise InputError("output", str(output), "a folder", "a file of that name exists")
     output.mkdir(parents=True, exist_ok=True)
+    require_no_links(output)
 
 
 _Work = list[tuple[Case, dict[str, Any], Path, bool]]
@@ -157,7 +160,8 @@ def on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
     """Outcomes as runs end, several runs at a time."""
     from joblib import Parallel, delayed
 
-    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
+    with safe_workers():
+        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
 
 
 def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:

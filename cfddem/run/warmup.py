@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.compile import use_threads
+from cfddem.backend.launch import python_command
 from cfddem.case.schema import Case
 from cfddem.fluid.momentum import transport
 from closures.compiled import cache_folder
@@ -44,7 +45,7 @@ def warmup(case: Case) -> Iterator[None]:
         yield
         return
     process = subprocess.Popen(
-        [sys.executable, "-m", "cfddem.run.warmup"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
+        python_command("-m", "cfddem.run.warmup"), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL, env={**os.environ, "NUMBA_NUM_THREADS": str(use_threads(None))},
     )  # fmt: skip
     try:

@@ -23,6 +23,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.launch import safe_workers
 from scenarios.collisions.three_spheres.engine import follow as follow_in_engine
 from scenarios.collisions.three_spheres.events import RELEASE, Path, follow
 from scenarios.collisions.three_spheres.motion import APART, JOINED, STATE, Numbers, view
@@ -238,7 +239,8 @@ def outcomes(stokes: Iterable[float], theta12: Iterable[float], **conditions: An
     numbers, angles = list(stokes), list(theta12)
     conditions = {"tolerance": MAP_TOLERANCE} | conditions
     jobs = -1 if len(numbers) * len(angles) >= PARALLEL_FROM else 1
-    table = Parallel(n_jobs=jobs)(delayed(_row)(numbers, angle, conditions) for angle in angles)
+    with safe_workers():
+        table = Parallel(n_jobs=jobs)(delayed(_row)(numbers, angle, conditions) for angle in angles)
     names = ("outcome", "restitution12", "restitution23")
     return {name: np.array([[run[place] for run in row] for row in table]) for place, name in enumerate(names)}
 
