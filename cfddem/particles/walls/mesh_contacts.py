@@ -168,19 +168,19 @@ def _to_common(neighbours, w, common, x):
 
 
 @serial
-def wall_contacts(particles, edges, minimum_gap, walls, free, cutoff_ratio):
+def wall_contacts(system, cutoff_ratio):
     """Find the geometry of all particle-wall edges.
 
-    minimum_gap   (n,) gap below which the solids of each edge touch [m]
     cutoff_ratio  reach of films over R*; 0 without films [-]
     """
-    touch(particles, edges, walls, free)
+    particles, edges, walls = system.particles, system.edges, system.walls
+    touch(system)
     if TRIANGLES:
         neighbours = _Neighbours(
             edges.between_particles,
             edges.first,
             edges.second,
-            minimum_gap,
+            system.memory.minimum_gap,
             edges.touch,
             particles.radius,
             walls.kind,
@@ -192,8 +192,9 @@ def wall_contacts(particles, edges, minimum_gap, walls, free, cutoff_ratio):
 
 
 @serial
-def share_memory(edges, memory, walls):
+def share_memory(system):
     """Copy the memory of each contact to the inactive triangles beside it, which may become active."""
+    edges, memory, walls = system.edges, system.memory, system.walls
     pairs, number = edges.between_particles, len(edges.first)
     begin = pairs
     for k in range(pairs, number):

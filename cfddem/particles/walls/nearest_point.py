@@ -204,8 +204,9 @@ def carried_back(walls, m, place):
 
 
 @serial
-def touch(particles, edges, walls, free):
+def touch(system):
     """Geometry of each particle-wall edge: normal, distance, velocity of the surface, turning rate of the normal."""
+    particles, edges, walls, free = system.particles, system.edges, system.walls, system.parameters.free
     pairs = edges.between_particles
     for k in range(pairs, len(edges.first)):
         i, w = np.int64(edges.first[k]), np.int64(edges.second[k])
