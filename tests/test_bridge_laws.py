@@ -114,8 +114,8 @@ def test_redistribution_keeps_all_liquid() -> None:
 
 def test_angles_on_walls_are_those_on_particles_unless_given() -> None:
     laws = BridgeLaws(contact_angle=0.3, wall_contact_angle=1.2, redistribution="contact_angle")
-    assert laws.built_in.wall_contact_angle == 1.2
-    assert BridgeLaws(contact_angle=0.3).built_in.wall_contact_angle == 0.3
+    assert laws.numbers.wall_contact_angle == 1.2
+    assert BridgeLaws(contact_angle=0.3).numbers.wall_contact_angle == 0.3
     with pytest.raises(InputError, match="wall_contact_angle"):
         BridgeLaws(wall_contact_angle=4.0).check()
 

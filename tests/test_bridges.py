@@ -139,9 +139,9 @@ def test_a_pair_alone_moves_along_its_exact_solution(film: Any, potential: str, 
 
 
 @serial
-def _imbalance(speed, gap, film, step, inverse_mass, p):  # type: ignore[no-untyped-def]
+def _imbalance(speed, gap, film, step, inverse_mass):  # type: ignore[no-untyped-def]
     """What the speed after a step leaves of its equation, over the speeds in it."""
-    state = BridgeState(gap, film, 0.0, 0.5 * RADIUS, 1e-7, 0.2, 0.0, 0.0, 0.0, p)
+    state = BridgeState(gap, film, 0.0, 0.5 * RADIUS, 1e-7, 0.2, 0.0, 0.0, 0.0, ())
     after = speed_after_bridge(speed, state, gap, step, inverse_mass)
     given = inverse_mass * resistance_integral(state, gap, step * after, held_gap(state))
     return abs(after + given - speed) / (abs(speed) + abs(after))
@@ -156,7 +156,7 @@ def test_the_speed_after_a_step_solves_its_equation(cut: str) -> None:
     worst = 0.0
     for gap, speed, step, mass in 10.0 ** draw.uniform([-7.5, -6.0, -8.0, -8.0], [-4.5, 0.0, -3.0, -5.0], (5000, 4)):
         for sign in (1.0, -1.0):
-            found = imbalance(sign * speed, gap, 2.0 * FILM, step, 1.0 / mass, run.laws.parameters)
+            found = imbalance(sign * speed, gap, 2.0 * FILM, step, 1.0 / mass)
             worst = max(worst, found)
     assert worst < 1e-9
 

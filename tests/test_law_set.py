@@ -15,7 +15,7 @@ from numba import njit as serial_without_cache
 from cfddem.backend.compile import either, inline, prange
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, adapted, callable_in_loops, check_compiles, fingerprint, specialise, written
-from cfddem.particles.pair_graph import memory_class
+from cfddem.backend.named import named_arrays
 
 scale = Slot("scale")
 TWICE = Slot("TWICE")
@@ -173,7 +173,7 @@ def test_the_cache_serves_a_users_law_and_is_never_stale(tmp_path: Path) -> None
 
 def test_the_type_of_a_memory_is_found_by_its_name_in_another_process() -> None:
     """The compile cache stores the types of the arguments of loops; another process may not have made them yet."""
-    stored = pickle.dumps(memory_class(("spring", "normal_wear"))).hex()
+    stored = pickle.dumps(named_arrays("Memory", ("spring", "normal_wear"))).hex()
     code = "import pickle, sys; print(pickle.loads(bytes.fromhex(sys.argv[1]))._fields)"
     found = subprocess.run([sys.executable, "-c", code, stored], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "('spring', 'normal_wear')"

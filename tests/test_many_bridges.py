@@ -20,9 +20,8 @@ from cfddem.particles.state import kinetic_energy, make_particles, particles_in
 
 def brake(run: ParticleSolver, span: float) -> None:
     """Give the particles the impulses of their bridges alone."""
-    particles, edges, memory, _, shift = run.views
-    specialise(find_bridge_impulses, run.choices)(particles, edges, memory, shift, run.laws.parameters, span)
-    specialise(apply_bridge_impulses, run.choices)(particles, edges, memory)
+    specialise(find_bridge_impulses, run.choices)(run.system, span)
+    specialise(apply_bridge_impulses, run.choices)(run.system)
 
 
 @pytest.mark.parametrize("span", [1e-6, 1e-4, 1e-2])

@@ -157,7 +157,8 @@ def test_a_registered_law_is_chosen_by_its_name_in_a_case() -> None:
     simulation.until(1e-3)
     assert simulation.energy is not None and simulation.energy.row()["energy_hysteresis"] == 0.0  # no collision yet
     assert "largest_overlap" in simulation.particle_solver.edges.fields
-    assert simulation.particle_solver.laws.parameters[:2] == (400.0, 500.0)
+    numbers_of_law = simulation.particle_solver.system.parameters.contact
+    assert (numbers_of_law.loading_stiffness, numbers_of_law.unloading_stiffness) == (400.0, 500.0)
     assert Case.from_text(case.to_toml()) == case
     page = call("explain", "walton_braun").out
     assert "Walton and Braun" in page and "unloading_stiffness = 40000" in page and "largest_overlap [m]" in page

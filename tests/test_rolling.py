@@ -36,7 +36,7 @@ def on_a_floor(speed: float, laws: Laws, lean: float = 0.0) -> ParticleSolver:
     weight = BALL.density * 4.0 / 3.0 * math.pi * RADIUS**3 * GRAVITY * math.cos(lean)
     stiffness = contact.hertz_stiffness(float(pair_table([BALL])[0, 0]["contact_modulus"]), RADIUS)
     overlap = (
-        weight / laws.contact_law.values[0]
+        weight / laws.contact_law.parameters["normal_stiffness"]
         if laws.contact_law.name == "linear"
         else (weight / stiffness) ** (2.0 / 3.0)
     )

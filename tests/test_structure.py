@@ -33,6 +33,12 @@ LONGEST_FILE, MARGIN = 350, 10
 MOST_ARGUMENTS, LONGEST_FUNCTION = 8, 80
 """Positional arguments and lines of a function outside compiled loops."""
 
+MANY_ARGUMENTS = 57
+"""Functions of more than `MOST_ARGUMENTS` arguments of all kinds, compiled ones included. It may only fall."""
+
+STRUCTURES = {"p", "parameters", "numbers", "bridge_functions"}
+"""Names of what holds the parameters of a run in `cfddem/particles`: read by names, never by position."""
+
 COMPILED = ("serial", "threaded", "either", "part", "inline", "vector_inline", "compiled", "njit", "jit", "overload")
 """Names of decorators that compile a function."""
 
@@ -129,6 +135,22 @@ def test_parallel_loops_write_to_members_through_helpers_only() -> None:
     assert not lost, "\n".join(lost)
 
 
+def test_no_parameter_is_read_by_position() -> None:
+    """A parameter more or less would move the others. In the text of generated loops, too."""
+    text = re.compile(rf"\b({'|'.join(sorted(STRUCTURES))})\[(-?\d|$)")
+    read = []
+    for name, path in modules().items():
+        for node in ast.walk(tree(path)) if name.startswith("cfddem.particles") else ():
+            if isinstance(node, ast.Subscript):
+                held = getattr(node.value, "id", getattr(node.value, "attr", ""))
+                named = isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, str)
+                if held in STRUCTURES and not named:
+                    read.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str) and text.search(node.value):
+                read.append(f"{name}:{node.lineno}: {node.value}")
+    assert not read, "\n".join(read)
+
+
 # ---------------------------------------------------------------- rooms and imports
 
 
@@ -196,6 +218,19 @@ def test_no_function_has_too_many_positional_arguments() -> None:
         if len(arguments) > MOST_ARGUMENTS:
             many.append(f"{file}:{node.lineno} {node.name}: {len(arguments)}")
     assert not many, "\n".join(many)
+
+
+def test_no_more_functions_have_many_arguments() -> None:
+    """Arguments of all kinds, compiled functions included: more than eight are a missing structure."""
+    many = []
+    for path in modules().values():
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.FunctionDef):
+                arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                count = len([each for each in arguments if each.arg not in ("self", "cls")])
+                if count > MOST_ARGUMENTS:
+                    many.append(f"{path.relative_to(HOME)}:{node.lineno} {node.name}: {count}")
+    assert len(many) <= MANY_ARGUMENTS, "\n".join(many)
 
 
 def test_no_function_is_too_long() -> None:

@@ -19,6 +19,7 @@ from typing import Any, Literal, Self
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.named import NAMES, can_be_named
 
 Role = Literal["state", "memory", "scratch"]
 """`state` describes the row itself, `memory` is what a law stores from step to step, `scratch` is valid within a step.
@@ -60,8 +61,8 @@ class Field:
     meaning: str = ""
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier() or self.name.startswith("_") or "__" in self.name:
-            raise InputError("Field.name", self.name, "a Python name without a leading or double underscore")
+        if not can_be_named(self.name):
+            raise InputError("Field.name", self.name, NAMES)
         if self.role not in ("state", "memory", "scratch"):
             raise InputError(f"role of the field {self.name!r}", self.role, "'state', 'memory' or 'scratch'")
 

@@ -90,11 +90,12 @@ def move_event(memory, k, to):
 
 
 @inline
-def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio, time, rows, count):
+def record_event(k, system, time, rows, count):
     """Store the start of a collision, or write a row at its end; returns the number of rows."""
-    separation, distance, gap = geometry(k, particles, edges, shift)
-    reduced_radius, inverse_mass = pair_mass_and_radius(k, particles, edges)
-    reach = cutoff_ratio * reduced_radius if FILM else 0.0
+    particles, edges, memory, walls = system.particles, system.edges, system.memory, system.walls
+    separation, distance, gap = geometry(k, system)
+    reduced_radius, inverse_mass = pair_mass_and_radius(k, system)
+    reach = system.parameters.cutoff_ratio * reduced_radius if FILM else 0.0
     known = not np.isnan(memory.begin[k])
     if known and gap < memory.closest_gap[k]:
         memory.closest_gap[k] = gap
@@ -104,7 +105,7 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
     if known == inside or portion(edges, k) == 0.0:
         return count
     normal = times(1.0 / distance, separation)
-    velocity = relative_velocity(k, particles, edges)
+    velocity = relative_velocity(k, system)
     normal_speed, tangential = dot(velocity, normal), across(velocity, normal)
     if not known:
         memory.begin[k], memory.begin_speed[k], memory.closest_gap[k] = time, normal_speed, gap
@@ -114,7 +115,7 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
             memory.wet[k], memory.lost_to_bridge[k] = memory.bridge_film[k] > 0.0, np.nan
         return count
 
-    row, materials = rows[count], pair_row(k, particles, edges, walls, table)
+    row, materials = rows[count], pair_row(k, system)
     i, j = edges.first[k], edges.second[k]
     row.first, row.second = particles.id[i], particles.id[j] if k < edges.between_particles else -1 - walls.wall[j]
     row.begin, row.end = memory.begin[k], time
@@ -122,13 +123,11 @@ def record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio,
         row.place[axis] = at(particles.position, i)[axis]
     speed, before = -memory.begin_speed[k], at(memory.begin_slip, k)
     row.approach_speed = speed
-    row.stokes = (
-        stokes(1.0 / inverse_mass, speed, pair_viscosity(k, particles, edges), reduced_radius) if FILM else np.inf
-    )
+    row.stokes = stokes(1.0 / inverse_mass, speed, pair_viscosity(k, system), reduced_radius) if FILM else np.inf
     row.minimum_gap = memory.minimum_gap[k]
     row.roughness_gap, row.elastohydrodynamic_gap = materials.roughness_gap, 0.0
     if FILM and speed > 0.0:
-        viscosity = pair_viscosity(k, particles, edges)
+        viscosity = pair_viscosity(k, system)
         row.elastohydrodynamic_gap = elastohydrodynamic(viscosity, speed, materials.film_modulus, reduced_radius)
     row.deformed = row.minimum_gap > materials.roughness_gap
     row.friction = dry_or_lubricated(

@@ -137,13 +137,11 @@ class Energies:
 
     def _pass(self, solver: ParticleSolver, step: float, before: float, after: float) -> None:
         solver.lists.ghosts.refresh("work")
-        particles, edges, memory, walls, shift = solver.views
         count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
         count.totals[:] = 0.0
-        gravity = np.array(solver.gravity, float)
-        count_motion(particles, count, gravity, np.array(solver.free, float), step, before, after)
-        p = solver.laws.parameters
-        self._work(particles, edges, memory, walls, count, shift, solver.table, p, step, before, after)
+        gravity, free = np.array(solver.gravity, float), np.array(solver.free, float)
+        count_motion(solver.system.particles, count, gravity, free, step, before, after)
+        self._work(solver.system, count, step, before, after)
         counted = solver.communicator.sum(count.totals[0], axis=0)
         self.totals[: len(CHANNELS)] += counted[: len(CHANNELS)]
         if self._bridges is not None:

@@ -75,12 +75,11 @@ class BridgeEnergies:
         before, after  half kicks before and after this instant [s]
         returns        energy of each channel (3,) and what moving walls have put in [J]
         """
-        particles, edges, memory, walls, shift = solver.views
         state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
         state.totals[:] = 0.0
-        if step > 0.0 and len(walls.kind) > 0:
-            _follow_bridges(edges, memory, walls, state)
-        self._loop(particles, edges, memory, state, shift, solver.laws.parameters, step, before, after)
+        if step > 0.0 and len(solver.walls.kind) > 0:
+            _follow_bridges(solver.system, state)
+        self._loop(solver.system, state, step, before, after)
         done = solver.communicator.sum(state.totals[0], axis=0)
         return done[[RESISTANCE, FORMED, BROKEN]], float(done[BY_WALLS])
 
@@ -90,8 +89,9 @@ class BridgeEnergies:
 
 
 @serial
-def _follow_bridges(edges, memory, walls, count):
+def _follow_bridges(system, count):
     """Move what is held for a bridge at a wall to the piece of the wall to which the bridge has passed."""
+    edges, memory, walls = system.edges, system.memory, system.walls
     begin, number = edges.between_particles, len(edges.first)
     while begin < number:
         end, left, taken = begin, -1, -1
@@ -115,8 +115,9 @@ def _half_motion(i, particles, kick, sign):
 
 
 @inline
-def _pulled(k, particles, edges, memory, kick, sign):
+def _pulled(k, system, kick, sign):
     """Work of the pull of edge k in a half kick, and the part of it that a wall does."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
     moved, force = _half_motion(i, particles, kick, sign), at(memory.bridge_force, k)
     if k < edges.between_particles:
@@ -126,8 +127,9 @@ def _pulled(k, particles, edges, memory, kick, sign):
 
 
 @inline
-def _resisted(k, particles, edges, memory, count, step):
+def _resisted(k, system, count, step):
     """Energy that the resistance of edge k has taken in the step, and that a moving wall has put in through it."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
     impulse, couple = at(memory.bridge_impulse, k), at(memory.bridge_couple, k)
     velocity, spin = mean_motion(i, particles, count, step)
@@ -149,11 +151,12 @@ def note_bridge_loss(k, memory, lost):
 
 
 @inline
-def _count_bridge(k, particles, edges, memory, count, shift, p, step, before, after, totals):
+def _count_bridge(k, system, count, step, before, after, totals):
     """Count the bridge of edge k at this instant."""
+    memory, p = system.memory, system.parameters
     bridged, change = memory.bridge_film[k] > 0.0, memory.bridge_change[k] if step > 0.0 else 0
     if step > 0.0 and ((bridged and change <= 0) or change < 0):
-        lost, by_wall = _resisted(k, particles, edges, memory, count, step)
+        lost, by_wall = _resisted(k, system, count, step)
         totals[RESISTANCE] += lost
         totals[BY_WALLS] += by_wall
         note_bridge_loss(k, memory, lost)
@@ -164,10 +167,10 @@ def _count_bridge(k, particles, edges, memory, count, shift, p, step, before, af
     count.pulled[k] = 0.0
     if not BRIDGE_PULL or not bridged:
         return
-    _, _, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    _, _, gap = geometry(k, system)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
     count.held[k] = pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
-    work, by_wall = _pulled(k, particles, edges, memory, before, -1.0)
+    work, by_wall = _pulled(k, system, before, -1.0)
     totals[BY_WALLS] += by_wall
     if change > 0:
         totals[FORMED] += count.held[k] + work
@@ -175,15 +178,16 @@ def _count_bridge(k, particles, edges, memory, count, shift, p, step, before, af
         surplus = pulled + work + count.held[k] - held
         totals[RESISTANCE] -= surplus
         note_bridge_loss(k, memory, -surplus)
-    count.pulled[k], by_wall = _pulled(k, particles, edges, memory, after, 1.0)
+    count.pulled[k], by_wall = _pulled(k, system, after, 1.0)
     totals[BY_WALLS] += by_wall
 
 
 @threaded
-def _count_bridges(particles, edges, memory, count, shift, p, step, before, after):
+def _count_bridges(system, count, step, before, after):
     """See `BridgeEnergies.count`."""
+    particles, edges = system.particles, system.edges
     number = len(edges.first)
     for chunk in prange(CHUNKS):
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
-            _count_bridge(k, particles, edges, memory, count, shift, p, step, before, after, totals)
+            _count_bridge(k, system, count, step, before, after, totals)

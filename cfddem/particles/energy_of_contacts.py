@@ -116,8 +116,9 @@ def note_loss(k, memory, channel, lost):
 
 
 @inline
-def _film_works(k, particles, edges, memory, count, step):
+def _film_works(k, system, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
     impulse = at(memory.impulse, k)
     drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
@@ -134,11 +135,12 @@ def _film_works(k, particles, edges, memory, count, step):
 
 
 @inline
-def _outrun(k, particles, edges, memory, count, step):
+def _outrun(k, system, count, step):
     """Work of the springs of edge k in the first half kick, at the speed that impulses took before the bodies moved.
 
     The springs give it, and the impulses of bridges take it again: none of it is stored.
     """
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     slowed, turned = taken_by_impulses(i, particles, count, step)
     turned = times(particles.radius[i], turned)
@@ -162,12 +164,13 @@ def _forget(k, count, totals, step):
 
 
 @inline
-def _moved(k, particles, edges, walls, count, duration):
+def _moved(k, system, count, duration):
     """Relative motion of two bodies over the half kicks around this instant.
 
     returns  displacement, rotation times radius and rotation of the first body relative to the second; the rates of
              the first two; the sum of the radii; the displacement of a wall
     """
+    particles, edges, walls = system.particles, system.edges, system.walls
     i, j = edges.first[k], edges.second[k]
     about = at(count.turned, i)
     moved, turned = at(count.moved, i), times(particles.radius[i], about)
@@ -193,21 +196,22 @@ def _slides(row, minimum_gap, pressed, tangent):
 
 
 @inline
-def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, duration, totals):
+def _contact_works(k, system, count, step, duration, totals):
     """Count what the contact of edge k has done, and keep what its springs hold; nothing if the solids do not touch."""
+    edges, memory, p = system.edges, system.memory, system.parameters
     if BRIDGE and step > 0.0:
-        outrun = _outrun(k, particles, edges, memory, count, step)
+        outrun = _outrun(k, system, count, step)
         totals[BY_IMPULSES] += outrun
         if memory.bridge_film[k] > 0.0:
             note_bridge_loss(k, memory, -outrun)
-    separation, distance, gap = geometry(k, particles, edges, shift)
+    separation, distance, gap = geometry(k, system)
     minimum_gap = memory.minimum_gap[k]
     if not gap < minimum_gap:
         _forget(k, count, totals, step)
         return
     normal = times(1.0 / distance, separation)
-    row = pair_row(k, particles, edges, walls, table)
-    reduced_radius, inverse_mass = pair_mass_and_radius(k, particles, edges)
+    row = pair_row(k, system)
+    reduced_radius, inverse_mass = pair_mass_and_radius(k, system)
     state = ContactState(minimum_gap - gap, gap, 0.0, step, minimum_gap, reduced_radius, 1.0 / inverse_mass)
     m = read_memory(memory, k)
     d = derive(state, row, p, m)
@@ -217,7 +221,7 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
     tangential = share * tangential_stiffness(equivalent, row, p, m, d)
     elastic = share * elastic_force(state, row, p, m, d)
     force, spring = at(memory.force, k), at(memory.spring, k)
-    moved, turned, about, velocity, surface_spin, radii, by_wall = _moved(k, particles, edges, walls, count, duration)
+    moved, turned, about, velocity, surface_spin, radii, by_wall = _moved(k, system, count, duration)
     stretch = distance / radii
     pressed, approach = dot(force, normal), dot(moved, normal)
     slip = minus(across(velocity, normal), times(stretch, cross(surface_spin, normal)))
@@ -254,17 +258,18 @@ def _contact_works(k, particles, edges, memory, walls, count, shift, table, p, s
 
 
 @threaded
-def count_work(particles, edges, memory, walls, count, shift, table, p, step, before, after):
+def count_work(system, count, step, before, after):
     """Count what films have done in the step, contacts in the half kicks around this instant, and what springs hold."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     number, pairs = len(edges.first), edges.between_particles
     near = may_touch(edges)
     for chunk in prange(CHUNKS):
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
             if FILM and step > 0.0:
-                lost, by_wall = _film_works(k, particles, edges, memory, count, step)
+                lost, by_wall = _film_works(k, system, count, step)
                 totals[FILMS] += lost
                 note_loss(k, memory, FILMS, lost)
                 totals[WALLS] += by_wall
             if not near <= k < pairs:
-                _contact_works(k, particles, edges, memory, walls, count, shift, table, p, step, before + after, totals)
+                _contact_works(k, system, count, step, before + after, totals)

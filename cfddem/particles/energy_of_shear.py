@@ -56,16 +56,16 @@ class ShearEnergies:
         """
         if step == 0.0:
             return np.zeros(2)
-        particles, edges, memory, walls, _ = solver.views
         state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
         state.totals[:] = 0.0
-        self._loop(particles, edges, memory, walls, state, step)
+        self._loop(solver.system, state, step)
         return solver.communicator.sum(state.totals[0], axis=0)
 
 
 @inline
-def _shear_works(k, particles, edges, memory, walls, count, step):
+def _shear_works(k, system, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
+    particles, edges, memory, walls = system.particles, system.edges, system.memory, system.walls
     i, j = edges.first[k], edges.second[k]
     impulse, first, second = impulses_of(k, memory)
     velocity, spin = mean_motion(i, particles, count, step)
@@ -79,13 +79,14 @@ def _shear_works(k, particles, edges, memory, walls, count, step):
 
 
 @threaded
-def _count_shear(particles, edges, memory, walls, count, step):
+def _count_shear(system, count, step):
     """See `ShearEnergies.count`."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     number = len(edges.first)
     for chunk in prange(CHUNKS):
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             totals = count.totals[0 if edges.first[k] < particles.owned else 1, chunk]
-            lost, by_wall = _shear_works(k, particles, edges, memory, walls, count, step)
+            lost, by_wall = _shear_works(k, system, count, step)
             totals[0] += lost
             totals[1] += by_wall
             note_loss(k, memory, FILMS, lost)

@@ -29,27 +29,30 @@ FIELDS = (Field("far_rate", "1/s", halo=("far",), meaning="resistance of the far
 
 
 @part
-def _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+def _find_hard(system, step):
     """Impulses of the far films that change much within their step."""
+    edges, memory = system.edges, system.memory
     for k in prange(edges.near, edges.between_particles):
         if memory.hard[k]:
-            film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+            film_impulse(k, system, step)
 
 
 @serial
-def far_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+def far_kick(system, step):
     """Give the particles the impulses of their far films.
 
     step  for which they are given: several steps of the run [s]
     """
-    far_impulses(edges.near, edges.between_particles, particles, edges, memory, cutoff_ratio, step)
-    _find_hard(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-    apply_all_film_impulses(particles, edges, memory, True)
+    edges = system.edges
+    far_impulses(edges.near, edges.between_particles, system, step)
+    _find_hard(system, step)
+    apply_all_film_impulses(system, True)
 
 
 @inline
-def _sum_rates(i, particles, edges, memory):
+def _sum_rates(i, system):
     """Sum the resistances of the films of particle i over its mass, those of far films apart."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     near = far = 0.0
     for place in places_of(i, edges):
         k, _ = edge_role(edges.incident[place])
@@ -63,18 +66,18 @@ def _sum_rates(i, particles, edges, memory):
 
 
 @part
-def _sum_all_rates(particles, edges, memory):
+def _sum_all_rates(system):
     """Sum the resistances of the films of all particles."""
+    particles = system.particles
     for i in prange(particles.owned):
-        _sum_rates(i, particles, edges, memory)
+        _sum_rates(i, system)
 
 
 @serial
-def sort_films(particles, edges, memory, shift, table, cutoff_ratio):
+def sort_films(system):
     """After a new list, in which other pairs are far: films at the present positions, and their sums."""
-    pairs, kinds, rows = edges.between_particles, np.uint64(len(table)), table.reshape(-1)
-    update_films(0, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
-    _sum_all_rates(particles, edges, memory)
+    update_films(0, system.edges.between_particles, system)
+    _sum_all_rates(system)
 
 
 def rates_of_films(particles: Particles) -> list[np.ndarray]:

@@ -27,6 +27,7 @@ from cfddem.particles.integrate import film_kick, find_bridge_changes, finish_st
 from cfddem.particles.interactions.shear_film import shear_kick
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
+from cfddem.particles.system import System
 
 BINS = 1000
 """Places among which a plane between two ranks is chosen."""
@@ -261,52 +262,53 @@ class StepsWithGhosts:
         self.films, self.bridges, self.recording = choices["DRIFTING"], choices["BRIDGE"], choices["RECORD"]
         self.shear, self.far, self.ghosts, self.communicator = choices["SHEAR"], choices["FAR"], ghosts, communicator
 
-    def __call__(self, *arguments: Any) -> tuple[int, float, int]:
+    def __call__(
+        self, system: System, step: float, steps: int, taken: int, origin: np.ndarray, reach: float, time: float,
+        log: np.ndarray,
+    ) -> tuple[int, float, int]:  # fmt: skip
         """Arguments and results of `integrate`."""
-        *pairs, p, free, gravity, step, steps, taken, every, origin, reach, time, log = arguments
-        particles, edges = pairs[:2]
+        every = system.parameters.far_film_steps
         self.ghosts.refresh("start")
         if self.bridges:
-            self.begin(particles)
+            self.begin(system.particles)
         largest, done, noted, full = 0.0, 0, 0, False
         if steps == 0:
-            self.finish(self._changes(pairs, p, free), *pairs, p, free, gravity, True, 0.0, time, log, noted)
+            self.finish(self._changes(system), system, True, 0.0, time, log, noted)
         while done < steps and not full and largest < reach * reach:
-            self.start(particles, step)
-            self._impulses(pairs, step, every if self.far and (taken + done) % every == 0 else 0)
-            moved = self.move(*pairs, p, free, step, origin)
+            self.start(system.particles, step)
+            self._impulses(system, step, every if self.far and (taken + done) % every == 0 else 0)
+            moved = self.move(system, step, origin)
             self.ghosts.refresh("motion")
             done += 1
-            changes = self._changes(pairs, p, free)
+            changes = self._changes(system)
             far = not self.far or (taken + done) % every == 0
-            noted = self.finish(changes, *pairs, p, free, gravity, far, step, time + done * step, log, noted)
+            noted = self.finish(changes, system, far, step, time + done * step, log, noted)
             largest = self.communicator.largest([largest, moved])
-            full = self.recording and self.communicator.any(len(log) - noted < len(edges.first))
+            full = self.recording and self.communicator.any(len(log) - noted < len(system.edges.first))
         return done, largest, noted
 
-    def _impulses(self, pairs: list[Any], step: float, far_steps: int) -> None:
+    def _impulses(self, system: System, step: float, far_steps: int) -> None:
         """Give ghosts what film and bridge impulses need; with both, films act here, else as particles move.
 
         far_steps  number of steps for which far films act now
         """
         if self.shear:
             self.ghosts.refresh("shear")
-            self.shear_kick(*pairs[:5], step)
+            self.shear_kick(system, step)
         if far_steps:
             self.ghosts.refresh("far")
-            self.far_kick(*pairs, far_steps * step)
+            self.far_kick(system, far_steps * step)
         if self.films:
             self.ghosts.refresh("film")
         if self.bridges and self.films:
-            self.film_kick(*pairs, step)
+            self.film_kick(system, step)
         if self.bridges:
             self.ghosts.refresh("bridge")
 
-    def _changes(self, pairs: list[Any], p: tuple[float, ...], free: Any) -> int:
+    def _changes(self, system: System) -> int:
         """Number of bridges that form and break, found before ghosts receive liquid; -1 without bridges."""
         if not self.bridges:
             return -1
-        particles, edges, memory, walls, shift, _, cutoff_ratio = pairs
-        changes: int = self.find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
+        changes: int = self.find_bridge_changes(system)
         self.ghosts.refresh("liquid")
         return changes

@@ -73,24 +73,34 @@ from cfddem.particles.walls.nearest_point import advance_walls, portion, touched
 
 
 @inline
-def find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+def find_film_impulses(system, step):
     """Impulses of all films over the coming step."""
-    film_impulses(0, edges.near if FAR else edges.between_particles, particles, edges, memory, cutoff_ratio, step)
-    find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+    edges = system.edges
+    film_impulses(0, edges.near if FAR else edges.between_particles, system, step)
+    find_hard_impulses(system, step)
 
 
 @part
-def find_hard_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+def find_hard_impulses(system, step):
     """Impulses of the films that change much in this step, and of films at walls."""
+    edges, memory = system.edges, system.memory
     pairs = edges.between_particles
     for k in prange(len(edges.first)):
         if k >= pairs or (memory.hard[k] and not (FAR and is_far(k, edges))):
-            film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+            film_impulse(k, system, step)
 
 
 @inline
-def wall_contact(k, particles, edges, memory, walls, shift, table, p, step):
+def wall_contact(k, system, step):
     """Contact of particle-wall edge k."""
+    particles, edges, memory, walls, table, p = (
+        system.particles,
+        system.edges,
+        system.memory,
+        system.walls,
+        system.table,
+        system.parameters,
+    )
     part = portion(edges, k)
     i, j = edges.first[k], edges.second[k]
     apart = not touched_distance(edges, k) - particles.radius[i] < memory.minimum_gap[k]
@@ -102,16 +112,17 @@ def wall_contact(k, particles, edges, memory, walls, shift, table, p, step):
         if part != 0.0:
             clear_contact(memory, k)
         return
-    kinematics = wall_kinematics(k, particles, edges, walls, shift)
+    kinematics = wall_kinematics(k, system)
     row = table[particles.material[i], walls.material[j]]
     edge_contact(k, kinematics, row, part, memory, p, step)
 
 
 @part
-def add_film_forces(particles, edges, memory, walls, shift, table, cutoff_ratio):
+def add_film_forces(system):
     """Add the forces of films that act as explicit forces."""
+    edges, memory = system.edges, system.memory
     for k in prange(len(edges.first)):
-        film = film_force(k, particles, edges, memory, walls, shift, table, cutoff_ratio)
+        film = film_force(k, system)
         put(memory.force, k, plus(at(memory.force, k), film))
 
 
@@ -124,33 +135,34 @@ def may_touch(edges):
 
 
 @inline
-def find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, far, step):
+def find_forces(system, far, step):
     """Films, contacts and rolling of all edges at the present positions.
 
     far   find films of pairs that cannot touch, too
     step  by which springs have moved since the last forces; 0 at the start [s]
     """
+    edges = system.edges
     pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
-    kinds, rows = np.uint64(len(table)), table.reshape(-1)
     if FILM:
         if far:
-            update_films(near, pairs, particles, edges, memory, shift, rows, kinds, cutoff_ratio)
+            update_films(near, pairs, system)
         for k in range(pairs, number):
-            update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ratio)
-    pair_forces(0, near, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p, free, step)
+            update_edge_film(k, system)
+    pair_forces(0, near, system, step)
     if WALLS:
         for k in range(pairs, number):
-            wall_contact(np.uint64(k), particles, edges, memory, walls, shift, table, p, step)
+            wall_contact(np.uint64(k), system, step)
     if FILM and not DRIFTING:
-        add_film_forces(particles, edges, memory, walls, shift, table, cutoff_ratio)
+        add_film_forces(system)
 
 
 @part
-def sum_forces(particles, edges, memory, gravity, far, step):
+def sum_forces(system, far, step):
     """Sum the forces on the particles, and kick them by half a step."""
+    particles, edges = system.particles, system.edges
     near = may_touch(edges)
     for i in prange(particles.owned):
-        gather_forces(i, particles, edges, memory, gravity, near, far)
+        gather_forces(i, system, near, far)
         if step > 0.0:
             kick(i, particles, step)
 
@@ -159,57 +171,59 @@ def sum_forces(particles, edges, memory, gravity, far, step):
 
 
 @serial
-def film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+def film_kick(system, step):
     """Give the particles the impulses of their films, where those of bridges follow."""
-    find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-    apply_all_film_impulses(particles, edges, memory, False)
+    find_film_impulses(system, step)
+    apply_all_film_impulses(system, False)
 
 
 @serial
-def move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step, origin):
+def move(system, step, origin):
     """Impulses and drift, and the motion of walls; returns the square of the largest displacement."""
+    walls = system.walls
     if DRIFTING and not BRIDGE:
-        find_film_impulses(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
+        find_film_impulses(system, step)
     if BRIDGE:
-        find_bridge_impulses(particles, edges, memory, shift, p, step)
-        apply_bridge_impulses(particles, edges, memory)
-    largest = drift_particles(particles, edges, memory, free, step, origin)
+        find_bridge_impulses(system, step)
+        apply_bridge_impulses(system)
+    largest = drift_particles(system, step, origin)
     if WALLS:
         largest = larger(largest, advance_walls(walls, step) ** 2)
         if TRIANGLES:
-            share_memory(edges, memory, walls)
+            share_memory(system)
     return largest
 
 
 @serial
-def find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio):
+def find_bridge_changes(system):
     """Walls at the present positions, and where bridges form and break; returns the number of these changes."""
     if WALLS:
-        wall_contacts(particles, edges, memory.minimum_gap, walls, free, cutoff_ratio)
-    return find_changes(particles, edges, memory, walls, shift, p) if BRIDGE else 0
+        wall_contacts(system, system.parameters.cutoff_ratio)
+    return find_changes(system) if BRIDGE else 0
 
 
 @serial
-def act_bridges(changes, particles, edges, memory, walls, shift, p):
+def act_bridges(changes, system):
     """Form and break bridges, of which `find_bridge_changes` has found the number, and find the pull at walls."""
     if changes > 0:
-        exchange_liquid(particles, edges, memory, walls, shift, p)
+        exchange_liquid(system)
     if WALLS:
-        renew_wall_bridges(particles, edges, memory, shift, p)
+        renew_wall_bridges(system)
 
 
 @inline
-def act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, step):
+def act(system, far, step):
     """Pairs and sums at the present positions, and the second half of the kick."""
-    find_forces(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, far, step)
-    sum_forces(particles, edges, memory, gravity, far, step)
+    find_forces(system, far, step)
+    sum_forces(system, far, step)
 
 
 @inline
-def record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted):
+def record(system, time, log, noted):
     """Write the collisions that have ended to `log`, after the rows there are; returns their number."""
+    edges = system.edges
     for k in range(len(edges.first)):
-        noted = record_event(k, particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted)
+        noted = record_event(k, system, time, log, noted)
     return noted
 
 
@@ -217,19 +231,17 @@ def record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, lo
 
 
 @serial
-def integrate(
-    particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, step, steps, taken, every, origin,
-    reach, time, log
-):  # fmt: skip
+def integrate(system, step, steps, taken, origin, reach, time, log):
     """Find the forces at the present positions, then advance by up to `steps` steps.
 
     With `steps` = 0 nothing moves. With `steps` > 0 the first kick uses the forces of the last step. The loop stops
     early when a particle has moved by `reach` from `origin`, or when `log`, the record of collisions ended since
-    `time`, could overflow. With the choice FAR, films of pairs that cannot touch act once in `every` steps, counted
-    from the first of the run, of which `taken` have been made. Returns the number of steps made, the largest squared
-    displacement (NaN if a position is NaN) and the number of rows written.
+    `time`, could overflow. With the choice FAR, films of pairs that cannot touch act once in `far_film_steps`,
+    counted from the first step of the run; `taken` steps have been made. Returns the number of steps made, the
+    largest squared displacement (NaN if a position is NaN) and the number of rows written.
     """
-    largest, done, noted, full = 0.0, 0, 0, False
+    particles, edges = system.particles, system.edges
+    largest, done, noted, full, every = 0.0, 0, 0, False, system.parameters.far_film_steps
     half = step if steps > 0 else 0.0
     if BRIDGE:
         renew_thickness(particles)
@@ -237,22 +249,22 @@ def integrate(
         if steps > 0:
             kick_particles(particles, step)
             if SHEAR:
-                shear_kick(particles, edges, memory, walls, shift, step)
+                shear_kick(system, step)
             if FAR and (taken + done) % every == 0:
-                far_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, every * step)
+                far_kick(system, every * step)
             if DRIFTING and BRIDGE:
-                film_kick(particles, edges, memory, walls, shift, table, cutoff_ratio, step)
-            moved = move(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, step, origin)
+                film_kick(system, step)
+            moved = move(system, step, origin)
             largest = larger(largest, moved)
             done += 1
-        changes = find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
+        changes = find_bridge_changes(system)
         if BRIDGE:
-            act_bridges(changes, particles, edges, memory, walls, shift, p)
+            act_bridges(changes, system)
         far = not FAR or steps == 0 or (taken + done) % every == 0
-        act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, half)
+        act(system, far, half)
         if RECORD:
             now = time + done * step
-            noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, now, log, noted)
+            noted = record(system, now, log, noted)
             full = len(log) - noted < len(edges.first)
         if done >= steps or full or not largest < reach * reach:
             return done, largest, noted
@@ -275,15 +287,13 @@ def start_step(particles, step):
 
 
 @serial
-def finish_step(
-    changes, particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, step, time, log, noted
-):
+def finish_step(changes, system, far, step, time, log, noted):
     """Find and act on bridges, unless found (`changes`); act, and record; returns the number of rows written."""
     if changes < 0:
-        changes = find_bridge_changes(particles, edges, memory, walls, shift, p, free, cutoff_ratio)
+        changes = find_bridge_changes(system)
     if BRIDGE:
-        act_bridges(changes, particles, edges, memory, walls, shift, p)
-    act(particles, edges, memory, walls, shift, table, cutoff_ratio, p, free, gravity, far, step)
+        act_bridges(changes, system)
+    act(system, far, step)
     if RECORD:
-        noted = record(particles, edges, memory, walls, shift, table, cutoff_ratio, time, log, noted)
+        noted = record(system, time, log, noted)
     return noted

@@ -11,12 +11,13 @@ from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 
 
 @inline
-def gather_forces(i, particles, edges, memory, gravity, near, far):
+def gather_forces(i, system, near, far):
     """Sum what the edges of particle i do to it, with weight and outside force.
 
     near  number of leading pairs that may touch
     far   far films have been found anew, see `far_films`
     """
+    particles, edges, memory = system.particles, system.edges, system.memory
     force, couple, moment, resistance = at(particles.applied, i), NOTHING, NOTHING, 0.0
     load = shear_load = far_resistance = 0.0
     for place in places_of(i, edges):
@@ -40,7 +41,7 @@ def gather_forces(i, particles, edges, memory, gravity, near, far):
         if ROLLING:
             moment = plus(moment, times(sign, at(memory.moment, k)))
     if particles.inverse_mass[i] > 0.0:
-        force = plus(force, times(1.0 / particles.inverse_mass[i], gravity))
+        force = plus(force, times(1.0 / particles.inverse_mass[i], system.parameters.gravity))
     put(particles.force, i, force)
     put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
     if FILM:
@@ -65,8 +66,9 @@ def kick(i, particles, step):
 
 
 @inline
-def apply_film_impulses(i, particles, edges, memory, far):
+def apply_film_impulses(i, system, far):
     """Give particle i the impulses of its films: of the far ones (`far_films`), or of all others."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     impulse = NOTHING
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
@@ -105,22 +107,24 @@ def kick_particles(particles, step):
 
 
 @part
-def apply_all_film_impulses(particles, edges, memory, far):
+def apply_all_film_impulses(system, far):
     """Give every particle the impulses of its far films, or of all others, before what acts on the velocities left."""
+    particles = system.particles
     for i in prange(particles.owned):
-        apply_film_impulses(i, particles, edges, memory, far)
+        apply_film_impulses(i, system, far)
 
 
 @part
-def drift_particles(particles, edges, memory, free, step, origin):
+def drift_particles(system, step, origin):
     """Apply the impulses of films and move the particles; returns the largest squared distance from the origin."""
+    particles = system.particles
     farthest, count = np.zeros(CHUNKS), particles.owned
     for chunk in prange(CHUNKS):
         far = 0.0
         for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
             if DRIFTING and not BRIDGE:
-                apply_film_impulses(i, particles, edges, memory, False)
-            far = larger(far, drift(i, particles, free, step, origin))
+                apply_film_impulses(i, system, False)
+            far = larger(far, drift(i, particles, system.parameters.free, step, origin))
         farthest[chunk] = far
     largest = 0.0
     for chunk in range(CHUNKS):

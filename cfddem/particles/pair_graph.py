@@ -14,14 +14,13 @@ the arrays of compiled loops are made from the declarations.
 from __future__ import annotations
 
 import math
-from collections import namedtuple
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from cfddem.backend.compile import inline, serial
+from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field, Table
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import at, dot, flat, minus, plus, times
@@ -72,7 +71,7 @@ class Edges(Table):
     @property
     def memory(self) -> Any:
         """The declared fields as loops take them: vectors one after the other; nothing is copied."""
-        return memory_class(tuple(self.fields))(*(array.reshape(-1) for array in self.arrays.values()))
+        return named_arrays("Memory", tuple(self.fields))(*(array.reshape(-1) for array in self.arrays.values()))
 
     def uses_outside(self, owned: int) -> int:
         """Uses of laws outside of their range that have been counted for edges whose first body is owned."""
@@ -147,24 +146,6 @@ class Edges(Table):
         found = np.empty(len(bodies), np.int64)
         _find_named(self.flat_graph, rows, bodies, found)
         return found
-
-
-_MEMORY = "Memory__"
-
-
-@cache
-def memory_class(names: tuple[str, ...]) -> Any:
-    """The type of `Edges.memory` for these fields. Its name lists them: see `__getattr__`."""
-    made = namedtuple(_MEMORY + "__".join(names), names)  # type: ignore[misc]
-    made.__module__ = __name__
-    return globals().setdefault(made.__name__, made)
-
-
-def __getattr__(name: str) -> Any:
-    """The type of a memory by its name, for loops that the compile cache has kept from another process."""
-    if name.startswith(_MEMORY):
-        return memory_class(tuple(name.removeprefix(_MEMORY).split("__")))
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 HOME = 13
@@ -293,7 +274,8 @@ def gaps(edges: Edges, particles: Particles, walls: Walls, box: np.ndarray) -> n
 def _gaps(edges, particles, walls, shift, result):
     for k in range(len(result)):
         if k < edges.between_particles:
-            result[k] = geometry(k, particles, edges, shift)[2]
+            _, distance, radii = of_two_spheres(k, particles, edges, shift)
+            result[k] = distance - radii
         else:
             i, w = edges.first[k], np.int64(edges.second[k])
             place = in_frame(walls, walls.wall[w], at(particles.position, i))
@@ -340,10 +322,11 @@ def of_two_spheres(k, particles, edges, shift):
 
 
 @inline
-def geometry(k, particles, edges, shift):
+def geometry(k, system):
     """Separation from the second body to the first, its length, and the gap."""
+    particles, edges = system.particles, system.edges
     if k < edges.between_particles:
-        separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+        separation, distance, radii = of_two_spheres(k, particles, edges, system.shift)
         return separation, distance, distance - radii
     distance = touched_distance(edges, k)
     return times(distance, touched(edges, k, NORMAL)), distance, distance - particles.radius[edges.first[k]]

@@ -27,14 +27,14 @@ from cfddem.particles.interactions.pair_loops import loop_choices
 from cfddem.particles.interactions.wall_liquid import with_room
 from cfddem.particles.listing import NeighbourLists, rows_before
 from cfddem.particles.named_state import named_state, restored_list
-from cfddem.particles.pair_graph import Edges, Graph, gaps, shifts
+from cfddem.particles.pair_graph import Edges, gaps, shifts
 from cfddem.particles.state import Particles
+from cfddem.particles.system import System
 from cfddem.particles.time_scales import TimeScales, check_step, refusing, time_scales
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restored_walls, wall_arrays
 from cfddem.particles.walls.load import wall_forces
 from cfddem.particles.walls.mesh_contacts import wall_contacts
-from cfddem.particles.walls.nearest_point import Walls
 from cfddem.particles.walls.shapes import Wall
 
 CHECK_EVERY = 20
@@ -101,8 +101,9 @@ class ParticleSolver:
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
         choices = self.laws.choices() | {"WALLS": bool(walls), "RECORD": record}
         choices["TRIANGLES"] = len(self.walls.cell_member) > 0
-        self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart)
-        self._parameters, self._loop, self._threads = self.laws.parameters, _NO_LOOP, False
+        self.parameters = self.laws.parameters(gravity, free)
+        self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
+        self._loop, self._threads = _NO_LOOP, False
         self._touch_walls = specialise(wall_contacts, self.choices)
         self._sort_films = specialise(sort_films, self.choices) if self.laws.far_film_steps > 1 else _NO_LOOP
         self.gravity, self.free = gravity, free
@@ -129,11 +130,6 @@ class ParticleSolver:
         self._outside = 0
         self.refresh()
         self.energies = Energies(self) if energies else None
-
-    @property
-    def views(self) -> tuple[Any, Graph, Any, Walls, np.ndarray]:
-        """Particles, graph, memory of pairs and walls as compiled loops take them, and shifts of periodic images."""
-        return self._views
 
     def _find_reach(self, after: Particles | None = None) -> float:
         """Reach that the next list must have; `after` a change to these particles."""
@@ -264,10 +260,8 @@ class ParticleSolver:
                 self._loop = StepsWithGhosts(self.choices, self._threads, self.lists.ghosts, self.communicator)
         log = _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first))
         return self._loop(  # type: ignore[no-any-return]
-            *self._views, self.table, self.laws.cutoff_ratio if self.laws.film else 0.0, self._parameters, self.free,
-            self.gravity, step, steps, self.steps, self.laws.far_film_steps, self._origin.reshape(-1),
-            0.5 * self.lists.skin, self.time, log,
-        )  # fmt: skip
+            self.system, step, steps, self.steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log
+        )
 
     def _take_list(self, edges: Edges) -> None:
         """Use a new neighbour list: note the positions it was made at, and make the arrays that loops take."""
@@ -275,14 +269,13 @@ class ParticleSolver:
         if self.laws.bridge is not None and self.laws.bridge.wall_share > 0.0:
             self.walls = with_room(self.walls, len(edges.first) - edges.between_particles)
         self._origin, self._listed_walls = self.particles.position.copy(), checkpoint_walls(self.walls)
-        self._views = (
+        self.system = System(
             self.particles.view_with(self.laws.particle_fields()), edges.flat_graph, edges.memory, flat(self.walls),
-            shifts(self.box).reshape(-1),
+            shifts(self.box).reshape(-1), self.table, self.parameters,
         )  # fmt: skip
         self.walls.travel[:] = 0.0
         if len(self.walls.kind):
-            particles, graph, memory, walls, _ = self._views
-            self._touch_walls(particles, graph, memory.minimum_gap, walls, self.free, self._reach)
+            self._touch_walls(self.system, self._reach)
 
     def _relist(self) -> None:
         """Make a new neighbour list; memory and present forces of pairs are carried over."""
@@ -290,8 +283,7 @@ class ParticleSolver:
         self.particles.drop_ghosts()
         self._renew(np.arange(self.particles.count, dtype=np.int32), self.steps)
         if self.laws.far_film_steps > 1:
-            *pairs, _, shift = self._views
-            self._sort_films(*pairs, shift, self.table, self.laws.cutoff_ratio)
+            self._sort_films(self.system)
         if self.lists.made % CHECK_EVERY == 0:
             self._accepted = 0.0
 

@@ -7,9 +7,7 @@ the owned rows; loops over pairs run over all pairs with an owned member.
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
+from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field, Phase, Table
 
 PARTICLE_FIELDS = (
@@ -54,25 +53,6 @@ PARTICLE_FIELDS = (
 With a fluid the coupling sets `applied` in every fluid step, weight and buoyancy included, and the particle solver has
 no gravity of its own. Without a fluid it is the user's.
 """
-
-_ARRAYS = "ParticleArrays__"
-
-
-@cache
-def arrays_class(names: tuple[str, ...]) -> Any:
-    """The type of the arrays of these fields as compiled loops take them, and the number of owned rows.
-
-    Its name lists the fields, for loops that the compile cache has kept from another process: see `__getattr__`.
-    """
-    made = namedtuple(_ARRAYS + "__".join(names), [*names, "owned"])  # type: ignore[misc]
-    made.__module__ = __name__
-    return globals().setdefault(made.__name__, made)
-
-
-def __getattr__(name: str) -> Any:
-    if name.startswith(_ARRAYS):
-        return arrays_class(tuple(name.removeprefix(_ARRAYS).split("__")))
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 class Particles(Table):
@@ -123,9 +103,9 @@ class Particles(Table):
         return self.view_with(())
 
     def view_with(self, fields: Iterable[Field]) -> Any:
-        """The arrays of `PARTICLE_FIELDS` and of more declared fields, as loops take them."""
+        """The arrays of `PARTICLE_FIELDS` and of more declared fields, as loops take them, and the number `owned`."""
         names = (*(field.name for field in PARTICLE_FIELDS), *(field.name for field in fields))
-        made = arrays_class(names)
+        made = named_arrays("Particles", (*names, "owned"))
         return made(*(self[name].reshape(-1) for name in names), owned=self.owned)
 
     def by_id(self, values: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.law_choice import called_by_name
 from cfddem.backend.law_set import specialise
+from cfddem.backend.named import named_arrays
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
 from cfddem.particles.interactions.laws import Laws
@@ -24,9 +25,10 @@ from cfddem.particles.interactions.slots import (
     read_memory,
     tangent_stiffness,
 )
-from cfddem.particles.pair_graph import Edges, memory_class
+from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles
 from cfddem.particles.step_criteria import STABLE, TimeScales, check_step, crossing_step
+from cfddem.particles.system import System
 from cfddem.particles.walls.nearest_point import Walls
 from closures import lubrication, timescales
 from closures.kinds import FILM_ARGUMENTS
@@ -62,8 +64,10 @@ def time_scales(
     largest_rate = specialise(_largest_rate, laws.choices())
     of_bridges = ("bridge_film", "bridge_volume", "bridge_gap") if laws.bridge is not None else ()
     remembered = ("minimum_gap", *of_bridges, *(field.name for field in laws.contact_law.memory))
-    memory = memory_class(remembered)(*(edges[name] for name in remembered))
-    rate = largest_rate(particles.view, edges.flat_graph, memory, walls, gap, table, laws.parameters)
+    memory = named_arrays("Memory", remembered)(*(edges[name] for name in remembered))
+    nowhere = np.zeros(0)  # gaps are known
+    system = System(particles.view, edges.flat_graph, memory, walls, nowhere, table, laws.parameters())
+    rate = largest_rate(system, gap)
     overlap = STABLE / math.sqrt(max(rate, 1e-300))
     crossing = crossing_step(communicator.smallest(particles.radius), speed)
     return TimeScales(*communicator.smallest(np.array([[hertz, impact, overlap, film, crossing]]), axis=0).tolist())
@@ -94,9 +98,10 @@ def _lightest_pairs(particles: Particles, table: np.ndarray) -> list[tuple[float
 
 
 @inline
-def _bridge_stiffness(k, gap, particles, edges, memory, p):
+def _bridge_stiffness(k, gap, system):
     """Slope of the pull of the bridge of edge k over its gap, to one side [N/m]."""
-    radius, _ = pair_mass_and_radius(k, particles, edges)
+    memory, p = system.memory, system.parameters
+    radius, _ = pair_mass_and_radius(k, system)
     change = 1e-3 * memory.bridge_film[k]
     far = max(gap, change)
     pulls = bridge_pull(bridge_state(k, far - change, radius, memory, p)) - bridge_pull(
@@ -106,12 +111,20 @@ def _bridge_stiffness(k, gap, particles, edges, memory, p):
 
 
 @serial
-def _largest_rate(particles, edges, memory, walls, gap, table, p):
+def _largest_rate(system, gap):
     """Bound of the squared angular frequency: twice the stiffness of contacts and pulls on a particle over its mass."""
+    particles, edges, memory, walls, table, p = (
+        system.particles,
+        system.edges,
+        system.memory,
+        system.walls,
+        system.table,
+        system.parameters,
+    )
     stiffness = np.zeros(len(particles.radius))
     for k in range(len(gap)):
         if BRIDGE and BRIDGE_PULL and memory.bridge_film[k] > 0.0:
-            stiff = _bridge_stiffness(k, gap[k], particles, edges, memory, p)
+            stiff = _bridge_stiffness(k, gap[k], system)
             stiffness[edges.first[k]] += stiff
             if k < edges.between_particles:
                 stiffness[edges.second[k]] += stiff
@@ -122,7 +135,7 @@ def _largest_rate(particles, edges, memory, walls, gap, table, p):
         i, j = edges.first[k], edges.second[k]
         pair = k < edges.between_particles
         row = table[particles.material[i], particles.material[j] if pair else walls.material[j]]
-        radius, inverse_mass = pair_mass_and_radius(k, particles, edges)
+        radius, inverse_mass = pair_mass_and_radius(k, system)
         state = ContactState(overlap, gap[k], 0.0, 0.0, separated, radius, 1.0 / inverse_mass)
         m = read_memory(memory, k)
         stiff = tangent_stiffness(state, row, p, m, derive(state, row, p, m))

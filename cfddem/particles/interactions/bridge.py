@@ -16,7 +16,6 @@ import numpy as np
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.bridge_law import BridgeNumbers
 from cfddem.particles.interactions.bridge_solution import at_gap, held_gap
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
 from cfddem.particles.interactions.slots import (
@@ -121,30 +120,20 @@ def coat(particles: Particles, thickness: np.ndarray | float) -> None:
     particles.liquid = np.asarray(film_volume(particles.radius, films))  # type: ignore[arg-type]  # of every sphere
 
 
-_FIRST_NUMBER = -1 - len(BridgeNumbers._fields)
-"""Place of the first number of bridges among those that loops take; the damping of rolling is the last of all."""
-
-
-@inline
-def numbers_of(p):
-    """The numbers of the bridge laws, among those that loops take."""
-    return BridgeNumbers(*p[_FIRST_NUMBER:-1])
-
-
 @inline
 def bridge_state(k, gap, reduced_radius, memory, p, capillary_number=0.0):
     """The bridge of edge k as its laws see it, at a gap."""
-    n = numbers_of(p)
+    n = p.bridge
     return BridgeState(
         gap, memory.bridge_film[k], memory.bridge_volume[k], reduced_radius, memory.bridge_gap[k],
-        n.viscosity, n.surface_tension, n.contact_angle, capillary_number, p,
+        n.viscosity, n.surface_tension, n.contact_angle, capillary_number, p.bridge_functions,
     )  # fmt: skip
 
 
 @inline
 def capillary_number_of(speed, p):
     """Capillary number of bodies that part or meet at this speed; 0 without surface tension."""
-    n = numbers_of(p)
+    n = p.bridge
     return capillary(n.viscosity, abs(speed), n.surface_tension) if n.surface_tension > 0.0 else 0.0
 
 
@@ -167,10 +156,11 @@ def resistance_along(state):
 
 
 @inline
-def renew_bridge(k, particles, edges, memory, shift, p):
+def renew_bridge(k, system):
     """Resistance and pull of the bridge of edge k at the present positions."""
-    separation, distance, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    memory, p = system.memory, system.parameters
+    separation, distance, gap = geometry(k, system)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
     state = bridge_state(k, gap, reduced_radius, memory, p)
     renew_resistance(k, state, memory)
     if BRIDGE_PULL:
@@ -194,8 +184,9 @@ def find_closed(k, reduced_radius, memory, p):
 
 
 @part
-def renew_wall_bridges(particles, edges, memory, shift, p):
+def renew_wall_bridges(system):
     """Resistance and pull of the bridges at walls; those of pairs are renewed as changes are found."""
+    edges, memory = system.edges, system.memory
     for k in prange(edges.between_particles, len(edges.first)):
         if memory.bridge_film[k] > 0.0:
-            renew_bridge(k, particles, edges, memory, shift, p)
+            renew_bridge(k, system)

@@ -18,7 +18,6 @@ from cfddem.particles.interactions.bridge import (
     bridge_state,
     capillary_number_of,
     find_closed,
-    numbers_of,
     renew_bridge,
     renew_resistance,
 )
@@ -61,34 +60,37 @@ def find_thickness(i, particles):
 
 
 @inline
-def longest_gap(k, particles, edges, memory, shift, p):
+def longest_gap(k, system):
     """Gap at which the bridge of edge k breaks; it grows with the speed at which the bodies part."""
-    separation, distance, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    parting = max(dot(relative_velocity(k, particles, edges), separation) / distance, 0.0)
+    memory, p = system.memory, system.parameters
+    separation, distance, gap = geometry(k, system)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
+    parting = max(dot(relative_velocity(k, system), separation) / distance, 0.0)
     state = bridge_state(k, gap, reduced_radius, memory, p, capillary_number_of(parting, p))
     return max(state.film, bridge_rupture(state))
 
 
 @serial
-def find_changes(particles, edges, memory, walls, shift, p):
+def find_changes(system):
     """Mark where bridges form or break, and what each body has for new ones; returns the number of changes.
 
     Bridges between particles that neither form nor break are renewed on the way.
     """
-    pair_bridges(0, edges.between_particles, particles, edges, memory, shift, p)
-    changes = _open_changes(particles, edges, memory, shift, p)
+    edges = system.edges
+    pair_bridges(0, edges.between_particles, system)
+    changes = _open_changes(system)
     if WALLS:
-        changes += wall_changes(particles, edges, memory, walls, shift, p)
+        changes += wall_changes(system)
     if changes > 0:
-        mark_bodies(particles, edges, memory)
-        limit_shares(particles, edges, memory)
+        mark_bodies(system)
+        limit_shares(system)
     return changes
 
 
 @serial
-def mark_bodies(particles, edges, memory):
+def mark_bodies(system):
     """Mark the particles whose bridges form or break."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     particles.bridges_change[:] = False
     for k in range(len(edges.first)):
         if memory.bridge_change[k] != 0:
@@ -98,57 +100,62 @@ def mark_bodies(particles, edges, memory):
 
 
 @serial
-def exchange_liquid(particles, edges, memory, walls, shift, p):
+def exchange_liquid(system):
     """Let bridges form and break where they are marked; liquid goes from bodies to bridges and back."""
-    fill_bridges(particles, edges, memory, walls, shift, p)
+    edges, memory = system.edges, system.memory
+    fill_bridges(system)
     if WALLS and WALL_LIQUID:
-        transfer_wall_liquid(particles, edges, memory, walls, p)
-    transfer_liquid(particles, edges, memory, p)
+        transfer_wall_liquid(system)
+    transfer_liquid(system)
     clear_bridges(edges, memory)
 
 
 @inline
-def _change(k, gap, film, particles, edges, memory, shift, p):
+def _change(k, gap, film, system):
     """1 where a bridge forms on edge k, -1 where one breaks, else 0.
 
     film  thickness of the liquid on both bodies [m]
     """
+    memory = system.memory
     if memory.bridge_film[k] > 0.0:
-        parted = gap > memory.bridge_film[k] and gap > longest_gap(k, particles, edges, memory, shift, p)
+        parted = gap > memory.bridge_film[k] and gap > longest_gap(k, system)
         return -1 if parted else 0
     return 1 if film > SMALLEST_GAP and gap < film else 0  # dry solids overlap without a bridge
 
 
 @part
-def _open_changes(particles, edges, memory, shift, p):
+def _open_changes(system):
     """Resistance of open bridges between particles, and those that break; returns how many pairs change."""
+    edges, memory = system.edges, system.memory
     counts, number = np.zeros(CHUNKS, np.int64), edges.between_particles
     for chunk in prange(CHUNKS):
         count = 0
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             if memory.bridge_open[k]:
-                _open_change(k, particles, edges, memory, shift, p)
+                _open_change(k, system)
             count += memory.bridge_change[k] * memory.bridge_change[k]
         counts[chunk] = count
     return counts.sum()  # local: pairs of this rank
 
 
 @inline
-def _open_change(k, particles, edges, memory, shift, p):
+def _open_change(k, system):
     """See `_open_changes`, for edge k."""
-    _, _, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    memory, p = system.memory, system.parameters
+    _, _, gap = geometry(k, system)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
     renew_resistance(k, bridge_state(k, gap, reduced_radius, memory, p), memory)
-    memory.bridge_change[k] = _change(k, gap, 0.0, particles, edges, memory, shift, p)
+    memory.bridge_change[k] = _change(k, gap, 0.0, system)
 
 
 @serial
-def wall_changes(particles, edges, memory, walls, shift, p):
+def wall_changes(system):
     """Mark where bridges at walls form or break, and move bridges to the nearest piece; returns their number.
 
     A particle has at most one bridge with a wall, at the nearest of its pieces: it does not matter how many pieces
     there are.
     """
+    particles, edges, memory, walls, p = system.particles, system.edges, system.memory, system.walls, system.parameters
     number, begin, count = len(edges.first), edges.between_particles, 0
     while begin < number:
         end, nearest, holder = begin, begin, -1
@@ -166,8 +173,8 @@ def wall_changes(particles, edges, memory, walls, shift, p):
         gap = touched_distance(edges, nearest) - particles.radius[edges.first[nearest]]
         film = particles.film_thickness[edges.first[nearest]]
         if gap < film + thickest_wall(walls, p):
-            film += wall_thickness(nearest, edges, walls, p)
-        change = _change(nearest, gap, film, particles, edges, memory, shift, p)
+            film += wall_thickness(nearest, system)
+        change = _change(nearest, gap, film, system)
         memory.bridge_change[nearest] = change
         count += change * change
         begin = end
@@ -204,8 +211,9 @@ def _other_radius(k, i, particles, edges):
 
 
 @inline
-def _shares(i, particles, edges, memory):
+def _shares(i, system):
     """Sum of the shares of its liquid that the new bridges of particle i ask for."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     asked = 0.0
     for place in range(edges.start[i], edges.start[i + 1]):
         k, _ = edge_role(edges.incident[place])
@@ -215,60 +223,66 @@ def _shares(i, particles, edges, memory):
 
 
 @inline
-def _limit_share(i, particles, edges, memory):
-    particles.liquid_supply[i] = particles.liquid[i] / max(1.0, _shares(i, particles, edges, memory))
+def _limit_share(i, system):
+    particles = system.particles
+    particles.liquid_supply[i] = particles.liquid[i] / max(1.0, _shares(i, system))
 
 
 @part
-def limit_shares(particles, edges, memory):
+def limit_shares(system):
     """Liquid of which each new bridge takes its share: less than there is where the shares add up to more than 1."""
+    particles = system.particles
     for i in prange(particles.owned):
         if particles.bridges_change[i]:
-            _limit_share(i, particles, edges, memory)
+            _limit_share(i, system)
 
 
 @part
-def fill_bridges(particles, edges, memory, walls, shift, p):
+def fill_bridges(system):
     """Volume, film and minimum gap of new bridges."""
+    edges, memory = system.edges, system.memory
     for k in prange(len(edges.first)):
         if memory.bridge_change[k] > 0:
-            _fill(k, particles, edges, memory, walls, shift, p)
+            _fill(k, system)
 
 
 @inline
-def _fill(k, particles, edges, memory, walls, shift, p):
+def _fill(k, system):
+    particles, edges, memory, p = system.particles, system.edges, system.memory, system.parameters
     i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, particles, edges, shift)
+    separation, distance, gap = geometry(k, system)
     volume = particles.liquid_supply[i] * drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
     film = particles.film_thickness[i]
     if k < edges.between_particles:
         volume += particles.liquid_supply[j] * drawn_share(particles.radius[j], particles.radius[i])
         film += particles.film_thickness[j]
     else:
-        film += wall_thickness(k, edges, walls, p)
-    approach = max(-dot(relative_velocity(k, particles, edges), separation) / distance, 0.0)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    n = numbers_of(p)
+        film += wall_thickness(k, system)
+    approach = max(-dot(relative_velocity(k, system), separation) / distance, 0.0)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
+    n = p.bridge
     glass = glass_transition(n.viscosity, approach, n.transition_pressure, reduced_radius, film)
     memory.bridge_volume[k], memory.bridge_film[k] = volume, film
     memory.bridge_gap[k] = max(glass, n.minimum_gap)
     memory.bridge_accounted[k] = gap
     find_closed(k, reduced_radius, memory, p)
     if k < edges.between_particles:
-        renew_bridge(k, particles, edges, memory, shift, p)
+        renew_bridge(k, system)
 
 
 @part
-def transfer_liquid(particles, edges, memory, p):
+def transfer_liquid(system):
     """Take what new bridges have drawn from the liquid of every particle, and add what broken ones return."""
+    particles = system.particles
     for i in prange(particles.owned):
         if particles.bridges_change[i]:
-            _transfer(i, particles, edges, memory, p)
+            _transfer(i, system)
 
 
 @inline
-def _transfer(i, particles, edges, memory, p):
+def _transfer(i, system):
     """See `transfer_liquid`, for particle i."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     drawn, returned, formed, broken = 0.0, 0.0, 0, 0
     for place in range(edges.start[i], edges.start[i + 1]):
         k, sign = edge_role(edges.incident[place])
@@ -277,7 +291,7 @@ def _transfer(i, particles, edges, memory, p):
             drawn += drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
             formed += 1 if sign > 0.0 else 0
         elif change < 0:
-            returned += _part_returned(k, sign, particles, edges, memory, p)
+            returned += _part_returned(k, sign, system)
             broken += 1 if sign > 0.0 else 0
     if drawn > 0.0 or returned > 0.0:
         particles.liquid[i] = max(particles.liquid[i] - particles.liquid_supply[i] * drawn, 0.0) + returned
@@ -287,13 +301,14 @@ def _transfer(i, particles, edges, memory, p):
 
 
 @inline
-def _part_returned(k, sign, particles, edges, memory, p):
+def _part_returned(k, sign, system):
     """Liquid of the broken bridge of edge k that its first (sign 1) or second body gets [m3]."""
+    particles, edges, memory, p = system.particles, system.edges, system.memory, system.parameters
     i, j = edges.first[k], edges.second[k]
     volume = memory.bridge_volume[k]
     if k >= edges.between_particles:
         return share_left_by_wall(particles.radius[i], p) * volume if WALL_LIQUID else volume
-    angle = numbers_of(p).contact_angle
+    angle = p.bridge.contact_angle
     to_first = returned_share(particles.radius[i], particles.radius[j], angle, angle) * volume
     return to_first if sign > 0.0 else volume - to_first
 

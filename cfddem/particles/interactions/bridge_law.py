@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_set import adapted, check_compiles
+from cfddem.backend.named import can_be_named
 from cfddem.particles.interactions.slots import BridgeState
 from closures import bridge, capillary, capillary_pull, rupture
 from closures.lubrication import film_strength
@@ -219,7 +220,7 @@ class BridgeLaws:
         if self.film_density > 0.0 and self.film == "none":
             raise InputError("film_density", self.film_density, "0 without a film", 'or choose film = "deforming"')
         for name, value in self.parameters.items():
-            if name in BridgeState._fields or not math.isfinite(value):
+            if name in BridgeState._fields or not can_be_named(name) or not math.isfinite(value):
                 raise InputError(f"parameters.{name}", value, "a finite number with a name of its own")
         if self.cut not in CUTS:
             raise InputError("cut", self.cut, nearest(str(self.cut), CUTS))
@@ -237,12 +238,7 @@ class BridgeLaws:
             check_compiles(f"laws.bridge.{name}", function)
 
     @property
-    def numbers(self) -> tuple[float, ...]:
-        """The numbers that loops take: those of the user's functions, then `built_in`."""
-        return (*(float(each) for each in self.parameters.values()), *self.built_in)
-
-    @property
-    def built_in(self) -> BridgeNumbers:
+    def numbers(self) -> BridgeNumbers:
         """The numbers of all laws."""
         on_walls = self.contact_angle if self.wall_contact_angle is None else self.wall_contact_angle
         given = {name: getattr(self, name) for name in BridgeNumbers._fields} | {"wall_contact_angle": on_walls}
@@ -251,9 +247,7 @@ class BridgeLaws:
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
         of_bridge = {name: f"bridge.{name}" for name in BridgeState._fields[:-1]}
-        # the damping of rolling and the built-in numbers follow in p
-        first = -(len(self.parameters) + len(BridgeNumbers._fields) + 1)
-        of_bridge |= {name: f"bridge.p[{first + n}]" for n, name in enumerate(self.parameters)}
+        of_bridge |= {name: f"bridge.functions.{name}" for name in self.parameters}
         of_radii = {name: name for name in ("radius", "other_radius")}
         of_angles = {name: name for name in ("contact_angle", "other_contact_angle")}
         made: dict[str, Any] = {

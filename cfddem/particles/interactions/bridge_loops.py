@@ -50,8 +50,9 @@ def shared_inverse_masses(rate, turn_rate, lever, resistance):
 
 
 @inline
-def kept_separation(k, particles, edges, memory):
+def kept_separation(k, system):
     """Separation of a pair at the present positions, its length, and the sum of the radii."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     radii = particles.radius[edges.first[k]] + particles.radius[edges.second[k]]
     return at(memory.bridge_separation, k), memory.bridge_distance[k], radii
 
@@ -68,8 +69,9 @@ def closed_speed(speed, resistance, given, step, inverse_mass):
 
 
 @inline
-def pair_bridge(n, particles, edges, memory, shift, p):
+def pair_bridge(n, system):
     """Pull of the bridge of a pair, its resistance if it is closed, and whether one forms."""
+    particles, edges, memory, shift, p = system.particles, system.edges, system.memory, system.shift, system.parameters
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     separation, distance, radii = of_two_spheres(k, particles, edges, shift)
@@ -90,11 +92,12 @@ def pair_bridge(n, particles, edges, memory, shift, p):
 
 
 @inline
-def pair_bridge_impulse(n, particles, edges, memory, step):
+def pair_bridge_impulse(n, system, step):
     """Impulse of the bridge of a pair that stays closed in this step; marks the others."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
-    separation, distance, radii = kept_separation(k, particles, edges, memory)
+    separation, distance, radii = kept_separation(k, system)
     normal = times(1.0 / distance, separation)
     gap, lever = distance - radii, distance / radii
     resistance = memory.bridge_resistance[k]

@@ -81,14 +81,14 @@ def release_bridges(solver: ParticleSolver, gone: np.ndarray) -> None:
     leaves = gone[edges.first]
     leaves[:pairs] |= gone[edges.second[:pairs]]
     edges.bridge_change[:] = np.where(leaves & (edges.bridge_film > 0.0), -1, 0)
-    particles, graph, memory, walls, _ = solver.views
-    specialise(_break, solver.choices)(particles, graph, memory, walls, solver.laws.parameters)
+    specialise(_break, solver.choices)(solver.system)
 
 
 @serial
-def _break(particles, edges, memory, walls, p):
-    mark_bodies(particles, edges, memory)
+def _break(system):
+    edges, memory = system.edges, system.memory
+    mark_bodies(system)
     if WALLS and WALL_LIQUID:
-        transfer_wall_liquid(particles, edges, memory, walls, p)
-    transfer_liquid(particles, edges, memory, p)
+        transfer_wall_liquid(system)
+    transfer_liquid(system)
     clear_bridges(edges, memory)

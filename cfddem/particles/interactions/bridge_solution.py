@@ -37,7 +37,7 @@ def at_gap(state, gap):
     """The same bridge at another gap."""
     return BridgeState(
         gap, state.film, state.volume, state.reduced_radius, state.minimum_gap,
-        state.viscosity, state.surface_tension, state.contact_angle, state.capillary_number, state.p,
+        state.viscosity, state.surface_tension, state.contact_angle, state.capillary_number, state.functions,
     )  # fmt: skip
 
 

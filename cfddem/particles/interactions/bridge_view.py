@@ -95,9 +95,8 @@ class Bridges:
     def gaps(self) -> tuple[np.ndarray, np.ndarray]:
         """Gap of every bridge, and how far it can still be stretched (n,), (n,) [m]."""
         solver, rows = self._solver, self.edges
-        particles, graph, memory, _, shift = solver.views
         longest = np.empty(len(rows))
-        specialise(_longest, solver.choices)(rows, particles, graph, memory, shift, solver.laws.parameters, longest)
+        specialise(_longest, solver.choices)(rows, solver.system, longest)
         gap = solver.gap[rows]
         return gap, longest - gap
 
@@ -123,6 +122,6 @@ class Bridges:
 
 
 @serial
-def _longest(rows, particles, edges, memory, shift, p, longest):
+def _longest(rows, system, longest):
     for n in range(len(rows)):
-        longest[n] = longest_gap(rows[n], particles, edges, memory, shift, p)
+        longest[n] = longest_gap(rows[n], system)

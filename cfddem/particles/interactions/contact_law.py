@@ -102,11 +102,6 @@ class ContactLaw:
         return replace(self, parameters={**self.parameters, **values}) if values else self
 
     @property
-    def values(self) -> tuple[float, ...]:
-        """Values of the parameters, as loops take them."""
-        return tuple(float(value) for value in self.parameters.values())
-
-    @property
     def adhesive(self) -> bool:
         """Whether solids attract each other, also across a gap."""
         return self.reach is not None

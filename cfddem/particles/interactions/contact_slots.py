@@ -9,6 +9,7 @@ from typing import Any
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import adapted, check_compiles, written
+from cfddem.backend.named import NAMES, can_be_named
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.interactions import bridge, contact, film, rolling, shear_film
 from cfddem.particles.interactions.contact_law import COLUMNS, ContactLaw, Function
@@ -66,6 +67,8 @@ def contact_choices(law: ContactLaw) -> dict[str, Any]:
 def check_contact_law(law: ContactLaw) -> None:
     """Refuse functions that cannot be compiled, invalid parameters, and memory fields that loops cannot keep."""
     for name, value in law.parameters.items():
+        if not can_be_named(name):
+            raise InputError(f"parameter of the contact law {law.name!r}", name, NAMES)
         if not 0.0 <= value < math.inf:
             raise InputError(f"contact_parameters.{name}", value, "at least 0 and finite")
     for each in law.functions:
@@ -86,7 +89,7 @@ def _places(law: ContactLaw) -> dict[str, str]:
     return {
         **{name: f"row.{name}" for name in COLUMNS},
         **{name: f"contact.{name}" for name in ContactState._fields},
-        **{name: f"p[{n}]" for n, name in enumerate(law.parameters)},
+        **{name: f"p.contact.{name}" for name in law.parameters},
         **{each.name: f"m[{n}]" for n, each in enumerate(law.memory)},
         **{name: f"d[{n}]" for n, name in enumerate(law.derived)},
     }

@@ -89,21 +89,24 @@ def renew_film(k, gap, viscosity, reduced_radius, share, memory, row, cutoff_rat
     share  part of the film that belongs to this edge: below 1 where triangles of a mesh share one
     """
     then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
-    now = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
-    memory.resistance[k] = share * now[0]
-    memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k] = now[1], now[2], now[3]
+    resistance, approach_speed, minimum_gap, accounted_gap = update_film(
+        gap, viscosity, reduced_radius, then, row, cutoff_ratio
+    )
+    memory.resistance[k], memory.approach_speed[k] = share * resistance, approach_speed
+    memory.minimum_gap[k], memory.accounted_gap[k] = minimum_gap, accounted_gap
 
 
 @inline
-def update_edge_film(k, particles, edges, memory, walls, shift, table, cutoff_ratio):
+def update_edge_film(k, system):
     """Update the film of edge k."""
-    _, _, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
-    viscosity = pair_viscosity(k, particles, edges)
-    row = pair_row(k, particles, edges, walls, table)
-    renew_film(k, gap, viscosity, reduced_radius, portion(edges, k), memory, row, cutoff_ratio)
+    edges, memory = system.edges, system.memory
+    _, _, gap = geometry(k, system)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
+    viscosity = pair_viscosity(k, system)
+    row = pair_row(k, system)
+    renew_film(k, gap, viscosity, reduced_radius, portion(edges, k), memory, row, system.parameters.cutoff_ratio)
     if SHEAR:
-        asymmetry = edge_asymmetry(k, particles, edges)
+        asymmetry = edge_asymmetry(k, system)
         renew_shear(k, gap, viscosity, reduced_radius, asymmetry, portion(edges, k), memory)
 
 
@@ -128,16 +131,18 @@ def record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row
 
 
 @inline
-def film_force(k, particles, edges, memory, walls, shift, table, cutoff_ratio):
+def film_force(k, system):
     """The film of edge k as an explicit force, for plain velocity Verlet."""
-    separation, distance, gap = geometry(k, particles, edges, shift)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    edges, memory = system.edges, system.memory
+    separation, distance, gap = geometry(k, system)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
     normal = times(1.0 / distance, separation)
-    normal_speed = dot(relative_velocity(k, particles, edges), normal)
-    viscosity = pair_viscosity(k, particles, edges)
-    row = pair_row(k, particles, edges, walls, table)
+    normal_speed = dot(relative_velocity(k, system), normal)
+    viscosity = pair_viscosity(k, system)
+    row = pair_row(k, system)
     record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row)
-    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
+    cutoff_gap = system.parameters.cutoff_ratio * reduced_radius
+    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_gap)
     if COUNT_FILM and memory.resistance[k] > 0.0:
         memory.outside[k] += film_outside(at_least(film))
     return times(-portion(edges, k) * explicit_resistance(film) * normal_speed, normal)
@@ -176,29 +181,31 @@ def film_impulse_short(speed, film, rate, memory, far, step):
 
 
 @inline
-def film_impulse(k, particles, edges, memory, walls, shift, table, cutoff_ratio, step):
+def film_impulse(k, system, step):
     """Impulse of the film of edge k over the coming step.
 
     Each body gives this film the part of its mass that the film has in the body's total resistance. The
     pair so made is solved exactly; the sum over all films conserves momentum and never raises energy.
     """
+    particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, particles, edges, shift)
+    separation, distance, gap = geometry(k, system)
     normal = times(1.0 / distance, separation)
     if memory.resistance[k] == 0.0:
         put(memory.impulse, k, times(0.0, normal))
         return
-    normal_speed = dot(relative_velocity(k, particles, edges), normal)
-    reduced_radius, _ = pair_mass_and_radius(k, particles, edges)
+    normal_speed = dot(relative_velocity(k, system), normal)
+    reduced_radius, _ = pair_mass_and_radius(k, system)
     rates = particles.far_rate if FAR and is_far(k, edges) else particles.film_rate
     rate = rates[i]
     if k < edges.between_particles:
         rate += rates[j]
     strength_per_mass = rate * max(gap, memory.minimum_gap[k])
     inverse_mass = rate * portion(edges, k) / memory.resistance[k]
-    viscosity, row = pair_viscosity(k, particles, edges), pair_row(k, particles, edges, walls, table)
+    viscosity, row = pair_viscosity(k, system), pair_row(k, system)
     record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row)
-    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
+    cutoff_gap = system.parameters.cutoff_ratio * reduced_radius
+    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_gap)
     given = memory.accounted_gap[k]
     new_speed = speed_after_film(normal_speed, film, given, step, strength_per_mass, inverse_mass)
     if COUNT_FILM:

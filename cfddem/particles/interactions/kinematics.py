@@ -31,13 +31,15 @@ class PairKinematics(NamedTuple):
 
 
 @inline
-def sphere_kinematics(k, apart, particles, edges, free):
+def sphere_kinematics(k, apart, system):
     """Kinematics of two spheres.
 
     apart  separation from the second to the first, its length, and the sum of the radii
     """
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     radius, spin, inverse_mass = particles.radius, particles.spin, particles.inverse_mass
+    free = system.parameters.free
     separation, distance, radii = apart
     inverse_sum = 1.0 / radii
     relative = minus(at(particles.velocity, i), at(particles.velocity, j))
@@ -58,16 +60,17 @@ def sphere_kinematics(k, apart, particles, edges, free):
 
 
 @inline
-def wall_kinematics(k, particles, edges, walls, shift):
+def wall_kinematics(k, system):
     """Kinematics of a sphere and a wall; the wall is flat, of infinite mass."""
+    particles, edges, walls = system.particles, system.edges, system.walls
     i = edges.first[k]
-    separation, distance, gap = geometry(k, particles, edges, shift)
+    separation, distance, gap = geometry(k, system)
     radius = particles.radius[i]
     return PairKinematics(
         separation,
         distance,
         gap,
-        relative_velocity(k, particles, edges),
+        relative_velocity(k, system),
         times(radius, at(particles.spin, i)),
         radius,
         1.0 / radius,
@@ -79,8 +82,9 @@ def wall_kinematics(k, particles, edges, walls, shift):
 
 
 @inline
-def pair_mass_and_radius(k, particles, edges):
+def pair_mass_and_radius(k, system):
     """Reduced radius and inverse of the reduced mass; those of the particle itself at a wall."""
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     if k < edges.between_particles:
         radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
@@ -89,24 +93,27 @@ def pair_mass_and_radius(k, particles, edges):
 
 
 @inline
-def relative_velocity(k, particles, edges):
+def relative_velocity(k, system):
     """Velocity of the first centre relative to the second, or to the surface of a wall."""
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     other = at(particles.velocity, j) if k < edges.between_particles else touched(edges, k, SURFACE)
     return minus(at(particles.velocity, i), other)
 
 
 @inline
-def pair_row(k, particles, edges, walls, table):
+def pair_row(k, system):
     """Row of the pair table for the two materials."""
+    particles, edges, walls, table = system.particles, system.edges, system.walls, system.table
     i, j = edges.first[k], edges.second[k]
     other = particles.material[j] if k < edges.between_particles else walls.material[j]
     return table[particles.material[i], other]
 
 
 @inline
-def pair_viscosity(k, particles, edges):
+def pair_viscosity(k, system):
     """Viscosity of the fluid in the gap [Pa s]."""
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     if k < edges.between_particles:
         return 0.5 * (particles.viscosity[i] + particles.viscosity[j])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
 from cfddem.particles.interactions.slots import FilmState, GapState
+from cfddem.particles.system import Parameters, numbers
 
 CHOICES = {
     "integrator": ("drift", "verlet"),
@@ -119,11 +120,24 @@ class Laws(NamedTuple):
             return self.lubrication
         return FilmLaw(chosen("lubrication", self.lubrication).function)
 
-    @property
-    def parameters(self) -> tuple[float, ...]:
-        """Numbers that the loops take: those of the contact law, of bridges, and the damping of rolling last."""
-        of_bridges = () if self.bridge is None else self.bridge.numbers
-        return (*self.contact_law.values, *of_bridges, float(self.rolling_damping))
+    def parameters(
+        self, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), free: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    ) -> Parameters:
+        """Numbers that the loops take.
+
+        gravity  [m/s2]
+        free     1 for each axis along which particles can move, else 0
+        """
+        return Parameters(
+            gravity=_three(gravity),
+            free=_three(free),
+            cutoff_ratio=float(self.cutoff_ratio) if self.film else 0.0,
+            far_film_steps=self.far_film_steps,
+            rolling_damping=float(self.rolling_damping),
+            contact=numbers(self.contact_law.parameters),
+            bridge=numbers({}) if self.bridge is None else self.bridge.numbers,
+            bridge_functions=numbers({} if self.bridge is None else self.bridge.parameters),
+        )
 
     def fields(self) -> list[Field]:
         """What pairs remember under these laws, and what the loops write for each pair."""
@@ -156,6 +170,11 @@ class Laws(NamedTuple):
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
         return _choices(self.contact_law, self._replace(contact="", far_film_steps=min(self.far_film_steps, 2)))
+
+
+def _three(values: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return float(x), float(y), float(z)
 
 
 @lru_cache(maxsize=64)

@@ -14,6 +14,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, prange, vector_part
 from cfddem.backend.law_set import specialise, written
+from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
@@ -35,7 +36,8 @@ from cfddem.particles.interactions.slots import (
     read_memory,
     write_memory,
 )
-from cfddem.particles.pair_graph import memory_class, of_two_spheres
+from cfddem.particles.pair_graph import of_two_spheres
+from cfddem.particles.system import PairSystem, Parameters
 from cfddem.particles.vectors import NOTHING, at, dot, minus, put, times
 
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
@@ -75,16 +77,18 @@ def edge_contact(k, kinematics, row, share, memory, p, step):
 
 
 @inline
-def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p, free, step):
+def pair_force(n, system, step):
     """Film and contact of one pair of particles."""
+    memory, p = system.memory, system.parameters
     k = np.uint64(n)
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
-    apart = kept_separation(k, particles, edges, memory) if BRIDGE else of_two_spheres(k, particles, edges, shift)
-    kinematics = sphere_kinematics(k, apart, particles, edges, free)
-    row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
+    apart = kept_separation(k, system) if BRIDGE else of_two_spheres(k, particles, edges, system.shift)
+    kinematics = sphere_kinematics(k, apart, system)
+    row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     if FILM:
         viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-        renew_film(k, kinematics.gap, viscosity, kinematics.reduced_radius, 1.0, memory, row, cutoff_ratio)
+        renew_film(k, kinematics.gap, viscosity, kinematics.reduced_radius, 1.0, memory, row, p.cutoff_ratio)
         keep_geometry(k, kinematics.separation, kinematics.distance, kinematics.gap, memory)
         if SHEAR:
             asymmetry = (particles.radius[i] - particles.radius[j]) * kinematics.inverse_sum
@@ -93,16 +97,18 @@ def pair_force(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio, p,
 
 
 @inline
-def pair_film(n, particles, edges, memory, shift, rows, kinds, cutoff_ratio):
+def pair_film(n, system):
     """Film of one pair of particles that cannot touch."""
+    memory, p = system.memory, system.parameters
     k = np.uint64(n)
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
-    separation, distance, radii = of_two_spheres(k, particles, edges, shift)
+    separation, distance, radii = of_two_spheres(k, particles, edges, system.shift)
     gap = distance - radii
     reduced_radius = particles.radius[i] * particles.radius[j] / radii
-    row = rows[np.uint64(particles.material[i]) * kinds + np.uint64(particles.material[j])]
+    row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-    renew_film(k, gap, viscosity, reduced_radius, 1.0, memory, row, cutoff_ratio)
+    renew_film(k, gap, viscosity, reduced_radius, 1.0, memory, row, p.cutoff_ratio)
     keep_geometry(k, separation, distance, gap, memory)
     if SHEAR:
         asymmetry = (particles.radius[i] - particles.radius[j]) / radii
@@ -117,31 +123,35 @@ def keep_geometry(k, separation, distance, gap, memory):
 
 
 @inline
-def pair_impulse(n, particles, edges, memory, cutoff_ratio, step):
+def pair_impulse(n, system, step):
     """Impulse of the film of one pair of particles."""
-    impulse_of_pair(np.uint64(n), particles, particles.film_rate, edges, memory, cutoff_ratio, False, step)
+    impulse_of_pair(np.uint64(n), system, system.particles.film_rate, False, step)
 
 
 @inline
-def far_impulse(n, particles, edges, memory, cutoff_ratio, step):
+def far_impulse(n, system, step):
     """The same of one pair that cannot touch, where its film acts once in several steps."""
-    impulse_of_pair(np.uint64(n), particles, particles.far_rate, edges, memory, cutoff_ratio, True, step)
+    impulse_of_pair(np.uint64(n), system, system.particles.far_rate, True, step)
 
 
 @inline
-def impulse_of_pair(k, particles, rates, edges, memory, cutoff_ratio, far, step):
+def impulse_of_pair(k, system, rates, far, step):
     """Impulse of the film of edge k; `rates` are the resistances of films over the mass that share out the mass."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
     normal, gap = at(memory.film_normal, k), memory.film_gap[k]
     reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
     speed = dot(minus(at(particles.velocity, i), at(particles.velocity, j)), normal)
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_ratio * reduced_radius)
-    then = (memory.resistance[k], memory.approach_speed[k], memory.accounted_gap[k])
+    film = FilmState(
+        gap, viscosity, reduced_radius, memory.minimum_gap[k], system.parameters.cutoff_ratio * reduced_radius
+    )
+    resistance = memory.resistance[k]
+    then = (resistance, memory.approach_speed[k], memory.accounted_gap[k])
     rate = rates[i] + rates[j]
     size, given, left = film_impulse_short(speed, film, rate, then, far, step)
     if COUNT_FILM:
-        memory.outside[k] += film_outside(at_least(film)) if then[0] > 0.0 and not left else 0
+        memory.outside[k] += film_outside(at_least(film)) if resistance > 0.0 and not left else 0
     memory.accounted_gap[k] = given
     memory.hard[k] = left
     put(memory.impulse, k, times(size, normal))
@@ -150,32 +160,35 @@ def impulse_of_pair(k, particles, rates, edges, memory, cutoff_ratio, far, step)
 class PairLoop(NamedTuple):
     """A loop over pairs."""
 
-    body: Callable[..., Any]  # function of one pair
-    rest: str  # what it takes beside the arrays
+    body: Callable[..., Any]  # function of one pair: (n, system) and the rest
+    rest: str = "step"  # what it takes beside the system
     particles: Any = PairParticles  # arrays of the particles that it reads
     needed_by: str = ""  # choice without which a run has no such loop
 
 
 LOOPS: dict[str, PairLoop] = {
-    "pair_forces": PairLoop(pair_force, "shift, rows, kinds, cutoff_ratio, p, free, step"),
-    "update_films": PairLoop(pair_film, "shift, rows, kinds, cutoff_ratio", needed_by="FILM"),
-    "film_impulses": PairLoop(pair_impulse, "cutoff_ratio, step", needed_by="FILM"),
-    "far_impulses": PairLoop(far_impulse, "cutoff_ratio, step", FarParticles, "FAR"),
-    "shear_impulses": PairLoop(pair_shear, "step", ShearParticles, "SHEAR"),
-    "pair_bridges": PairLoop(pair_bridge, "shift, p", WetParticles, "BRIDGE"),
-    "bridge_impulses": PairLoop(pair_bridge_impulse, "step", WetParticles, "BRIDGE"),
+    "pair_forces": PairLoop(pair_force),
+    "update_films": PairLoop(pair_film, rest="", needed_by="FILM"),
+    "film_impulses": PairLoop(pair_impulse, needed_by="FILM"),
+    "far_impulses": PairLoop(far_impulse, particles=FarParticles, needed_by="FAR"),
+    "shear_impulses": PairLoop(pair_shear, particles=ShearParticles, needed_by="SHEAR"),
+    "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
+    "bridge_impulses": PairLoop(pair_bridge_impulse, particles=WetParticles, needed_by="BRIDGE"),
 }
 """Slot -> loop over pairs."""
 
 
-def loop_choices(fields: Iterable[Field], choices: dict[str, Any], kept_apart: Collection[str]) -> dict[str, Any]:
+def loop_choices(
+    fields: Iterable[Field], choices: dict[str, Any], kept_apart: Collection[str], parameters: Parameters
+) -> dict[str, Any]:
     """What goes into the slots of the loops over pairs that carry these fields.
 
     kept_apart  fields that inactive triangles do not take over
+    parameters  of the run; their names count
     """
     fields = list(fields)
-    names = tuple(each.name for each in fields)
-    loops = {slot: over_pairs(specialise(loop.body, choices), names, loop.rest, loop.particles)
+    memory = named_arrays("Memory", tuple(each.name for each in fields))
+    loops = {slot: over_pairs(specialise(loop.body, choices), loop.rest, loop.particles, memory, parameters)
              for slot, loop in LOOPS.items() if choices.get(loop.needed_by, True)}  # fmt: skip
     lines = ["put(memory.{0}, to, at(memory.{0}, k))" if each.components else "memory.{0}[to] = memory.{0}[k]"
              for each in fields]  # fmt: skip
@@ -199,24 +212,49 @@ def _clear_contact(memory, k):
     write_memory(memory, k, read_memory(memory, k), False)
 
 
-def over_pairs(body: Any, names: tuple[str, ...], rest: str, particles: Any = PairParticles) -> Any:
-    """A loop `(begin, end, particles, edges, memory, rest)` over pairs, with each array an argument of its own.
+def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Parameters) -> Any:
+    """A loop `(begin, end, system, rest)` over pairs, with each array and number an argument of its own.
 
-    body       (n, particles, edges, memory, rest), compiled by `inline`
-    names      of the fields of a pair
+    body       (n, system, rest), compiled by `inline`, where the system is a `PairSystem`
     rest       further arguments
     particles  arrays of the particles that the body reads
+    memory     arrays of the pairs
     """
-    structures = {"particles": particles, "edges": PairEnds, "memory": memory_class(names)}
-    arrays = {name: [f"{name}_{each}" for each in made._fields] for name, made in structures.items()}
-    every = ", ".join(each for some in arrays.values() for each in some)
-    rebuilt = ", ".join(f"{name}_of({', '.join(some)})" for name, some in arrays.items())
-    given = ", ".join(f"{name}.{each}" for name, made in structures.items() for each in made._fields)
-    classes = {f"{name}_of": made for name, made in structures.items()}
+    arrays = {name: each(*each._fields) for name, each in
+              (("particles", particles), ("edges", PairEnds), ("memory", memory))}  # fmt: skip
+    system = PairSystem(**arrays, shift="shift", rows="rows", kinds="kinds", parameters=parameters)  # type: ignore[arg-type]
+    structures: dict[str, Any] = {}
+    rebuilt = _rebuilt(system, "system", structures)
+    places = _places(system, "system")
+    names = ", ".join(each.replace(".", "_") for each in places)
+    more = f", {rest}" if rest else ""
     loop = (
-        f"def over_pairs(begin, end, {every}, {rest}):\n"
+        f"def over_pairs(begin, end, {names}{more}):\n"
         f"    for n in prange(begin, end):\n"
-        f"        body(n, {rebuilt}, {rest})\n"
+        f"        body(n, {rebuilt}{more})\n"
     )
-    call = f"def call(begin, end, particles, edges, memory, {rest}):\n    over_pairs(begin, end, {given}, {rest})\n"
-    return written(call, over_pairs=written(loop, vector_part, body=body, prange=prange, **classes))
+    given = ", ".join({"system.rows": "rows", "system.kinds": "kinds"}.get(each, each) for each in places)
+    call = (
+        f"def call(begin, end, system{more}):\n"
+        f"    kinds, rows = uint64(len(system.table)), system.table.reshape(-1)\n"
+        f"    over_pairs(begin, end, {given}{more})\n"
+    )
+    made_loop = written(loop, vector_part, body=body, prange=prange, **structures)
+    return written(call, over_pairs=made_loop, uint64=np.uint64)
+
+
+def _places(value: Any, place: str) -> list[str]:
+    """Where the arrays and numbers of a structure of structures are."""
+    if not hasattr(value, "_fields"):
+        return [place]
+    return [inner for name, each in zip(value._fields, value) for inner in _places(each, f"{place}.{name}")]
+
+
+def _rebuilt(value: Any, place: str, structures: dict[str, Any]) -> str:
+    """The structure, made of arguments that are named after their places; collects the classes that it needs."""
+    if not hasattr(value, "_fields"):
+        return place.replace(".", "_")
+    name = f"{place.replace('.', '_')}_of"
+    structures[name] = type(value)
+    inner = [_rebuilt(each, f"{place}.{member}", structures) for member, each in zip(value._fields, value)]
+    return f"{name}({', '.join(inner)})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
@@ -21,6 +22,17 @@ FIELDS = (
     Field("roll", "rad", 3, "memory", meaning="angle of the rolling spring"),
     Field("moment", "N m", 3, "memory", meaning="torque against rolling and twisting on the first body"),
 )
+
+
+class RollingState(NamedTuple):
+    """A contact that rolls, as a law of rolling sees it."""
+
+    normal: tuple[float, float, float]
+    rate: tuple[float, float, float]  # of rolling [rad/s]
+    limit: float  # largest torque [N m]
+    stiffness: float  # of the rolling spring [N m/rad]
+    softly: float  # torque over the rate of rolling that does not turn the motion round [N m s]
+    inverse_inertia: float  # of both bodies [1/(kg m2)]
 
 
 @inline
@@ -50,31 +62,30 @@ def resist_rolling(kinematics, contact, row, force, roll, p, m, d):
     twisting = -min(max(twist * softly, -twisting), twisting)
     secant = share * secant_stiffness(contact, row, p, m, d)
     stiffness = rolling_stiffness(secant, row.rolling_friction, contact.reduced_radius)
-    moment, roll = rolling_torque(normal, rate, roll, limit, stiffness, softly, kinematics, contact.step, p)
+    rolling = RollingState(normal, rate, limit, stiffness, softly, kinematics.inverse_inertia)
+    moment, roll = rolling_torque(rolling, roll, contact.step, p)
     moment = plus(moment, times(twisting, normal))
     return either(touching, moment, NOTHING), either(touching, roll, NOTHING)
 
 
 @inline
-def constant_torque(normal, rate, roll, limit, stiffness, softly, kinematics, step, p):
+def constant_torque(rolling, roll, step, p):
     """A torque of constant size against rolling."""
-    speed = math.sqrt(dot(rate, rate))
-    return times(-min(limit, speed * softly) / max(speed, LEAST), rate), NOTHING
+    speed = math.sqrt(dot(rolling.rate, rolling.rate))
+    return times(-min(rolling.limit, speed * rolling.softly) / max(speed, LEAST), rolling.rate), NOTHING
 
 
 @inline
-def spring_dashpot(normal, rate, roll, limit, stiffness, softly, kinematics, step, p):
-    """A spring that yields at the largest rolling torque, and a dashpot that acts until then.
-
-    The last parameter of the loops is the damping over critical.
-    """
+def spring_dashpot(rolling, roll, step, p):
+    """A spring that yields at the largest rolling torque, and a dashpot that acts until then."""
+    normal, rate, limit, stiffness = rolling.normal, rolling.rate, rolling.limit, rolling.stiffness
     roll = across(plus(roll, times(step, rate)), normal)
     size = stiffness * math.sqrt(dot(roll, roll))
     yields = size > limit
     roll = times(limit / max(size, LEAST) if yields else 1.0, roll)
     # a sphere that rolls turns about the contact: 7/2 of its inertia about the centre
-    inertia = 3.5 / max(kinematics.inverse_inertia, LEAST)
-    damping = 0.0 if yields else rolling_damping(p[-1], inertia, stiffness)
+    inertia = 3.5 / max(rolling.inverse_inertia, LEAST)
+    damping = 0.0 if yields else rolling_damping(p.rolling_damping, inertia, stiffness)
     return times(-1.0, plus(times(stiffness, roll), times(damping, rate))), roll
 
 

@@ -68,8 +68,9 @@ def logarithm(x):
 
 
 @inline
-def edge_asymmetry(k, particles, edges):
+def edge_asymmetry(k, system):
     """Difference of the radii of edge k over their sum; -1 at a wall."""
+    particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     if k < edges.between_particles:
         return (particles.radius[i] - particles.radius[j]) / (particles.radius[i] + particles.radius[j])
@@ -157,8 +158,9 @@ def impulses_of(k, memory):
 
 
 @inline
-def pair_shear(n, particles, edges, memory, step):
+def pair_shear(n, system, step):
     """Impulses of the film of one pair of particles that slides and rolls; zero out of its reach."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
     radius, spin, resistance = particles.radius, at(particles.spin, i), memory.shear_resistance[k]
@@ -198,17 +200,18 @@ def pair_shear(n, particles, edges, memory, step):
 
 
 @inline
-def wall_shear(k, particles, edges, memory, walls, shift, step):
+def wall_shear(k, system, step):
     """Impulses of the film of particle-wall edge k, which slides and rolls."""
+    particles, edges, memory, walls = system.particles, system.edges, system.memory, system.walls
     i = edges.first[k]
     resistance = memory.shear_resistance[k]
     if resistance == 0.0:
         write_impulse(k, memory, NOTHING, NOTHING, NOTHING)
         return
     radius, spin = particles.radius[i], at(particles.spin, i)
-    separation, distance, gap = geometry(k, particles, edges, shift)
+    separation, distance, gap = geometry(k, system)
     normal = times(1.0 / distance, separation)
-    slip = minus(across(relative_velocity(k, particles, edges), normal), times(radius, cross(spin, normal)))
+    slip = minus(across(relative_velocity(k, system), normal), times(radius, cross(spin, normal)))
     spin = minus(spin, at(walls.spin, walls.wall[edges.second[k]]))
     rate, turn = particles.slip_rate[i], particles.turn_rate[i]
     rates = (rate + radius * radius * turn, radius * turn, turn, rate * turn)
@@ -225,15 +228,17 @@ def wall_shear(k, particles, edges, memory, walls, shift, step):
 
 
 @part
-def find_wall_shear(particles, edges, memory, walls, shift, step):
+def find_wall_shear(system, step):
     """Impulses against sliding and rolling of all films at walls."""
+    edges = system.edges
     for k in prange(edges.between_particles, len(edges.first)):
-        wall_shear(k, particles, edges, memory, walls, shift, step)
+        wall_shear(k, system, step)
 
 
 @part
-def apply_shear_impulses(particles, edges, memory):
+def apply_shear_impulses(system):
     """Give every particle the impulses of its films against sliding and rolling."""
+    particles, edges, memory = system.particles, system.edges, system.memory
     for i in prange(particles.owned):
         impulse, couple = NOTHING, NOTHING
         for place in places_of(i, edges):
@@ -248,8 +253,9 @@ def apply_shear_impulses(particles, edges, memory):
 
 
 @serial
-def shear_kick(particles, edges, memory, walls, shift, step):
+def shear_kick(system, step):
     """Give the particles the impulses of their films against sliding, rolling and twisting."""
-    shear_impulses(0, edges.between_particles, particles, edges, memory, step)
-    find_wall_shear(particles, edges, memory, walls, shift, step)
-    apply_shear_impulses(particles, edges, memory)
+    edges = system.edges
+    shear_impulses(0, edges.between_particles, system, step)
+    find_wall_shear(system, step)
+    apply_shear_impulses(system)

@@ -44,7 +44,7 @@ class BridgeState(NamedTuple):
     surface_tension: float  # [N/m]
     contact_angle: float  # [rad]
     capillary_number: float  # of the speed at which the bodies part; in resistances, or meet, and 0 below h_min [-]
-    p: tuple[float, ...]  # numbers of the laws, with those of a user's functions
+    functions: tuple[float, ...]  # parameters of a user's functions, by their names
 
 
 class GapState(NamedTuple):

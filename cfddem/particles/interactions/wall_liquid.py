@@ -13,7 +13,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.errors import InputError
-from cfddem.particles.interactions.bridge import FLAT, find_closed, numbers_of
+from cfddem.particles.interactions.bridge import FLAT, find_closed
 from cfddem.particles.interactions.slots import WALL_LIQUID, returned_share
 from cfddem.particles.walls.nearest_point import FOOT, Walls, carried_back, touched
 
@@ -77,11 +77,12 @@ def _place(walls, key):
 
 
 @inline
-def wall_thickness(k, edges, walls, p):
+def wall_thickness(k, system):
     """Thickness of the liquid on the wall of edge k, below its particle [m]."""
+    edges, walls, p = system.edges, system.walls, system.parameters
     if not WALL_LIQUID:
         return 0.0
-    n = numbers_of(p)
+    n = p.bridge
     key = _key(k, edges, walls, n.wall_patch)
     row = _place(walls, key)
     if row < walls.patch_count[0] and walls.patch_key[row] == key:
@@ -92,14 +93,14 @@ def wall_thickness(k, edges, walls, p):
 @inline
 def share_left_by_wall(radius, p):
     """Part of a broken bridge at a wall that its particle gets."""
-    n = numbers_of(p)
+    n = p.bridge
     return returned_share(radius, FLAT, n.contact_angle, n.wall_contact_angle)
 
 
 @inline
 def thickest_wall(walls, p):
     """Upper bound of the thickness of the liquid on walls [m]."""
-    return max(numbers_of(p).wall_film, walls.patch_thickest[0]) if WALL_LIQUID else 0.0
+    return max(p.bridge.wall_film, walls.patch_thickest[0]) if WALL_LIQUID else 0.0
 
 
 @inline
@@ -118,9 +119,10 @@ def _touched_patch(k, edges, walls, n):
 
 
 @serial
-def transfer_wall_liquid(particles, edges, memory, walls, p):
+def transfer_wall_liquid(system):
     """Draw liquid for new bridges at walls, and return that of broken ones, in the order of the ids of particles."""
-    n, begin, number = numbers_of(p), edges.between_particles, len(edges.first)
+    particles, edges, memory, walls, p = system.particles, system.edges, system.memory, system.walls, system.parameters
+    n, begin, number = p.bridge, edges.between_particles, len(edges.first)
     area = n.wall_patch * n.wall_patch
     changed = begin + np.flatnonzero(memory.bridge_change[begin:number])
     order = np.argsort(particles.id[edges.first[changed]], kind="mergesort")

@@ -12,7 +12,6 @@ active.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -29,138 +28,120 @@ from cfddem.particles.walls.nearest_point import (
     SHARE,
     TOUCH,
     TRIANGLE,
+    WallPairs,
     touch,
     touched,
     touched_distance,
 )
 
 
-class _Neighbours(NamedTuple):
-    """The triangles near particles: few arrays, so that the functions compile fast."""
-
-    pairs: int
-    first: np.ndarray
-    second: np.ndarray
-    minimum_gap: np.ndarray
-    touch: np.ndarray
-    radius: np.ndarray
-    kind: np.ndarray
-    wall: np.ndarray
-    corner: np.ndarray
-    shape: np.ndarray
-
-
 @serial
-def _share(neighbours, cutoff_ratio):
+def _share(at_walls, cutoff_ratio):
     """Find the share of each triangle in the contact and film of its mesh."""
-    begin, number = neighbours.pairs, len(neighbours.first)
+    begin, number = at_walls.between_particles, len(at_walls.first)
     while begin < number:
         end = begin + 1
-        while end < number and neighbours.first[end] == neighbours.first[begin]:
+        while end < number and at_walls.first[end] == at_walls.first[begin]:
             end += 1
         active = 0
         for k in range(begin, end):
-            if _within_reach(k, neighbours, cutoff_ratio):
+            if _within_reach(k, at_walls, cutoff_ratio):
                 inactive, other = False, begin
                 while other < end and not inactive:
-                    inactive = _is_inactive_beside(k, other, neighbours)
+                    inactive = _is_inactive_beside(k, other, at_walls)
                     other += 1
-                neighbours.touch[_row(k, neighbours) + SHARE] = 0.0 if inactive else 1.0
+                at_walls.touch[_row(k, at_walls) + SHARE] = 0.0 if inactive else 1.0
                 active += 0 if inactive else 1
         if active > 1:
-            _divide(begin, end, neighbours, cutoff_ratio)
+            _divide(begin, end, at_walls, cutoff_ratio)
         begin = end
 
 
 @inline
-def _row(k, neighbours):
+def _row(k, at_walls):
     """Where the columns of edge k begin in `touch`."""
-    return TOUCH * (k - neighbours.pairs)
+    return TOUCH * (k - at_walls.between_particles)
 
 
 @inline
-def _within_reach(k, neighbours, cutoff_ratio):
+def _within_reach(k, at_walls, cutoff_ratio):
     """Whether edge k is of a triangle near enough for its contact or film."""
-    radius = neighbours.radius[neighbours.first[k]]
-    gap = neighbours.touch[_row(k, neighbours) + DISTANCE] - radius
-    return neighbours.kind[neighbours.second[k]] == TRIANGLE and gap <= max(
-        cutoff_ratio * radius, neighbours.minimum_gap[k]
-    )
+    radius = at_walls.radius[at_walls.first[k]]
+    gap = at_walls.touch[_row(k, at_walls) + DISTANCE] - radius
+    return at_walls.kind[at_walls.second[k]] == TRIANGLE and gap <= max(cutoff_ratio * radius, at_walls.minimum_gap[k])
 
 
 @inline
-def _common(k, other, neighbours):
+def _common(k, other, at_walls):
     """Corners that the triangles of two edges share, as sums of the corners of the first and of the second."""
-    w, v = np.int64(neighbours.second[k]), np.int64(neighbours.second[other])
+    w, v = np.int64(at_walls.second[k]), np.int64(at_walls.second[other])
     own, theirs = 0, 0
-    if neighbours.wall[w] == neighbours.wall[v] and neighbours.corner[3 * w] >= 0:
+    if at_walls.wall[w] == at_walls.wall[v] and at_walls.corner[3 * w] >= 0:
         for a in range(3):
             for b in range(3):
-                if neighbours.corner[3 * w + a] == neighbours.corner[3 * v + b]:
+                if at_walls.corner[3 * w + a] == at_walls.corner[3 * v + b]:
                     own |= 1 << a
                     theirs |= 1 << b
     return own, theirs
 
 
 @inline
-def _is_inactive_beside(k, other, neighbours):
+def _is_inactive_beside(k, other, at_walls):
     """Whether the nearest point of k lies on what it shares with a nearer triangle, or with an equal earlier one."""
-    own, theirs = _row(k, neighbours), _row(other, neighbours)
-    if other == k or neighbours.touch[theirs + DISTANCE] > (1.0 + 1e-9) * neighbours.touch[own + DISTANCE]:
+    own, theirs = _row(k, at_walls), _row(other, at_walls)
+    if other == k or at_walls.touch[theirs + DISTANCE] > (1.0 + 1e-9) * at_walls.touch[own + DISTANCE]:
         return False
-    mine, others = _common(k, other, neighbours)
-    if mine == 0 or int(neighbours.touch[own + FEATURE]) & ~mine != 0:
+    mine, others = _common(k, other, at_walls)
+    if mine == 0 or int(at_walls.touch[own + FEATURE]) & ~mine != 0:
         return False
-    return int(neighbours.touch[theirs + FEATURE]) & ~others != 0 or neighbours.second[other] < neighbours.second[k]
+    return int(at_walls.touch[theirs + FEATURE]) & ~others != 0 or at_walls.second[other] < at_walls.second[k]
 
 
 @serial
-def _divide(begin, end, neighbours, cutoff_ratio):
+def _divide(begin, end, at_walls, cutoff_ratio):
     """Divide the contact of one particle among its active triangles.
 
     The part that a triangle yields to a second one is reduced by the part that the second yields to a third.
     """
     active = np.zeros(end - begin, np.bool_)
     for k in range(begin, end):
-        active[k - begin] = neighbours.touch[_row(k, neighbours) + SHARE] > 0.0 and _within_reach(
-            k, neighbours, cutoff_ratio
-        )
+        active[k - begin] = at_walls.touch[_row(k, at_walls) + SHARE] > 0.0 and _within_reach(k, at_walls, cutoff_ratio)
     rows = begin + np.flatnonzero(active)
     for k in rows:
         part = 1.0
         for other in rows:
-            weight = 1.0 - _kept(k, other, neighbours)
+            weight = 1.0 - _kept(k, other, at_walls)
             for third in rows:
                 if weight > 0.0 and third != k:
-                    weight *= _kept(other, third, neighbours)
+                    weight *= _kept(other, third, at_walls)
             part *= 1.0 - weight
-        neighbours.touch[_row(k, neighbours) + SHARE] = part
+        at_walls.touch[_row(k, at_walls) + SHARE] = part
 
 
 @serial
-def _kept(k, other, neighbours):
+def _kept(k, other, at_walls):
     """Part that edge k keeps beside another of the same mesh: 1 where their common edge is outside the overlap."""
-    common, _ = _common(k, other, neighbours)
+    common, _ = _common(k, other, at_walls)
     if common == 0 or k == other:
         return 1.0
-    w, row = np.int64(neighbours.second[k]), _row(k, neighbours)
-    distance = neighbours.touch[row + DISTANCE]
-    gap = distance - neighbours.radius[neighbours.first[k]]
-    beyond = _to_common(neighbours, w, common, row + PLACE) - distance
-    joint = 1.0 - beyond / max(abs(gap), neighbours.minimum_gap[k], 1e-300)
+    w, row = np.int64(at_walls.second[k]), _row(k, at_walls)
+    distance = at_walls.touch[row + DISTANCE]
+    gap = distance - at_walls.radius[at_walls.first[k]]
+    beyond = _to_common(at_walls, w, common, row + PLACE) - distance
+    joint = 1.0 - beyond / max(abs(gap), at_walls.minimum_gap[k], 1e-300)
     if joint <= 0.0:
         return 1.0
-    mine = _to_common(neighbours, w, common, row + FOOT)
-    others = _to_common(neighbours, w, common, _row(other, neighbours) + FOOT)
+    mine = _to_common(at_walls, w, common, row + FOOT)
+    others = _to_common(at_walls, w, common, _row(other, at_walls) + FOOT)
     return 1.0 - min(joint, 1.0) * others / max(mine + others, 1e-300)
 
 
 @inline
-def _to_common(neighbours, w, common, x):
+def _to_common(at_walls, w, common, x):
     """Distance of the point at column x of `touch` from a corner or an edge of triangle w."""
-    a = at(neighbours.shape, 4 * w + (0 if common & 1 else 1 if common & 2 else 2))
-    b = at(neighbours.shape, 4 * w + (2 if common & 4 else 1 if common & 2 else 0))
-    along, away = minus(b, a), minus((neighbours.touch[x], neighbours.touch[x + 1], neighbours.touch[x + 2]), a)
+    a = at(at_walls.shape, 4 * w + (0 if common & 1 else 1 if common & 2 else 2))
+    b = at(at_walls.shape, 4 * w + (2 if common & 4 else 1 if common & 2 else 0))
+    along, away = minus(b, a), minus((at_walls.touch[x], at_walls.touch[x + 1], at_walls.touch[x + 2]), a)
     length = dot(along, along)
     if length > 0.0:
         away = minus(away, times(min(max(dot(away, along) / length, 0.0), 1.0), along))
@@ -168,32 +149,27 @@ def _to_common(neighbours, w, common, x):
 
 
 @serial
-def wall_contacts(particles, edges, minimum_gap, walls, free, cutoff_ratio):
+def wall_contacts(system, cutoff_ratio):
     """Find the geometry of all particle-wall edges.
 
-    minimum_gap   (n,) gap below which the solids of each edge touch [m]
     cutoff_ratio  reach of films over R*; 0 without films [-]
     """
-    touch(particles, edges, walls, free)
+    particles, edges, walls = system.particles, system.edges, system.walls
+    at_walls = WallPairs(
+        edges.between_particles, edges.first, edges.second, system.memory.minimum_gap, edges.touch,
+        particles.position, particles.velocity, particles.radius, system.parameters.free,
+        walls.kind, walls.shape, walls.corner, walls.wall, walls.velocity, walls.spin, walls.centre, walls.shift,
+        walls.turned, walls.sweep,
+    )  # fmt: skip
+    touch(at_walls)
     if TRIANGLES:
-        neighbours = _Neighbours(
-            edges.between_particles,
-            edges.first,
-            edges.second,
-            minimum_gap,
-            edges.touch,
-            particles.radius,
-            walls.kind,
-            walls.wall,
-            walls.corner,
-            walls.shape,
-        )
-        _share(neighbours, cutoff_ratio)
+        _share(at_walls, cutoff_ratio)
 
 
 @serial
-def share_memory(edges, memory, walls):
+def share_memory(system):
     """Copy the memory of each contact to the inactive triangles beside it, which may become active."""
+    edges, memory, walls = system.edges, system.memory, system.walls
     pairs, number = edges.between_particles, len(edges.first)
     begin = pairs
     for k in range(pairs, number):

@@ -57,6 +57,30 @@ class Walls(NamedTuple):
     patch_thickest: np.ndarray = np.zeros(1)  # (1,) largest thickness of the liquid on a patch so far [m]
 
 
+class WallPairs(NamedTuple):
+    """The particle-wall edges, and all that their geometry depends on: one compiled loop serves all laws."""
+
+    between_particles: int  # edges that come before
+    first: np.ndarray
+    second: np.ndarray
+    minimum_gap: np.ndarray  # gap below which the solids of each edge touch [m]
+    touch: np.ndarray  # what is found
+    position: np.ndarray  # of the particles [m]
+    moved: np.ndarray  # velocity of the particles [m/s]
+    radius: np.ndarray  # of the particles [m]
+    free: tuple[float, float, float]  # 1 for each axis along which particles can move
+    kind: np.ndarray  # of the pieces, and so on: see `Walls`
+    shape: np.ndarray
+    corner: np.ndarray
+    wall: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    centre: np.ndarray
+    shift: np.ndarray
+    turned: np.ndarray
+    sweep: np.ndarray
+
+
 @inline
 def _triangle(shape, w, place):
     """Direction from the nearest point, distance, and the feature of the triangle it lies on (Ericson 2004, 5.1.5)."""
@@ -204,33 +228,33 @@ def carried_back(walls, m, place):
 
 
 @serial
-def touch(particles, edges, walls, free):
+def touch(at_walls):
     """Geometry of each particle-wall edge: normal, distance, velocity of the surface, turning rate of the normal."""
-    pairs = edges.between_particles
-    for k in range(pairs, len(edges.first)):
-        i, w = np.int64(edges.first[k]), np.int64(edges.second[k])
-        m = np.int64(walls.wall[w])
-        place = at(particles.position, i)
-        seen = in_frame(walls, m, place)
-        normal, distance, feature, curvature, bend, direction = nearest(walls.kind, walls.shape, w, seen)
+    pairs, free = at_walls.between_particles, at_walls.free
+    for k in range(pairs, len(at_walls.first)):
+        i, w = np.int64(at_walls.first[k]), np.int64(at_walls.second[k])
+        m = np.int64(at_walls.wall[w])
+        place = at(at_walls.position, i)
+        seen = in_frame(at_walls, m, place)
+        normal, distance, feature, curvature, bend, direction = nearest(at_walls.kind, at_walls.shape, w, seen)
         row = TOUCH * (k - pairs)
-        _put(edges.touch, row + PLACE, seen)
-        _put(edges.touch, row + FOOT, minus(seen, times(distance, normal)))
-        if walls.sweep[m] != 0.0:
-            normal, direction = _rotated(walls.turned, m, normal), _rotated(walls.turned, m, direction)
-        velocity, spin = at(walls.velocity, m), at(walls.spin, m)
-        arm = minus(place, plus(at(walls.centre, m), at(walls.shift, m)))
+        _put(at_walls.touch, row + PLACE, seen)
+        _put(at_walls.touch, row + FOOT, minus(seen, times(distance, normal)))
+        if at_walls.sweep[m] != 0.0:
+            normal, direction = _rotated(at_walls.turned, m, normal), _rotated(at_walls.turned, m, direction)
+        velocity, spin = at(at_walls.velocity, m), at(at_walls.spin, m)
+        arm = minus(place, plus(at(at_walls.centre, m), at(at_walls.shift, m)))
         surface = plus(velocity, cross(spin, minus(arm, times(distance, normal))))
-        moved = at(particles.velocity, i)
+        moved = at(at_walls.moved, i)
         moved = (free[0] * moved[0], free[1] * moved[1], free[2] * moved[2])
         moved = minus(moved, plus(velocity, cross(spin, arm)))
         turn = plus(times(curvature, moved), times(bend * dot(moved, direction), direction))
-        _put(edges.touch, row + NORMAL, normal)
-        edges.touch[row + DISTANCE] = distance
-        _put(edges.touch, row + SURFACE, surface)
-        _put(edges.touch, row + TURN, plus(turn, cross(spin, normal)))
-        edges.touch[row + FEATURE] = feature
-        edges.touch[row + SHARE] = 1.0
+        _put(at_walls.touch, row + NORMAL, normal)
+        at_walls.touch[row + DISTANCE] = distance
+        _put(at_walls.touch, row + SURFACE, surface)
+        _put(at_walls.touch, row + TURN, plus(turn, cross(spin, normal)))
+        at_walls.touch[row + FEATURE] = feature
+        at_walls.touch[row + SHARE] = 1.0
 
 
 @inline

@@ -108,7 +108,7 @@ def rates(state, pair):
     liquid = pair.liquid
     bridge = BridgeState(
         wetted, film, 0.0, reduced_radius, pair.minimum_gap,
-        liquid.viscosity, liquid.surface_tension, liquid.contact_angle, 0.0, (0.0,),
+        liquid.viscosity, liquid.surface_tension, liquid.contact_angle, 0.0, (),
     )  # fmt: skip
     push = resistance_along(bridge) * approach - (bridge_pull(bridge) if BRIDGE_PULL else 0.0)
     drag = resistance_across(bridge) * sliding

@@ -192,7 +192,7 @@ def _pair(given: Mapping[str, Any], laws: BridgeLaws) -> Pair:
         shear_modulus=contact.reduced_shear_modulus(*elastic, *elastic),
         damping_ratio=contact.damping_ratio(given["restitution"]),
         friction=given["friction"],
-        liquid=laws.built_in,
+        liquid=laws.numbers,
     )
 
 
