@@ -23,7 +23,7 @@ force. Without slip there is no agitation.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,11 +34,12 @@ from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.terms import CouplingTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
-from closures.added_mass import zuber
 from closures.agitation import SHORT, force_deviation, force_rate, isolated_drag_factor
 from closures.kinds import AGITATION_ARGUMENTS
 from closures.registry import Law, law_of
@@ -72,16 +73,64 @@ class AgitationTerms(NamedTuple):
     """What agitation adds to one fluid step."""
 
     velocity: Array  # fluctuation of the fluid velocity in the drag (N, 3) [m/s]
-    force: Array | None  # explicit force on every particle, its opposite on the fluid (N, 3) [N]; None for none
+    force: Array  # explicit force on every particle, its opposite on the fluid (N, 3) [N]
 
 
-class PseudoTurbulence:
+class Agitation(FluidForce):
+    """What both models of agitation share: the surroundings of the particles, and the number of their step.
+
+    fluid, kernel  of the run
+    seed           of the random numbers
+
+    pushes  whether there is a force beside the drag of the fluctuation
+    """
+
+    name, lines, pushes = "agitation", ("agitation",), True
+
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, seed: int) -> None:
+        self.fluid, self.kernel, self.seed, self.steps = fluid, kernel, seed, 0
+        self._mean_slip = np.zeros((0, 3))
+
+    def begin(self, terms: CouplingTerms) -> None:
+        """Give drag laws the Reynolds number of the mean slip around each particle.
+
+        They are fits to mean slips: with individual, fluctuating slips the drag would grow with the fluctuation.
+        """
+        particles, flow = terms.particles, terms.flow
+        self._mean_slip = neighbourhood_mean(self.kernel, terms.cell_map, terms.solid, flow.slip)
+        speed = np.sqrt((self._mean_slip**2).sum(axis=1))  # local: components of a row
+        scale = 2.0 * self.fluid.density * particles.radius * flow.voidage
+        terms.flow = flow._replace(reynolds=scale * speed / np.maximum(particles.viscosity, 1e-300))
+
+    def act(self, terms: CouplingTerms) -> None:
+        """The fluctuation acts through the drag, the rest as a force."""
+        drag = terms.conductance("drag")
+        around = Neighbourhood(terms.cell_map, terms.flow, self._mean_slip, drag, terms.solid)
+        made = self.terms(terms.particles, around, terms.step)
+        terms.fluctuate("drag", made.velocity)
+        if self.pushes:
+            terms.between("agitation", made.force)
+
+    def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
+        """What a model adds to the coming fluid step [s]."""
+        raise NotImplementedError
+
+    def checkpoint(self) -> dict[str, Any]:
+        """The number of the step, from which random numbers follow."""
+        return {"steps": self.steps}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self.steps = int(state["steps"])
+
+
+class PseudoTurbulence(Agitation):
     """Fluctuation of the fluid velocity that each particle sees.
 
     fluid, kernel      of the run
     seed               of the random numbers
     law                variance of the fluctuation over the square of the mean slip, of the kind `agitation`
-    added_mass         of the particles; without one, the response to du''/dt takes Zuber's C
+    added_mass         whose coefficient the response to du''/dt takes
     drag_share_along   a_d along the mean slip: part of the fluctuation that enters the drag [-]
     drag_share_across  a_d across the mean slip [-]
     inertia_share      a_i, part of the response to du''/dt, an average over eddies as small as a particle [-]
@@ -97,19 +146,17 @@ class PseudoTurbulence:
         seed: int,
         law: Law,
         *,
-        added_mass: AddedMass | None = None,
+        added_mass: AddedMass,
         drag_share_along: float = 1.0,
         drag_share_across: float = 1.0,
         inertia_share: float = 0.0,
         time_share: float = 1.0,
     ) -> None:
-        self.fluid, self.kernel, self.seed = fluid, kernel, seed
+        super().__init__(fluid, kernel, seed)
         self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
-        self.inertia_share, self.time_share = inertia_share, time_share
-        self.steps = self.outside = 0
-        self.fields: tuple[Field, ...] = (PROCESS,)
-        if inertia_share:
-            self.fields, self.added_mass = (PROCESS, FLUCTUATION), added_mass or AddedMass(law_of(zuber), fluid.density)
+        self.inertia_share, self.time_share, self.pushes = inertia_share, time_share, inertia_share > 0.0
+        self.fields = (PROCESS, FLUCTUATION) if self.pushes else (PROCESS,)
+        self.added_mass = added_mass
         called = adapted(law.function, ", ".join(AGITATION_ARGUMENTS), {name: name for name in AGITATION_ARGUMENTS})
         self._loop = specialise(_fluctuate, {"variance": called})
         self._ranges = np.array([law.ranges.get(name, (-math.inf, math.inf)) for name in AGITATION_ARGUMENTS])
@@ -131,10 +178,10 @@ class PseudoTurbulence:
         velocity = without_mean(self.kernel, around.cell_map, around.conductance, seen[0])
         return AgitationTerms(velocity, self._inertial_force(particles, around, seen[1], step))
 
-    def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array | None:
+    def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array:
         """Response of every particle to the acceleration of the fluctuation (N, 3) [N]."""
-        if not self.inertia_share:
-            return None
+        if not self.pushes:
+            return np.zeros_like(seen)
         change = seen - particles[FLUCTUATION.name]
         change[np.isnan(change)] = 0.0  # of inserted particles
         particles[FLUCTUATION.name][:] = seen
@@ -147,7 +194,7 @@ class PseudoTurbulence:
         return force * without_mean(self.kernel, around.cell_map, inertia, change)
 
 
-class FluctuatingForce:
+class FluctuatingForce(Agitation):
     """Fluctuating force of Lattanzi et al. (2022).
 
     fluid, kernel      of the run
@@ -171,9 +218,9 @@ class FluctuatingForce:
         drag_share_across: float = 0.6,
         time_share: float = 1.0,
     ) -> None:
-        self.fluid, self.kernel, self.seed, self.time_share = fluid, kernel, seed, time_share
+        super().__init__(fluid, kernel, seed)
         self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
-        self.steps = self.outside = 0
+        self.time_share = time_share
         self._range = law_of(force_deviation).ranges["solid_fraction"]
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
