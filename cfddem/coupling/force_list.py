@@ -42,8 +42,8 @@ class ForceList:
         """Add a force, and declare its fields."""
         if force.name in self or not force.name:
             raise InputError("name of a force", force.name, "a name that no other force of the run has")
-        if unknown := set(force.lines) - set(LINES):
-            raise InputError(f"lines of the force {force.name}", *sorted(unknown), f"some of {', '.join(LINES)}")
+        if not set(force.lines) <= set(LINES):
+            raise InputError(f"lines of the force {force.name}", force.lines, f"some of {', '.join(LINES)}")
         for field in force.fields:
             particles.declare(field)
         self._forces = sorted([*self._forces, force], key=lambda each: each.late)
@@ -59,8 +59,8 @@ class ForceList:
 
     @property
     def lines(self) -> list[str]:
-        """Lines of the energy budget that the forces have, and that of forces from outside."""
-        present = {line for force in self for line in force.lines} | {"external"}
+        """Lines of the energy budget that the forces have."""
+        present = {line for force in self for line in force.lines}
         return [line for line in LINES if line in present]
 
     def act(self, terms: ForceTerms) -> None:

@@ -260,11 +260,15 @@ class Simulation:
         self.steps = int(state["steps"])
         return float(state["particle_step"])
 
+    def _is_acted_on(self) -> bool:
+        """Whether a user's function may put energy in."""
+        return bool(self.callbacks or self.features) or "external" in self.forces.lines
+
     def _ledger(self, state: dict[str, Any] | None = None) -> EnergyLedger | None:
         """The energy ledger, where the case asks for one."""
         if not self.case.run.energy_budget:
             return None
-        ledger = EnergyLedger(self.particle_solver, self.fluid, self.coupling)
+        ledger = EnergyLedger(self.particle_solver, self.fluid, self.coupling, self._is_acted_on)
         if state is not None:
             ledger.restore(state["energy"])
         return ledger

@@ -6,6 +6,7 @@ independently. The remainder is the change of the stored energy that gains and l
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from cfddem.coupling.coupling import Coupling
@@ -93,10 +94,17 @@ class EnergyLedger:
 
     particle_solver  counts its own work, `energies=True`
     fluid, coupling  of a run with a fluid
+    acted_on         whether a user acts on the run, so that the line of forces from outside is shown
     """
 
-    def __init__(self, particle_solver: ParticleSolver, fluid: FluidSolver | None, coupling: Coupling | None) -> None:
-        self.particle_solver, self.fluid, self.coupling = particle_solver, fluid, coupling
+    def __init__(
+        self,
+        particle_solver: ParticleSolver,
+        fluid: FluidSolver | None,
+        coupling: Coupling | None,
+        acted_on: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.particle_solver, self.fluid, self.coupling, self._acted_on = particle_solver, fluid, coupling, acted_on
         self._work = None if coupling is None else CouplingWork(particle_solver.particles, coupling)
         self._recent = (0.0, 0.0)  # work of the pressure on the displaced volume in the last two fluid steps [J]
         self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
@@ -147,6 +155,8 @@ class EnergyLedger:
         stored, sums = self._stored(), self._totals()
         lines = {name: stored[name] - self.start[name] for name in stored}
         absent = set() if self.fluid is not None else set(_OF_FLUID)
+        if not self._acted_on() and sums["external"] == 0.0:
+            absent.add("external")
         if self.particle_solver.laws.contact_law.lost is None:
             absent.add("hysteresis")
         if not self.particle_solver.laws.shears:

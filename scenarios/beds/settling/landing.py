@@ -1,8 +1,8 @@
 """The sphere of ten Cate et al. (2002) falls in a box of oil, with the extra drag beside its walls, onto the floor.
 
-The fluid is at rest apart from what drag, added mass, film and wall drag describe (`QuiescentFluid`), or it is computed on
-a coarse grid over a floor. The same equation of motion is integrated independently, with the exact resistance towards
-the floor instead of film and law.
+The fluid is at rest apart from what drag, added mass, film and wall drag describe (`QuiescentFluid`), or it is computed
+on a coarse grid over a floor. The same equation of motion is integrated independently, with the exact resistance
+towards the floor instead of film and law.
 """
 
 from __future__ import annotations
