@@ -178,7 +178,7 @@ class Charges(FluidForce):
         self.calls = int(state["calls"])
 
 
-@pytest.mark.parametrize("changes", [{}, DRY], ids=["in a fluid", "dry"])
+@pytest.mark.parametrize("changes", [{"laws__drag": "wen_yu"}, DRY], ids=["in a fluid", "dry"])
 def test_a_resumed_run_has_the_same_bits(changes: dict[str, Any], tmp_path: Path) -> None:
     """Function, class and field; a run that is resumed without the function says so."""
 

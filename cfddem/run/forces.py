@@ -10,7 +10,8 @@ import numpy as np
 
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.added_mass import AddedMass
-from cfddem.coupling.forces.agitation import Agitation, FluctuatingForce, PseudoTurbulence
+from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
+from cfddem.coupling.forces.agitation_terms import Agitation
 from cfddem.coupling.forces.drag import Drag
 from cfddem.coupling.forces.history import History
 from cfddem.coupling.forces.lift import Lift

@@ -20,8 +20,8 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
-from cfddem.io.folder import AVERAGES_FROM, make_folder, read_about, require_free, require_no_foreign_files
-from cfddem.io.kept_files import keep_files, text_with_kept_files, with_kept_files
+from cfddem.io.folder import AVERAGES_FROM, read_about
+from cfddem.io.kept_files import prepare_folder, text_with_kept_files, with_kept_files
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, Quantity, of_fields
 from cfddem.io.rank_folders import folder_of_ranks
@@ -114,7 +114,7 @@ class Run:
         require_measures_of(case)
         require_measured_units(case, history.units_of(case))
         require_compiled(case)
-        communicator.by_first(lambda: _prepare_folder(folder, text, case))
+        communicator.by_first(lambda: prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
         given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         wall = Stopwatch()
@@ -339,14 +339,6 @@ class Run:
         self.folder.note("wall_time", dict(simulation.wall.seconds))
         self._checkpoint_at = clock.monotonic()
         self._checkpoint_cost = self._checkpoint_at - begin
-
-
-def _prepare_folder(folder: Path, text: str, case: Case) -> None:
-    """Make the folder of a new run, before its preparation, which may take long."""
-    require_free(folder, text)
-    require_no_foreign_files(folder)
-    make_folder(folder)
-    keep_files(case, folder)
 
 
 def quantities_of(simulation: Simulation) -> Quantities:
