@@ -16,8 +16,11 @@ from cfddem import Field, FluidForce, OwnForce, Run, Simulation
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.schema import Case
+from cfddem.coupling.forces.drag import Drag
 from cfddem.model.feature import Equipment, On
 from cfddem.particles.state import Particles
+from closures.drag import wen_yu
+from closures.registry import law_of
 
 FORCE = np.array([3e-6, -1e-6, 2e-6])
 
@@ -158,6 +161,20 @@ def test_the_work_of_a_force_without_a_fluid_is_that_of_the_displacement() -> No
 
 
 # ---------------------------------------------------------------- checkpoints, ranks, classes
+
+
+def test_a_force_that_a_user_adds_is_one_like_ours() -> None:
+    """The drag law of the case, and the same law added to a case without drag: the same bits."""
+    law = {"drag": None, "gravity": (0.0, 0.0, -9.81), "lubrication": "none"}
+    ours, added = Simulation(suspension(laws=law | {"drag": "wen_yu"})), Simulation(suspension(laws=law))
+    added.add(Drag(law_of(wen_yu), "A"))
+    for simulation in (ours, added):
+        for _ in range(3):
+            simulation.step()
+    assert np.array_equal(ours.particles.velocity, added.particles.velocity)
+    assert np.abs(ours.particles.velocity).max() > 1e-3
+    assert ours.coupling is not None and added.coupling is not None
+    assert ours.coupling.outside["drag"] == added.coupling.outside["drag"]
 
 
 class Charges(FluidForce):

@@ -25,7 +25,7 @@ drag_factor = Slot("drag_factor")
 class Drag(FluidForce):
     """Drag over slip of every particle.
 
-    law    drag law; None for no drag
+    law    drag law
     model  "A" or "B" of the fluid
 
     outside  how often the law was evaluated outside its range
@@ -33,15 +33,12 @@ class Drag(FluidForce):
 
     name, lines = "drag", ("drag",)
 
-    def __init__(self, law: Law | None, model: str) -> None:
-        self.needs_sizes = law is not None and "diameter_ratio" in signature(law.function).parameters
-        self.model, self.outside, self._loop = model, 0, None
-        self.law_name = "" if law is None else law.name
-        if law is not None:
-            factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
-            self._loop = specialise(_conductances, {"drag_factor": factor})
-        ranges = {} if law is None else law.ranges
-        self._ranges = tuple(ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
+    def __init__(self, law: Law, model: str) -> None:
+        self.law_name, self.model = law.name, model
+        self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
+        factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
+        self._loop = specialise(_conductances, {"drag_factor": factor})
+        self._ranges = tuple(law.ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
 
     def act(self, terms: ForceTerms) -> None:
         """Resist the slip."""
@@ -49,8 +46,6 @@ class Drag(FluidForce):
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
-        if self._loop is None:
-            return np.zeros(particles.count)
         conductance = np.empty(particles.count)
         outside, wrong = self._loop(
             particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges,
