@@ -116,11 +116,11 @@ def test_the_inertia_follows_the_local_solid_fraction() -> None:
     """The coefficient of each particle is the law at the voidage around it."""
     simulation = Simulation(suspension(**{"laws.added_mass": "zuber"}))
     simulation.step()
-    particles, exchange = simulation.particles, simulation.exchange
-    assert exchange is not None
-    terms = exchange.prepare(particles, simulation.last_step)
+    particles, coupling = simulation.particles, simulation.coupling
+    assert coupling is not None
+    terms = coupling.prepare(particles, simulation.last_step)
     expected = [zuber(voidage) for voidage in terms.flow.voidage]
-    coefficient = exchange.added_mass.mass(particles) / (1000.0 * particles.volume)
+    coefficient = simulation.forces["added_mass"].mass(particles) / (1000.0 * particles.volume)
     assert coefficient == pytest.approx(np.array(expected), rel=1e-12)
     assert coefficient.max() - coefficient.min() > 0.05
 
@@ -166,11 +166,11 @@ def test_a_change_of_the_added_mass_is_in_the_energy_ledger() -> None:
     """The coefficient of all particles triples: the remainder changes by less than 2 % of what this adds."""
     simulation = stirred(suspension(**{"laws.added_mass": 0.5, "run.energy_budget": True}))
     simulation.step()
-    particles, exchange = simulation.particles, simulation.exchange
-    assert simulation.energy is not None and exchange is not None
+    particles, coupling = simulation.particles, simulation.coupling
+    assert simulation.energy is not None and coupling is not None
     before = simulation.energy.row()["energy_remainder"]
     added = float((0.5 * 1000.0 * particles.volume[:, None] * particles.velocity**2).sum())
-    exchange.added_mass = AddedMass(1.5, 1000.0)
+    simulation.forces["added_mass"]._fill = lambda voidage, values: values.fill(1.5)
     particles.sampled_velocity[:] = np.nan
     simulation.step()
     assert abs(simulation.energy.row()["energy_remainder"] - before) < 0.02 * added
@@ -182,12 +182,12 @@ def test_removed_particles_take_the_energy_of_their_added_mass(added_mass: float
     simulation = stirred(suspension(**{"laws.added_mass": added_mass, "run.energy_budget": True}))
     for _ in range(3):
         simulation.step()
-    assert simulation.energy is not None and simulation.exchange is not None
+    assert simulation.energy is not None and simulation.coupling is not None
     solver, before = simulation.particle_solver, simulation.energy.row()
     gone = simulation.particles.id % 3 == 0
     taken = solver.remove(gone)
     after = simulation.energy.row()
-    lost = 0.5 * float((simulation.exchange.added_mass.mass(taken)[:, None] * taken.velocity**2).sum())
+    lost = 0.5 * float((simulation.forces["added_mass"].mass(taken)[:, None] * taken.velocity**2).sum())
     assert lost > 0.1 * -after["energy_fed"]
     assert before["energy_added_mass"] - after["energy_added_mass"] == pytest.approx(lost, rel=1e-9)
     assert after["energy_remainder"] == pytest.approx(before["energy_remainder"], abs=1e-9 * lost)
@@ -205,10 +205,10 @@ def test_agitation_and_added_mass_have_one_coefficient() -> None:
                 "bed.count": 20,
             }
         )
-        exchange = Simulation(case).exchange
-        assert exchange is not None and isinstance(exchange.agitation, PseudoTurbulence)
-        assert exchange.agitation.added_mass.coefficient(voidage) == pytest.approx(expected, rel=1e-12)
-        assert not exchange.added_mass or exchange.agitation.added_mass is exchange.added_mass
+        forces = Simulation(case).forces
+        assert isinstance(forces["agitation"], PseudoTurbulence)
+        assert forces["agitation"].added_mass.coefficient(voidage) == pytest.approx(expected, rel=1e-12)
+        assert "added_mass" not in forces or forces["agitation"].added_mass is forces["added_mass"]
 
 
 def test_fluid_in_uniform_motion_does_not_push_a_fixed_particle() -> None:
@@ -225,12 +225,12 @@ def test_fluid_in_uniform_motion_does_not_push_a_fixed_particle() -> None:
     )
     number = 2.0 * np.pi / height
     simulation = Simulation(case)
-    particles, fluid, exchange = simulation.particles, simulation.fluid, simulation.exchange
-    assert fluid is not None and exchange is not None
+    particles, fluid, coupling = simulation.particles, simulation.fluid, simulation.coupling
+    assert fluid is not None and coupling is not None
     fluid.set_velocity((lambda x, y, z: amplitude * np.cos(number * z) + 0.0 * x * y, 0.0, speed))
     simulation.step()
     particles.inverse_mass[:] = 1.0 / (particles.mass + 0.5 * 1000.0 * particles.volume)  # as if it were free
-    terms = exchange.prepare(particles, simulation.last_step)
+    terms = coupling.prepare(particles, simulation.last_step)
     change = (terms.flow.slip - particles.sampled_velocity)[0, 0] / simulation.last_step
     assert change == pytest.approx(amplitude * number * speed, rel=0.05)
-    assert abs(terms.explicit[0, 0]) < 0.05 * 0.5 * 1000.0 * particles.volume[0] * change
+    assert abs(terms.explicit["explicit"][0, 0]) < 0.05 * 0.5 * 1000.0 * particles.volume[0] * change

@@ -11,7 +11,8 @@ import closures
 from cfddem.backend.compile import serial, use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.coupling.forces.agitation import AgitationTerms, _advanced, _transition
+from cfddem.coupling.forces.agitation import _advanced, _transition
+from cfddem.coupling.forces.agitation_terms import AgitationTerms
 from cfddem.preflight.bed_waves import uniform_bed, with_agitation
 from cfddem.run.simulation import Simulation
 from closures import registry
@@ -66,10 +67,10 @@ def suspension(text: str = SUSPENSION, **changes: object) -> Simulation:
 
 def agitation_of(simulation: Simulation) -> AgitationTerms:
     """Agitation that the next step would have."""
-    assert simulation.exchange is not None
-    terms = simulation.exchange.prepare(simulation.particles, simulation.last_step or 1e-4).agitation
-    assert terms is not None
-    return terms
+    assert simulation.coupling is not None
+    terms = simulation.coupling.prepare(simulation.particles, simulation.last_step or 1e-4)
+    velocity = terms.fluctuations["drag"]
+    return AgitationTerms(velocity, terms.explicit.get("agitation", np.zeros_like(velocity)))
 
 
 @serial
@@ -116,9 +117,9 @@ def test_momentum_is_conserved(law: str) -> None:
     end = fluid.momentum() + (particles.mass[:, None] * particles.velocity).sum(axis=0)
     passed = float(np.abs(particles.mass[:, None] * particles.velocity).sum())
     assert np.abs(end - start).max() < 1e-3 * passed  # the last force of the step has not acted yet
-    terms = simulation.exchange.prepare(particles, 1e-4)
+    terms = simulation.coupling.prepare(particles, 1e-4)
     given = terms.source.sum(axis=(0, 1, 2)) * fluid.grid.cell_volume
-    force = sum(each for each in (terms.explicit, terms.fluctuating_force) if each is not None)
+    force = sum(terms.force(line) for line in terms.on_fluid)
     assert np.abs(given + force.sum(axis=0)).max() < 1e-12 * np.abs(force).sum()
 
 
@@ -170,10 +171,10 @@ def test_the_power_of_agitation_is_a_line_of_the_energy_ledger() -> None:
     """
     still = {"material__glass__restitution": 1.0, "material__glass__friction": 0.0}
     simulation = suspension(run__energy_budget=True, laws__agitation_drag_along=1.0, **still)
-    particles, exchange, ledger = simulation.particles, simulation.exchange, simulation.energy
+    particles, coupling, ledger = simulation.particles, simulation.coupling, simulation.energy
     for _ in range(150):
         simulation.step()
-    resistance = exchange.prepare(particles, simulation.last_step).drag
+    resistance = coupling.prepare(particles, simulation.last_step).conductance("drag")
     began, start, lost = ledger.row(), simulation.time, 0.0
     for _ in range(300):
         simulation.step()
@@ -204,9 +205,9 @@ def test_a_mixture_gets_no_net_drag() -> None:
     simulation = suspension(text, bed__species=species, laws__agitation_inertia=0.4)
     for _ in range(5):
         simulation.step()
-    terms = simulation.exchange.prepare(simulation.particles, simulation.last_step)
-    force = terms.drag[:, None] * terms.agitation.velocity
-    for each in (force, terms.agitation.force):
+    terms = simulation.coupling.prepare(simulation.particles, simulation.last_step)
+    force = terms.conductance("drag")[:, None] * terms.fluctuations["drag"]
+    for each in (force, terms.explicit["agitation"]):
         assert np.abs(each.sum(axis=0)).max() < 1e-12 * np.abs(each).sum()
 
 
@@ -225,16 +226,18 @@ def test_a_law_of_the_user_agitates() -> None:
     slip = 0.08 - simulation.particles.velocity[:, 2].mean()
     deviation = agitation_of(simulation).velocity.std(axis=0) / slip
     assert deviation == pytest.approx(math.sqrt(0.1) * np.array([1.0, 1.0, 2.0]), rel=0.06)
-    assert simulation.exchange.agitation.outside == 2 * simulation.particles.count
+    assert simulation.forces["agitation"].outside == 2 * simulation.particles.count
 
 
 @pytest.mark.parametrize(
     "law, factors", [("pseudo_turbulence", (0.45, 0.65)), ("lattanzi", (1.0, 0.6)), (even_fluctuation, (1.0, 1.0))]
 )
 def test_factors_of_the_drag_are_those_of_the_law_unless_given(law: object, factors: tuple[float, float]) -> None:
-    made = suspension(laws__agitation=law).exchange.agitation
+    made = suspension(laws__agitation=law).forces["agitation"]
     assert (made.drag_share_along, made.drag_share_across) == factors
-    made = suspension(laws__agitation=law, laws__agitation_drag_across=0.0, laws__agitation_time=3.0).exchange.agitation
+    made = suspension(laws__agitation=law, laws__agitation_drag_across=0.0, laws__agitation_time=3.0).forces[
+        "agitation"
+    ]
     assert (made.drag_share_along, made.drag_share_across, made.time_share) == (factors[0], 0.0, 3.0)
 
 

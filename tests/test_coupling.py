@@ -134,10 +134,11 @@ def stirred(case: Case) -> Simulation:
 def momentum(simulation: Simulation) -> np.ndarray:
     particles = simulation.particles
     assert simulation.fluid is not None
-    assert simulation.exchange is not None
     total: np.ndarray = (particles.mass[:, None] * particles.velocity).sum(axis=0) + simulation.fluid.momentum()
     deferred_momentum = (
-        simulation.exchange.added_mass.deferred_momentum(particles).sum(axis=0) if simulation.steps else 0.0
+        simulation.forces["added_mass"].deferred_momentum(particles).sum(axis=0)
+        if simulation.steps and "added_mass" in simulation.forces
+        else 0.0
     )
     return total + deferred_momentum
 

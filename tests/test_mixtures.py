@@ -169,17 +169,17 @@ def test_drag_uses_the_diameter_over_the_local_sauter_mean() -> None:
         column__sides="periodic", column__ends="periodic", column__height=0.012, bed__species__pellets__spread=0
     )
     parts = parts_of(case.with_(**{"bed.species.beads.count": 300}))
-    particles, exchange = parts.particle_solver.particles, parts.exchange
-    assert exchange is not None
-    place = exchange.kernel.map_particles(particles.position, particles.radius)
-    solid = exchange.kernel.solid_fraction(place)
-    flow = exchange.flow.sample(particles, place, solid)
+    particles, coupling = parts.particle_solver.particles, parts.coupling
+    assert coupling is not None
+    place = coupling.kernel.map_particles(particles.position, particles.radius)
+    solid = coupling.kernel.solid_fraction(place)
+    flow = coupling.flow.sample(particles, place, solid)
     ratio = flow.diameter_ratio
     sauter = (particles.radius**3).sum() / (particles.radius**2).sum() * 2.0
     for diameter in (1e-3, 2e-3):
         assert ratio[particles.radius == 0.5 * diameter].mean() == pytest.approx(diameter / sauter, rel=0.1)
     reynolds, voidage = np.full(particles.count, 20.0), np.full(particles.count, 0.7)
-    resistance = exchange.drag.conductance(particles, flow._replace(reynolds=reynolds, voidage=voidage))
+    resistance = coupling.forces["drag"].conductance(particles, flow._replace(reynolds=reynolds, voidage=voidage))
     for row in (0, particles.count - 1):
         factor = beetstra_polydisperse(20.0, 0.7, ratio[row])
         stokes = 3.0 * math.pi * 1e-3 * 2.0 * particles.radius[row]

@@ -29,7 +29,7 @@ from cfddem.run.runner import Run
 from closures import check, registry
 from closures.check import first_cause
 from closures.drag import di_felice
-from closures.registry import REGISTRY, law
+from closures.registry import REGISTRY, law, law_of
 
 Declare = Callable[..., Any]
 
@@ -126,8 +126,8 @@ def test_a_law_that_cannot_be_compiled_leaves_no_folder(declare: Declare, tmp_pa
 
 
 def test_a_law_that_is_not_finite_in_a_run_is_named_with_its_arguments() -> None:
-    drag = Drag(None, "A")
-    drag.name = "mine"
+    drag = Drag(law_of(di_felice), "A")
+    drag.law_name = "mine"
     numbers = SimpleNamespace(reynolds=np.array([1.0, 2.5, np.nan]), voidage=np.array([0.5, 0.42, 0.5]))
     drag._require_drag(numbers, np.array([3.0, 4.0, np.nan]))  # type: ignore[arg-type]
     for wrong in (np.nan, -1.0, np.inf):

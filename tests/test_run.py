@@ -60,7 +60,7 @@ def test_a_run_of_another_version_is_refused_and_left_unchanged(
 ) -> None:
     folder = shutil.copytree(undisturbed, tmp_path / "run")
     state = checkpoint.newest(folder)
-    del state["simulation"]["exchange"]["last_step"]
+    del state["simulation"]["coupling"]["last_step"]
     monkeypatch.setattr(checkpoint, "newest", lambda _: state)
     with pytest.raises(InputError, match=r"must be a run of this version of cfddem; .* run .*case.toml again"):
         Run.resume(folder, until=0.03)

@@ -13,6 +13,7 @@ HOME = Path(__file__).parents[1]
 ROOMS = (
     "backend",
     "data",
+    "model",
     "particles",
     "fluid",
     "coupling",

@@ -49,15 +49,11 @@ def heat_capacity(particles: Particles) -> Array:
     return HEAT_CAPACITY * particles.mass
 
 
-def heat_transfer(kernel: FilterKernel, conductivity: float) -> Transfer:
-    """Transfer of heat with the conductance Nu k/d times the surface [W/K]."""
-
-    def conductance(particles: Particles, flow: SampledFlow) -> Array:
-        nusselt = 2.0 + 0.6 * np.sqrt(flow.reynolds) * 0.7 ** (1.0 / 3.0)
-        diameter = 2.0 * particles.radius
-        return np.asarray(nusselt * conductivity / diameter * math.pi * diameter**2)
-
-    return Transfer(kernel, "temperature", ("heat", "J"), conductance, heat_capacity)
+def conductance(particles: Particles, flow: SampledFlow, conductivity: float) -> Array:
+    """The conductance Nu k/d times the surface (N,) [W/K]."""
+    nusselt = 2.0 + 0.6 * np.sqrt(flow.reynolds) * 0.7 ** (1.0 / 3.0)
+    diameter = 2.0 * particles.radius
+    return np.asarray(nusselt * conductivity / diameter * math.pi * diameter**2)
 
 
 class Bed:
@@ -74,7 +70,8 @@ class Bed:
         places = draw.uniform(0.0, 1.0, (50, 3)) * np.array(grid.size)
         self.particles = make_particles(places, draw.uniform(1e-3, 3e-3, 50), 2500.0)
         self.particles.declare(TEMPERATURE, draw.uniform(300.0, 400.0, 50))
-        self.transfer, self.source = heat_transfer(self.kernel, conductivity), source
+        self.transfer, self.source = Transfer(self.kernel, "temperature", ("heat", "J"), heat_capacity), source
+        self.conductivity = conductivity
         self.transfer.declare(self.particles)
         self.cells = Cells(grid, np.full(grid.shape, fluid), capacity)
         none, vectors = np.zeros(50), np.zeros((50, 3))
@@ -82,14 +79,19 @@ class Bed:
         self.flow = SampledFlow(vectors, vectors, none, reynolds, none, none)
 
     @property
+    def conductance(self) -> Array:
+        """Conductance between each particle and the fluid (N,) [W/K]."""
+        return conductance(self.particles, self.flow, self.conductivity)
+
+    @property
     def rate(self) -> Array:
         """Rate at which each particle approaches the fluid's temperature [1/s]."""
-        return self.transfer.conductance(self.particles, self.flow) / heat_capacity(self.particles)
+        return self.conductance / heat_capacity(self.particles)
 
     def step(self, step: float) -> None:
         particles = self.particles
         cell_map = self.kernel.map_particles(particles.position, particles.radius)
-        sent = self.transfer.prepare(particles, cell_map, self.flow, step)
+        sent = self.transfer.prepare(particles, cell_map, self.conductance, step)
         received = self.transfer.apply(particles, cell_map, sent, *self.cells.advance(sent))
         particles.temperature += step * (received[:, 0] + self.source) / heat_capacity(particles)
 

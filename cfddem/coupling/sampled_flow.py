@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.self_disturbance import SelfDisturbance
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
@@ -26,26 +26,33 @@ class SampledFlow(NamedTuple):
     diameter_ratio: Array  # diameter over the Sauter mean of the particles around (N,)
 
 
+Own = Callable[[Particles, ParticleCellMap], tuple[Array, Array]]
+"""What every particle adds to the flow: modes of its disturbance (N, modes, 3) [m/s], and solid fraction (N,)."""
+
+
+def nothing_of_its_own(particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
+    """No modes, and no solid fraction: the flow is sampled as it is."""
+    return np.zeros((particles.count, 0, 3)), np.zeros(particles.count)
+
+
 class FlowSampler:
     """Samples the flow around particles.
 
-    fluid             the fluid solver
-    kernel            gathers the fields of the fluid
-    self_disturbance  correction for the disturbance of each particle; None for no correction
-    sizes             whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
+    fluid   the fluid solver
+    kernel  gathers the fields of the fluid
+    own     what every particle adds itself, which is taken away
+    sizes   whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
     """
 
-    def __init__(
-        self, fluid: FluidSolver, kernel: FilterKernel, self_disturbance: SelfDisturbance | None, sizes: bool
-    ) -> None:
-        self.fluid, self.kernel, self.self_disturbance, self.sizes = fluid, kernel, self_disturbance, sizes
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, own: Own = nothing_of_its_own, sizes: bool = False):
+        self.fluid, self.kernel, self.own, self.sizes = fluid, kernel, own, sizes
 
     def sample(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> SampledFlow:
         """The flow around every particle now.
 
         solid  solid fraction of the cells (nz, ny, nx)
         """
-        gathered, (modes, own) = self._gathered(cell_map, solid), self._own(particles, cell_map)
+        gathered, (modes, own) = self._gathered(cell_map, solid), self.own(particles, cell_map)
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
         _sample(
@@ -59,12 +66,6 @@ class FlowSampler:
         """Mean velocity of the fluid and solid fraction around every particle (N, 4) [m/s], [-]."""
         velocity = self.kernel.smooth(np.moveaxis(self.fluid.velocity, -1, 0))
         return self.kernel.gather(cell_map.stencil, np.concatenate([velocity, solid[None]]))
-
-    def _own(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
-        """What every particle adds itself: modes of its disturbance (N, modes, 3) [m/s], and solid fraction (N,)."""
-        if self.self_disturbance is None:
-            return np.zeros((particles.count, 0, 3)), np.zeros(particles.count)
-        return self.self_disturbance.own(particles, cell_map)
 
     def _diameter_ratio(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Diameter of every particle over the Sauter mean around it (N,) [-]; 1 unless sizes are sampled.

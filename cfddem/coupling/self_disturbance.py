@@ -30,8 +30,11 @@ from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
 from cfddem.coupling.self_disturbance_walls import WallsOfGrid
+from cfddem.coupling.terms import CouplingTerms, total
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from closures.disturbance import wake_decay
 
@@ -41,17 +44,18 @@ DISTURBANCE = Field(
 )  # fmt: skip
 
 
-class SelfDisturbance:
+class SelfDisturbance(FluidForce):
     """Disturbance of every particle by its own force and volume.
 
+    fluid   the fluid solver
     kernel  of the run; its tables are found once for each grid
     walls   of the grid that stop the disturbance, where a law of the drag beside walls acts; None for none
     """
 
-    fields = (DISTURBANCE,)
+    name, fields = "self_disturbance", (DISTURBANCE,)
 
-    def __init__(self, kernel: FilterKernel, walls: WallsOfGrid | None = None) -> None:
-        grid, self._walls = kernel.grid, walls
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, walls: WallsOfGrid | None = None) -> None:
+        grid, self.fluid, self._walls = kernel.grid, fluid, walls
         self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
         self._tables = tables(kernel)
 
@@ -63,6 +67,15 @@ class SelfDisturbance:
             return modes, solid
         left = self._walls.left(cell_map)
         return modes * left.flow, solid * left.solid
+
+    def end(self, terms: CouplingTerms) -> None:
+        """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""
+        if self.fluid.viscous:
+            on_slip = total({line: terms.force(line) for line in terms.conductances}, terms.force("drag"))
+            screening = terms.conductance("drag") * terms.flow.others / (self.fluid.density * terms.flow.voidage)
+            self.advance(
+                terms.particles, terms.cell_map, terms.flow.slip, on_slip, screening, self.fluid.density, terms.step
+            )
 
     def advance(
         self,

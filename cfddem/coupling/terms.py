@@ -1,53 +1,162 @@
-"""What the coupling keeps between the parts of a fluid step: terms before it, and forces after it."""
+"""The terms of one fluid step: what forces add for the particles and the fluid, and what they receive."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import numpy as np
 
-from cfddem.coupling.forces.agitation import AgitationTerms
-from cfddem.coupling.forces.history import HistoryTerms
 from cfddem.coupling.kernel import ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.transfer import ImplicitCoefficients
 from cfddem.fluid.grid import Array
+from cfddem.particles.state import Particles
+
+LINES = {
+    "drag": "drag",
+    "pressure": "pressure of model A, without buoyancy",
+    "weight": "weight, less buoyancy",
+    "explicit": "lift, viscous stress, added mass, and wall drag across the slip",
+    "agitation": "acceleration of the fluctuation of the fluid, or fluctuating force; not that in the drag",
+    "history": "history force",
+    "external": "forces from outside, and of a user",
+}
+"""Lines of the energy budget of the coupling, in the order in which forces are summed."""
 
 
-class CouplingTerms(NamedTuple):
-    """What particles send into a fluid step, and what the coupling needs after it."""
+class ForceTerms:
+    """The terms of one fluid step.
 
-    cell_map: ParticleCellMap
+    particles   of this rank, without ghosts
+    step        length of the step [s]
+    last_step   of the step before, 0 in the first [s]
+    flow        the undisturbed flow around every particle; forces may change what the laws see
+
+    A force adds its part of a line of `LINES`:
+
+    resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid
+    fluctuate   a velocity u'' (N, 3) [m/s], added to u in the resistance of a line
+    push        a force on the particles (N, 3) [N]
+    pull        a force on the fluid around them (N, 3) [N]
+    between     a force on the particles (N, 3) [N], and its opposite on the fluid
+    """
+
     flow: SampledFlow
-    drag: Array  # conductance of the drag, with that of wall drag along the slip (N,) [kg/s]
-    implicit: ImplicitCoefficients  # of drag and history force
-    explicit: Array | None  # lift, viscous stress, added mass, wall drag across the slip (N, 3) [N]
-    added: Array  # change of the added mass of every particle at the start of the step (N,) [kg]
-    voidage: Array  # of the cells (nz, ny, nx)
-    source: Array | None  # force on the fluid (nz, ny, nx, 3) [N/m3]
-    agitation: AgitationTerms | None = None
-    history: HistoryTerms | None = None
+
+    def __init__(self, particles: Particles, step: float, last_step: float) -> None:
+        self.particles, self.step, self.last_step = particles, step, last_step
+        self.conductances: dict[str, Array] = {}
+        self.fluctuations: dict[str, Array] = {}
+        self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
+        self.on_fluid: dict[str, Array] = {}
+        self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
+        self.added = np.zeros(0)  # change of the added mass at the start of the step (N,) [kg]; empty for none
+        self.spin_work = 0.0  # kinetic energy that torques of the fluid have given to the particles [J]
+
+    def resist(self, line: str, conductance: Array) -> None:
+        """Add a resistance to the slip of the particles."""
+        _add(self.conductances, line, conductance)
+
+    def fluctuate(self, line: str, velocity: Array) -> None:
+        """Add a fluctuation of the fluid velocity that acts through the resistance of a line."""
+        _add(self.fluctuations, line, velocity)
+
+    def push(self, line: str, force: Array) -> None:
+        """Add a force on the particles."""
+        _add(self.explicit, line, force)
+
+    def pull(self, line: str, force: Array) -> None:
+        """Add a force on the fluid around the particles."""
+        _add(self.on_fluid, line, force)
+
+    def between(self, line: str, force: Array) -> None:
+        """Add a force on the particles, and its opposite on the fluid."""
+        self.push(line, force)
+        self.pull(line, -force)
+
+    def conductance(self, line: str) -> Array:
+        """Conductance of a line so far (N,) [kg/s]; zero for a line without resistance."""
+        return self.conductances[line] if line in self.conductances else np.zeros(self.particles.count)
 
     @property
-    def step(self) -> float:
-        """Length of the fluid step [s]."""
-        return self.implicit.step
+    def resistance(self) -> Array:
+        """Conductance of all lines (N,) [kg/s]."""
+        return total(self.conductances, np.zeros(self.particles.count))
 
     @property
-    def fluctuating_force(self) -> Array | None:
-        """Explicit force of agitation on every particle (N, 3) [N]."""
-        return None if self.agitation is None else self.agitation.force
+    def inertia(self) -> Array:
+        """Mass and added mass of every particle (N,) [kg]; infinite for fixed particles."""
+        return inertia(self.particles)
+
+    @property
+    def unseen(self) -> Array:
+        """Part of the cells' velocity that does not act on every particle (N, 3) [m/s].
+
+        It is the velocity that the particle causes itself, less the fluctuation, which acts through its lines alone.
+        """
+        seen = self.flow.disturbance
+        for line, velocity in self.fluctuations.items():
+            share = self.conductance(line) / np.maximum(self.resistance, 1e-300)
+            seen = seen - share[:, None] * velocity
+        return seen
+
+    def receive(self, force: Array) -> None:
+        """Divide the force of all resistance among its lines, by their conductances and fluctuations (N, 3) [N].
+
+        The first line gets what the others leave.
+        """
+        of_slip, resistance = force, np.maximum(self.resistance, 1e-300)
+        for line, velocity in self.fluctuations.items():
+            of_slip = of_slip - self.conductance(line)[:, None] * velocity
+        first, *others = [line for line in LINES if line in self.conductances] or ["drag"]
+        self.implicit_force = {line: of_slip * (self.conductances[line] / resistance)[:, None] for line in others}
+        for part in self.implicit_force.values():
+            force = force - part
+        self.implicit_force = {first: force} | self.implicit_force
+
+    def force(self, line: str) -> Array:
+        """Force of a line on every particle (N, 3) [N]; zero for a line that the run lacks."""
+        parts = [each[line] for each in (self.implicit_force, self.explicit) if line in each]
+        return sum(parts[1:], parts[0]) if parts else np.zeros((self.particles.count, 3))
+
+    @property
+    def forces(self) -> dict[str, Array]:
+        """Force of every line that the step has on every particle (N, 3) [N]."""
+        return {line: self.force(line) for line in LINES if line in self.implicit_force or line in self.explicit}
+
+
+class CouplingTerms(ForceTerms):
+    """The terms of a step that is coupled with the cells of a fluid.
+
+    cell_map  positions of the particles among the cells
+    solid     solid fraction of the cells (nz, ny, nx)
+    """
+
+    implicit: ImplicitCoefficients
+    source: Array | None = None  # explicit force on the fluid (nz, ny, nx, 3) [N/m3]
+
+    def __init__(
+        self, particles: Particles, step: float, last_step: float, cell_map: ParticleCellMap, solid: Array
+    ) -> None:
+        super().__init__(particles, step, last_step)
+        self.cell_map, self.solid = cell_map, solid
 
     @property
     def fields(self) -> tuple[Array, Array, Array, Array | None]:
         """Arguments of `FluidSolver.step` after the length of the step."""
-        return self.voidage, self.implicit.cell_conductance, self.implicit.cell_product, self.source
+        return 1.0 - self.solid, self.implicit.cell_conductance, self.implicit.cell_product, self.source
 
 
-class FluidForces(NamedTuple):
-    """Forces of the fluid on every particle, constant over a fluid step (N, 3) [N]; None for those that a run lacks."""
+def inertia(particles: Particles) -> Array:
+    """Mass and added mass of every particle (N,) [kg]; infinite for fixed particles."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(1.0 / particles.inverse_mass)
 
-    drag: Array
-    pressure: Array | None  # of model A, without buoyancy
-    weight: Array  # less buoyancy
-    explicit: Array | None  # lift, viscous stress, added mass, wall drag across the slip
-    agitation: Array | None  # by the acceleration of the fluctuation, or the fluctuating force; not that in the drag
-    history: Array | None
+
+def total(parts: dict[str, Array], nothing: Array) -> Array:
+    """Sum over the lines, in their order; `nothing` without any."""
+    present = [parts[line] for line in LINES if line in parts]
+    return sum(present[1:], present[0]) if present else nothing
+
+
+def _add(parts: dict[str, Array], line: str, values: Array) -> None:
+    """Add to a line."""
+    parts[line] = parts[line] + values if line in parts else values

@@ -33,7 +33,6 @@ import numpy as np
 
 from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.data.fields import Field, Table
 from cfddem.fluid.grid import Array
 from cfddem.fluid.momentum import implicitness
@@ -58,7 +57,6 @@ class Transfer:
     kernel       deposits the coefficients and gathers the field of the fluid
     value        field of the particles that relaxes towards the fluid: "velocity", "temperature"; (N, m) or (N,)
     received     name of the field that stores what each particle received in the last step, and its unit
-    conductance  law: particles and the flow around each -> b (N,)
     capacity     particles -> C (N,), infinite where the value is held
     source       particles -> f in the first step, (N, m); zero if None
     """
@@ -66,7 +64,6 @@ class Transfer:
     kernel: FilterKernel
     value: str
     received: tuple[str, str]
-    conductance: Callable[[Particles, SampledFlow], Array]
     capacity: Callable[[Particles], Array]
     source: Callable[[Particles], Array] | None = None
     last_step: float = 0.0  # length of the step before; 0 before the first [s]
@@ -96,26 +93,20 @@ class Transfer:
         self,
         particles: Particles,
         cell_map: ParticleCellMap,
-        flow: SampledFlow,
+        conductance: Array,
         step: float,
         disturbance: Array | None = None,
-        conductance: Array | None = None,
     ) -> ImplicitCoefficients:
         """Coefficients of the coming step [s].
 
+        conductance  b (N,)
         disturbance  part of the fluid's value that the particle causes itself, not part of u (N, m); zero if None
-        conductance  b, where the law has been evaluated already (N,)
         """
         kernel, value = self.kernel, _columns(particles[self.value])
-        if conductance is None:
-            conductance = self.conductance(particles, flow)
         disturbance = _or_zero(disturbance, value)
-        implicit, target = np.empty(particles.count), np.empty(value.shape)
-        carried = np.empty((particles.count, 1 + value.shape[1]))
-        _implicit_coefficients(
-            conductance, self.capacity(particles), value, disturbance, *self._last(particles, value), step,
-            implicit, target, carried,
-        )  # fmt: skip
+        implicit, target, carried = implicit_coefficients(
+            conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step
+        )
         cells = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
         return ImplicitCoefficients(step, conductance, implicit, target, cells[0], np.moveaxis(cells[1:], 0, -1))
 
@@ -138,9 +129,14 @@ class Transfer:
 
     def _last(self, particles: Particles, value: Array) -> tuple[Array, Array, float]:
         """Value before the last step (N, m), what it received (N, m) and the length of that step [s]."""
-        if self.last_step == 0.0:  # as if the source of the first step had acted for a second
-            return value, -_or_zero(None if self.source is None else self.source(particles), value), 1.0
+        if self.last_step == 0.0:
+            return after_source(value, _or_zero(None if self.source is None else self.source(particles), value))
         return _columns(particles[self.before]), _columns(particles[self.received[0]]), self.last_step
+
+
+def after_source(value: Array, source: Array) -> tuple[Array, Array, float]:
+    """The last step of `implicit_coefficients`, as if a source (N, m) alone had acted in it, for a second."""
+    return value, -source, 1.0
 
 
 @cache
@@ -156,6 +152,19 @@ def _columns(values: Array) -> Array:
 
 def _or_zero(values: Array | None, like: Array) -> Array:
     return np.zeros_like(like) if values is None else values
+
+
+def implicit_coefficients(
+    conductance: Array, capacity: Array, value: Array, disturbance: Array, last: tuple[Array, Array, float], step: float
+) -> tuple[Array, Array, Array]:
+    """b* (N,), v* (N, m), and what each particle deposits: b* and b* v* (N, 1 + m).
+
+    last  value before the last step (N, m), what the transfer gave in it (N, m), and its length [s]
+    """
+    implicit, target = np.empty(len(value)), np.empty(value.shape)
+    carried = np.empty((len(value), 1 + value.shape[1]))
+    _implicit_coefficients(conductance, capacity, value, disturbance, *last, step, implicit, target, carried)
+    return implicit, target, carried
 
 
 @threaded

@@ -10,16 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.coupling.exchange import Exchange
-from cfddem.coupling.terms import CouplingTerms, FluidForces
+from cfddem.coupling.coupling import Coupling
+from cfddem.coupling.terms import LINES, CouplingTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
 
-FORCES = tuple(
-    Field(f"force_of_{name}", "N", 3, "scratch", meaning=f"force of the fluid on the particle: {name}")
-    for name in FluidForces._fields
-)
+FORCES = {
+    line: Field(f"force_of_{line}", "N", 3, "scratch", meaning=f"force on the particle: {meaning}")
+    for line, meaning in LINES.items()
+}
 FLUCTUATING = Field("force_of_fluctuation", "N", 3, "scratch", meaning="drag of the fluctuation of the fluid velocity")
 PRESSURE = Field("pressure_before", "Pa", role="scratch", meaning="fluid pressure before the particles moved")
 
@@ -32,6 +32,7 @@ class ImplicitWork(NamedTuple):
     of_fluctuation: float  # work of that part of the drag [J]
     history: float  # of the implicit part of the history force [J]
     explicit_history: float  # of the rest [J]
+    external: float  # of forces from outside on the fluid [J]
 
 
 class ParticleWork(NamedTuple):
@@ -46,6 +47,8 @@ class ParticleWork(NamedTuple):
     explicit_history_on_fluid: float  # of its other part
     explicit: float  # lift, viscous stress, added mass and wall drag across the slip
     agitation: float  # other forces of agitation
+    external: float  # forces from outside, and of a user
+    external_on_fluid: float  # of those on the fluid
     added: float  # kinetic energy that a change of the added mass has given to the particles
     weight: float  # less buoyancy
     driving: float  # mean pressure gradient of periodic sides
@@ -57,57 +60,62 @@ class CouplingWork:
     """Counts the work of the forces of a coupling.
 
     particles  get the fields that the count stores within a step
-    exchange   the coupling
-    gravity    (3,) [m/s2]
+    coupling   the coupling
     """
 
-    def __init__(self, particles: Particles, exchange: Exchange, gravity: Array) -> None:
-        self.exchange, self.gravity = exchange, gravity
-        for field in (*FORCES, FLUCTUATING, PRESSURE):
+    def __init__(self, particles: Particles, coupling: Coupling) -> None:
+        self.coupling = coupling
+        for field in (*FORCES.values(), FLUCTUATING, PRESSURE):
             particles.declare(field)
-        self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0)
+        self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0, 0.0)
         self._added = 0.0
         self._pressure = np.zeros(0)  # of the cells, smoothed by the kernel (1, nz, ny, nx) [Pa]
 
-    def begin(self, particles: Particles, terms: CouplingTerms, forces: FluidForces) -> None:
-        """After `Exchange.apply`, before the particles move; `particles` are those of this rank, without ghosts."""
-        total = self.exchange.fluid.communicator.sum
-        pressure = np.ascontiguousarray(self.exchange.fluid.pressure)[None]
-        self._pressure = self.exchange.kernel.smooth(pressure)
-        self._on_fluid = self._implicit_work(particles, terms, forces)
+    def begin(self, terms: CouplingTerms) -> None:
+        """After `Coupling.apply`, before the particles move."""
+        particles = terms.particles
+        total = self.coupling.fluid.communicator.sum
+        pressure = np.ascontiguousarray(self.coupling.fluid.pressure)[None]
+        self._pressure = self.coupling.kernel.smooth(pressure)
+        self._on_fluid = self._implicit_work(particles, terms)
         particles[FLUCTUATING.name][:] = self._on_fluid.fluctuating
-        self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
-        for field, force in zip(FORCES, forces):
-            particles[field.name][:] = 0.0 if force is None else force
+        self._added = total(0.5 * terms.added[:, None] * particles.velocity**2) if len(terms.added) else 0.0
+        for line, field in FORCES.items():
+            particles[field.name][:] = terms.force(line)
         particles.pressure_before = self._pressure_at(particles)
 
     def end(self, particles: Particles) -> ParticleWork:
         """After the particles have moved."""
-        fluid, total = self.exchange.fluid, self.exchange.fluid.communicator.sum
+        fluid, total = self.coupling.fluid, self.coupling.fluid.communicator.sum
         model_a = float(fluid.model == "A")
-        drag, pressure, weight, explicit, agitation, history = (particles[field.name] for field in FORCES)
+
+        def work(line: str) -> float:
+            return float(total(particles[FORCES[line].name] * particles.work_displacement))
+
         driving = model_a * particles.volume[:, None] * fluid.boundaries.driving
         rise = self._pressure_at(particles) - particles.pressure_before
         return ParticleWork(
-            drag=total(drag * particles.work_displacement),
+            drag=work("drag"),
             drag_on_fluid=self._on_fluid.drag,
             fluctuating=total(particles[FLUCTUATING.name] * particles.work_displacement),
             fluctuating_on_fluid=self._on_fluid.of_fluctuation,
-            history=total(history * particles.work_displacement),
+            history=work("history"),
             history_on_fluid=self._on_fluid.history,
             explicit_history_on_fluid=self._on_fluid.explicit_history,
-            explicit=total(explicit * particles.work_displacement),
-            agitation=total(agitation * particles.work_displacement),
+            explicit=work("explicit"),
+            agitation=work("agitation"),
+            external=work("external"),
+            external_on_fluid=self._on_fluid.external,
             added=self._added,
-            weight=total(weight * particles.displacement),
+            weight=total(particles[FORCES["weight"].name] * particles.displacement),
             driving=total(driving * particles.work_displacement),
-            pressure=total((pressure - driving) * particles.work_displacement),
+            pressure=total((particles[FORCES["pressure"].name] - driving) * particles.work_displacement),
             displaced=-total(model_a * particles.volume * rise),
         )
 
-    def _implicit_work(self, particles: Particles, terms: CouplingTerms, forces: FluidForces) -> ImplicitWork:
-        """Work of drag and history force on the fluid."""
-        kernel, fluid, received = self.exchange.kernel, self.exchange.fluid, particles.drag_impulse / terms.step
+    def _implicit_work(self, particles: Particles, terms: CouplingTerms) -> ImplicitWork:
+        """Work of drag and history force on the fluid, and of forces from outside."""
+        kernel, fluid, received = self.coupling.kernel, self.coupling.fluid, particles.drag_impulse / terms.step
         weight = kernel.smooth(np.moveaxis(fluid.drag_response()[0], -1, 0))
         conductance = kernel.gather(terms.cell_map.stencil, weight) * terms.implicit.implicit[:, None]
         acting = terms.implicit.target + received / np.maximum(conductance, 1e-300)
@@ -115,16 +123,26 @@ class CouplingWork:
         def work(force: Array) -> float:
             return terms.step * float(fluid.communicator.sum(force * acting))
 
-        drag, history, explicit, fluctuating = received, 0.0, 0.0, np.zeros_like(received)
-        if terms.history is not None and forces.history is not None:
-            drag, explicit = forces.drag, work(terms.history.force)
-            history = work(forces.history - terms.history.force)
-        if terms.agitation is not None:
-            share = terms.drag / np.maximum(terms.implicit.conductance, 1e-300)
-            fluctuating = share[:, None] * conductance * terms.agitation.velocity
-        return ImplicitWork(work(drag), fluctuating, work(fluctuating), history, explicit)
+        fluctuating = np.zeros_like(received)
+        for line, velocity in terms.fluctuations.items():
+            share = terms.conductance(line) / np.maximum(terms.resistance, 1e-300)
+            fluctuating = share[:, None] * conductance * velocity
+        none = np.zeros_like(received)
+        return ImplicitWork(
+            work(terms.implicit_force["drag"]), fluctuating, work(fluctuating),
+            work(terms.implicit_force.get("history", none)), work(terms.explicit.get("history", none)),
+            self._external_work(terms),
+        )  # fmt: skip
+
+    def _external_work(self, terms: CouplingTerms) -> float:
+        """Work of forces from outside on the fluid, at the mean of its velocity before and after the step."""
+        if "external" not in terms.on_fluid:
+            return 0.0
+        kernel, fluid = self.coupling.kernel, self.coupling.fluid
+        velocity = kernel.gather(terms.cell_map.stencil, kernel.smooth(np.moveaxis(fluid.mean_velocity, -1, 0)))
+        return terms.step * float(fluid.communicator.sum(terms.on_fluid["external"] * velocity))
 
     def _pressure_at(self, particles: Particles) -> Array:
         """Pressure at every particle, by the weights of the deposit (N,) [Pa]."""
-        kernel = self.exchange.kernel
+        kernel = self.coupling.kernel
         return kernel.gather(kernel.stencil(particles.position, particles.radius), self._pressure)[:, 0]

@@ -78,6 +78,12 @@ class FluidState:
         return np.moveaxis(self._in_cells(self.fields.velocity, self._every_face), 0, -1)
 
     @property
+    def mean_velocity(self) -> Array:
+        """Mean of the velocities before and after the last step at cell centres (nz, ny, nx, 3) [m/s]."""
+        mean = 0.5 * (self.fields.other_velocity + self.fields.velocity)
+        return np.moveaxis(self._in_cells(mean, self._every_face), 0, -1)
+
+    @property
     def voidage(self) -> Array:
         """Voidage at the end of the last step (nz, ny, nx), a view."""
         return self.fields.owned("voidage")

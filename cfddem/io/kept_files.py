@@ -9,6 +9,7 @@ from cfddem.case import compare
 from cfddem.case.schema import Case
 from cfddem.case.walls import copy_of, with_surfaces
 from cfddem.io.files import reason, write_whole
+from cfddem.io.folder import make_folder, require_free, require_no_foreign_files
 
 
 def keep_files(case: Case, folder: Path) -> None:
@@ -53,3 +54,11 @@ def _copy(key: str, file: str, path: Path, kind: str) -> None:
         raise InputError(key, file, f"a readable {kind}", why) from None
     path.parent.mkdir(exist_ok=True)
     write_whole(path, content)
+
+
+def prepare_folder(folder: Path, text: str, case: Case) -> None:
+    """Make the folder of a new run, before its preparation, which may take long."""
+    require_free(folder, text)
+    require_no_foreign_files(folder)
+    make_folder(folder)
+    keep_files(case, folder)

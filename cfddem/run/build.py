@@ -15,11 +15,7 @@ from cfddem.case.bed import Jet
 from cfddem.case.column_grid import grid_of, open_floor
 from cfddem.case.materials import pair_overrides
 from cfddem.case.schema import Case, Column
-from cfddem.coupling.exchange import Exchange
-from cfddem.coupling.forces.added_mass import AddedMass
-from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
-from cfddem.coupling.forces.history import History
-from cfddem.coupling.forces.wall_drag import WallDrag
+from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
@@ -34,17 +30,17 @@ from cfddem.particles.spray import Spray, box, cone
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
 from cfddem.run.equipment import case_walls
+from cfddem.run.forces import forces_of, sampler_of, wall_drag_of
 from cfddem.run.initial_particles import SPECIES, particles_of, periodic_box, periodic_directions
-from closures.registry import Law
 
 
 @dataclass(frozen=True)
 class Parts:
-    """The solvers of a run and their coupling; no fluid and no exchange for a case of particles only."""
+    """The solvers of a run and their coupling; no fluid and no coupling for a case of particles only."""
 
     particle_solver: ParticleSolver
     fluid: FluidSolver | None
-    exchange: Exchange | None
+    coupling: Coupling | None
 
 
 def parts_of(
@@ -86,10 +82,10 @@ def parts_of(
     )
     if case.fluid is None:
         return Parts(solver, None, None)
-    fluid, exchange = flow_of(case, solver.particles, communicator, cells)
-    if exchange.added_mass:
-        solver.refresh()  # the forces of films depend on the inertia, which includes the added mass now
-    return Parts(solver, fluid, exchange)
+    fluid, coupling = flow_of(case, solver.particles, communicator, cells)
+    if coupling.sets_inertia:
+        solver.refresh()  # the forces of films depend on the inertia
+    return Parts(solver, fluid, coupling)
 
 
 def require_parallel(case: Case, ranks: int) -> None:
@@ -113,7 +109,7 @@ def division_of(case: Case, spheres: Particles, ranks: int, cells: Division | No
 
 def flow_of(
     case: Case, spheres: Particles, communicator: Communicator = SERIAL, cells: Division | None = None
-) -> tuple[FluidSolver, Exchange]:
+) -> tuple[FluidSolver, Coupling]:
     """The fluid of a case around its particles, and their coupling.
 
     spheres  particles of this rank
@@ -143,47 +139,9 @@ def flow_of(
     owned = spheres.without_ghosts()
     fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(owned.position, owned.radius)))
     fluid.set_velocity((0.0, 0.0, 0.0))  # the flow at the start passes between the particles
-    added_mass = AddedMass(case.laws.added_mass_law, fluid.density)
-    exchange = Exchange(
-        spheres,
-        fluid,
-        kernel,
-        case.laws.drag_law,
-        added_mass=added_mass,
-        self_disturbance=case.laws.self_disturbance_correction,
-        lift=case.laws.lift,
-        torque=case.laws.torque,
-        viscous_stress=case.laws.viscous_stress,
-        agitation=agitation_of(case, fluid, kernel, added_mass),
-        history=None if case.laws.history == "none" else History(case.laws.history, fluid.density, fluid.model),
-        wall_drag=wall_drag_of(case),
-    )
-    return fluid, exchange
-
-
-def wall_drag_of(case: Case) -> WallDrag | None:
-    """Extra drag beside the walls of the column and of the case."""
-    which = case.laws.wall_drag
-    if which == "none":
-        return None
-    laws = laws_of(case)
-    return WallDrag(walls_of(case), which, film=laws.film, shear=laws.shears)
-
-
-def agitation_of(
-    case: Case, fluid: FluidSolver, kernel: FilterKernel, added_mass: AddedMass
-) -> PseudoTurbulence | FluctuatingForce | None:
-    """Agitation of the particles by the disturbed flow around their neighbours."""
-    law = case.agitation
-    if law == "none":
-        return None
-    given = case.agitation_factors
-    factors = {"drag_share_along": given.along, "drag_share_across": given.across, "time_share": given.time}
-    if not isinstance(law, Law):
-        return FluctuatingForce(fluid, kernel, case.bed.seed, **factors)
-    return PseudoTurbulence(
-        fluid, kernel, case.bed.seed, law, added_mass=added_mass, inertia_share=given.inertia, **factors
-    )
+    beside = wall_drag_of(case.laws.wall_drag, walls_of(case), laws_of(case))
+    forces = forces_of(case, fluid, kernel, beside)
+    return fluid, Coupling(spheres, fluid, kernel, sampler_of(fluid, kernel, forces), forces)
 
 
 def materials_of(case: Case) -> np.ndarray:

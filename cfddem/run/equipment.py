@@ -66,7 +66,7 @@ LANDED = Field(
 """Declared on the particles of a run with feeds."""
 
 
-class Equipment:
+class CaseEquipment:
     """Moving walls, feeds and outlets of a case.
 
     case    with tables [[wall]], [[feed]] and [[outlet]]

@@ -258,15 +258,16 @@ def particle_count(simulation: Simulation) -> float:
 @measure("1", group="recorded", when=_has_fluid)
 def out_of_range_count(simulation: Simulation) -> float:
     """How often drag and film laws were evaluated outside of their ranges so far."""
-    assert simulation.exchange is not None
-    return simulation.exchange.outside + simulation.communicator.sum([simulation.particle_solver.outside])
+    assert simulation.coupling is not None
+    of_fluid = simulation.coupling.outside
+    return of_fluid.get("drag", 0) + simulation.communicator.sum([simulation.particle_solver.outside])
 
 
 @measure("1", group="recorded", when=_is_agitated)
 def agitation_out_of_range_count(simulation: Simulation) -> float:
     """How often the law of agitation was evaluated outside of its range so far."""
-    assert simulation.exchange is not None and simulation.exchange.agitation is not None
-    return simulation.communicator.sum(simulation.exchange.agitation.outside)
+    assert simulation.coupling is not None
+    return simulation.coupling.outside["agitation"]
 
 
 # ---------------------------------------------------------------- mixtures

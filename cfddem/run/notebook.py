@@ -17,6 +17,7 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.io.folder import read_about
 from cfddem.io.reading import Run, open_run
+from cfddem.model.feature import Feature, Function
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run import runner
 from cfddem.run.progress import Status, live_line
@@ -34,11 +35,12 @@ def run_case(
     overwrite: bool = False,
     fields: Sequence[Field] = (),
     callbacks: Sequence[Callback] = (),
+    features: Sequence[Feature | Function] = (),
 ) -> Run:
     """Check a case, run it in a new folder with a progress bar, and open the result.
 
     overwrite          delete the run that the folder holds
-    fields, callbacks  of the simulation
+    fields, callbacks, features  of the simulation
     returns            the run, to read its fields and history
     errors             PreflightError if the check finds errors; InputError if the folder holds a run,
                        or, with overwrite, a run.json that is not that of a run
@@ -51,8 +53,9 @@ def run_case(
     with notebook_line() if in_notebook() else live_line() as line:
         with warmup(case):
             prepared = runner.Run.begin(
-                case, folder, report=line.update, progress=line.progress, fields=fields, callbacks=callbacks
-            )
+                case, folder, report=line.update, progress=line.progress, fields=fields, callbacks=callbacks,
+                features=features,
+            )  # fmt: skip
         prepared.go()
     return open_run(folder)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,10 +10,9 @@ from typing import Any
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.io.writer import RunFolder
 from cfddem.run import history
-from cfddem.run.simulation import Callback, Simulation
+from cfddem.run.simulation import Simulation
 
 
 def require_forward(until: float | None, state: Mapping[str, Any] | None) -> None:
@@ -49,15 +48,15 @@ def restored(
     case: Case,
     state: Mapping[str, Any],
     folder: Path,
-    fields: Sequence[Field],
-    callbacks: Sequence[Callback],
     communicator: Communicator,
+    **given: Any,
 ) -> Simulation:
-    """The simulation of a checkpoint; InputError if the checkpoint does not fit."""
+    """The simulation of a checkpoint; InputError if the checkpoint does not fit.
+
+    given  fields, callbacks and features of the simulation
+    """
     try:
-        simulation = Simulation.restored(
-            case, state["simulation"], fields=fields, callbacks=callbacks, communicator=communicator
-        )
+        simulation = Simulation.restored(case, state["simulation"], communicator=communicator, **given)
         if simulation.particle_solver.collisions is not None and communicator.rank == 0:
             simulation.particle_solver.collisions.put_back(state["collisions"])
     except (KeyError, IndexError, TypeError) as failure:

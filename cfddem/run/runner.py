@@ -21,12 +21,13 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
-from cfddem.io.folder import AVERAGES_FROM, make_folder, read_about, require_free, require_no_foreign_files
-from cfddem.io.kept_files import keep_files, text_with_kept_files, with_kept_files
+from cfddem.io.folder import AVERAGES_FROM, read_about
+from cfddem.io.kept_files import prepare_folder, text_with_kept_files, with_kept_files
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, Quantity, of_fields
 from cfddem.io.rank_folders import folder_of_ranks
 from cfddem.io.writer import RunFolder
+from cfddem.model.feature import Feature, Function
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
 from cfddem.particles.guard import guard
 from cfddem.run import history
@@ -97,6 +98,7 @@ class Run:
         progress: Callable[[str], None] = lambda _: None,
         fields: Sequence[Field] = (),
         callbacks: Sequence[Callback] = (),
+        features: Sequence[Feature | Function] = (),
         communicator: Communicator = SERIAL,
     ) -> Run:
         """Prepare a case in a new folder, and write its initial state.
@@ -104,7 +106,7 @@ class Run:
         text               the case file as the user wrote it; made from the case if None
         report             called after every row of history
         progress           called with a line of text for each part of the preparation
-        fields, callbacks  of the simulation, see `Simulation`
+        fields, callbacks, features  of the simulation, see `Simulation`
         communicator       of the ranks that share the run; all of them call this. Rank 0 writes
         errors             InputError if the folder holds a run or cannot be written
         """
@@ -113,11 +115,12 @@ class Run:
         require_measures_of(case)
         require_measured_units(case, history.units_of(case))
         require_compiled(case)
-        communicator.by_first(lambda: _prepare_folder(folder, text, case))
+        communicator.by_first(lambda: prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
+        given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         wall = Stopwatch()
         with _no_empty_folder(folder):
-            simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
+            simulation = Simulation(case, progress, communicator=communicator, **given)
         wall.count("preparation")  # initial packing, loading of compiled loops
         simulation.wall.seconds |= wall.seconds
         grid = None if simulation.fluid is None else simulation.fluid.grid.whole
@@ -143,6 +146,7 @@ class Run:
         progress: Callable[[str], None] = lambda _: None,
         fields: Sequence[Field] = (),
         callbacks: Sequence[Callback] = (),
+        features: Sequence[Feature | Function] = (),
         communicator: Communicator = SERIAL,
     ) -> Run:
         """Continue from the newest undamaged checkpoint of a folder, bit for bit; later snapshots and rows are dropped.
@@ -154,6 +158,7 @@ class Run:
         errors  InputError if the folder holds no run, or one that cannot be continued
         """
         folder = Path(folder)
+        given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
         before = read_about(folder)
         require_forward(until, state)
@@ -162,10 +167,10 @@ class Run:
         written = folder_of_ranks(communicator, lambda: RunFolder.reopen(folder))
         with status_restored_on_refusal(written, before):
             if state is None:
-                simulation = Simulation(case, progress, fields=fields, callbacks=callbacks, communicator=communicator)
+                simulation = Simulation(case, progress, communicator=communicator, **given)
             else:
                 communicator.by_first(lambda: require_measures(written, case))
-                simulation = restored(case, state, folder, fields, callbacks, communicator)
+                simulation = restored(case, state, folder, communicator, **given)
                 simulation.wall.seconds.update(written.about.get("wall_time", {}))
         warn_of_changes(written, case)
         written.drop_after(-1.0 if state is None else simulation.time)
@@ -336,14 +341,6 @@ class Run:
         self.folder.note("wall_time", dict(simulation.wall.seconds))
         self._checkpoint_at = clock.monotonic()
         self._checkpoint_cost = self._checkpoint_at - begin
-
-
-def _prepare_folder(folder: Path, text: str, case: Case) -> None:
-    """Make the folder of a new run, before its preparation, which may take long."""
-    require_free(folder, text)
-    require_no_foreign_files(folder)
-    make_folder(folder)
-    keep_files(case, folder)
 
 
 @contextmanager

@@ -68,12 +68,12 @@ def warm_up(case: Case) -> None:
     radius = 0.5 * case.bed.largest_diameter
     places = np.array([[0.5 * width + side * radius, 0.5 * depth, 0.5 * height] for side in (-1.2, 1.2)])
     spheres = make_particles(places, radius, case.solid_density)
-    fluid, exchange = flow_of(case, spheres)
+    fluid, coupling = flow_of(case, spheres)
     for _ in range(2):
         step = min(fluid.largest_step().step, 1e-6)  # nothing limits the step of a fluid at rest
-        terms = exchange.prepare(spheres, step)
+        terms = coupling.prepare(spheres, step)
         fluid.step(step, *terms.fields)
-        exchange.apply(spheres, terms, np.array(case.laws.gravity))
+        coupling.apply(spheres, terms)
 
 
 if __name__ == "__main__":

@@ -29,6 +29,7 @@ ROOMS = {
     ),
     "cfddem/fluid": ("Fluid", "Volume-averaged flow on a staggered grid."),
     "cfddem/coupling": ("Coupling", "Momentum exchange between particles and fluid."),
+    "cfddem/model": ("Features", "What a simulation is made of: forces, equipment, and what a user adds."),
     "cfddem/data": ("Data", "Declared fields of particles, pairs and cells."),
     "cfddem/io": ("Input and output", "Run folders, snapshots, checkpoints, reading, export."),
     "cfddem/analysis": ("Analysis", "Measures of a run, time series, bubbles, mixing, reports."),

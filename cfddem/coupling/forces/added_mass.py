@@ -27,14 +27,19 @@ fluid has not received yet is kept, so that no momentum is lost.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
 from cfddem.backend.law_set import Slot, adapted, specialise
+from cfddem.coupling.kernel import ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.terms import CouplingTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
+from cfddem.model.feature import FluidForce
 from cfddem.particles.far_films import rates_of_films
 from cfddem.particles.state import Particles, added_mass
 from closures.registry import Law
@@ -54,31 +59,58 @@ DAMPED = 1.5
 coefficient = Slot("coefficient")
 
 
-class AddedMass:
+class AddedMass(FluidForce):
     """Added mass of the particles and its force.
 
-    given    C, or a law C(voidage); 0 for none
+    given    C, or a law C(voidage)
     density  rho of the fluid [kg/m3]
+    passing  places among the cells, and slip -> the change of the fluid velocity along the slip; none if not given
     """
 
-    def __init__(self, given: float | Law, density: float) -> None:
-        self.law = given if isinstance(given, Law) else None
-        self.constant, self.density = 0.0 if isinstance(given, Law) else float(given), density
-        self.fields = (SAMPLED, ACCELERATION, OWED) if self else ()
-        self._loop = None
-        if self.law is not None:
-            law = adapted(self.law.function, "voidage", {"voidage": "voidage"})
-            self._loop = specialise(_coefficients, {"coefficient": law})
+    name, lines, sets_inertia = "added_mass", ("explicit",), True
+    fields = (SAMPLED, ACCELERATION, OWED)
 
-    def __bool__(self) -> bool:
-        """Whether particles have an added mass."""
-        return self.law is not None or self.constant > 0.0
+    def __init__(
+        self,
+        given: float | Law,
+        density: float,
+        passing: Callable[[ParticleCellMap, Array], Array] = lambda _, slip: np.zeros_like(slip),
+    ) -> None:
+        self.density, self._passing = density, passing
+        self._varies = isinstance(given, Law)
+        self._deferred = np.zeros((0, 3))
+        if isinstance(given, Law):
+            law = adapted(given.function, "voidage", {"voidage": "voidage"})
+            self._fill = specialise(_coefficients, {"coefficient": law})
+        else:
+            self._fill = lambda voidage, values: values.fill(float(given))
+
+    def begin(self, terms: CouplingTerms) -> None:
+        """Set the inertia of the step; what the particles owe the fluid is taken with that of the last step."""
+        first = terms.last_step == 0.0
+        self._deferred = np.zeros((terms.particles.count, 3)) if first else self.deferred_momentum(terms.particles)
+        terms.added = self.update(terms.particles, terms.flow.voidage)
+
+    def act(self, terms: CouplingTerms) -> None:
+        """The fluid's acceleration pushes the particles; on the fluid acts its opposite, and, a step late, what the
+        particles have lost to their added mass."""
+        particles, flow = terms.particles, terms.flow
+        if terms.last_step == 0.0:
+            terms.between("explicit", np.zeros((particles.count, 3)))
+            return
+        weight = self.newest_weight(particles, flow.voidage)
+        force = self.force(particles, flow, self._passing(terms.cell_map, flow.slip), weight, terms.last_step)
+        terms.push("explicit", force)
+        terms.pull("explicit", self.hand_over(particles, self._deferred, weight) / terms.step - force)
+
+    def end(self, terms: CouplingTerms) -> None:
+        """Store the sampled velocity for the next step."""
+        terms.particles.sampled_velocity = terms.flow.slip + terms.particles.velocity
 
     def coefficient(self, voidage: Array) -> Array:
         """C of particles at these voidages (N,) [-]."""
-        values = np.full(len(voidage), self.constant)
-        if self._loop is not None:
-            self._loop(voidage, values)
+        values = np.empty(len(voidage))
+        self._fill(voidage, values)
         return values
 
     def update(self, particles: Particles, voidage: Array) -> Array:
@@ -88,10 +120,8 @@ class AddedMass:
         returns  change of the added mass of every particle (N,) [kg]
         """
         change = np.zeros(particles.count)
-        if not self:
-            return change
         rows = particles.inverse_mass > 0.0
-        if self.law is None:
+        if not self._varies:
             rows &= np.isnan(particles.sampled_velocity[:, 0])
         if rows.any():  # local: every rank sets the inertia of its own particles
             before = particles.inverse_mass[rows]
@@ -132,8 +162,6 @@ class AddedMass:
 
         :math:`C\rho V\,\Delta v` of the last fluid step, with C still that of this step, and what earlier steps left.
         """
-        if not self:
-            return np.zeros((particles.count, 3))
         moved = self.mass(particles)[:, None] * (particles.velocity - particles.velocity_before)
         owed: Array = moved + particles.added_momentum
         return owed
@@ -147,11 +175,6 @@ class AddedMass:
         given: Array = weight[:, None] * deferred
         particles.added_momentum[:] = deferred - given
         return given
-
-    def store(self, particles: Particles, slip: Array) -> None:
-        """Store the sampled velocity of this step for the next."""
-        if self:
-            particles.sampled_velocity = slip + particles.velocity
 
     mass = staticmethod(added_mass)
 

@@ -15,15 +15,14 @@ the run, so that no acceleration is counted twice.
 **Fluctuating force** after Lattanzi et al. (2022): :math:`dF'' = -F''\,dt/\tau_F + \sigma_F\sqrt{2/\tau_F}\,dW`.
 
 Both are random processes of each particle, drawn by seed, particle and step (:mod:`cfddem.backend.counter_random`).
-:func:`without_mean` subtracts the mean over the neighbourhood, so that the sum of the fluctuating forces is zero, for
-any mixture. A lone particle is its own neighbourhood and feels no agitation. The fluid receives the opposite of every
-force. Without slip there is no agitation.
+The mean over the neighbourhood is subtracted (:func:`cfddem.coupling.forces.agitation_terms.without_mean`), so that the
+sum of the fluctuating forces is zero, for any mixture. A lone particle is its own neighbourhood and feels no agitation.
+The fluid receives the opposite of every force. Without slip there is no agitation.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,13 +31,18 @@ from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.counter_random import normal_numbers
 from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.forces.added_mass import AddedMass
-from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.forces.agitation_terms import (
+    Agitation,
+    AgitationTerms,
+    Neighbourhood,
+    neighbourhood_mean,
+    without_mean,
+)
+from cfddem.coupling.kernel import FilterKernel
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
-from closures.added_mass import zuber
 from closures.agitation import SHORT, force_deviation, force_rate, isolated_drag_factor
 from closures.kinds import AGITATION_ARGUMENTS
 from closures.registry import Law, law_of
@@ -58,30 +62,13 @@ FORCE_PROCESS = Field(
 variance = Slot("variance")
 
 
-class Neighbourhood(NamedTuple):
-    """The surroundings of the particles in one fluid step."""
-
-    cell_map: ParticleCellMap
-    flow: SampledFlow
-    mean_slip: Array  # mean over the neighbourhood, weighted by volume (N, 3) [m/s]
-    conductance: Array  # drag over slip (N,) [kg/s]
-    solid: Array  # solid fraction of the cells (nz, ny, nx)
-
-
-class AgitationTerms(NamedTuple):
-    """What agitation adds to one fluid step."""
-
-    velocity: Array  # fluctuation of the fluid velocity in the drag (N, 3) [m/s]
-    force: Array | None  # explicit force on every particle, its opposite on the fluid (N, 3) [N]; None for none
-
-
-class PseudoTurbulence:
+class PseudoTurbulence(Agitation):
     """Fluctuation of the fluid velocity that each particle sees.
 
     fluid, kernel      of the run
     seed               of the random numbers
     law                variance of the fluctuation over the square of the mean slip, of the kind `agitation`
-    added_mass         of the particles; without one, the response to du''/dt takes Zuber's C
+    added_mass         whose coefficient the response to du''/dt takes
     drag_share_along   a_d along the mean slip: part of the fluctuation that enters the drag [-]
     drag_share_across  a_d across the mean slip [-]
     inertia_share      a_i, part of the response to du''/dt, an average over eddies as small as a particle [-]
@@ -97,19 +84,17 @@ class PseudoTurbulence:
         seed: int,
         law: Law,
         *,
-        added_mass: AddedMass | None = None,
+        added_mass: AddedMass,
         drag_share_along: float = 1.0,
         drag_share_across: float = 1.0,
         inertia_share: float = 0.0,
         time_share: float = 1.0,
     ) -> None:
-        self.fluid, self.kernel, self.seed = fluid, kernel, seed
+        super().__init__(fluid, kernel, seed)
         self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
-        self.inertia_share, self.time_share = inertia_share, time_share
-        self.steps = self.outside = 0
-        self.fields: tuple[Field, ...] = (PROCESS,)
-        if inertia_share:
-            self.fields, self.added_mass = (PROCESS, FLUCTUATION), added_mass or AddedMass(law_of(zuber), fluid.density)
+        self.inertia_share, self.time_share, self.pushes = inertia_share, time_share, inertia_share > 0.0
+        self.fields = (PROCESS, FLUCTUATION) if self.pushes else (PROCESS,)
+        self.added_mass = added_mass
         called = adapted(law.function, ", ".join(AGITATION_ARGUMENTS), {name: name for name in AGITATION_ARGUMENTS})
         self._loop = specialise(_fluctuate, {"variance": called})
         self._ranges = np.array([law.ranges.get(name, (-math.inf, math.inf)) for name in AGITATION_ARGUMENTS])
@@ -131,10 +116,10 @@ class PseudoTurbulence:
         velocity = without_mean(self.kernel, around.cell_map, around.conductance, seen[0])
         return AgitationTerms(velocity, self._inertial_force(particles, around, seen[1], step))
 
-    def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array | None:
+    def _inertial_force(self, particles: Particles, around: Neighbourhood, seen: Array, step: float) -> Array:
         """Response of every particle to the acceleration of the fluctuation (N, 3) [N]."""
-        if not self.inertia_share:
-            return None
+        if not self.pushes:
+            return np.zeros_like(seen)
         change = seen - particles[FLUCTUATION.name]
         change[np.isnan(change)] = 0.0  # of inserted particles
         particles[FLUCTUATION.name][:] = seen
@@ -147,7 +132,7 @@ class PseudoTurbulence:
         return force * without_mean(self.kernel, around.cell_map, inertia, change)
 
 
-class FluctuatingForce:
+class FluctuatingForce(Agitation):
     """Fluctuating force of Lattanzi et al. (2022).
 
     fluid, kernel      of the run
@@ -171,9 +156,9 @@ class FluctuatingForce:
         drag_share_across: float = 0.6,
         time_share: float = 1.0,
     ) -> None:
-        self.fluid, self.kernel, self.seed, self.time_share = fluid, kernel, seed, time_share
+        super().__init__(fluid, kernel, seed)
         self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
-        self.steps = self.outside = 0
+        self.time_share = time_share
         self._range = law_of(force_deviation).ranges["solid_fraction"]
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
@@ -196,30 +181,6 @@ class FluctuatingForce:
         free = volume * (particles.inverse_mass > 0.0)  # fixed particles get no force and are left out of the mean
         acceleration = without_mean(self.kernel, around.cell_map, free, force / volume[:, None])
         return AgitationTerms(np.zeros_like(force), free[:, None] * acceleration)
-
-
-def neighbourhood_mean(kernel: FilterKernel, cell_map: ParticleCellMap, solid: Array, values: Array) -> Array:
-    """Mean of values (N, m) over the particles around each one, weighted by volume and kernel (N, m)."""
-    carried = np.ascontiguousarray(cell_map.volume[:, None] * values)
-    fields = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
-    gathered = kernel.gather(cell_map.stencil, np.concatenate([fields, solid[None]]))
-    mean: Array = gathered[:, :-1] / gathered[:, -1:]
-    return mean
-
-
-def without_mean(kernel: FilterKernel, cell_map: ParticleCellMap, weight: Array, values: Array) -> Array:
-    r"""Values (N, m) less a mean over the particles around each one, so that the weighted sum of all is zero.
-
-    .. math:: x_p - \sum_q K_{pq}\,\frac{g_q}{s_q}\,x_q,\qquad s_q = \sum_p K_{qp}\,g_p
-
-    K is the product of deposit, smoothing and gather; it is symmetric, hence :math:`\sum_p g_p x_p` vanishes to
-    round-off.
-
-    weight  g (N,), not negative
-    """
-    around = kernel.gather(cell_map.stencil, kernel.smooth(kernel.deposit(cell_map, weight[:, None])))
-    carried = values * (weight / np.maximum(around[:, 0], 1e-300))[:, None]
-    return values - kernel.gather(cell_map.stencil, kernel.smooth(kernel.deposit(cell_map, carried)))
 
 
 @inline

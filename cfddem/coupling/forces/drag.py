@@ -12,7 +12,9 @@ from cfddem.backend.compile import prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.terms import ForceTerms
 from cfddem.fluid.grid import Array
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from closures.kinds import DRAG_ARGUMENTS
 from closures.registry import Law
@@ -20,29 +22,30 @@ from closures.registry import Law
 drag_factor = Slot("drag_factor")
 
 
-class Drag:
+class Drag(FluidForce):
     """Drag over slip of every particle.
 
-    law    drag law; None for no drag
+    law    drag law
     model  "A" or "B" of the fluid
 
     outside  how often the law was evaluated outside its range
     """
 
-    def __init__(self, law: Law | None, model: str) -> None:
-        self.needs_sizes = law is not None and "diameter_ratio" in signature(law.function).parameters
-        self.model, self.outside, self._loop = model, 0, None
-        self.name = "" if law is None else law.name
-        if law is not None:
-            factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
-            self._loop = specialise(_conductances, {"drag_factor": factor})
-        ranges = {} if law is None else law.ranges
-        self._ranges = tuple(ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
+    name, lines = "drag", ("drag",)
+
+    def __init__(self, law: Law, model: str) -> None:
+        self.law_name, self.model = law.name, model
+        self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
+        factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
+        self._loop = specialise(_conductances, {"drag_factor": factor})
+        self._ranges = tuple(law.ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
+
+    def act(self, terms: ForceTerms) -> None:
+        """Resist the slip."""
+        terms.resist("drag", self.conductance(terms.particles, terms.flow))
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
-        if self._loop is None:
-            return np.zeros(particles.count)
         conductance = np.empty(particles.count)
         outside, wrong = self._loop(
             particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges,
@@ -61,7 +64,7 @@ class Drag:
         if wrong.any():  # local: every rank has its own particles
             n = int(np.argmax(wrong))  # local: the first on this rank
             at = f"it is {factor[n]:.3g} at Re = {flow.reynolds[n]:.3g}, voidage = {flow.voidage[n]:.3g}"
-            raise InputError("laws.drag", self.name, "a law that is finite and not negative", at)
+            raise InputError("laws.drag", self.law_name, "a law that is finite and not negative", at)
 
 
 @threaded

@@ -33,8 +33,10 @@ from cfddem.backend.law_set import specialise
 from cfddem.coupling.forces import history_modes
 from cfddem.coupling.forces.history_modes import Memory, columns, exponentials
 from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from closures.history import (
     BASSET_AMPLITUDES,
@@ -86,13 +88,15 @@ _KERNELS = {
 """The kernel, and its scale of time t_c."""
 
 
-class History:
+class History(FluidForce):
     """History force of the particles.
 
     kernel   "mei_adrian" or "basset"
     density  of the fluid [kg/m3]
     model    "A" or "B" of the fluid
     """
+
+    name, lines, late = "history", ("history",), True
 
     def __init__(self, kernel: Literal["mei_adrian", "basset"], density: float, model: str = "A") -> None:
         self.density, self.model = density, model
@@ -103,6 +107,16 @@ class History:
         self.fields = (SLIP, NEWEST, self._modes)
         self._terms = _room(0)
         self._advance = specialise(history_modes.advance, {"memory_time": scale})
+
+    def act(self, terms: ForceTerms) -> None:
+        """Resist the newest change of the slip; the memory of the others pushes."""
+        made = self.terms(terms.particles, terms.flow, terms.resistance, terms.inertia, terms.step, terms.last_step)
+        terms.resist("history", made.conductance)
+        terms.between("history", made.force)
+
+    def end(self, terms: ForceTerms) -> None:
+        """Store the impulse of the implicit part."""
+        self.store(terms.particles, terms.implicit_force["history"], self._terms, terms.step)
 
     def terms(
         self, particles: Particles, flow: SampledFlow, drag: Array, inertia: Array, step: float, last_step: float

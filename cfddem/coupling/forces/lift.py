@@ -8,9 +8,36 @@ import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.terms import CouplingTerms
+from cfddem.coupling.velocity_gradient import vorticity_at
 from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.vectors import cross, dot, minus, of_row, times
 from closures.lift import magnus, saffman_mei
+
+
+class Lift(FluidForce):
+    """Lift on every particle in a viscous fluid.
+
+    fluid   the fluid solver
+    kernel  gathers its vorticity
+    """
+
+    name, lines = "lift", ("explicit",)
+
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
+        self.fluid, self.kernel = fluid, kernel
+
+    def act(self, terms: CouplingTerms) -> None:
+        """Lift at the present slip, spin and vorticity."""
+        if self.fluid.viscous:
+            spheres, curl = terms.particles, vorticity_at(self.fluid, self.kernel, terms.cell_map)
+            force = lift_force(
+                terms.flow.slip, curl, spheres.spin, spheres.radius, self.fluid.density, spheres.viscosity
+            )
+            terms.between("explicit", force)
 
 
 def lift_force(slip: Array, curl: Array, spin: Array, radius: Array, density: float, viscosity: Array) -> Array:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap, Stencil
+from cfddem.coupling.terms import CouplingTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 
 MAPPED, MAPPED_EARLIER = (
@@ -20,32 +22,35 @@ MAPPED, MAPPED_EARLIER = (
 """The voidage that the fluid sees is a mean over three steps; so is the pressure gradient that a particle sees."""
 
 
-class PressureForce:
-    """Pressure force of model A; zero in model B, where the fluid carries the whole pressure gradient.
+class PressureForce(FluidForce):
+    """Pressure force of model A; in model B the fluid carries the whole pressure gradient.
 
     fluid   the fluid solver
     kernel  gathers the pressure gradient
     """
 
+    name, lines, fields = "pressure", ("pressure",), (MAPPED, MAPPED_EARLIER)
+
     def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
         self.fluid, self.kernel = fluid, kernel
-        self.fields = (MAPPED, MAPPED_EARLIER) if fluid.model == "A" else ()
         self._known: list[ParticleCellMap] = []  # of the last step and the one before
         self._known_ids = np.zeros(0, np.int64)  # of the particles in the rows of these maps
 
-    def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array | None:
-        """Force on every particle (N, 3) [N], after the step of the fluid; None in model B.
+    def respond(self, terms: CouplingTerms) -> None:
+        """The force by the new pressure."""
+        terms.push("pressure", self.force(terms.particles, terms.cell_map))
+
+    def force(self, particles: Particles, cell_map: ParticleCellMap) -> Array:
+        """Force on every particle (N, 3) [N], after the step of the fluid.
 
         The fluid has used the voidage of the last three steps with the weights 1/4, 1/2 and 1/4. The gradient is
         gathered from the places of these three steps with the same weights.
         """
-        if not self.fields:
-            return None
         gradient = self.kernel.smooth(self.fluid.cell_pressure_gradient())
         if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
             self._known = []  # rows have changed
         last, earlier = (self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER)))
-        force = self.kernel.gather_over_steps(earlier, last, cell_map.stencil, gradient)
+        force: Array = self.kernel.gather_over_steps(earlier, last, cell_map.stencil, gradient)
         for along in force.T:
             along *= -cell_map.volume
         return force
@@ -56,9 +61,9 @@ class PressureForce:
             return self._known[n].stencil
         return self.kernel.stencil(particles[name], particles.radius)
 
-    def store(self, particles: Particles, cell_map: ParticleCellMap) -> None:
+    def end(self, terms: CouplingTerms) -> None:
         """Store the places of this step for the next two."""
-        if self.fields:
-            particles.earlier_mapped_position = particles.mapped_position
-            particles.mapped_position = cell_map.position
-            self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()
+        particles, cell_map = terms.particles, terms.cell_map
+        particles.earlier_mapped_position = particles.mapped_position
+        particles.mapped_position = cell_map.position
+        self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()

@@ -16,9 +16,34 @@ import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.terms import CouplingTerms
+from cfddem.coupling.velocity_gradient import vorticity_at
 from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from closures.lift import torque
+
+
+class Torque(FluidForce):
+    """Torque of a viscous fluid on every particle.
+
+    fluid   the fluid solver
+    kernel  gathers its vorticity
+    """
+
+    name = "torque"
+
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
+        self.fluid, self.kernel = fluid, kernel
+
+    def end(self, terms: CouplingTerms) -> None:
+        """Turn the particles over the step."""
+        if self.fluid.viscous:
+            curl = vorticity_at(self.fluid, self.kernel, terms.cell_map)
+            gained = turn_with_fluid(terms.particles, curl, self.fluid.density, terms.step)
+            terms.spin_work = self.fluid.communicator.sum(gained)
 
 
 def turn_with_fluid(particles: Particles, curl: Array, density: float, step: float) -> Array:

@@ -2,12 +2,25 @@ r"""Force of the fluid's viscous stress on the volume of a particle, :math:`V\,\
 
 from __future__ import annotations
 
-from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.fluid.grid import Array
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.terms import CouplingTerms
 from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 
 
-def viscous_force(fluid: FluidSolver, kernel: FilterKernel, cell_map: ParticleCellMap) -> Array:
-    """Force on every particle (N, 3) [N]."""
-    force: Array = cell_map.volume[:, None] * kernel.gather(cell_map.stencil, kernel.smooth(fluid.cell_viscous_force()))
-    return force
+class ViscousStress(FluidForce):
+    """Viscous stress of model A on the volume of every particle.
+
+    fluid   the fluid solver
+    kernel  gathers the stress
+    """
+
+    name, lines = "viscous_stress", ("explicit",)
+
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
+        self.fluid, self.kernel = fluid, kernel
+
+    def act(self, terms: CouplingTerms) -> None:
+        """The force of the stress now."""
+        stress = self.kernel.gather(terms.cell_map.stencil, self.kernel.smooth(self.fluid.cell_viscous_force()))
+        terms.between("explicit", terms.cell_map.volume[:, None] * stress)

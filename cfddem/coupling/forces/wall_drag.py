@@ -22,7 +22,9 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
+from cfddem.coupling.terms import ForceTerms
 from cfddem.fluid.grid import Array
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import NOTHING, dot, flat, minus, of_row, plus, times
 from cfddem.particles.walls.arrays import wall_arrays
@@ -41,7 +43,7 @@ class WallTerms(NamedTuple):
     force: Array  # across the slip (N, 3) [N]
 
 
-class WallDrag:
+class WallDrag(FluidForce):
     """Extra drag beside walls.
 
     walls   at rest; no meshes
@@ -50,6 +52,8 @@ class WallDrag:
     shear   whether they resist sliding
     """
 
+    name, lines = "wall_drag", ("drag", "explicit")
+
     def __init__(
         self, walls: Sequence[Wall], which: Literal["nearest", "all"], *, film: bool, shear: bool = False
     ) -> None:
@@ -57,6 +61,12 @@ class WallDrag:
             if isinstance(wall, Mesh) or wall.sweep() != 0.0:
                 raise InputError("wall_drag", type(wall).__name__, "walls at rest that are no meshes")
         self._walls, self._options = flat(wall_arrays(walls)), (which == "all", film, shear)
+
+    def act(self, terms: ForceTerms) -> None:
+        """Resist the slip, and turn it."""
+        beside = self.terms(terms.particles, terms.flow.slip)
+        terms.resist("drag", beside.conductance)
+        terms.between("explicit", beside.force)
 
     def terms(self, particles: Particles, slip: Array) -> WallTerms:
         """Extra drag at the slip u - v (N, 3) [m/s]."""

@@ -6,12 +6,12 @@ independently. The remainder is the change of the stored energy that gains and l
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from cfddem.coupling.exchange import Exchange
-from cfddem.coupling.terms import CouplingTerms, FluidForces
+from cfddem.coupling.coupling import Coupling
+from cfddem.coupling.terms import CouplingTerms
 from cfddem.coupling.work_on_particles import CouplingWork
-from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.solver import ParticleSolver
@@ -36,6 +36,7 @@ GAINED = {
     "stiffening": "by tangential springs whose stiffness changes with the overlap",
     "bridges_formed": "where liquid bridges form at a gap",
     "fed": "by inserted particles, less that of removed ones",
+    "external": "by forces from outside, and of a user",
     "agitation": "by the fluctuating forces of the flow around neighbours, which moves particles at random",
     "model_b": "by the pressure on the volume of the particles, which model B gives to the fluid",
 }
@@ -92,22 +93,26 @@ class EnergyLedger:
     """Sums the energy of a simulation: every force returns its work, and the ledger adds it to a line.
 
     particle_solver  counts its own work, `energies=True`
-    fluid, exchange  of a run with a fluid
-    gravity          (3,) [m/s2]
+    fluid, coupling  of a run with a fluid
+    acted_on         whether a user acts on the run, so that the line of forces from outside is shown
     """
 
     def __init__(
-        self, particle_solver: ParticleSolver, fluid: FluidSolver | None, exchange: Exchange | None, gravity: Array
+        self,
+        particle_solver: ParticleSolver,
+        fluid: FluidSolver | None,
+        coupling: Coupling | None,
+        acted_on: Callable[[], bool] = lambda: False,
     ) -> None:
-        self.particle_solver, self.fluid, self.exchange = particle_solver, fluid, exchange
-        self._coupling = None if exchange is None else CouplingWork(particle_solver.particles, exchange, gravity)
+        self.particle_solver, self.fluid, self.coupling, self._acted_on = particle_solver, fluid, coupling, acted_on
+        self._work = None if coupling is None else CouplingWork(particle_solver.particles, coupling)
         self._recent = (0.0, 0.0)  # work of the pressure on the displaced volume in the last two fluid steps [J]
         self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
         self.start = self._stored()
 
-    def after_fluid_step(self, terms: CouplingTerms, forces: FluidForces) -> None:
-        """Add the work on the fluid, after `Exchange.apply` and before the particles move."""
-        assert self.fluid is not None and self.exchange is not None and self._coupling is not None
+    def after_fluid_step(self, terms: CouplingTerms) -> None:
+        """Add the work on the fluid, after `Coupling.apply` and before the particles move."""
+        assert self.fluid is not None and self._work is not None
         fluid, sums, done = self.fluid, self.sums, self.fluid.work()
         sums["inflow"] += done.inflow + done.held
         sums["driving"] += done.driving
@@ -117,16 +122,19 @@ class EnergyLedger:
         sums["implicit_drag"] -= done.implicit
         sums["drag_in_cells"] -= done.drag - done.held
         sums["lift_and_added_mass"] -= done.source
-        sums["torque"] -= self.exchange.spin_work
+        sums["torque"] -= terms.spin_work
         sums["drag_from_fluid"] -= done.drag - done.held + done.implicit
         sums["pressure_from_fluid"] -= done.solids
-        self._coupling.begin(self.particle_solver.particles.without_ghosts(), terms, forces)
+        self._work.begin(terms)
 
     def after_particle_steps(self) -> None:
         """Add the work of the fluid on the particles."""
-        if self._coupling is None:
+        sums, owned = self.sums, self.particle_solver.particles.without_ghosts()
+        if self._work is None:
+            sums["external"] += self.particle_solver.communicator.sum(owned.applied * owned.work_displacement)
             return
-        sums, done = self.sums, self._coupling.end(self.particle_solver.particles.without_ghosts())
+        done = self._work.end(owned)
+        sums["external"] += done.external + done.external_on_fluid
         agitation = done.fluctuating - done.fluctuating_on_fluid
         sums["agitation"] += agitation + done.agitation
         sums["drag"] += done.drag_on_fluid - done.drag + agitation
@@ -135,6 +143,7 @@ class EnergyLedger:
         sums["drag_in_cells"] -= done.drag_on_fluid + done.history_on_fluid
         sums["history"] += done.history_on_fluid + done.explicit_history_on_fluid - done.history
         sums["lift_and_added_mass"] -= done.explicit + done.added + done.explicit_history_on_fluid
+        sums["lift_and_added_mass"] += done.external_on_fluid  # not between the phases
         sums["fallen"] += done.weight
         sums["driving"] += done.driving
         sums["pressure_to_particles"] += done.pressure
@@ -146,12 +155,13 @@ class EnergyLedger:
         stored, sums = self._stored(), self._totals()
         lines = {name: stored[name] - self.start[name] for name in stored}
         absent = set() if self.fluid is not None else set(_OF_FLUID)
+        if not self._acted_on() and sums["external"] == 0.0:
+            absent.add("external")
         if self.particle_solver.laws.contact_law.lost is None:
             absent.add("hysteresis")
         if not self.particle_solver.laws.shears:
             absent.add("film_shear")
-        if self.exchange is None or self.exchange.history is None:
-            absent.add("history")
+        absent |= {"history"} - {*(self.coupling.forces.lines if self.coupling else ())}
         if self.particle_solver.laws.bridge is None:
             absent |= {"bridge", "bridges_formed", "bridges_broken"}
         names = [name for name in [*GAINED, *LOST, *PASSED] if name not in absent]
@@ -206,7 +216,7 @@ class EnergyLedger:
         }
         if particle_solver.bridges is not None:
             stored["bridges"] = count.bridges(particle_solver)
-        if self.fluid is None or self.exchange is None:
+        if self.fluid is None:
             return stored
         return stored | {
             "fluid_kinetic": self.fluid.kinetic_energy(),

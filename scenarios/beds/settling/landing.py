@@ -1,8 +1,8 @@
 """The sphere of ten Cate et al. (2002) falls in a box of oil, with the extra drag beside its walls, onto the floor.
 
-The fluid is at rest apart from what drag, added mass, film and wall drag describe (`StillFluid`), or it is computed on
-a coarse grid over a floor. The same equation of motion is integrated independently, with the exact resistance towards
-the floor instead of film and law.
+The fluid is at rest apart from what drag, added mass, film and wall drag describe (`QuiescentFluid`), or it is computed
+on a coarse grid over a floor. The same equation of motion is integrated independently, with the exact resistance
+towards the floor instead of film and law.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from cfddem.case.materials import Material
 from cfddem.coupling.forces.wall_drag import WallDrag
-from cfddem.coupling.still_fluid import StillFluid
+from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -59,7 +59,7 @@ def land(density: float, viscosity: float, walls: Walls, step: float = 5e-4) -> 
         laws=Laws(film=True), skin=RADIUS, check_steps=False,
     )  # fmt: skip
     beside = None if walls == "none" else WallDrag([FLOOR, *SIDES, LID], walls, film=True)
-    oil = StillFluid(
+    oil = QuiescentFluid(
         run, density, viscosity, law_of(abraham), history="none", wall=FLOOR, wall_drag=beside,
         gravity=(0.0, 0.0, -GRAVITY),
     )  # fmt: skip

@@ -80,7 +80,7 @@ def shares_of_loss(path: Collision) -> dict[str, float]:
 
     volume = 4.0 / 3.0 * np.pi * RADIUS**3
     mass, displaced = STEEL.density * volume, FLUID_DENSITY * volume
-    added = near_wall(path.gap[0] + RADIUS, RADIUS) * displaced if "force_added_mass_gradient" in path.history else 0.0
+    added = near_wall(path.gap[0] + RADIUS, RADIUS) * displaced if "force_weight" in path.history else 0.0
     whole = 0.5 * (mass + added) * SPEED**2 - taken("weight")
     shares = {name: taken(name) / whole for name in ("drag", "history")}
     return shares | {"film and contact": 1.0 - sum(shares.values())}

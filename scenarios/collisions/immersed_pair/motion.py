@@ -11,7 +11,7 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.case.materials import Material
-from cfddem.coupling.still_fluid import StillFluid
+from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
@@ -128,7 +128,7 @@ def follow(
     simulation: ParticleSolver,
     setting: Setting,
     full: bool,
-    fluid: StillFluid | None = None,
+    fluid: QuiescentFluid | None = None,
     until: float | None = None,
 ) -> dict[str, np.ndarray]:
     """Integrate until the pair has left the film or stopped; returns the history as columns.
@@ -170,7 +170,7 @@ def follow(
 
 
 def _moments(
-    simulation: ParticleSolver, rows: list[dict[str, Any]], fluid: StillFluid | None
+    simulation: ParticleSolver, rows: list[dict[str, Any]], fluid: QuiescentFluid | None
 ) -> Iterator[tuple[_Moment, float]]:
     listed = simulation.edges.minimum_gap
     begins_with = float(listed[0])  # where a pair that has left the neighbour list begins anew
@@ -187,8 +187,8 @@ def _moments(
     )
 
 
-def _row(simulation: ParticleSolver, moment: _Moment, fluid: StillFluid | None) -> dict[str, Any]:
-    around = {} if fluid is None else {f"force_{name}": force[0].copy() for name, force in fluid.forces.items()}
+def _row(simulation: ParticleSolver, moment: _Moment, fluid: QuiescentFluid | None) -> dict[str, Any]:
+    around = {} if fluid is None else {f"force_{name}": force[0].copy() for name, force in fluid.force.items()}
     return around | {
         "time": simulation.time,
         "gap": moment.gap,

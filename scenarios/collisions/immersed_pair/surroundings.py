@@ -1,4 +1,4 @@
-"""The fluid around a pair that collides: drag, added mass, history force and drag beside the wall, by `StillFluid`."""
+"""The fluid around a pair that collides, a `QuiescentFluid`: drag, added mass, history, and drag beside the wall."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.coupling.forces.wall_drag import WallDrag
-from cfddem.coupling.still_fluid import StillFluid
+from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.walls.shapes import Plane
 from closures.drag_single import schiller_naumann
@@ -38,7 +38,7 @@ def chosen_forces(given: str | Sequence[str]) -> tuple[str, ...]:
 
 def fluid_around(
     run: ParticleSolver, forces: Sequence[str], density: float, viscosity: float, gravity: float, against_wall: bool
-) -> StillFluid | None:
+) -> QuiescentFluid | None:
     """A fluid at rest with these forces; None where nothing but the film and the contact acts.
 
     gravity  along x, from striker to target [m/s2]
@@ -50,7 +50,7 @@ def fluid_around(
     beside = None
     if against_wall and "wall_drag" in forces:
         beside = WallDrag([WALL], "nearest", film=run.laws.film, shear=run.laws.shears)
-    return StillFluid(
+    return QuiescentFluid(
         run,
         density,
         viscosity,

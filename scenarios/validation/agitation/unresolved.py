@@ -101,12 +101,10 @@ def run(row: dict[str, Any], *, settle: float = 10.0, until: float = 60.0, **cha
 
 def _hold_drag(simulation: Simulation, ratio: float) -> None:
     """Multiply the drag law, so that the mean drag is that of the resolved run."""
-    exchange = simulation.exchange
-    assert exchange is not None
-    drag = exchange.drag
+    assert simulation.coupling is not None
+    drag = simulation.forces["drag"]
     law = drag.conductance
-    drag.conductance = lambda particles, flow: ratio * law(particles, flow)  # type: ignore[method-assign]
-    exchange.momentum.conductance = drag.conductance
+    drag.conductance = lambda particles, flow: ratio * law(particles, flow)
 
 
 def _note(series: Series, simulation: Simulation, point: Point, hits: float, impact: float) -> None:

@@ -122,8 +122,8 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
     rate = complex(wave.growth, -number * wave.speed)
     simulation = Simulation(case)
     fluid, particles = simulation.fluid, simulation.particles
-    exchange = simulation.exchange
-    assert fluid is not None and exchange is not None
+    coupling = simulation.coupling
+    assert fluid is not None and coupling is not None
     height = particles.position[:, 2]
     by_particles = START * -rate / (1j * number)  # complex amplitudes of the velocities
     by_fluid = START * smoothed * (1.0 - bed.voidage) * (rate + 1j * number * slip) / (1j * number * bed.voidage)
@@ -135,7 +135,7 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
     particles.velocity += _random_motion(case, particles.count)
     simulation.particle_solver.refresh()
     fluid.boundaries.driving[2] = (1.0 - bed.voidage) * (bed.density - bed.fluid_density) * bed.gravity
-    kernel = exchange.kernel
+    kernel = coupling.kernel
     fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(particles.position, particles.radius)))
     fluid.set_velocity((0.0, 0.0, lambda x, y, z: slip + (by_fluid * np.exp(1j * number * z)).real + 0.0 * x * y))
     times, components, temperatures = [], [], []

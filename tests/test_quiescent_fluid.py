@@ -9,7 +9,7 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
-from cfddem.coupling.still_fluid import StillFluid
+from cfddem.coupling.quiescent_fluid import QuiescentFluid
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
@@ -31,7 +31,7 @@ def sphere(velocity: float = 0.0, height: float = 1.0, **changes: object) -> Par
 
 def fall(history: str, step: float, until: float) -> tuple[np.ndarray, np.ndarray]:
     run = sphere()
-    fluid = StillFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), history=history, gravity=(0.0, 0.0, -9.81))  # type: ignore[arg-type]
+    fluid = QuiescentFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), history=history, gravity=(0.0, 0.0, -9.81))  # type: ignore[arg-type]
     speeds = [0.0]
     for _ in range(round(until / step)):
         fluid.advance(step)
@@ -58,7 +58,7 @@ def test_added_mass_beside_a_wall_keeps_the_energy() -> None:
     """Without drag, (m + C m_f) v^2 is constant while the sphere approaches the wall."""
     radius = 0.5 * DIAMETER
     run, wall = sphere(-0.1, 6.0 * radius), Plane()
-    fluid = StillFluid(run, WATER, VISCOSITY, None, history="none", wall=wall)
+    fluid = QuiescentFluid(run, WATER, VISCOSITY, None, history="none", wall=wall)
 
     def energy() -> float:
         place, velocity = float(run.particles.position[0, 2]), float(run.particles.velocity[0, 2])
@@ -73,18 +73,20 @@ def test_added_mass_beside_a_wall_keeps_the_energy() -> None:
 
 def test_gravity_belongs_to_the_fluid() -> None:
     with pytest.raises(InputError, match="give it to the fluid"):
-        StillFluid(sphere(gravity=(0.0, 0.0, -9.81)), WATER, VISCOSITY, None)
+        QuiescentFluid(sphere(gravity=(0.0, 0.0, -9.81)), WATER, VISCOSITY, None)
 
 
 def test_a_fluid_without_viscosity_is_refused() -> None:
     with pytest.raises(InputError, match="viscosity"):
-        StillFluid(sphere(), WATER, 0.0, None)
+        QuiescentFluid(sphere(), WATER, 0.0, None)
 
 
 def test_a_restored_solver_continues_with_its_memory() -> None:
     """The checkpoint of the solver holds what the fluid remembers: the same bits."""
     runs = [sphere(), sphere()]
-    fluids = [StillFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), gravity=(0.0, 0.0, -9.81)) for run in runs]
+    fluids = [
+        QuiescentFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), gravity=(0.0, 0.0, -9.81)) for run in runs
+    ]
     for _ in range(5):
         fluids[0].advance(1e-3)
     runs[1].restore(runs[0].checkpoint())
@@ -96,5 +98,5 @@ def test_a_restored_solver_continues_with_its_memory() -> None:
 def test_a_fixed_sphere_stays() -> None:
     one = make_particles([[0.0, 0.0, 1.0]], 0.5 * DIAMETER, GLASS.density, fixed=True)
     run = ParticleSolver(one, pair_table([GLASS]), check_steps=False)
-    StillFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), gravity=(0.0, 0.0, -9.81)).advance(1e-3, 5)
+    QuiescentFluid(run, WATER, VISCOSITY, law_of(schiller_naumann), gravity=(0.0, 0.0, -9.81)).advance(1e-3, 5)
     assert run.particles.position[0, 2] == 1.0

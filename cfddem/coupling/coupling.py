@@ -1,0 +1,149 @@
+r"""Coupling of particles and fluid over one fluid step.
+
+The force of the fluid on a particle of volume V and diameter d, at the velocity v in a fluid of velocity u:
+
+.. math:: \text{model A:}\quad b(u-v) - V\nabla p' - \rho V g, \qquad b = 3\pi\eta d\,\varepsilon F
+.. math:: \text{model B:}\quad \tfrac{1}{\varepsilon}\, b(u-v) - \rho V g
+
+with F(Re, eps) the drag factor of the drag law. Added mass, history force, lift and viscous stress are optional. Each
+force is a :class:`cfddem.model.feature.FluidForce`; the coupling goes over their list and names none of them.
+Resistance is implicit on both sides, see :mod:`cfddem.coupling.transfer`; all other forces are explicit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from cfddem.coupling.fluid_step_limits import COURANT, crossing_rate
+from cfddem.coupling.force_list import ForceList
+from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.sampled_flow import FlowSampler
+from cfddem.coupling.terms import CouplingTerms, inertia, total
+from cfddem.coupling.transfer import Transfer
+from cfddem.fluid.grid import Array
+from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
+from cfddem.particles.state import Particles
+
+SAME_STEP = 1e-6
+"""Fluid steps that differ by less than this part are equal."""
+
+STEP_RELAXATION = 0.01
+"""Weight of the present step in the running mean of the fluid step."""
+
+
+class Coupling:
+    """All forces between a fluid and its particles.
+
+    particles  get the fields that the coupling stores
+    fluid      the fluid solver; its model, "A" or "B", holds for the coupling
+    kernel     deposits on cells and gathers from them
+    flow       samples the flow around each particle
+    forces     in the order in which they act
+    """
+
+    def __init__(
+        self,
+        particles: Particles,
+        fluid: FluidSolver,
+        kernel: FilterKernel,
+        flow: FlowSampler,
+        forces: Iterable[FluidForce],
+    ) -> None:
+        self.fluid, self.kernel, self.flow = fluid, kernel, flow
+        self.momentum = Transfer(
+            kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
+        )
+        self._mean_step = 0.0
+        declared = self.momentum.declare(particles)
+        self.forces = ForceList(particles, forces)
+        self._stored = (*declared, *(field.name for force in self.forces for field in force.fields))
+        if self.sets_inertia:
+            owned = particles.without_ghosts()
+            terms = self._terms(owned, kernel.map_particles(owned.position, owned.radius), 0.0)
+            for force in self.forces:
+                if force.sets_inertia:
+                    force.begin(terms)
+
+    @property
+    def sets_inertia(self) -> bool:
+        """Whether a force changes the inertia of particles."""
+        return any(force.sets_inertia for force in self.forces)
+
+    # ------------------------------------------------------------ around one fluid step
+
+    def prepare(self, particles: Particles, step: float) -> CouplingTerms:
+        """What the particles send into the coming fluid step [s]: volume, drag, momentum and explicit forces.
+
+        particles  of this rank, without ghosts
+        """
+        if self.momentum.last_step == 0.0:
+            particles.reset(*self._stored)  # particles may have been moved since the fields were declared
+        particles.viscosity[:] = self.fluid.viscosity_at(particles.position)
+        cell_map = self.kernel.map_particles(self._mapped_position(particles, step), particles.radius)
+        terms = self._terms(particles, cell_map, step)
+        self.forces.act(terms)
+        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen)
+        if terms.on_fluid:
+            terms.source = self._source(cell_map, total(terms.on_fluid, terms.unseen))
+        return terms
+
+    def apply(self, particles: Particles, terms: CouplingTerms) -> None:
+        """Set `particles.applied`, the force on every particle until the next fluid step.
+
+        The fluid has made its step with `terms`, which then have the force of every line.
+        """
+        terms.receive(self.momentum.apply(particles, terms.cell_map, terms.implicit, *self.fluid.drag_response()))
+        self.forces.finish(terms)
+
+    def solid_fraction(self, particles: Particles) -> Array:
+        """Solid fraction of the cells by the places from which the last voidage was computed (nz, ny, nx) [-]."""
+        place = particles.mapped_position if "mapped_position" in particles else particles.position
+        return self.kernel.solid_fraction(self.kernel.map_particles(place, particles.radius))
+
+    @property
+    def outside(self) -> dict[str, int]:
+        """How often the law of each force was evaluated outside its range, by the name of the force."""
+        return self.forces.outside(self.fluid.communicator)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next step depends on beside fluid, particles and forces."""
+        return {"last_step": self.momentum.last_step, "mean_step": self._mean_step}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
+
+    # ------------------------------------------------------------ terms
+
+    def _terms(self, particles: Particles, cell_map: ParticleCellMap, step: float) -> CouplingTerms:
+        """Terms of a step with the flow around every particle, before any force has acted."""
+        solid = self.kernel.solid_fraction(cell_map)
+        terms = CouplingTerms(particles, step, self.momentum.last_step, cell_map, solid)
+        terms.flow = self.flow.sample(particles, cell_map, solid)
+        return terms
+
+    def _mapped_position(self, particles: Particles, step: float) -> Array:
+        r"""Positions from which the voidage is computed, :math:`x + (h - \bar h)\,v` (N, 3) [m].
+
+        h is the length of this step and :math:`\bar h` a running mean of it, which follows h slowly. Over a step the
+        voidage moves from where the particles were mapped in the step before to where they are mapped now. The
+        particles took the last step, h_l, between the two; the fluid takes h. The shift makes both intervals h. Without
+        it particles would displace the fluid at h_l/h of their rate, a pressure shock in a liquid.
+        """
+        fluid, mean = self.fluid, self._mean_step or step
+        self._mean_step = mean
+        if abs(step - mean) < SAME_STEP * step:
+            return particles.position
+        crossing = crossing_rate(particles.velocity, fluid.grid.spacing, fluid.communicator)
+        mean = min(mean, step + COURANT / max(crossing, 1e-300))  # particles are not moved by more than a cell
+        self._mean_step = mean + STEP_RELAXATION * (step - mean)
+        return self.kernel.wrapped(particles.position + (step - mean) * particles.velocity)
+
+    def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
+        """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
+        source = self.kernel.smooth(self.kernel.deposit(cell_map, force)) / self.fluid.grid.cell_volume
+        return np.ascontiguousarray(np.moveaxis(source, 0, -1))
