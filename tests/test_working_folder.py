@@ -198,5 +198,5 @@ def test_no_command_of_the_wheel_executes_a_canary(tmp_path: Path) -> None:
     trap = lay(tmp_path / "here")
     seen = execute(trap, [str(python), "-P", "-c", "import cfddem; print(cfddem.__file__)"], "")
     assert seen.stdout.startswith(where), "the wheel is tested, not the source"
-    with_mpiexec = os.pathsep.join((sysconfig.get_path("scripts"), os.environ["PATH"]))
-    try_all(trap, [str(home / "bin" / "cfddem")], PATH=with_mpiexec)
+    path = os.pathsep.join((sysconfig.get_path("scripts"), os.environ["PATH"]))
+    try_all(trap, [str(home / "bin" / "cfddem")], PATH=path, LD_LIBRARY_PATH=str(Path(sys.prefix) / "lib"))  # of MPI
