@@ -97,8 +97,9 @@ def _with_ranks(result: Preflight, described: Case, ranks: int) -> Preflight:
         return result.with_errors(
             [Issue("error", failure.field, f"{failure.value} must be {failure.limit}", failure.remedy)]
         )
-    share = described.particle_count / ranks
-    row = Row("several processes", "ranks", ranks, "", f"can share the case, about {share:.3g} particles each")
+    count = described.particle_count
+    share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
+    row = Row("several processes", "ranks", ranks, "", f"can share the case{share}")
     return replace(result, rows=(*result.rows, row))
 
 
