@@ -163,7 +163,7 @@ def run(
     from cfddem.case.toml_text import read_text
 
     described = Case.from_toml(path, overrides(set or []))
-    communicator = on_ranks(ranks, threads)
+    communicator = on_ranks(ranks, threads, folder)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
             _warn_of_another_case(described, folder)
@@ -253,7 +253,8 @@ def resume(
     from cfddem.run.runner import Run
     from cfddem.run.threads import threads_for
 
-    folder, communicator = folder or newest_run(Path()), on_ranks(ranks, threads)
+    folder = folder or newest_run(Path())
+    communicator = on_ranks(ranks, threads, folder)
     if until is None and (before := open_run(folder)).status == "finished":
         if communicator.rank == 0:
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
