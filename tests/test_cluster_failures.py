@@ -153,6 +153,47 @@ def test_one_rank_of_a_script_that_fails_ends_all(home: Path, tmp_path: Path) ->
     assert took < LONGEST and done.returncode == 1 and "ValueError: something unforeseen" in done.stderr
 
 
+def begun(home: Path, run: Path, processes: Path) -> subprocess.Popen[str]:
+    """A long run on two ranks that has written a snapshot; its temporary files are in the folder `processes`."""
+    words = ["run", str(home / "case.toml"), "-o", str(run), "--ranks", "2", "--set", "run.until=100"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cfddem", *words], env=environment() | {"TMPDIR": str(processes)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    until = time.monotonic() + 600.0
+    while not (run / "data" / "00000001.h5").exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    return process
+
+
+@pytest.mark.parametrize("rank", [0, 1])
+def test_a_killed_rank_is_named_with_what_to_do(home: Path, tmp_path: Path, rank: int) -> None:
+    """In one line, with exit code 137, as the page of clusters says; the launcher's text remains."""
+    run = tmp_path / "run"
+    process = begun(home, run, tmp_path)
+    (victim,) = (int(each.name) for each in tmp_path.glob("cfddem-*/*") if each.read_text() == str(rank))
+    os.kill(victim, signal.SIGKILL)
+    output, message = process.communicate(timeout=LONGEST)
+    assert process.returncode == 128 + signal.SIGKILL
+    assert message.splitlines()[-1] == (
+        f"cfddem: rank {rank} was killed by SIGKILL, by hand or because memory ran out, and all others ended; "
+        f"continue with: cfddem resume {run}"
+    )
+    assert str(victim) in output and not list(tmp_path.glob("cfddem-*"))
+    assert_whole(run)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends processes with their parent")
+def test_ranks_end_where_their_command_is_killed(home: Path, tmp_path: Path) -> None:
+    process = begun(home, tmp_path / "run", tmp_path)
+    process.kill()
+    process.communicate(timeout=LONGEST)
+    until = time.monotonic() + LONGEST
+    while other_ranks(tmp_path / "run"):
+        time.sleep(0.1)
+        assert time.monotonic() < until
+
+
 def kill_all(home: Path, run: Path, kills: int, seed: int) -> None:
     """Kill the launcher and all ranks at random instants, look at the folder, go on, and look at the end."""
     instants, ranks = random.Random(seed), 2
@@ -227,17 +268,13 @@ def test_a_full_disk_ends_all_ranks_and_leaves_a_whole_folder(home: Path, tmp_pa
 def test_a_scheduler_stops_all_ranks_with_a_checkpoint(home: Path, tmp_path: Path) -> None:
     """SIGTERM to the launcher: all ranks end within 10 s, with its code."""
     run = tmp_path / "run"
-    words = ["run", str(home / "case.toml"), "-o", str(run), "--ranks", "2", "--set", "run.until=100"]
-    process = subprocess.Popen([sys.executable, "-m", "cfddem", *words], env=environment(), stderr=subprocess.PIPE)
-    until = time.monotonic() + 600.0
-    while not (run / "data" / "00000001.h5").exists() and time.monotonic() < until:
-        time.sleep(0.1)
+    process = begun(home, run, tmp_path)
     process.send_signal(signal.SIGTERM)
     try:
         _, message = process.communicate(timeout=LONGEST)
     finally:
         process.kill()
     assert process.returncode == 128 + signal.SIGTERM, message
-    assert b"stopped by SIGTERM" in message and message.count(b"continue with") == 1
+    assert "stopped by SIGTERM" in message and message.count("continue with") == 1
     assert open_run(run).status == "stopped" and checkpoint.exists(run)
     assert_whole(run)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import call
 from example_case import TEXT
 from made_up_run import BED, made_up
 
@@ -19,7 +21,9 @@ from cfddem.analysis.comparison import compare, lines
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.cli.laws_file import import_laws
 from cfddem.coupling.forces.drag import Drag
+from cfddem.io.reading import open_run
 from cfddem.plotting.report_page import page
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.law_ranges import effect_of_drag
@@ -171,7 +175,7 @@ def test_a_run_is_read_without_the_law_that_it_used(tmp_path: Path) -> None:
     assert "law narrow is not installed here" in page(tmp_path / "run", tmp_path / "run.html").read_text()
     found = compare([made_up(tmp_path / "other"), tmp_path / "run"])
     assert found["changed"]["laws.drag"] == ["di_felice", "narrow"]
-    with pytest.raises(InputError, match=r"laws.drag = 'narrow': must be one of"):
+    with pytest.raises(InputError, match=r"laws.drag = 'narrow': must be a law that is known here; .*--laws FILE.py"):
         Run.resume(tmp_path / "run")
 
 
@@ -221,3 +225,78 @@ def test_any_use_outside_of_the_range_is_reported(tmp_path: Path) -> None:
         file["out_of_range_count"][:] = 3.0
     said = "\n".join(each for group in report(tmp_path / "run")["advice"].values() for each in group)
     assert "outside of its range in 3.75e-05 % of its uses (3 times)" in said
+
+
+# ---------------------------------------------------------------- resumed runs
+
+OWN = """
+import math
+
+import closures
+
+
+@closures.law("drag", "a test", reynolds=(0.0, 300.0), voidage=(0.3, 1.0))
+def of_a_file(reynolds: float, voidage: float) -> float:
+    return (1.0 + 0.15 * reynolds**0.687) * voidage**-3.2
+"""
+
+
+@pytest.fixture
+def stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Path, Path]]:
+    """A run with a law of a file, and that file; the law is not known any more."""
+    registry.load_built_in_laws()
+    monkeypatch.setitem(REGISTRY, "drag", dict(REGISTRY["drag"]))
+    (file := tmp_path / "laws_of_a_test.py").write_text(OWN)
+    import_laws(file)
+    changes = {
+        "laws.drag": "of_a_file", "laws.lubrication": "none", "bed.start": "suspended", "bed.count": 50,
+        "run.until": 0.002, "run.every": 0.001, "run.average_from": 0.0, "column.height": 0.032,
+    }  # fmt: skip
+    Run.begin(Case.from_text(TEXT, "bed.toml", changes), tmp_path / "bed").go()
+    del REGISTRY["drag"]["of_a_file"], sys.modules[file.stem]
+    yield tmp_path / "bed", file
+    sys.modules.pop(file.stem, None)
+
+
+def test_resume_imports_a_law_of_the_file_that_the_user_names(
+    stopped: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without its name, files beside the run and in it are not executed, and the message names the remedy."""
+    folder, file = stopped
+    monkeypatch.chdir(folder.parent)
+    for place in (folder, folder.parent):
+        (place / "my_laws.py").write_text("raise SystemExit('executed')")
+    done = call("resume", "bed", "--until", "0.003")
+    assert done.code == 2 and len(done.err.splitlines()) == 1
+    assert "laws.drag = 'of_a_file': must be a law that is known here" in done.err
+    assert "cfddem resume bed --laws FILE.py" in done.err and "cfddem.Run.resume" in done.err
+    assert open_run(folder).status == "finished" and file.stem not in sys.modules
+    done = call("resume", "bed", "--until", "0.003", "--laws", file.name)
+    assert done.code == 0 and "warning: laws.drag" not in done.err, done.err
+    assert open_run(folder).history["time"][-1] == 0.003
+
+
+def test_a_file_of_laws_that_is_none_is_refused(tmp_path: Path) -> None:
+    for name, text, said in [
+        ("no_python.txt", "", "must be an existing Python file"),
+        ("numpy.py", "", "must be a file with a name of its own"),
+        ("turtle.py", "", "must be a file with a name of its own"),
+        (
+            "broken_laws.py",
+            "import nothing_of_this_name",
+            "No module named 'nothing_of_this_name'",
+        ),
+    ]:
+        (tmp_path / name).write_text(text)
+        with pytest.raises(InputError, match=said):
+            import_laws(tmp_path / name)
+    assert "broken_laws" not in sys.modules
+
+
+def test_resume_says_how_a_changed_case_is_run(tmp_path: Path) -> None:
+    """`cfddem resume FOLDER --set ...`: one line with the command, whose case file exists."""
+    folder = made_up(tmp_path / "run")
+    done = call("resume", str(folder), "--set", "fluid.viscosity=2e-3")
+    assert done.code == 2 and len(done.err.splitlines()) == 1
+    assert f"cfddem run {folder}/case.toml --set fluid.viscosity=2e-3 -o NEW" in done.err
+    assert (folder / "case.toml").is_file() and "--set" not in call("resume", "--help").out

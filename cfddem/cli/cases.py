@@ -24,6 +24,7 @@ THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
 LOG = "file for progress, one line per history row"
+LAWS = "Python file with the user's laws of the run, which is executed; nothing in a run folder ever is"
 
 
 def new(
@@ -97,8 +98,9 @@ def _with_ranks(result: Preflight, described: Case, ranks: int) -> Preflight:
         return result.with_errors(
             [Issue("error", failure.field, f"{failure.value} must be {failure.limit}", failure.remedy)]
         )
-    share = described.particle_count / ranks
-    row = Row("several processes", "ranks", ranks, "", f"can share the case, about {share:.3g} particles each")
+    count = described.particle_count
+    share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
+    row = Row("several processes", "ranks", ranks, "", f"can share the case{share}")
     return replace(result, rows=(*result.rows, row))
 
 
@@ -162,7 +164,7 @@ def run(
     from cfddem.case.toml_text import read_text
 
     described = Case.from_toml(path, overrides(set or []))
-    communicator = on_ranks(ranks, threads)
+    communicator = on_ranks(ranks, threads, folder)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
             _warn_of_another_case(described, folder)
@@ -235,6 +237,8 @@ def resume(
     folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
     *,
     until: Annotated[float | None, Parameter(help="new end time [s]")] = None,
+    laws: Annotated[Path | None, Parameter(help=LAWS)] = None,
+    set: Annotated[list[str] | None, Parameter(show=False, negative="")] = None,
     threads: Annotated[int | None, Parameter(help=THREADS)] = None,
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
@@ -246,13 +250,21 @@ def resume(
     Example: cfddem resume bed --until 0.03
     """
     from cfddem.backend.compile import use_threads
+    from cfddem.backend.errors import InputError
+    from cfddem.cli.laws_file import import_laws
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
     from cfddem.run.resuming import case_to_continue
     from cfddem.run.runner import Run
     from cfddem.run.threads import threads_for
 
-    folder, communicator = folder or newest_run(Path()), on_ranks(ranks, threads)
+    folder = folder or newest_run(Path())
+    if set:
+        remedy = f"a changed case is a new run: cfddem run {folder}/case.toml --set {set[0]} -o NEW"
+        raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
+    communicator = on_ranks(ranks, threads, folder)
+    if laws is not None:
+        import_laws(laws)
     if until is None and (before := open_run(folder)).status == "finished":
         if communicator.rank == 0:
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")

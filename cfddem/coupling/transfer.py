@@ -146,8 +146,8 @@ def _present(name: str) -> Callable[[Table, np.ndarray], np.ndarray]:
 
 
 def _columns(values: Array) -> Array:
-    """Values of the particles as (N, m), a view."""
-    return values.reshape(len(values), -1)
+    """Values of the particles as (N, m), a view; a rank may hold no particle."""
+    return values.reshape(len(values), math.prod(values.shape[1:]))
 
 
 def _or_zero(values: Array | None, like: Array) -> Array:

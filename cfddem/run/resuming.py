@@ -9,10 +9,13 @@ from typing import Any
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
+from cfddem.case.compare import with_files_of
 from cfddem.case.schema import Case
+from cfddem.case.toml_text import read_text
 from cfddem.io.writer import RunFolder
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
+from closures.registry import REGISTRY, load_package_laws
 
 
 def require_forward(until: float | None, state: Mapping[str, Any] | None) -> None:
@@ -37,11 +40,25 @@ def status_restored_on_refusal(written: RunFolder, before: Mapping[str, Any]) ->
 
 
 def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float | None) -> Case:
-    """The case of a folder, with the intervals of a checkpoint and perhaps a new end [s]."""
+    """The case of a folder, with the intervals of a checkpoint and perhaps a new end [s].
+
+    errors  InputError if its laws are not known here
+    """
     overrides = ({} if state is None else state["overrides"]) | (
         {} if until is None else {"run.until": until, "run.until_error": {}}
     )
-    return Case.from_toml(folder / "case.toml", overrides)
+    path = folder / "case.toml"
+    case = Case.from_text(read_text(path), str(path), overrides, finished=True)
+    for key, name in case.laws.missing.items():
+        if name in REGISTRY.get(key, {}):
+            return Case.from_toml(path, overrides)  # it says why the law cannot be used
+        lost = [f"; the package {each} could not be loaded: {why}" for each, why in load_package_laws().items()]
+        remedy = (
+            f"resume it with the file that declares the law: cfddem resume {folder} --laws FILE.py; or install its "
+            f"package; or import it in Python and call cfddem.Run.resume{''.join(lost)}"
+        )
+        raise InputError(f"laws.{key}", name, "a law that is known here", remedy)
+    return with_files_of(case, folder)
 
 
 def restored(
