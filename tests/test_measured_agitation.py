@@ -23,7 +23,7 @@ from scenarios.validation.resolved_suspension.fitting import autocovariance, fit
 from scenarios.validation.resolved_suspension.measures import Series, even_window
 from scenarios.validation.resolved_suspension.study import stored
 from scenarios.validation.resolved_suspension.suspension import Point
-from scenarios.validation.table import validate
+from scenarios.validation.targets import validate
 
 
 def liquid_bed(**changes: Any) -> Case:

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from cfddem.backend.errors import InputError, nearest
 from cfddem.cli.printing import announce_compilation
 from scenarios.validation.targets import ONLY_IF_NAMED, PIECEMEAL, TARGETS
+from scenarios.validation.targets import validate as run
 
 
 def validate(
@@ -38,8 +39,6 @@ def validate(
     """
     if not json:
         announce_compilation()
-    from scenarios.validation.table import validate as run
-
     if target != "all" and target not in TARGETS:
         raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
     if data and target != "binary-collision":

@@ -250,7 +250,7 @@ def called(words: list[str]) -> tuple[int, str, str]:
     stop = mock.Mock(side_effect=Started)
     patches = {
         "cfddem.run.runner.Simulation": stop, "cfddem.run.sweep.on_this_machine": stop, "os.execv": stop,
-        "cfddem.plotting.browser.browse": stop, "scenarios.validation.table.validate": stop,
+        "cfddem.plotting.browser.browse": stop, "cfddem.cli.validation.run": stop,
         "scenarios.benchmarks.dense_bed.bench": stop, "scenarios.beds.gas_bed.study.bench": stop,
         "sys.argv": ["cfddem", *words],
     }  # fmt: skip
