@@ -13,7 +13,7 @@ from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.report import report
 from cfddem.plotting.sweep_figure import Point, sweep_figure
-from cfddem.run.sweep import Outcome, _measured, write_table
+from cfddem.studies.sweep import Outcome, _measured, write_table
 
 
 def answer(folder: Path, name: str) -> dict[str, object]:

@@ -296,15 +296,15 @@ def sweep(
     from dataclasses import asdict
 
     from cfddem.case.gallery import find_case, overrides
-    from cfddem.run.samples import chosen_values
-    from cfddem.run.sweep import Outcome, failures
-    from cfddem.run.sweep import sweep as run_all
+    from cfddem.studies.samples import chosen_values
+    from cfddem.studies.sweep import Outcome, failures
+    from cfddem.studies.sweep import sweep as run_all
 
     path = find_case(case)
     values = chosen_values(over or [], vary or [], sample, runs)
     folder = output or Path(f"{path.stem}-sweep")
     if write_jobs:
-        from cfddem.run.job_array import write_jobs as write
+        from cfddem.studies.job_array import write_jobs as write
 
         lines, script, count = write(path, values, folder, overrides(set or []))
         print(f"{count} commands written to {lines}; submit with: sbatch {script}")

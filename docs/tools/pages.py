@@ -22,7 +22,8 @@ ROOMS = {
     "closures": ("Laws", "Physical laws as scalar functions: one function per equation."),
     "cfddem/case": ("Case", "Case files: schema, materials, input errors, the gallery."),
     "cfddem/preflight": ("Pre-run check", "Estimates, warnings and errors before a run."),
-    "cfddem/run": ("Run", "Simulation, time step, run folder, sweeps, budgets."),
+    "cfddem/run": ("Run", "Simulation, time step, run folder, history, budgets."),
+    "cfddem/studies": ("Studies", "Sweeps, samples, calibration, job arrays, a run in a notebook."),
     "cfddem/particles": (
         "Particles",
         "Discrete-element solver: contacts, films, bridges, walls, neighbours, packings.",
@@ -47,6 +48,7 @@ TABLES = {"material": "[material.NAME]", "pair": "[pair.NAME.NAME]", "compare": 
 HIDDEN = {
     "scenarios/validation",
     "scenarios/benchmarks",
+    "scenarios/references/resolved_suspension",
     "figures.py",
     "validation.py",
     "checks.py",

@@ -30,7 +30,7 @@ TARGETS: dict[str, str] = {
     "wet-beds": "scenarios.beds.wet_bed.validation",
     "waves": "scenarios.validation.bed_waves.study",
     "agitation": "scenarios.validation.agitation.study",
-    "resolved": "scenarios.validation.resolved_suspension.study",
+    "resolved": "scenarios.references.resolved_suspension.study",
 }
 """Name of each target, and the module that holds its `study`."""
 

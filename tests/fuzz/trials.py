@@ -249,7 +249,7 @@ def called(words: list[str]) -> tuple[int, str, str]:
     out, err, code = io.StringIO(), io.StringIO(), 0
     stop = mock.Mock(side_effect=Started)
     patches = {
-        "cfddem.run.runner.Simulation": stop, "cfddem.run.sweep.on_this_machine": stop, "os.execv": stop,
+        "cfddem.run.runner.Simulation": stop, "cfddem.studies.sweep.on_this_machine": stop, "os.execv": stop,
         "cfddem.plotting.browser.browse": stop, "cfddem.cli.validation.run": stop,
         "scenarios.benchmarks.dense_bed.bench": stop, "scenarios.beds.gas_bed.study.bench": stop,
         "sys.argv": ["cfddem", *words],

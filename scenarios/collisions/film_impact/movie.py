@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from cfddem.plotting.curves import blank
-from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.record import Record
 from scenarios.collisions.film_impact.result import FilmImpact, Frame
 from scenarios.collisions.film_impact.solver import Impact
 from scenarios.collisions.film_impact.study import impact
+from scenarios.references.isph.impact import SmoothedImpact
 
 FRAMES, FRAMES_PER_SECOND = 30, 12
 """Frames in the time in which the bead would fall through the film at constant speed, and how fast they are shown."""

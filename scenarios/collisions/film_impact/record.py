@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.result import COLUMNS, Frame, Moment
 from scenarios.collisions.film_impact.solver import Impact
+from scenarios.references.isph.impact import SmoothedImpact
 
 
 class Record:

@@ -23,7 +23,6 @@ from cfddem.case.materials import Material
 from closures.film_impact import film_added_mass
 from scenarios.collisions.film_impact.cavitation import EXCHANGES
 from scenarios.collisions.film_impact.grid import Grid
-from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.materials import GLASS, Liquid, liquid_named, touching_gap
 from scenarios.collisions.film_impact.pressure import Bead
 from scenarios.collisions.film_impact.record import Record
@@ -31,6 +30,7 @@ from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact
 from scenarios.collisions.film_impact.solver import Impact, Settings
 from scenarios.collisions.film_impact.surface import Tension
 from scenarios.collisions.film_impact.volume import overfilled
+from scenarios.references.isph.impact import SmoothedImpact
 
 METHODS = {"grid": 20, "isph": 5}
 """Method -> cells or layers of particles in the film, if not given."""

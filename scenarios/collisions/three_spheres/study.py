@@ -25,8 +25,8 @@ from joblib import Parallel, delayed
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.launch import safe_workers
 from scenarios.collisions.three_spheres.engine import follow as follow_in_engine
-from scenarios.collisions.three_spheres.events import RELEASE, Path, follow
-from scenarios.collisions.three_spheres.motion import APART, JOINED, STATE, Numbers, view
+from scenarios.references.three_spheres.events import RELEASE, Path, follow
+from scenarios.references.three_spheres.motion import APART, JOINED, STATE, Numbers, view
 
 PAIRS = (12, 23, 13)
 OUTCOMES = ("FA", "PA1", "PA2", "PA3", "FS")

@@ -16,7 +16,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from closures import timescales
 from closures.contact import hertz_stiffness
-from scenarios.collisions.wet_pair.motion import Motion, Pair
+from scenarios.references.wet_pair import Motion, Pair
 
 FILM_STEP = 1e-3
 """Step where the solids are apart, over the time in which the pair crosses the film at its present speed."""

@@ -25,7 +25,7 @@ from closures import contact
 from closures.lubrication import film_strength
 from closures.minimum_gap import glass_transition
 from scenarios.collisions.wet_pair.engine import follow as follow_in_engine
-from scenarios.collisions.wet_pair.motion import Motion, Pair, follow
+from scenarios.references.wet_pair import Motion, Pair, follow
 
 BRIDGES = ("deforming", "static")
 SOLVERS = ("equations", "particles")

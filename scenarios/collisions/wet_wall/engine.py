@@ -1,6 +1,6 @@
 """A wet impact on a wall in the particle engine: its contact, and a liquid bridge between a particle and a wall.
 
-The bridge has the forces of :mod:`scenarios.collisions.wet_wall.motion` along the normal, as laws of the engine. What
+The bridge has the forces of :mod:`scenarios.references.wet_wall.motion` along the normal, as laws of the engine. What
 the layer does along the wall is added between the steps.
 """
 
@@ -19,7 +19,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import capillary, timescales
-from scenarios.collisions.wet_wall.motion import (
+from scenarios.references.wet_wall.motion import (
     BOUNCES,
     LONGEST,
     PHASES,

@@ -23,10 +23,10 @@ from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
 from closures import capillary, contact, timescales
 from scenarios.collisions.results import plain
-from scenarios.collisions.wet_wall import motion
 from scenarios.collisions.wet_wall.engine import follow as follow_in_engine
 from scenarios.collisions.wet_wall.materials import BALLS, GLASS, LIQUIDS, Ball, Liquid, half_filling, sliding_friction
-from scenarios.collisions.wet_wall.motion import COLUMNS, Path, Wet, follow
+from scenarios.references.wet_wall import motion
+from scenarios.references.wet_wall.motion import COLUMNS, Path, Wet, follow
 
 PULLED_IN = {"always": ("I", "III", "IV"), "rebound": ("III", "IV"), "bridge": ("IV",)}
 """Phases with a capillary force, by name; the source does not say whether the first is among them."""

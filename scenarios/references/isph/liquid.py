@@ -17,9 +17,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import LinearOperator, bicgstab
 
 from cfddem.backend.errors import RunFailed
-from scenarios.collisions.film_impact.isph import kernel, points
-from scenarios.collisions.film_impact.isph.solids import Seen, solid
 from scenarios.collisions.film_impact.pressure import Bead
+from scenarios.references.isph import kernel, points
+from scenarios.references.isph.solids import Seen, solid
 
 TOLERANCE = 1e-9
 """Of the residual of the pressure, relative; that of the paper."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.compile import use_threads
-from scenarios.validation.resolved_suspension.measures import Series, even_window, measure
-from scenarios.validation.resolved_suspension.suspension import Point, Suspension, prepare
+from scenarios.references.resolved_suspension.measures import Series, even_window, measure
+from scenarios.references.resolved_suspension.suspension import Point, Suspension, prepare
 from scenarios.validation.table import Progress, replacing
 
 SETTLE, AVERAGE = 10.0, 20.0
@@ -169,7 +169,7 @@ def write_table(rows: list[dict[str, Any]], path: Path, made: str) -> None:
 
 
 def main() -> None:
-    """Run or continue the matrix: python -m scenarios.validation.resolved_suspension.matrix FOLDER [RUN ...]."""
+    """Run or continue the matrix: python -m scenarios.references.resolved_suspension.matrix FOLDER [RUN ...]."""
     use_threads(1)
     folder, *numbers = sys.argv[1:]
     listed = list(runs())

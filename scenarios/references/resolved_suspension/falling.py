@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from closures.drag_single import clift, schiller_naumann
-from scenarios.validation.resolved_suspension.flow import Flow, force_of, sphere_volume
-from scenarios.validation.resolved_suspension.suspension import Suspension
+from scenarios.references.resolved_suspension.flow import Flow, force_of, sphere_volume
+from scenarios.references.resolved_suspension.suspension import Suspension
 from scenarios.validation.table import reference
 
 GRAVITY = 9.81

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.plotting.curves import BLUE, ORANGE, label, panels, save
-from scenarios.validation.resolved_suspension.suspension import Suspension
+from scenarios.references.resolved_suspension.suspension import Suspension
 
 
 def slice_of(suspension: Suspension, path: Path) -> None:

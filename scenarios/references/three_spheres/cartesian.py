@@ -1,6 +1,6 @@
 """A second solution of the three wet spheres, for comparison: positions and velocities in the plane.
 
-It shares nothing with the polar equations of :mod:`scenarios.collisions.three_spheres.motion`: the forces are written
+It shares nothing with the polar equations of :mod:`scenarios.references.three_spheres.motion`: the forces are written
 out here, and the motion is that of each sphere in Cartesian coordinates.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from scenarios.collisions.ode import event
+from scenarios.references.ode import event
 
 PAIRS = {12: (0, 1), 23: (1, 2), 13: (0, 2)}
 RIM = 1e-9

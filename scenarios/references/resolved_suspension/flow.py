@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from scenarios.validation.resolved_suspension import lattice, spheres
+from scenarios.references.resolved_suspension import lattice, spheres
 
 MAGIC = 3.0 / 16.0
 """Product of both relaxation times: a plane wall then lies half-way between solid and fluid cells."""

@@ -13,7 +13,7 @@ from typing import Any
 
 from scipy.integrate import solve_ivp
 
-from scenarios.collisions.ode import event
+from scenarios.references.ode import event
 
 SPHERES = {  # radius, density, E, nu, e
     "glass_1.74": (0.87e-3, 2500.0, 63e9, 0.23, 0.96),

@@ -20,7 +20,7 @@ from cfddem.particles.interactions.bridge_law import BridgeLaws, BridgeNumbers
 from cfddem.particles.interactions.slots import BRIDGE_PULL, BridgeState, bridge_pull
 from closures.contact import hertz_damping, hertz_force, hertz_stiffness, mindlin_stiffness
 from closures.friction import coulomb_limit
-from scenarios.collisions.ode import ABSOLUTE, METHOD, RELATIVE, event
+from scenarios.references.ode import ABSOLUTE, METHOD, RELATIVE, event
 
 STILL = 1e-10
 """A pair whose speeds and accelerations all fall below this has come to rest; in the units of the state."""

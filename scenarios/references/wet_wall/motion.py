@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from cfddem.backend.errors import RunFailed
 from closures import capillary, contact, layer, lubrication, numbers, timescales
 from closures.friction import coulomb_limit
-from scenarios.collisions.ode import event
+from scenarios.references.ode import event
 
 LONGEST = 1.0
 """A sphere that has not left a phase after this time has stuck [s]."""

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from closures.drag_resolved import beetstra, tenneti
-from scenarios.validation.resolved_suspension.fitting import inertia_coefficient
-from scenarios.validation.resolved_suspension.flow import sphere_volume
-from scenarios.validation.resolved_suspension.suspension import Point, Suspension
+from scenarios.references.resolved_suspension.fitting import inertia_coefficient
+from scenarios.references.resolved_suspension.flow import sphere_volume
+from scenarios.references.resolved_suspension.suspension import Point, Suspension
 
 ALONG = 2
 """Axis of gravity."""

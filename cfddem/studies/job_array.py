@@ -10,7 +10,7 @@ from typing import Any
 
 from cfddem.backend.errors import InputError
 from cfddem.preflight.summary import preflight
-from cfddem.run.sweep import Over, cases_of, make_output
+from cfddem.studies.sweep import Over, cases_of, make_output
 
 SLURM = """#!/bin/bash
 # One run a task. Set partition, account and time; then: sbatch {script}
@@ -32,7 +32,7 @@ def write_jobs(
 ) -> tuple[Path, Path, int]:
     """Write `jobs.txt`, one command for each run of a sweep, and `jobs.slurm`, which starts them; nothing is run.
 
-    Arguments as of :func:`cfddem.run.sweep.sweep`, which collects table and figure when the jobs have ended.
+    Arguments as of :func:`cfddem.studies.sweep.sweep`, which collects table and figure when the jobs have ended.
 
     returns  the two files, and the number of runs
     errors   InputError for a case with errors, before anything is written

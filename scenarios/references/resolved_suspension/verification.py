@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from closures.drag_resolved import beetstra, tenneti
-from scenarios.validation.resolved_suspension.falling import held_in_a_stream, ten_cate, two_spheres
-from scenarios.validation.resolved_suspension.film import approach_resistance, unresolved_film
-from scenarios.validation.resolved_suspension.flow import Flow, force_of, sphere_volume
-from scenarios.validation.resolved_suspension.suspension import Point, random_arrangement
+from scenarios.references.resolved_suspension.falling import held_in_a_stream, ten_cate, two_spheres
+from scenarios.references.resolved_suspension.film import approach_resistance, unresolved_film
+from scenarios.references.resolved_suspension.flow import Flow, force_of, sphere_volume
+from scenarios.references.resolved_suspension.suspension import Point, random_arrangement
 from scenarios.validation.table import Row, worst
 
 ZICK_HOMSY = {0.064: 2.810, 0.125: 4.292, 0.216: 7.442, 0.343: 15.4}

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.collisions.film_impact.isph import points
-from scenarios.collisions.film_impact.isph.liquid import SmoothedLiquid
+from scenarios.references.isph import points
+from scenarios.references.isph.liquid import SmoothedLiquid
 
 
 class AtRest(NamedTuple):

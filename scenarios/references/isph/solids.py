@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenarios.collisions.film_impact.isph.kernel import REACH, SMOOTHING, slope
+from scenarios.references.isph.kernel import REACH, SMOOTHING, slope
 
 POINTS, STEPS = 200, 600
 """Entries of the tables over the distance, and steps of the integrals over s."""

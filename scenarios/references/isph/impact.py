@@ -12,11 +12,11 @@ import math
 import numpy as np
 
 from scenarios.collisions.film_impact.grid import Grid
-from scenarios.collisions.film_impact.isph import points
-from scenarios.collisions.film_impact.isph.liquid import SmoothedLiquid
 from scenarios.collisions.film_impact.ledger import Losses
 from scenarios.collisions.film_impact.pressure import Bead, Solved
 from scenarios.collisions.film_impact.solver import Settings
+from scenarios.references.isph import points
+from scenarios.references.isph.liquid import SmoothedLiquid
 
 COARSEST = 34, 5
 """Particles along the side of the quarter and in the depth of the film, in the coarsest run of the paper."""

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from cfddem.backend.errors import RunFailed
-from scenarios.collisions.ode import ABSOLUTE, METHOD, RELATIVE, event
-from scenarios.collisions.three_spheres.motion import (
+from scenarios.references.ode import ABSOLUTE, METHOD, RELATIVE, event
+from scenarios.references.three_spheres.motion import (
     APART,
     JOINED,
     RESTING,

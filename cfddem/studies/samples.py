@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.gallery import full_key
-from cfddem.run.sweep import Over, ranges
+from cfddem.studies.sweep import Over, ranges
 
 Array = NDArray[np.float64]
 

@@ -28,8 +28,9 @@ from cfddem.case.compare import Points, held, points_of, require_measured_units,
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.reading import open_run
-from cfddem.run import history, sweep
-from cfddem.run.samples import Array, Variable, unit_samples
+from cfddem.run import history
+from cfddem.studies import sweep
+from cfddem.studies.samples import Array, Variable, unit_samples
 
 STUDY = "calibration"
 

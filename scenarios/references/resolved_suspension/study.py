@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.compile import use_threads
-from scenarios.validation.resolved_suspension import matrix, pictures
-from scenarios.validation.resolved_suspension.verification import PARTS
+from scenarios.references.resolved_suspension import matrix, pictures
+from scenarios.references.resolved_suspension.verification import PARTS
 from scenarios.validation.table import Progress, Row, replacing
 
 
