@@ -13,8 +13,6 @@ pressure/    the pressure equation: conjugate gradients with a multigrid precond
 stability    rates of the flow that limit a step
 step_limit   the largest stable step at these rates; nothing compiled
 checks       checks of input and of divergence
-state        the fields and their values in cells and at points
+solver       the fluid: its fields, their values in cells and at points, and the step
 budgets      momentum, drag and energy of the step just made
-work_of_terms  the work of each term of the momentum balance
-solver       the step
 """

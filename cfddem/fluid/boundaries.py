@@ -207,6 +207,19 @@ class Boundaries:
         """Whether a side of the box normal to x, y, z has an outlet (3,)."""
         return np.array([any(s.axis == d and bool(s.outlet.any()) for s in self.box.sides) for d in range(3)])
 
+    def pressure_gradient(self, pressure: Array) -> Array:
+        """grad p' on the faces (3, ...) of a padded pressure [Pa/m], with the mean gradient of periodic directions."""
+        gradient = np.empty((3, *pressure.shape))
+        self.fill_pressure(pressure)
+        values = pressure.reshape(-1)
+        for d, rise in enumerate(gradient.reshape(3, -1)):
+            before = pressure.strides[2 - d] // pressure.itemsize  # distance of the cell before in the flat array
+            np.subtract(values[before:], values[:-before], out=rise[before:])
+            rise[:before] = 0.0  # outermost ghosts
+            rise *= 1.0 / self.grid.spacing[d]
+            rise -= self.driving[d]
+        return gradient
+
     def varies_along(self, axis: int) -> bool:
         """Whether the flow can vary along an axis; false for one cell between planes of symmetry or periodic sides."""
         sides = [side for side in self.box.sides if side.axis == axis]
