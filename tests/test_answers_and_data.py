@@ -17,8 +17,8 @@ from cfddem.analysis.comparison import compare, distinct_names, lines
 from cfddem.analysis.measured import largest_chi2
 from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.report import case_of, report
-from cfddem.analysis.report_markdown import markdown
 from cfddem.analysis.report_text import lines as report_lines
+from cfddem.analysis.report_text import markdown
 from cfddem.backend.errors import InputError
 from cfddem.case.compare import CaseData, points_of
 from cfddem.case.data_table import read_table

@@ -12,7 +12,7 @@ from scipy.optimize import brentq, curve_fit
 
 from cfddem.backend.errors import InputError
 from scenarios.collisions.film_impact import impact
-from scenarios.collisions.film_impact.banded import solve_banded
+from scenarios.collisions.film_impact.cavitation import solve_banded
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.ledger import while_turning
 from scenarios.collisions.film_impact.pressure import Bead

@@ -12,8 +12,8 @@ from made_up_run import made_up
 
 from cfddem.analysis.comparison import compare, lines
 from cfddem.analysis.report import report
-from cfddem.analysis.report_markdown import markdown
 from cfddem.analysis.report_text import lines as report_lines
+from cfddem.analysis.report_text import markdown
 from cfddem.io.reading import open_run
 from cfddem.plotting.comparison_page import comparison_page
 from cfddem.plotting.report_page import render

@@ -25,9 +25,8 @@ from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
 from cfddem.plotting.panels import BUBBLE, Stage, _bubbles
 from cfddem.plotting.pictures import movie, picture
-from cfddem.plotting.scene import Look, Scene
+from cfddem.plotting.scene import Look, Scene, scene, window
 from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
-from cfddem.plotting.window import scene, window
 from scenarios.beds.liquid_bed.movie import side_by_side
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))

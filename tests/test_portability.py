@@ -94,7 +94,7 @@ def test_the_package_works_where_there_are_no_posix_modules(tmp_path: Path) -> N
         "import sys\n"
         "sys.modules.update(dict.fromkeys(['fcntl', 'resource', 'pwd']))\n"
         "from cfddem.io.folder import lock\nfrom pathlib import Path\nlock(Path('.')).close()\n"
-        "import cfddem.backend.shared_cache, cfddem.run.runner\n"
+        "import cfddem.backend.compile, cfddem.run.runner\n"
         "sys.argv = ['cfddem', 'check', 'liquid-bed']\n"
         "from cfddem.cli.app import main\nmain()\n"
     )

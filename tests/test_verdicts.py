@@ -12,7 +12,7 @@ import pytest
 from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.report import report
-from cfddem.plotting.sweep_figure import Point, sweep_figure
+from cfddem.plotting.study_figures import Point, sweep_figure
 from cfddem.studies.sweep import Outcome, _measured, write_table
 
 

@@ -1,11 +1,11 @@
-"""The report of a run as text and as JSON: the answer first, then what to do about warnings, then details."""
+"""The report of a run as text, JSON and Markdown: the answer first, then what to do about warnings, then details."""
 
 from __future__ import annotations
 
 import json
 import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from cfddem.analysis.bed_laws import FROM_PRESSURE
@@ -208,3 +208,73 @@ def _advice(grouped: dict[str, list[str]]) -> Iterator[str]:
         opening = "" if action == NOTE else "warning: "
         for each in found:
             yield from textwrap.wrap(f"{opening}{each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+
+
+# ---------------------------------------------------------------- Markdown
+
+
+def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -> str:
+    """The report as Markdown.
+
+    result   of :func:`cfddem.analysis.report.report`
+    figures  caption -> place of a picture
+    """
+    end = result["window"][1]
+    laws = (
+        (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
+        for row in result["laws"]
+    )
+    parts = [
+        f"# {_escaped(result['case'])}",
+        f"{result['status']} at {end:g} s; {_escaped(window(result))}",
+        *_markdown_table(("", "value", "verdict"), map(_answer_cells, result["answers"])),
+        *bounds_note(result),
+        *_measured_rows(result["measured"]),
+        *_advice_lists(result["advice"]),
+        *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),
+        "## Means",
+        *_markdown_table(("measure", "mean", "in time"), map(_measure_cells, result["measures"].items())),
+        *(
+            ["## Published laws", *_markdown_table(("law", "run", "law", "run / law", "unit"), laws)]
+            if result["laws"]
+            else ()
+        ),
+        *([result["laws_note"]] if result["laws_note"] else ()),
+        "## Conservation",
+        *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result["ledger"].items())),
+        "## References of the laws",
+        "\n".join(f"- {_escaped(' '.join(law.values()))}" for law in result["references"]),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _answer_cells(each: dict[str, Any]) -> tuple[str, ...]:
+    return f"**{each['name']}**", with_error(each), each["verdict"]
+
+
+def _measured_rows(found: list[dict[str, Any]]) -> list[str]:
+    rows = ((each["name"], f"{each['points']} of {spelled(each['quantity'])}", each["verdict"]) for each in found)
+    return _markdown_table(("measured data", "points", "verdict"), rows) if found else []
+
+
+def _measure_cells(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
+    name, each = item
+    return spelled(name), with_error(each), steadiness(each)
+
+
+def _advice_lists(grouped: dict[str, list[str]]) -> Iterator[str]:
+    for action, found in grouped.items():
+        yield f"**{action[0].upper()}{action[1:]}**"
+        yield "\n".join(f"- {_escaped(each)}" for each in found)
+
+
+def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    lines = [head, ["---"] * len(head), *rows]
+    return ["\n".join("| " + " | ".join(map(_escaped, cells)) + " |" for cells in lines)]
+
+
+def _escaped(text: str) -> str:
+    """Text without the signs that Markdown reads; bold is kept."""
+    for sign in ("\\", "|", "<", "_", "`"):
+        text = text.replace(sign, f"\\{sign}")
+    return text

@@ -26,13 +26,12 @@ def explain(
 
     Example: cfddem explain di_felice --plot di_felice.png
     """
-    from cfddem.cli import key_page
-    from cfddem.cli import law_page as pages
+    from cfddem.cli import explain_pages as pages
     from cfddem.io.files import require_folder
 
     known, keys = pages.laws() if law is None else pages.of_kind(law), list[str]()
     if law is not None and not pages.is_law(law):
-        known, keys = known or pages.containing(law), key_page.matching(law)
+        known, keys = known or pages.containing(law), pages.matching(law)
     if known or (keys and not json):
         every = [pages.summary(each) for kind in known.values() for each in kind.values()]
         print(_json.dumps(every) if json else "\n".join([*pages.listing(known), *keys]))

@@ -4,8 +4,7 @@ grid         the box, its cells and solid cells, and values at points
 cell_counts  how cells divide a box; nothing compiled
 fields       declared fields of cells and faces
 conditions   walls, inlets, outlets, periodic sides, and the times and regions in which they hold
-boundaries   the conditions as known faces and values of ghosts
-sides        arrays of one side, and the loop that applies its conditions
+boundaries   the conditions as known faces and values of ghosts; arrays of one side
 halo         fills the ghosts of padded fields
 momentum     the terms of the momentum balance (models A and B); predictor
 viscosity    effective viscosity, with the sub-grid viscosity

@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cfddem.fluid.boundaries import Side
 from cfddem.fluid.grid import HIGH, LOW, Array, on_faces
 from cfddem.fluid.momentum import implicitness
-from cfddem.fluid.sides import Side
 from cfddem.fluid.solver import FluidSolver
 
 

@@ -349,7 +349,7 @@ def _verdict(identified: bool, tied: Sequence[str], at_limit: bool, agrees: bool
 def write_results(found: Calibration, output: Path) -> None:
     """Write `calibration.json`, `trials.csv` and `calibration.png`."""
     from cfddem.analysis.report_text import as_json
-    from cfddem.plotting.calibration_figure import calibration_figure
+    from cfddem.plotting.study_figures import calibration_figure
 
     write_whole(output / "calibration.json", as_json(found.summary()).encode())
     lines = [",".join(["trial", *(each.key for each in found.variables), "chi2", "status"])]

@@ -280,7 +280,7 @@ def _curves(cases: Iterable[Case]) -> list[Points]:
 
 
 def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool, measured: Sequence[Points]) -> None:
-    from cfddem.plotting.sweep_figure import Point, sample_figure, sweep_figure
+    from cfddem.plotting.study_figures import Point, sample_figure, sweep_figure
 
     points = [Point(each.values, each.measures) for each in outcomes if each.measures]
     if sampled:

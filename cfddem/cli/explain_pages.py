@@ -1,17 +1,27 @@
-"""Documentation of a law on a terminal: sentence, equation, arguments, range, reference; and a plot."""
+"""What `cfddem explain` shows: laws with equation, arguments, range, reference and plot, and keys of a case."""
 
 from __future__ import annotations
 
 import inspect
+import json
 import math
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from pydantic.fields import FieldInfo
+from pylatexenc.latex2text import LatexNodes2Text, MacroTextSpec
+from pylatexenc.latex2text import get_default_latex_context_db as text_of_macros
+from pylatexenc.latexwalker import LatexWalker
+from pylatexenc.latexwalker import get_default_latex_context_db as arguments_of_macros
+from pylatexenc.macrospec import MacroSpec
+
 from cfddem.backend.errors import InputError, nearest
-from cfddem.cli.equation_text import equation_text
+from cfddem.case.input_errors import sections_of
+from cfddem.case.schema import Case
 from cfddem.cli.scenario_commands import descriptions
 from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named
 from closures import registry
@@ -87,8 +97,6 @@ def find(name: str) -> Law:
     every = [law for those in laws().values() for law in those.values()]
     found = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not found:
-        from cfddem.cli.key_page import every_key
-
         closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
         raise InputError("law", name, f"a name listed by `cfddem explain`{closest}")
     if len(found) > 1:
@@ -256,3 +264,126 @@ def _value(law: Law, arguments: dict[str, float]) -> float:
         return float(law.function(**arguments))
     except (ArithmeticError, ValueError):
         return math.nan
+
+
+# ---------------------------------------------------------------- equations on a terminal
+
+
+_FRACTIONS = ("frac", "tfrac", "dfrac")
+_NAME = r"(?:\d+(?:\.\d+)?|[A-Z][a-z]+|\w)"
+_ATOM = re.compile(rf"{_NAME}(?:\^\*)?(?:_\w|_\{{\w+\}})?(?:\^[\w*]|\^\{{\w+\}})?")
+"""Text that needs no brackets in a fraction: a number or symbol with its indices."""
+
+
+def equation_text(equation: str) -> str:
+    r"""An equation in LaTeX as plain text; fractions of sums and products get square brackets.
+
+    >>> equation_text(r"h_\varepsilon = 0.37\,(\eta v / E^*)^{2/5}\,R^{*\,3/5}")
+    'h_ε = 0.37 (η v / E*)^(2/5) R*^(3/5)'
+    >>> equation_text(r"Ar = \frac{g\,\rho_f(\rho_p-\rho_f)d^3}{\eta^2} + \tfrac12")
+    'Ar = [g ρ_f(ρ_p-ρ_f)d^3]/η^2 + 1/2'
+    """
+    source = re.sub(r"\\[,;: ]", "~", equation.replace(r"^\circ", "°").replace("&", ""))
+    nodes, _, _ = LatexWalker(source, latex_context=_parser_macros()).get_latex_nodes()
+    return _plain_indices(_converter().nodelist_to_text(nodes))
+
+
+@cache
+def _parser_macros() -> Any:
+    macros = arguments_of_macros()
+    macros.add_context_category("fractions", macros=[MacroSpec(name, "{{") for name in _FRACTIONS], prepend=True)
+    return macros
+
+
+@cache
+def _converter() -> LatexNodes2Text:
+    macros = text_of_macros()
+    specs = [MacroTextSpec(name, simplify_repl=_fraction) for name in _FRACTIONS]
+    specs += [MacroTextSpec(name, simplify_repl="") for name in ("bigl", "bigr", "Bigl", "Bigr", "!")]
+    macros.add_context_category("equations", macros=specs, prepend=True)
+    return LatexNodes2Text(
+        latex_context=macros,
+        math_mode="text",
+        strict_latex_spaces="based-on-source",
+        keep_braced_groups=True,
+        keep_braced_groups_minlen=2,
+    )
+
+
+def _fraction(node: Any, l2tobj: LatexNodes2Text) -> str:
+    over, under = (_bracketed(l2tobj.nodelist_to_text([each])) for each in node.nodeargd.argnlist)
+    return f" {over}/{under} "
+
+
+def _bracketed(part: str) -> str:
+    """Numerator or denominator, in brackets unless it is a single symbol or number."""
+    part = part.strip()
+    if part.startswith("{") and part.endswith("}"):
+        part = part[1:-1].strip()
+    return part if _ATOM.fullmatch(part) else f"[{part}]"
+
+
+def _plain_indices(text: str) -> str:
+    """Text with braces after ^ and _ replaced by round brackets, or by nothing around a word or a number."""
+    while found := re.search(r"([\^_]?)\{([^{}]*)\}", text):
+        mark, inner = found[1], found[2].strip()
+        bare = not mark or len(inner) == 1 or (inner.isalnum() if mark == "_" else inner.isdigit())
+        text = text[: found.start()] + mark + (inner if bare else f"({inner})") + text[found.end() :]
+    text = re.sub(r"\^\(\* ?(\w)\)", r"*^\1", text)
+    text = re.sub(r"\^\(\* ?([^()]*)\)", r"*^(\1)", text).replace("^*", "*")
+    return re.sub(r"(?<=[\[(]) | (?=[\]),])", "", " ".join(text.split()))
+
+
+# ---------------------------------------------------------------- keys of a case
+
+
+SEVERAL = {name: f"{name}.NAME" for name in ("material", "compare")} | {"pair": "pair.NAME.NAME"}
+SEVERAL |= {name: f"{name}.NUMBER" for name in ("wall", "feed", "outlet")}
+"""Tables that a case has several of, by the place of their keys."""
+
+
+def matching(name: str) -> list[str]:
+    """Documentation of a key, of all keys of a table, or of all keys that contain a word.
+
+    returns  lines of at most 100 columns; empty if nothing matches
+
+    >>> matching("bed.jet.velocity"), matching("run.until")[0][:34]
+    (['bed.jet.velocity = (required)     superficial velocity, upward [m/s]'], 'run.until = (required)            ')
+    """
+    every, word = dict(_keys()), name.lower()
+    plain = {key: re.sub(r"\.(NAME|NUMBER)\b", "", key).lower() for key in every}
+    found = [
+        key for key in every if any(each == word or each.startswith(f"{word}.") for each in (key.lower(), plain[key]))
+    ]
+    found = found or [key for key in every if word in key.lower()]
+    return [line for key in found for line in _lines(key, every[key])]
+
+
+def every_key() -> list[str]:
+    """Names of all keys, with their tables."""
+    return [key for key, _ in _keys()]
+
+
+def _keys() -> Iterator[tuple[str, FieldInfo]]:
+    """Every key with its table."""
+    for name, field in Case.model_fields.items():
+        parts = sections_of(field)
+        if not parts:
+            yield name, field
+            continue
+        for key, each in parts[0].model_fields.items():
+            yield f"{SEVERAL.get(name, name)}.{key}", each
+            below = f"{SEVERAL.get(name, name)}.{key}{'.NAME' * str(each.annotation).startswith('dict')}"
+            for part in sections_of(each):
+                yield from ((f"{below}.{inner}", rest) for inner, rest in part.model_fields.items())
+
+
+def _lines(key: str, field: FieldInfo) -> list[str]:
+    """A key, its default and its meaning."""
+    default = None if field.is_required() else field.get_default()
+    if any(getattr(rule, "gt", None) == default for rule in field.metadata):  # it stands for a key that is left out
+        default = None
+    shown = " = (required)" if field.is_required() else "" if default is None else f" = {json.dumps(default)}"
+    choices = re.findall(r"Literal\[([^\]]*)\]", str(field.annotation))
+    meaning = (field.description or "") + (f"; one of {choices[0]}" if choices else "")
+    return textwrap.wrap(f"{key + shown:<33} {meaning}", WIDTH, subsequent_indent=" " * 34)
