@@ -1,4 +1,4 @@
-"""The report of a run as text, JSON and Markdown: the answer first, then what to do about warnings, then details."""
+"""The report of a run as text, JSON and Markdown: key results first, then what to do about warnings, then details."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def lines(result: dict[str, Any]) -> list[str]:
     """
     return [
         *_headline(result),
-        *_answers(result["answers"]),
+        *_key_results(result["key_results"]),
         *_measured(result["measured"]),
-        *_advice(result["advice"]),
+        *_actions(result["actions"]),
         *_measures(result),
         *_laws(result["laws"], result["laws_note"]),
         *_ledger(result["ledger"]),
@@ -89,7 +89,7 @@ def number(value: float | str, error: float = math.nan, unit: str = "", at_least
 
 
 def with_error(row: dict[str, Any], unit: str | None = None) -> str:
-    """The value of an answer or the mean of a measure, with its error and unit."""
+    """The value of a key result or the mean of a measure, with its error and unit."""
     value = row["mean"] if "mean" in row else row["value"]
     return number(value, row["error"], row["unit"] if unit is None else unit, row["error_is_lower_bound"])
 
@@ -101,8 +101,8 @@ def window(result: dict[str, Any]) -> str:
 
 
 def bounds_note(result: dict[str, Any]) -> list[str]:
-    """What "at least" means, if an answer says it."""
-    bounds = (each["error_is_lower_bound"] and not math.isnan(each["error"]) for each in result["answers"])
+    """What "at least" means, if a key result says it."""
+    bounds = (each["error_is_lower_bound"] and not math.isnan(each["error"]) for each in result["key_results"])
     return [LOWER_BOUND] * any(bounds)
 
 
@@ -113,7 +113,7 @@ def _headline(result: dict[str, Any]) -> Iterator[str]:
     yield from bounds_note(result)
 
 
-def _answers(found: list[dict[str, Any]]) -> Iterator[str]:
+def _key_results(found: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
     wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each["value"], str)), 0)
     for each in found:
@@ -136,10 +136,10 @@ def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def _measures(result: dict[str, Any]) -> Iterator[str]:
-    answered = {each["name"] for each in result["answers"]}
+    shown = {each["name"] for each in result["key_results"]}
     yield ""
     yield "  all other means"
-    others = {name: each for name, each in result["measures"].items() if spelled(name) not in answered}
+    others = {name: each for name, each in result["measures"].items() if spelled(name) not in shown}
     wide = max(28, *(len(with_error(each)) for each in others.values()), 0)
     for name, each in others.items():
         yield f"  {spelled(name):<28} {with_error(each):<{wide}} {steadiness(each)}{REMARKS.get(name, '')}"
@@ -201,7 +201,7 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
     return ["", *(line.replace(NO_BREAK, " ") for line in lines)]
 
 
-def _advice(grouped: dict[str, list[str]]) -> Iterator[str]:
+def _actions(grouped: dict[str, list[str]]) -> Iterator[str]:
     for action, found in grouped.items():
         yield ""
         yield f"  {action}"
@@ -227,10 +227,10 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
     parts = [
         f"# {_escaped(result['case'])}",
         f"{result['status']} at {end:g} s; {_escaped(window(result))}",
-        *_markdown_table(("", "value", "verdict"), map(_answer_cells, result["answers"])),
+        *_markdown_table(("", "value", "verdict"), map(_key_result_cells, result["key_results"])),
         *bounds_note(result),
         *_measured_rows(result["measured"]),
-        *_advice_lists(result["advice"]),
+        *_action_lists(result["actions"]),
         *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),
         "## Means",
         *_markdown_table(("measure", "mean", "in time"), map(_measure_cells, result["measures"].items())),
@@ -248,7 +248,7 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
     return "\n\n".join(parts) + "\n"
 
 
-def _answer_cells(each: dict[str, Any]) -> tuple[str, ...]:
+def _key_result_cells(each: dict[str, Any]) -> tuple[str, ...]:
     return f"**{each['name']}**", with_error(each), each["verdict"]
 
 
@@ -262,7 +262,7 @@ def _measure_cells(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     return spelled(name), with_error(each), steadiness(each)
 
 
-def _advice_lists(grouped: dict[str, list[str]]) -> Iterator[str]:
+def _action_lists(grouped: dict[str, list[str]]) -> Iterator[str]:
     for action, found in grouped.items():
         yield f"**{action[0].upper()}{action[1:]}**"
         yield "\n".join(f"- {_escaped(each)}" for each in found)

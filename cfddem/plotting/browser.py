@@ -17,7 +17,7 @@ from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.curves import BLUE, blank, encoded
 from cfddem.plotting.panels import title_of
@@ -139,7 +139,7 @@ class Viewer:
 
     # ------------------------------------------------------------ what the page shows
 
-    def _take(self, run: Run) -> None:
+    def _take(self, run: RunData) -> None:
         """Show a run, just read."""
         self.run = run
         self.state.status = f"{run.status}: {run.message}" if run.message else run.status
@@ -151,14 +151,14 @@ class Viewer:
         if self.scene is None:
             self._begin(run)
         else:
-            self.scene.follow(run)
+            self.scene.take(run)
         self.state.last = len(run.times) - 1
         if at_end:
             self.state.snapshot = self.state.last
         self._show()
         self._draw_history()
 
-    def _begin(self, run: Run) -> None:
+    def _begin(self, run: RunData) -> None:
         """The first snapshot: which colours and layers there are; the page is built."""
         self.scene = Scene(run, off_screen=True)
         known = colours.choices(run)
@@ -365,7 +365,7 @@ def usual_columns(known: Sequence[str]) -> list[str]:
     return [name for name in USUAL if name in known][:_USED] or list(known[:_USED])
 
 
-def strip(run: Run, columns: Sequence[str]) -> Strip | None:
+def strip(run: RunData, columns: Sequence[str]) -> Strip | None:
     """Curves of some columns against time, one below the other; None if there is nothing to draw."""
     names = [name for name in columns if name in run.history][:_MOST]
     if not names or len(run.history["time"]) < 2:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.curves import BLUE, ORANGE, SKY, blank
 from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
@@ -45,7 +45,7 @@ _TALL = 0.9  # height over width of the bed from which panels stand side by side
 class Stage:
     """What all pictures of a run share: panels, view and colour limits."""
 
-    run: Run
+    run: RunData
     panels: tuple[str, ...]
     bounds: np.ndarray  # (3, 2), lowest and highest x, y, z in view [m]
     depth: int  # axis of the line of sight, 0 or 1
@@ -54,7 +54,7 @@ class Stage:
     limits: dict[str, tuple[float, float]]  # of the colours, by panel
 
     @classmethod
-    def of(cls, run: Run, snapshots: Sequence[int], show: Sequence[str], colour: str, cut: bool | None) -> Stage:
+    def of(cls, run: RunData, snapshots: Sequence[int], show: Sequence[str], colour: str, cut: bool | None) -> Stage:
         """The stage for a run.
 
         snapshots  that set the limits of view and colours
@@ -240,14 +240,14 @@ def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str
     bar.ax.locator_params(axis="y", nbins=6)
 
 
-def _corners(run: Run) -> tuple[np.ndarray, np.ndarray]:
+def _corners(run: RunData) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of the grid [m]."""
     grid: Any = run.grid
     low = np.array(grid.origin)
     return low, low + np.array(grid.cells) * np.array(grid.spacing)
 
 
-def bounds_of(run: Run, snapshots: Sequence[int]) -> np.ndarray:
+def bounds_of(run: RunData, snapshots: Sequence[int]) -> np.ndarray:
     """The space in view (3, 2) [m]: the grid up to somewhat above the highest bed, or else the particles."""
     if run.grid is not None:
         low, high = _corners(run)
@@ -268,7 +268,7 @@ def bounds_of(run: Run, snapshots: Sequence[int]) -> np.ndarray:
     return np.stack([low - margin, high + margin], axis=1)
 
 
-def title_of(run: Run) -> str:
+def title_of(run: RunData) -> str:
     """Title of the case, or name of the folder."""
     name = tomllib.loads(run.case_text).get("title")
     return name if isinstance(name, str) else run.folder.resolve().name

@@ -1,4 +1,4 @@
-"""The report of a run as one self-contained HTML page: answer, warnings by what to do, figures, details."""
+"""The report of a run as one self-contained HTML page: key results, warnings by what to do, figures, details."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from cfddem.case.compare import ABSCISSAE
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import rendering
 from cfddem.plotting.case_drawing import case_drawing
 from cfddem.plotting.curves import (
@@ -83,7 +83,7 @@ def markdown_page(folder: Path, output: Path, result: dict[str, Any] | None = No
     return output
 
 
-def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
+def render(run: RunData, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
     """The page as text."""
     case, end, steps = with_files(case_of(run), data), result["window"][1], result["steps"]
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
@@ -93,7 +93,7 @@ def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
         status=f"{result['status']} at {end:g} s; {counts}; {window(result)}",
         bounds_note=bounds_note(result),
         note=NOTE,
-        answers=_answers(result["answers"]),
+        key_results=_key_results(result["key_results"]),
         measures=_measures(result["measures"]),
         laws=_laws(result["laws"]),
         ledger=[(spelled(name), f"{value:.2g}") for name, value in result["ledger"].items()],
@@ -117,7 +117,7 @@ def _template() -> Any:
 # ---------------------------------------------------------------- tables
 
 
-def _answers(found: list[dict[str, Any]]) -> list[dict[str, str]]:
+def _key_results(found: list[dict[str, Any]]) -> list[dict[str, str]]:
     marks = {True: "good", False: "bad", None: "open"}
     return [
         {
@@ -200,7 +200,7 @@ Figures = dict[str, tuple[Any, str]]
 """Name of a figure, the figure, and its caption."""
 
 
-def figures_of(run: Run, case: Case, result: dict[str, Any]) -> Figures:
+def figures_of(run: RunData, case: Case, result: dict[str, Any]) -> Figures:
     """All figures that a run has, in reading order.
 
     result  of :func:`cfddem.analysis.report.report`
@@ -208,7 +208,7 @@ def figures_of(run: Run, case: Case, result: dict[str, Any]) -> Figures:
     return {name: (figure, caption) for name, figure, caption in _all(run, case, result)}
 
 
-def _all(run: Run, case: Case, result: dict[str, Any]) -> Iterator[tuple[str, Any, str]]:
+def _all(run: RunData, case: Case, result: dict[str, Any]) -> Iterator[tuple[str, Any, str]]:
     begin, end = result["window"]
     height = result["measures"].get("bed_height", {}).get("mean")
     if compared := compared_with_measured(run, case, begin):
@@ -245,7 +245,7 @@ def _all(run: Run, case: Case, result: dict[str, Any]) -> Iterator[tuple[str, An
     yield "case", case_drawing(case, height), "The case before it runs, seen along y; dashed: bed height of the run."
 
 
-def _picture(run: Run) -> Any:
+def _picture(run: RunData) -> Any:
     """Spheres and voidage of the last snapshot; None if there is nothing to draw, or this machine cannot render."""
     if not len(run.times) or rendering.why_not() is not None:
         return None
@@ -255,7 +255,7 @@ def _picture(run: Run) -> Any:
         return None
 
 
-def _series(run: Run, case: Case, begin: float, end: float) -> Any:
+def _series(run: RunData, case: Case, begin: float, end: float) -> Any:
     """Bed height, pressure drop over the buoyant weight, and granular temperature in time, with their means."""
     history, weight = run.history, weight_over_floor(case)
     curves = [("bed height\n[m]", history["bed_height"])]
@@ -277,7 +277,7 @@ def _series(run: Run, case: Case, begin: float, end: float) -> Any:
     return figure
 
 
-def _profiles(run: Run, case: Case, begin: float) -> Profiles | None:
+def _profiles(run: RunData, case: Case, begin: float) -> Profiles | None:
     """The profiles of a run; None if no snapshot in the window can be read, or none has a quantity to show."""
     try:
         found = profiles_of(run, case, begin)

@@ -15,7 +15,7 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.panels import SOLID, bounds_of
 from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
@@ -51,7 +51,7 @@ class Scene:
     off_screen  draw to memory only
     """
 
-    def __init__(self, run: Run, off_screen: bool = False) -> None:
+    def __init__(self, run: RunData, off_screen: bool = False) -> None:
         import pyvista
 
         make: Any = pyvista.Plotter
@@ -61,10 +61,10 @@ class Scene:
         self.plotter.set_background("white", all_renderers=True)
         self.plotter.link_views()
         self._bars: dict[int, str] = {}
-        self.follow(run)
+        self.take(run)
         self.turn_to_front()
 
-    def follow(self, run: Run) -> None:
+    def take(self, run: RunData) -> None:
         """Show a run from now on: the same one, read again when it has more snapshots."""
         self.run = run
         count = len(run.times)
@@ -231,7 +231,7 @@ def window(folder: str | Path, colour: str = "speed") -> None:
     scene(open_run(folder), colour).show()
 
 
-def scene(run: Run, colour: str = "speed", off_screen: bool = False) -> Any:
+def scene(run: RunData, colour: str = "speed", off_screen: bool = False) -> Any:
     """Spheres, a layer of the voidage, axes in metres and a time slider, as a pyvista Plotter."""
     rendering.require_rendering()
     shown = Scene(run, off_screen)

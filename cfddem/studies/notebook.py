@@ -16,7 +16,7 @@ from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.io.folder import read_about
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.model.feature import Feature, Function
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run import runner
@@ -36,7 +36,7 @@ def run_case(
     fields: Sequence[Field] = (),
     callbacks: Sequence[Callback] = (),
     features: Sequence[Feature | Function] = (),
-) -> Run:
+) -> RunData:
     """Check a case, run it in a new folder with a progress bar, and open the result.
 
     overwrite          delete the run that the folder holds

@@ -55,7 +55,7 @@ class Motion(NamedTuple):
     spin: np.ndarray  # of the first sphere [rad/s]
 
 
-def follow(pair: Pair, laws: BridgeLaws, angle: float, duration: float) -> Motion:
+def integrate(pair: Pair, laws: BridgeLaws, angle: float, duration: float) -> Motion:
     """Integrate until the films separate, the pair has turned a full circle or come to rest, or the time is over.
 
     laws      of the bridge

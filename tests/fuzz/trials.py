@@ -191,7 +191,7 @@ def folder_trial(around: Surroundings, chance: random.Random) -> str:
 
     def read() -> None:
         run = open_run(folder)
-        assert repr(run).startswith("Run(")
+        assert repr(run).startswith("RunData(")
         for name in run.fluid_fields:
             run.fluid(name, 0)
         run.particles(-1), run.history, run.collisions, run.times

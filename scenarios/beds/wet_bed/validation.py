@@ -24,8 +24,7 @@ from cfddem.analysis.series import block_average
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run as Written
-from cfddem.io.reading import open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting.curves import BLUE, GREEN, ORANGE, label, legend, line_styles, panels, save
 from scenarios.beds.defluidisation.study import layers, onset
 from scenarios.beds.gas_bed.study import mueller
@@ -204,7 +203,7 @@ def windows(folder: Path) -> dict[str, dict[int, float]]:
     return ends
 
 
-def rest(run: Written, case: Case) -> float:
+def rest(run: RunData, case: Case) -> float:
     """Time from which on a wet bed is not fluidised [s]; infinite if it is at the end."""
     found = defluidisation_of(run, case)
     return math.inf if found is None else found.time
@@ -283,7 +282,7 @@ def over_packings(runs: Sequence[Means], quantity: str) -> Estimate:
 # ---------------------------------------------------------------- one run
 
 
-def means(run: Written, begin: float, end: float = math.inf) -> Means:
+def means(run: RunData, begin: float, end: float = math.inf) -> Means:
     """Means of a run between two times [s]."""
     inside = (run.history["time"] >= begin) & (run.history["time"] <= end * (1.0 + 1e-9))
     history = {name: column[inside] for name, column in run.history.items()}
@@ -309,7 +308,7 @@ def _deviation(values: np.ndarray) -> Estimate:
     return math.sqrt(square), error / (2.0 * math.sqrt(square)) if square > 0.0 else 0.0
 
 
-def mean_bubble(run: Written, begin: float, end: float = math.inf) -> Estimate:
+def mean_bubble(run: RunData, begin: float, end: float = math.inf) -> Estimate:
     """Diameter of the bubbles in the snapshots between two times, weighted by their areas [m]; NaN without any.
 
     The error takes bubbles of different snapshots as independent. Snapshots are closer than a bubble lives: it is a

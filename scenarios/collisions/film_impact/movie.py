@@ -10,7 +10,7 @@ import numpy as np
 from cfddem.plotting.curves import blank
 from scenarios.collisions.film_impact.record import Record
 from scenarios.collisions.film_impact.result import FilmImpact, Frame
-from scenarios.collisions.film_impact.solver import Impact
+from scenarios.collisions.film_impact.solver import GridImpact
 from scenarios.collisions.film_impact.study import impact
 from scenarios.references.isph.impact import SmoothedImpact
 
@@ -44,7 +44,7 @@ def movie(
     frames: list[Frame] = []
     turning: list[int] = []
 
-    def keep(run: Impact | SmoothedImpact) -> None:
+    def keep(run: GridImpact | SmoothedImpact) -> None:
         turning.extend([run.steps] * (run.contacts > 0 and len(turning) < AFTER_CONTACT))
         due = run.time * velocity / film >= (len(frames) - len(turning)) / FRAMES
         if len(frames) < MOST and (due or turning[-1:] == [run.steps]):

@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from scenarios.collisions.film_impact.result import COLUMNS, Frame, Moment
-from scenarios.collisions.film_impact.solver import Impact
+from scenarios.collisions.film_impact.solver import GridImpact
 from scenarios.references.isph.impact import SmoothedImpact
 
 
 class Record:
     """Rows and frames of one impact."""
 
-    def __init__(self, impact: Impact | SmoothedImpact) -> None:
+    def __init__(self, impact: GridImpact | SmoothedImpact) -> None:
         self.impact = impact
         self.rows: list[tuple[float, ...]] = []
         self.frames: dict[str, Frame] = {}

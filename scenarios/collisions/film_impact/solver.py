@@ -34,7 +34,7 @@ class Settings:
 
 
 @dataclass
-class Impact:
+class GridImpact:
     """State of an impact, advanced by :meth:`step`."""
 
     grid: Grid

@@ -52,7 +52,7 @@ def _pull(gap: float, film: float, surface_tension: float, reduced_radius: float
     return constant_capillary(surface_tension, reduced_radius - 0.25 * touch) if gap < film else 0.0
 
 
-def follow(state: np.ndarray, numbers: Numbers, until: float, overlap: float) -> Path:
+def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float) -> Path:
     """Integrate to the end in the particle engine.
 
     state    at the start, as in :mod:`scenarios.references.three_spheres.motion`

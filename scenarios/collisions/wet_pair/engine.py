@@ -30,7 +30,7 @@ IMPACT_STEP = 0.01
 MOST_STEPS = 2_000_000
 
 
-def follow(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, duration: float) -> Motion:
+def integrate(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, duration: float) -> Motion:
     """Integrate in the particle engine until the bridge has ruptured or the time is over.
 
     liquid    laws of the bridge

@@ -91,7 +91,7 @@ def _rupture(
     return length_from + capillary.rupture_length(capillary_number, contact_angle, liquid)
 
 
-def follow(wet: Wet, solids: tuple[Material, Material], speed: float, along: float, spin: float) -> Path:
+def integrate(wet: Wet, solids: tuple[Material, Material], speed: float, along: float, spin: float) -> Path:
     """Move a sphere that arrives at the surface of the layer, or of a dry wall.
 
     solids  of the sphere and of the wall

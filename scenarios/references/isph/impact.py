@@ -1,4 +1,4 @@
-r"""One impact with smoothed particles, step by step; it has the same interface as the grid's :class:`~..solver.Impact`.
+r"""One impact with smoothed particles, step by step, with the interface of the grid's :class:`GridImpact`.
 
 In a film thinner than the spacing, particles miss a part of the viscous resistance; the bead gets it as an impulse,
 

@@ -74,7 +74,7 @@ class Path:
         return next((speed for kind, which, _, speed in self.events if (kind, which) == (SEPARATE, pair)), 0.0)
 
 
-def follow(
+def integrate(
     state: np.ndarray, modes: np.ndarray, numbers: Numbers, until: float, tolerance: float | None = None
 ) -> Path:
     """Integrate to the end, from event to event.

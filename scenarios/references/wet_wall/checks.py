@@ -28,7 +28,7 @@ LIQUIDS = {  # density, viscosity, surface tension
 }
 
 
-class Impact:
+class SecondSolution:
     """The constants of an impact and its equations; symbols are those of the paper."""
 
     def __init__(self, sphere: str, liquid: str, film: float, phi: float, mu: float) -> None:
@@ -105,7 +105,7 @@ def independent(
     sphere: str, liquid: str, film: float, phi: float, v0: float, angle: float, omega: float, mu: float
 ) -> tuple[float, float, float]:
     """Restitution, tangential restitution and spin; solved by DOP853 to 1e-12, phase by phase."""
-    impact = Impact(sphere, liquid, film, phi, mu)
+    impact = SecondSolution(sphere, liquid, film, phi, mu)
     R = impact.R
 
     def stop(distance: Callable[[Any], float], direction: int) -> Any:

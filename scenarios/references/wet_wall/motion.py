@@ -240,7 +240,7 @@ class Path(NamedTuple):
     stuck: bool
 
 
-def follow(wet: Wet, speed: float, along: float, spin: float, tolerance: float) -> Path:
+def integrate(wet: Wet, speed: float, along: float, spin: float, tolerance: float) -> Path:
     """Move a sphere that arrives at the surface of the layer, or of a dry wall.
 
     speed      towards the wall, > 0 [m/s]

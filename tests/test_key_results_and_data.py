@@ -12,8 +12,8 @@ import pytest
 from command_line import call
 from made_up_run import BED, WEIGHT, made_up
 
-from cfddem.analysis.answers import agreement
 from cfddem.analysis.comparison import compare, distinct_names, lines
+from cfddem.analysis.key_results import agreement
 from cfddem.analysis.measured import largest_chi2
 from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.report import case_of, report
@@ -32,12 +32,12 @@ from cfddem.run.runner import Run
 
 def answer(folder: Path, name: str) -> dict[str, object]:
     """One answer of a report."""
-    return next(each for each in report(folder)["answers"] if each["name"] == name)
+    return next(each for each in report(folder)["key_results"] if each["name"] == name)
 
 
 def test_the_answer_says_which_voidage_to_believe_and_what_carries_the_bed(tmp_path: Path) -> None:
     folder = made_up(tmp_path / "run")
-    assert [each["name"] for each in report(folder)["answers"]] == [
+    assert [each["name"] for each in report(folder)["key_results"]] == [
         "bed height", "bed voidage", "pressure drop", "regime",
     ]  # fmt: skip
     assert answer(folder, "regime")["value"] == "fluidised, expanded"

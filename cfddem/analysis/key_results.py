@@ -1,4 +1,4 @@
-"""The answer of a run in a few lines: bed height, voidage, pressure drop and regime, each with its error and a verdict.
+"""The key results of a run in a few lines: bed height, voidage, pressure drop, regime; each with error and verdict.
 
 A verdict compares a mean with what it should be, in units of its standard error.
 """
@@ -16,7 +16,7 @@ from cfddem.analysis.bed_laws import FROM_HEIGHT, FROM_PRESSURE, weight_over_flo
 from cfddem.analysis.measures import OF_THE_BED
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.preflight.bed_estimate import BedEstimate, estimate_bed
 from cfddem.preflight.issue import percent
 
@@ -49,7 +49,7 @@ COUNTED = 1000.0
 """Most standard errors that are written as a number."""
 
 
-class Answer(NamedTuple):
+class KeyResult(NamedTuple):
     """One quantity that a reader asks for first."""
 
     name: str
@@ -61,21 +61,21 @@ class Answer(NamedTuple):
     error_is_lower_bound: bool = False
 
 
-def answers(
-    run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], defluidised: bool = False
+def key_results(
+    run: RunData, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], defluidised: bool = False
 ) -> list[dict[str, Any]]:
-    """The answers of a run, most important first.
+    """The key results of a run, most important first.
 
     measures, laws  of :func:`cfddem.analysis.report.report`
     defluidised     a wet bed has come to rest although it is blown
-    returns         fields of :class:`Answer` as plain values
+    returns         fields of :class:`KeyResult` as plain values
     """
     found = [*_speed(laws), *_height(case, measures, laws), *_voidage(measures, laws), *_drop(case, measures, laws)]
     found += _particles(run)
     regime, reason, holds = _classified(run, case, measures)
     if defluidised:
         regime, holds = "defluidised", False
-    return [each._asdict() for each in (*found, Answer("regime", regime, math.nan, "", reason, holds))]
+    return [each._asdict() for each in (*found, KeyResult("regime", regime, math.nan, "", reason, holds))]
 
 
 def agreement(computed: float, error: float, expected: float, name: str) -> tuple[str, bool | None]:
@@ -103,12 +103,12 @@ def agreement(computed: float, error: float, expected: float, name: str) -> tupl
     return f"{word} {name}: {side}{count}", errors <= AGREES
 
 
-def _speed(laws: list[dict[str, Any]]) -> Iterator[Answer]:
+def _speed(laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
     """Last speed of a single sphere against its terminal velocity."""
     for row in laws:
         if row["law"].startswith("terminal velocity"):
             words, holds = agreement(row["computed"], math.nan, row["expected"], f"the {row['law']}")
-            yield Answer("settling speed", row["computed"], math.nan, "m/s", words, holds)
+            yield KeyResult("settling speed", row["computed"], math.nan, "m/s", words, holds)
 
 
 def _usable(measure: dict[str, Any]) -> bool:
@@ -117,8 +117,8 @@ def _usable(measure: dict[str, Any]) -> bool:
     return bool(measure["stationary"]) or abs(drift) <= DRIFTING * abs(measure["mean"])
 
 
-def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) -> Answer:
-    """An answer from a measure, with how steady it is; a mean that drifts much is not to be used."""
+def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) -> KeyResult:
+    """A key result from a measure, with how steady it is; a mean that drifts much is not to be used."""
     drift, mean = measure["drift"], measure["mean"]
     if measure["stationary"] or drift == 0.0:
         steady = "steady"
@@ -133,10 +133,10 @@ def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) 
             steady, holds = f"{steady}, do not use the mean", False
     verdict = f"{steady}; {verdict}" if verdict else steady
     bound = measure["error_is_lower_bound"]
-    return Answer(name, measure["mean"], measure["error"], measure["unit"], verdict, holds, bound)
+    return KeyResult(name, measure["mean"], measure["error"], measure["unit"], verdict, holds, bound)
 
 
-def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
+def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
     """Bed height, and the heights that published expansion laws give for the same particles."""
     if "bed_height" not in measures or case.is_one_sphere:
         return
@@ -155,7 +155,7 @@ def _published(laws: list[dict[str, Any]]) -> list[float]:
     return [row["expected"] for row in laws if row["law"].startswith("voidage by ")]
 
 
-def _voidage(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
+def _voidage(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
     """The voidage to believe: that from the bed height, which published laws were fitted to."""
     if FROM_HEIGHT not in measures:
         return
@@ -173,7 +173,7 @@ def _voidage(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[A
     yield _mean("bed voidage", voidage, verdict.removeprefix("; "), holds)
 
 
-def _drop(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[Answer]:
+def _drop(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
     """Pressure drop against the weight of the bed, or against the drag law for a fixed one."""
     if "pressure_drop" not in measures:
         return
@@ -202,7 +202,7 @@ def _shallow(case: Case, measures: dict[str, Any]) -> str:
     )
 
 
-def _particles(run: Run) -> Iterator[Answer]:
+def _particles(run: RunData) -> Iterator[KeyResult]:
     """Particles at the end of a run with feeds or outlets, and how many have entered and left."""
     history = run.history
     if not {"fed_count", "removed_count"} & history.keys():
@@ -214,13 +214,13 @@ def _particles(run: Run) -> Iterator[Answer]:
         said.append(f"{history['fed_count'][-1]:.0f} fed" + f", {waiting:.0f} wait for a place" * bool(waiting))
     if "removed_count" in history:
         said.append(f"{history['removed_count'][-1]:.0f} removed, {history['removed_mass'][-1]:.3g} kg")
-    yield Answer("particles", f"{count[-1]:.0f}", math.nan, "1", "; ".join(said), None)
+    yield KeyResult("particles", f"{count[-1]:.0f}", math.nan, "1", "; ".join(said), None)
 
 
 # ---------------------------------------------------------------- regime
 
 
-def _classified(run: Run, case: Case, measures: dict[str, Any]) -> tuple[str, str, bool | None]:
+def _classified(run: RunData, case: Case, measures: dict[str, Any]) -> tuple[str, str, bool | None]:
     """The state of the particles in words, what it was concluded from, and whether it is as expected."""
     fastest = run.history.get("largest_speed", np.zeros(1))[-1]
     moving = f"the fastest particle moves at {fastest:.2g} m/s"
