@@ -14,6 +14,7 @@ from cfddem.analysis.key_results import AGREES
 from cfddem.analysis.report import case_of, report
 from cfddem.analysis.report_text import WIDTH, spelled, with_error
 from cfddem.backend.errors import InputError
+from cfddem.backend.tables import table
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 
@@ -230,11 +231,9 @@ def _means(result: dict[str, Any]) -> Iterator[str]:
     for name, measure in result["measures"].items():
         yield ""
         yield spelled(name)
+        rows = []
         for place, (run, row) in enumerate(zip(names, measure["runs"])):
             value = "-" if row["mean"] is None else with_error(row, measure["unit"])
-            opening = f"  {run[:wide]:<{wide}} {value:<30}"
-            yield (
-                opening.rstrip()
-                if place == 0 or row["mean"] is None
-                else (f"{opening} {relative(row):>10}  {row['verdict']}")
-            )
+            judged = ("", "") if place == 0 or row["mean"] is None else (relative(row), row["verdict"])
+            rows.append((run[:wide], value, *judged))
+        yield from table(rows, right=(2,), widths=(wide, 30, 10), indent=2)

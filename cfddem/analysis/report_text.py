@@ -10,6 +10,7 @@ from typing import Any
 
 from cfddem.analysis.bed_laws import FROM_PRESSURE
 from cfddem.analysis.run_warnings import NOTE
+from cfddem.backend.tables import table
 from cfddem.io.quantities import shown_unit
 
 WIDTH = 98
@@ -140,28 +141,29 @@ def _measures(result: dict[str, Any]) -> Iterator[str]:
     yield ""
     yield "  all other means"
     others = {name: each for name, each in result["measures"].items() if spelled(name) not in shown}
-    wide = max(28, *(len(with_error(each)) for each in others.values()), 0)
-    for name, each in others.items():
-        yield f"  {spelled(name):<28} {with_error(each):<{wide}} {steadiness(each)}{REMARKS.get(name, '')}"
+    rows = (
+        (spelled(name), with_error(each), f"{steadiness(each)}{REMARKS.get(name, '')}") for name, each in others.items()
+    )
+    yield from table(rows, widths=(28, 28), indent=2)
 
 
 def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
     if not rows:
         return
-    wide = max(40, *(len(row["law"]) for row in rows))
     yield ""
-    yield f"  {'law':<{wide}} {'run':>10} {'law':>10} {'ratio':>7} unit"
-    for row in rows:
-        numbers = f"{row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}"
-        yield f"  {row['law']:<{wide}} {numbers} {shown_unit(row['unit'])}"
+    shown = (
+        (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
+        for row in rows
+    )
+    headings = ("law", "run", "law", "ratio", "unit")
+    yield from table(shown, headings, right=(1, 2, 3), widths=(40, 10, 10, 7), indent=2)
     yield from textwrap.wrap(note, WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
 def _ledger(ledger: dict[str, float]) -> Iterator[str]:
     yield ""
     yield "  conservation, largest relative imbalance of the run"
-    for name, value in ledger.items():
-        yield f"  {spelled(name):<26} {value:.2g}"
+    yield from table(((spelled(name), f"{value:.2g}") for name, value in ledger.items()), widths=(26,), indent=2)
 
 
 def _collisions(found: dict[str, float]) -> Iterator[str]:
@@ -186,9 +188,11 @@ def _energy(result: dict[str, Any]) -> Iterator[str]:
     if result["energy"]:
         yield ""
         yield f"  energy budget, of an input of {result['energy']['put_in']:.4g} J"
-        for row in result["energy_lines"]:
-            percent = 100.0 * row["fraction"]
-            yield f"  {row['group']:<26} {spelled(row['name']):<24} {row['energy']:>12.4g} J {percent:>9.3f} %"
+        rows = (
+            (row["group"], spelled(row["name"]), f"{row['energy']:.4g} J", f"{100.0 * row['fraction']:.3f} %")
+            for row in result["energy_lines"]
+        )
+        yield from table(rows, right=(2, 3), widths=(26, 24, 14, 11), indent=2)
 
 
 def _wall_time(seconds: dict[str, float]) -> list[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.tables import table
 from cfddem.cli.printing import announce_compilation, with_colour
 from cfddem.cli.ranks import on_ranks
 
@@ -42,8 +43,8 @@ def new(
     if schema:
         print(_json.dumps(Case.model_json_schema(), indent=2))
     elif name is None:
-        for known, path in gallery().items():
-            print(f"{known:<20}  {Case.from_toml(path).title}")
+        titles = [(known, Case.from_toml(path).title) for known, path in gallery().items()]
+        print("\n".join(table(titles, widths=(20,), gap=2)))
     else:
         written = copy_from_gallery(name, output)
         print(f"written to {written}; edit it, then: cfddem check {written}, cfddem run {written}")

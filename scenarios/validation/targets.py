@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.tables import WIDTH, grid
 
 if TYPE_CHECKING:
     from scenarios.validation.table import Progress, Row
@@ -39,9 +40,6 @@ ONLY_IF_NAMED = ("resolved", "wet-beds")
 
 PIECEMEAL = ("wet-beds",)
 """Targets that make their table of what has been computed, and go on with the rest another time."""
-
-WIDTH = 100
-"""Width of a printed table [characters]."""
 
 
 def validate(
@@ -115,22 +113,21 @@ def _progress(name: str) -> Iterator[Progress]:
 def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
     """Print the table, the verdict and the folder of the files."""
     from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
+    from rich.text import Text
 
     console = Console(highlight=False)
     console = Console(highlight=False, width=min(WIDTH, console.width) if console.is_terminal else WIDTH)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("quantity (worst of n)", overflow="fold")
-    for heading in ("model", "reference", "difference", "limit"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
     colour = {"holds": "green", "FAILS": "bold red", "report": "dim"}
-    for row in rows:
-        label = escape(row.quantity if row.unit == "-" else f"{row.quantity} [{row.unit}]")
-        verdict = f"[{colour[row.verdict]}]{row.verdict}"
-        table.add_row(label, *map(_number, (row.value, row.reference, row.difference, row.limit)), verdict)
-    console.print(table)
+    shown: list[Sequence[str | Text]] = [
+        (
+            row.quantity if row.unit == "-" else f"{row.quantity} [{row.unit}]",
+            *map(_number, (row.value, row.reference, row.difference, row.limit)),
+            Text(row.verdict, style=colour[row.verdict], no_wrap=True),
+        )
+        for row in rows
+    ]
+    headings = ("quantity (worst of n)", "model", "reference", "difference", "limit", "verdict")
+    console.print(grid(shown, headings, right=(1, 2, 3, 4), widths=(20, 0, 0, 0, 0, 7), gap=2))
     failed = sum(row.verdict == "FAILS" for row in rows)
     judged = sum(row.verdict != "report" for row in rows)
     console.print(f"{name}: {judged - failed} of {judged} limits hold; {len(rows) - judged} rows are for information.")
