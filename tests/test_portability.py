@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cfddem.io import file_lock
+from cfddem.io import files
 
 HOME = Path(__file__).parents[1]
 FILES = [path for package in ("cfddem", "closures", "scenarios") for path in sorted((HOME / package).rglob("*.py"))]
@@ -114,7 +114,7 @@ def test_a_lock_of_windows(
             if failure is not None:
                 raise failure
 
-    monkeypatch.setattr(file_lock, "fcntl", None)
-    monkeypatch.setattr(file_lock, "msvcrt", Windows)
+    monkeypatch.setattr(files, "fcntl", None)
+    monkeypatch.setattr(files, "msvcrt", Windows)
     with (tmp_path / "lock").open("w", encoding="utf-8") as file:
-        assert file_lock.lock_file(file) is free
+        assert files.lock_file(file) is free

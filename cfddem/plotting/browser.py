@@ -20,7 +20,7 @@ from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.curves import BLUE, blank, encoded
-from cfddem.plotting.panels import title_of
+from cfddem.plotting.pictures import title_of
 from cfddem.plotting.scene import NOTHING, Look, Scene
 
 HOST = "127.0.0.1"

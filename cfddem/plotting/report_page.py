@@ -41,7 +41,7 @@ from cfddem.plotting.curves import (
     panels,
     save,
 )
-from cfddem.plotting.panels import Stage
+from cfddem.plotting.pictures import Stage
 from cfddem.plotting.wave_figures import BED, draw_impacts, draw_map
 from cfddem.preflight.bed_waves import is_liquid_bed
 

@@ -17,7 +17,7 @@ from cfddem.backend.errors import RunFailed
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
-from cfddem.plotting.panels import SOLID, bounds_of
+from cfddem.plotting.pictures import SOLID, bounds_of
 from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
 
 NOTHING = "none"

@@ -35,7 +35,10 @@ ROOMS = {
     "cfddem/io": ("Input and output", "Run folders, snapshots, checkpoints, reading, export."),
     "cfddem/analysis": ("Analysis", "Measures of a run, time series, bubbles, mixing, reports."),
     "cfddem/plotting": ("Plotting", "Pictures, movies and curves from run folders."),
-    "cfddem/backend": ("Backend", "Compilation and caching of loops, threads, errors, the communicator."),
+    "cfddem/backend": (
+        "Backend",
+        "Compilation and caching of loops, threads, errors, the communicator, printed tables.",
+    ),
     "scenarios": ("Scenarios", "Cases that can be run from Python."),
 }
 """Folder of modules -> title and sentence."""

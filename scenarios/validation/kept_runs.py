@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.case.schema import Case
-from cfddem.io.file_lock import lock_file
+from cfddem.io.files import lock_file
 from cfddem.io.reading import RunData, open_run
 from cfddem.run.progress import Status
 from cfddem.run.runner import Run

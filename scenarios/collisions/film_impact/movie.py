@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.plotting.curves import blank
-from scenarios.collisions.film_impact.record import Record
-from scenarios.collisions.film_impact.result import FilmImpact, Frame
+from scenarios.collisions.film_impact.result import FilmImpact, Frame, Record
 from scenarios.collisions.film_impact.solver import GridImpact
 from scenarios.collisions.film_impact.study import impact
 from scenarios.references.isph.impact import SmoothedImpact

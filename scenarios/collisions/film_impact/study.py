@@ -25,8 +25,7 @@ from scenarios.collisions.film_impact.cavitation import EXCHANGES
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.materials import GLASS, Liquid, liquid_named, touching_gap
 from scenarios.collisions.film_impact.pressure import Bead
-from scenarios.collisions.film_impact.record import Record
-from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact
+from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact, Record
 from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.surface import Tension
 from scenarios.collisions.film_impact.volume import overfilled
