@@ -40,7 +40,7 @@ _MODULES = {
     "measure": "cfddem.run.history",
     "open_run": "cfddem.io.reading",
     "pair_table": "cfddem.particles.material_pairs",
-    "run_case": "cfddem.run.notebook",
+    "run_case": "cfddem.studies.notebook",
     "pour": "cfddem.particles.initial.pouring",
 }
 __all__ = ["__version__", *sorted(_MODULES)]

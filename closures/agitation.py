@@ -18,7 +18,7 @@ from closures.registry import law
 _SOURCE = "Mehrabadi, Tenneti, Garg & Subramaniam, J. Fluid Mech. 770 (2015) 210"
 _LATTANZI = "Lattanzi, Tavanashad, Subramaniam & Capecelatro, Phys. Rev. Fluids 7 (2022) 014301"
 
-_RESOLVED = "resolved simulations of free spheres, scenarios/validation/resolved_suspension"
+_RESOLVED = "resolved simulations of free spheres, scenarios/references/resolved_suspension"
 
 INERTIA_SHARE = 0.0
 """Part of the force by the acceleration of the fluctuation; the resolved simulations show none."""

@@ -17,7 +17,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from closures.registry import REGISTRY
+from closures.registry import REGISTRY, WHEN_REGISTERED
 
 _IMPORTS = re.compile(
     r"^(?:from|import) ((?:cfddem|closures|scenarios)[\w.]*)(?: import ([\w ,]+|\([^)]*\)))?", re.MULTILINE
@@ -142,3 +142,4 @@ from numba.extending import overload  # noqa: E402  the compiler reads its setti
 for _laws in REGISTRY.values():
     for _law in _laws.values():
         expose(_law.function)
+WHEN_REGISTERED.append(expose)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import pkgutil
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
@@ -61,6 +60,9 @@ class Law:
 REGISTRY: dict[str, dict[str, Law]] = {}
 """All laws that have been imported, by kind and name."""
 
+WHEN_REGISTERED: list[Callable[[Callable[..., float]], None]] = []
+"""Called with the function of each new law; :mod:`closures.compiled` lets loops call it."""
+
 
 def law(kind: str, reference: str, **ranges: tuple[float, float]) -> Callable[[Function], Function]:
     """Decorator: register a scalar function as a law and let compiled loops call it.
@@ -78,9 +80,8 @@ def law(kind: str, reference: str, **ranges: tuple[float, float]) -> Callable[[F
         if not is_built_in(function):
             _refuse_impossible(entry)
         REGISTRY.setdefault(kind, {})[function.__name__] = entry
-        compiled = sys.modules.get("closures.compiled")
-        if compiled is not None:
-            compiled.expose(function)
+        for call in WHEN_REGISTERED:
+            call(function)
         return function
 
     return register

@@ -13,6 +13,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.agitation import _advanced, _transition
 from cfddem.coupling.forces.agitation_terms import AgitationTerms
+from cfddem.fluid import budgets
 from cfddem.preflight.bed_waves import uniform_bed, with_agitation
 from cfddem.run.simulation import Simulation
 from closures import registry
@@ -111,10 +112,10 @@ def test_momentum_is_conserved(law: str) -> None:
     fluid, particles = simulation.fluid, simulation.particles
     assert fluid is not None
     fluid.boundaries.driving[2] = 0.0
-    start = fluid.momentum() + (particles.mass[:, None] * particles.velocity).sum(axis=0)
+    start = budgets.momentum(fluid) + (particles.mass[:, None] * particles.velocity).sum(axis=0)
     for _ in range(20):
         simulation.step()
-    end = fluid.momentum() + (particles.mass[:, None] * particles.velocity).sum(axis=0)
+    end = budgets.momentum(fluid) + (particles.mass[:, None] * particles.velocity).sum(axis=0)
     passed = float(np.abs(particles.mass[:, None] * particles.velocity).sum())
     assert np.abs(end - start).max() < 1e-3 * passed  # the last force of the step has not acted yet
     terms = simulation.coupling.prepare(particles, 1e-4)

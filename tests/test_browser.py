@@ -28,7 +28,7 @@ from cfddem.io.writer import RunFolder
 from cfddem.particles.collision_events import COLLISION, COLLISION_FIELDS
 from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import colours, rendering
-from cfddem.plotting.history_strip import strip
+from cfddem.plotting.browser import strip
 from cfddem.plotting.scene import FLUID, NOTHING, Look, Scene
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))

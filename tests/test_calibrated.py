@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from cfddem.run.calibration import Calibration, calibrate
-from cfddem.run.samples import variables
+from cfddem.studies.calibration import Calibration, calibrate
+from cfddem.studies.samples import variables
 
 PAGE = (Path(__file__).parents[1] / "docs" / "how-to" / "calibrate.md").read_text()
 

@@ -14,8 +14,8 @@ from made_up_run import BED
 
 from cfddem.analysis.response import FLAT, response
 from cfddem.backend.errors import InputError
-from cfddem.run import calibration, sweep
-from cfddem.run.samples import Variable, samples, unit_samples, variables
+from cfddem.studies import calibration, sweep
+from cfddem.studies.samples import Variable, samples, unit_samples, variables
 
 TIMES = np.linspace(0.0, 1.0, 12)
 

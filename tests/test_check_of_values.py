@@ -7,7 +7,7 @@ import pytest
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.cli.key_page import matching
+from cfddem.cli.explain_pages import matching
 from cfddem.preflight.summary import preflight
 
 GALLERY = {name: Case.from_toml(path) for name, path in gallery().items()}

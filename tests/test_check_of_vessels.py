@@ -199,8 +199,8 @@ def test_the_report_of_a_bead_with_a_feed_and_a_thin_tube_warns_of_the_tube_and_
     Run.begin(case, tmp_path / "run").go()
     told = report(tmp_path / "run")
     assert open_run(tmp_path / "run").status == "finished"
-    assert not [each for each in told["answers"] if each["name"] == "settling speed"] and not told["laws"]
-    assert next(each["value"] for each in told["answers"] if each["name"] == "regime") != "sphere in motion"
+    assert not [each for each in told["key_results"] if each["name"] == "settling speed"] and not told["laws"]
+    assert next(each["value"] for each in told["key_results"] if each["name"] == "regime") != "sphere in motion"
     assert any("the wall closes no cell: the fluid passes through it" in each for each in told["warnings"])
 
 

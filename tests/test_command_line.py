@@ -289,7 +289,7 @@ def test_a_sweep_keeps_finished_runs_lists_failed_ones_and_continues(
 
 
 def test_a_stopped_sweep_begins_no_further_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cfddem.run import sweep
+    from cfddem.studies import sweep
 
     def one(case: Case, values: dict[str, int], folder: Path, alone: bool) -> sweep.Outcome:
         status = "stopped" if values["bed.seed"] == 2 else "failed"

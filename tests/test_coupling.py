@@ -13,6 +13,7 @@ from cfddem.case.schema import Case
 from cfddem.coupling.forces.lift import lift_force
 from cfddem.coupling.forces.torque import turn_with_fluid
 from cfddem.coupling.kernel import MAPPINGS, FilterKernel
+from cfddem.fluid import budgets
 from cfddem.fluid.grid import Grid, outside_cylinder
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.run.simulation import Simulation
@@ -134,7 +135,7 @@ def stirred(case: Case) -> Simulation:
 def momentum(simulation: Simulation) -> np.ndarray:
     particles = simulation.particles
     assert simulation.fluid is not None
-    total: np.ndarray = (particles.mass[:, None] * particles.velocity).sum(axis=0) + simulation.fluid.momentum()
+    total: np.ndarray = (particles.mass[:, None] * particles.velocity).sum(axis=0) + budgets.momentum(simulation.fluid)
     deferred_momentum = (
         simulation.forces["added_mass"].deferred_momentum(particles).sum(axis=0)
         if simulation.steps and "added_mass" in simulation.forces

@@ -17,7 +17,7 @@ from cfddem.cli.app import app
 
 
 def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None:
-    from cfddem.cli import law_page as pages
+    from cfddem.cli import explain_pages as pages
 
     every = [law for kind in pages.laws().values() for law in kind.values()]
     assert len(every) > 60
@@ -55,7 +55,7 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
 
 
 def test_every_argument_of_every_law_is_plotted_with_its_unit() -> None:
-    from cfddem.cli import law_page as pages
+    from cfddem.cli import explain_pages as pages
 
     every = [law for kind in pages.laws().values() for law in kind.values()]
     bare = [

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cfddem.case.compare import Points
-from cfddem.plotting import curves, sweep_figure
+from cfddem.plotting import curves, study_figures
 from cfddem.plotting.colours import colour_map
 
 HOME = Path(__file__).parents[1]
@@ -137,19 +137,19 @@ def test_pictures_of_the_pages_have_no_colour_of_a_former_palette() -> None:
 def test_a_sweep_joins_numbers_and_never_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The key with numbers is on the axis, wherever it stands; one curve for each word."""
     drawn: list[Any] = []
-    monkeypatch.setattr(sweep_figure, "save", lambda figure, path: drawn.append(figure))
+    monkeypatch.setattr(study_figures, "save", lambda figure, path: drawn.append(figure))
     points = [
-        sweep_figure.Point({"laws.drag": law, "bed.inlet_velocity": speed}, {"bed_height": (0.04, 1e-4, "m")})
+        study_figures.Point({"laws.drag": law, "bed.inlet_velocity": speed}, {"bed_height": (0.04, 1e-4, "m")})
         for law in ("di_felice", "wen_yu")
         for speed in (0.03, 0.045)
     ]
-    words = [sweep_figure.Point({"laws.drag": each.values["laws.drag"]}, each.measures) for each in points[::2]]
+    words = [study_figures.Point({"laws.drag": each.values["laws.drag"]}, each.measures) for each in points[::2]]
     for each in (points, words):
-        assert sweep_figure.sweep_figure(each, tmp_path / "sweep.png")
+        assert study_figures.sweep_figure(each, tmp_path / "sweep.png")
     (both,), (alone,) = drawn[0].axes, drawn[1].axes
     assert both.get_xlabel() == "bed.inlet_velocity  [m/s]" and alone.get_xlabel() == "laws.drag"
     curve = Points("mine", "bed_height", "m", "inlet_velocity", np.array([0.04]), np.array([0.05]), np.array([np.nan]))
-    assert sweep_figure.sweep_figure(points, tmp_path / "sweep.png", [curve])
+    assert study_figures.sweep_figure(points, tmp_path / "sweep.png", [curve])
     (measured,) = drawn[2].axes
     assert measured.containers[-1].get_label() == "measured: mine" and len(measured.containers) == 3
     curves_of = [each.lines[0].get_linestyle() for panel in (both, alone) for each in panel.containers]

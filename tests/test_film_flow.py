@@ -13,7 +13,7 @@ from scipy.special import j0, jn_zeros
 from scenarios.collisions.film_impact import faces, liquid, pressure, viscosity
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.pressure import Bead, Solved
-from scenarios.collisions.film_impact.solver import Impact, Settings
+from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.volume import overfilled
 
 FLAT = 1e25
@@ -59,7 +59,7 @@ def still(radius: float, gap: float, mass: float = math.inf) -> Bead:
 
 def test_a_layer_at_rest_stays_at_rest() -> None:
     """Hydrostatic pressure rho g (H - z) and no motion, to 1e-8."""
-    layer = Impact(Grid(12, 20, 1e-3), still(FLAT, 1.0), 8e-3, 1000.0, 1e-3, 1.0)
+    layer = GridImpact(Grid(12, 20, 1e-3), still(FLAT, 1.0), 8e-3, 1000.0, 1e-3, 1.0)
     for _ in range(5):
         layer.step()
     z = (np.arange(8) + 0.5) * 1e-3
@@ -77,7 +77,7 @@ def test_a_wave_in_a_cup_has_the_frequency_of_linear_theory(cells: int, within: 
     radius, depth = 0.1, 0.05
     dx = depth / cells
     k = float(jn_zeros(1, 1)[0]) / radius
-    cup = Impact(Grid(round(radius / dx), 2 * cells, dx), still(FLAT, 1.0), depth, 1000.0, 0.0, 1.0,
+    cup = GridImpact(Grid(round(radius / dx), 2 * cells, dx), still(FLAT, 1.0), depth, 1000.0, 0.0, 1.0,
                  settings=Settings(per_side=4, courant=0.2, flip=1.0))  # fmt: skip
     raised = 1.0 + 0.06 * j0(k * cup.particles[:, 0])
     cup.particles[:, 1] *= raised
@@ -162,7 +162,7 @@ def test_a_disc_accelerates_an_inviscid_film() -> None:
     bead.mass = exact
     assert added_mass(Filled(Grid(width, cells + 2, 1.0, outer_open=True), bead, 1.0)) == pytest.approx(exact, rel=0.02)
 
-    moving = Impact(Grid(width, cells + 2, 1.0, outer_open=True), Bead(FLAT, math.inf, float(cells), -1.0),
+    moving = GridImpact(Grid(width, cells + 2, 1.0, outer_open=True), Bead(FLAT, math.inf, float(cells), -1.0),
                     float(cells), 1.0, 0.0, 1.0, 0.0, Settings(contact=False, flip=1.0, per_side=4))  # fmt: skip
     moving.step(1e-9)
     moving.step(0.02)  # the flow has begun, the particles have not moved yet

@@ -19,7 +19,7 @@ from closures.restitution import davis_sitison, singh
 from scenarios.collisions.film_impact import FilmImpact, Liquid, impact
 from scenarios.collisions.film_impact.film_laws import laws_of
 from scenarios.collisions.film_impact.materials import LIQUIDS
-from scenarios.collisions.film_impact.statements import peaks
+from scenarios.collisions.film_impact.validation import peaks
 
 
 @cache

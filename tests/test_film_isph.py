@@ -9,9 +9,9 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from scenarios.collisions.film_impact import impact
-from scenarios.collisions.film_impact.isph import kernel, points
-from scenarios.collisions.film_impact.isph.checks import layer_at_rest, taylor_green
-from scenarios.collisions.film_impact.isph.solids import solid
+from scenarios.references.isph import kernel, points
+from scenarios.references.isph.checks import layer_at_rest, taylor_green
+from scenarios.references.isph.liquid import solid
 
 
 def test_a_layer_at_rest_has_hydrostatic_pressure_and_stays_at_rest() -> None:

@@ -12,22 +12,22 @@ from scipy.optimize import brentq, curve_fit
 
 from cfddem.backend.errors import InputError
 from scenarios.collisions.film_impact import impact
-from scenarios.collisions.film_impact.banded import solve_banded
+from scenarios.collisions.film_impact.cavitation import solve_banded
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.ledger import while_turning
 from scenarios.collisions.film_impact.pressure import Bead
-from scenarios.collisions.film_impact.solver import Impact, Settings
+from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.surface import NEUTRAL, Tension
 
 NOWHERE = Bead(1e25, math.inf, 1e25, 0.0)
 """A bead out of reach."""
 
 
-def drop(radius: float, stretch: float = 0.0) -> Impact:
+def drop(radius: float, stretch: float = 0.0) -> GridImpact:
     """A drop of a radius in cells, stretched along the axis by a share of it; unit density and tension, no weight."""
     half = round(1.4 * radius) + 4
     settings = Settings(guessed=0.0, tension=Tension(1.0, NEUTRAL, NEUTRAL))
-    run = Impact(Grid(half, 2 * half, 1.0), NOWHERE, 2.0 * half, 1.0, 0.0, 1.0, 0.0, settings)
+    run = GridImpact(Grid(half, 2 * half, 1.0), NOWHERE, 2.0 * half, 1.0, 0.0, 1.0, 0.0, settings)
     away = run.particles[:, :2] - np.array([0.0, half])
     far = np.hypot(*away.T)
     cosine = away[:, 1] / np.maximum(far, 1e-9)
@@ -100,7 +100,7 @@ def rise(length: int, angle: float) -> float:
     """Height of the meniscus at the side of the grid over its level, in capillary lengths of `length` cells."""
     radius, depth = 6, 2.0
     settings = Settings(guessed=0.0, tension=Tension(1.0, NEUTRAL, NEUTRAL, angle))
-    run = Impact(Grid(radius * length, round(4.2 * length), 1.0), NOWHERE, depth * length, 1.0, 0.3 * length**0.5,
+    run = GridImpact(Grid(radius * length, round(4.2 * length), 1.0), NOWHERE, depth * length, 1.0, 0.3 * length**0.5,
                  1.0, length**-2.0, settings)  # fmt: skip
     heights = []
     while run.time < 25.0 * length**1.5:

@@ -16,6 +16,7 @@ from test_fluid_pressure import CASES, equation
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
+from cfddem.fluid import budgets
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
@@ -162,10 +163,10 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
     return fluid.checkpoint() | {
         "viscous force": grid.joined(fluid.cell_viscous_force()),
         "pressure gradient": grid.joined(fluid.cell_pressure_gradient()),
-        "drag": grid.joined(np.moveaxis(fluid.drag_exchange(), -1, 0)),
-        "ledger": np.array([line for name, line in fluid.momentum_ledger().items() if name != "change"]),
-        "work": np.array(fluid.work()),
-        "kinetic energy": np.array(fluid.kinetic_energy()),
+        "drag": grid.joined(np.moveaxis(budgets.drag_exchange(fluid), -1, 0)),
+        "ledger": np.array([line for name, line in budgets.momentum_ledger(fluid).items() if name != "change"]),
+        "work": np.array(budgets.works(fluid)),
+        "kinetic energy": np.array(budgets.kinetic_energy(fluid)),
         "rates": np.array(fluid.rates()),
         "points": total(velocity, axis=()),
     }

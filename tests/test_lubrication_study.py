@@ -10,9 +10,8 @@ import pytest
 
 from cfddem.analysis.bed_laws import expansion_laws
 from cfddem.preflight.summary import preflight
-from scenarios.beds.lubrication_study.figures import measures, profiles
 from scenarios.beds.lubrication_study.study import SEEDS, SETTINGS, VOIDAGE, Outcome, bed, folder_of, mean, meetings
-from scenarios.beds.lubrication_study.validation import rows
+from scenarios.beds.lubrication_study.validation import measures, profiles, rows
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)

@@ -12,8 +12,8 @@ from made_up_run import made_up
 
 from cfddem.analysis.comparison import compare, lines
 from cfddem.analysis.report import report
-from cfddem.analysis.report_markdown import markdown
 from cfddem.analysis.report_text import lines as report_lines
+from cfddem.analysis.report_text import markdown
 from cfddem.io.reading import open_run
 from cfddem.plotting.comparison_page import comparison_page
 from cfddem.plotting.report_page import render
@@ -25,7 +25,7 @@ def test_the_drift_is_that_of_the_rows_that_are_averaged(tmp_path: Path) -> None
     with h5py.File(folder / "history.h5", "r+") as file:
         part = np.clip((file["time"][:] - 1.0) / 0.75, 0.0, 1.0)
         file["bed_height"][:] = 0.04 * (1.0 - 0.035 * part) + 1e-6 * np.sin(np.arange(121))
-    found = next(each for each in report(folder)["answers"] if each["name"] == "bed height")
+    found = next(each for each in report(folder)["key_results"] if each["name"] == "bed height")
     assert str(found["verdict"]).startswith("still drifts by 4 % from 1 to 2 s, do not use the mean")
     assert found["holds"] is False
     measure = report(folder)["measures"]["bed_height"]

@@ -15,15 +15,15 @@ from cfddem.case.schema import Case
 from closures.agitation import free_spheres
 from closures.registry import law_of
 from scenarios.beds.liquid_bed.study import FluidisedBed, Study
+from scenarios.references.resolved_suspension import matrix
+from scenarios.references.resolved_suspension.fitting import autocovariance, fit_levels, fit_shares, seen_fluctuation
+from scenarios.references.resolved_suspension.measures import Series, even_window
+from scenarios.references.resolved_suspension.study import stored
+from scenarios.references.resolved_suspension.suspension import Point
 from scenarios.validation.agitation import study
 from scenarios.validation.agitation.study import fits, fitted
 from scenarios.validation.agitation.unresolved import case_of
-from scenarios.validation.resolved_suspension import matrix
-from scenarios.validation.resolved_suspension.fitting import autocovariance, fit_levels, fit_shares, seen_fluctuation
-from scenarios.validation.resolved_suspension.measures import Series, even_window
-from scenarios.validation.resolved_suspension.study import stored
-from scenarios.validation.resolved_suspension.suspension import Point
-from scenarios.validation.table import validate
+from scenarios.validation.targets import validate
 
 
 def liquid_bed(**changes: Any) -> Case:

@@ -75,7 +75,7 @@ def test_means_of_a_run_in_steps_are_those_of_its_last_velocity(tmp_path: Path) 
     folder = made_up(tmp_path / "run", text, largest_speed=0.0, wall_load=WEIGHT)
     found = report(folder)
     assert found["window"] == pytest.approx([0.5 * (1.21 + 2.0), 2.0])
-    regime = next(each for each in found["answers"] if each["name"] == "regime")
+    regime = next(each for each in found["key_results"] if each["name"] == "regime")
     assert "although" not in regime["verdict"] and "the inlet velocity is 0." in regime["verdict"]
 
 

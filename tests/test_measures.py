@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cfddem.analysis import bubbles, measures, mixing
+from cfddem.analysis import bubbles, measures
 from cfddem.backend.errors import InputError
 
 SPACING = (0.01, 0.02, 0.005)
@@ -133,42 +133,42 @@ def test_mixing_indices_of_segregated_and_mixed_beds() -> None:
     position = random().uniform(0.0, 1.0, (2000, 3))
     cells = measures.cells_of(position, (5, 5, 5), (0.2, 0.2, 0.2))
     apart = position[:, 2] > 0.4
-    assert mixing.lacey_index(apart, cells) == pytest.approx(0.0, abs=1e-9)
-    assert mixing.neighbour_mixing_index(apart, position) < 0.2
+    assert measures.lacey_index(apart, cells) == pytest.approx(0.0, abs=1e-9)
+    assert measures.neighbour_mixing_index(apart, position) < 0.2
     for seed in range(100):
         mixed = random(seed).permutation(apart)
-        lacey.append(mixing.lacey_index(mixed, cells))
-        nearest.append(mixing.neighbour_mixing_index(mixed, position))
+        lacey.append(measures.lacey_index(mixed, cells))
+        nearest.append(measures.neighbour_mixing_index(mixed, position))
     for values in (lacey, nearest):
         assert np.mean(values) == pytest.approx(1.0, abs=3.0 * np.std(values) / 10.0)
         assert np.std(values) < 0.03
     half = np.where(position[:, 0] < 0.5, apart, random().permutation(apart)).astype(bool)
-    assert 0.3 < mixing.neighbour_mixing_index(half, position) < 0.7
+    assert 0.3 < measures.neighbour_mixing_index(half, position) < 0.7
 
 
 def test_neighbour_mixing_index_of_three_species() -> None:
     position, species = random().uniform(0.0, 1.0, (3000, 3)), np.arange(3000) % 3
-    found = [mixing.neighbour_mixing_index(random(seed).permutation(species), position) for seed in range(30)]
+    found = [measures.neighbour_mixing_index(random(seed).permutation(species), position) for seed in range(30)]
     assert np.mean(found) == pytest.approx(1.0, abs=3.0 * np.std(found) / np.sqrt(30.0))
     layers = np.searchsorted(np.quantile(position[:, 2], [1 / 3, 2 / 3]), position[:, 2])
-    assert mixing.neighbour_mixing_index(layers, position) < 0.3
+    assert measures.neighbour_mixing_index(layers, position) < 0.3
 
 
 def test_lacey_index_of_a_random_mixture_is_one_in_small_samples() -> None:
     """Twelve particles in four cells, shuffled 4 000 times; without the finite-sample terms the mean would be 0.89."""
     position = np.column_stack([np.arange(12) % 4 + 0.5, np.full((12, 2), 0.5)])
     cells = measures.cells_of(position, (1, 1, 4), (1.0, 1.0, 1.0))
-    values = [mixing.lacey_index(random(seed).permutation(12) < 5, cells) for seed in range(4000)]
+    values = [measures.lacey_index(random(seed).permutation(12) < 5, cells) for seed in range(4000)]
     assert np.mean(values) == pytest.approx(1.0, abs=0.02)
 
 
 def test_mixing_indices_of_an_ordered_mixture_exceed_one() -> None:
     grid = np.stack(np.meshgrid(*[np.arange(10.0)] * 3), -1).reshape(-1, 3)
     board = grid.sum(axis=1) % 2 == 0
-    assert mixing.neighbour_mixing_index(board, grid, neighbours=6) > 1.5
-    assert mixing.lacey_index(board, measures.cells_of(grid, (5, 5, 5), (2.0, 2.0, 2.0))) > 1.0
-    assert np.isnan(mixing.neighbour_mixing_index(np.ones(1000, bool), grid))
-    assert np.isnan(mixing.lacey_index(np.ones(1000, bool), measures.cells_of(grid, (5, 5, 5), (2.0, 2.0, 2.0))))
+    assert measures.neighbour_mixing_index(board, grid, neighbours=6) > 1.5
+    assert measures.lacey_index(board, measures.cells_of(grid, (5, 5, 5), (2.0, 2.0, 2.0))) > 1.0
+    assert np.isnan(measures.neighbour_mixing_index(np.ones(1000, bool), grid))
+    assert np.isnan(measures.lacey_index(np.ones(1000, bool), measures.cells_of(grid, (5, 5, 5), (2.0, 2.0, 2.0))))
 
 
 # ---------------------------------------------------------------- bubbles

@@ -21,9 +21,9 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.preflight.summary import preflight
-from cfddem.run import notebook as run_notebook
-from cfddem.run.notebook import run_case
 from cfddem.run.progress import Status
+from cfddem.studies import notebook as run_notebook
+from cfddem.studies.notebook import run_case
 from closures.drag import di_felice
 
 ROOT = Path(__file__).parents[1]

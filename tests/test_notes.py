@@ -103,7 +103,7 @@ def test_a_value_of_a_case_cannot_be_set_and_a_key_is_found_by_its_nearest_name(
 def test_the_height_of_a_single_falling_sphere_is_no_mean(tmp_path: Path) -> None:
     """Where a bed height drifts, the report names the curves; a sphere that falls has no bed."""
     found = report(made_up(tmp_path / "bed", trend=0.01))
-    (drifts,) = found["advice"]["run longer, or average over another window"]
+    (drifts,) = found["actions"]["run longer, or average over another window"]
     assert "window: bed height; run longer" in drifts and "curves over time (cfddem view --history)" in drifts
     sphere = Case.from_text(BED.replace("count = 2000", "count = 1"))
     assert not list(run_warnings._series_warnings(sphere, {"bed_height": found["measures"]["bed_height"]}))

@@ -223,7 +223,7 @@ def test_any_use_outside_of_the_range_is_reported(tmp_path: Path) -> None:
 
     with h5py.File(made_up(tmp_path / "run") / "history.h5", "r+") as file:
         file["out_of_range_count"][:] = 3.0
-    said = "\n".join(each for group in report(tmp_path / "run")["advice"].values() for each in group)
+    said = "\n".join(each for group in report(tmp_path / "run")["actions"].values() for each in group)
     assert "outside of its range in 3.75e-05 % of its uses (3 times)" in said
 
 

@@ -23,11 +23,9 @@ from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import rendering
 from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
-from cfddem.plotting.panels import BUBBLE, Stage, _bubbles
-from cfddem.plotting.pictures import movie, picture
-from cfddem.plotting.scene import Look, Scene
+from cfddem.plotting.pictures import BUBBLE, Stage, _bubbles, movie, picture
+from cfddem.plotting.scene import Look, Scene, scene, window
 from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
-from cfddem.plotting.window import scene, window
 from scenarios.beds.liquid_bed.movie import side_by_side
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
@@ -159,7 +157,7 @@ def test_axes_colour_bars_and_title_are_labelled(renders, bed):
 
 
 def test_a_long_title_fits_a_narrow_picture(bed, monkeypatch):
-    monkeypatch.setattr("cfddem.plotting.panels.title_of", lambda run: "Liquid-fluidised bed of alumina beads")
+    monkeypatch.setattr("cfddem.plotting.pictures.title_of", lambda run: "Liquid-fluidised bed of alumina beads")
     figure = Stage.of(open_run(bed), [2], ("voidage",), "speed", None).figure(2)
     left, right = figure._suptitle.get_window_extent().intervalx
     assert 0.0 < left < right < figure.bbox.width

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cfddem.io import file_lock
+from cfddem.io import files
 
 HOME = Path(__file__).parents[1]
 FILES = [path for package in ("cfddem", "closures", "scenarios") for path in sorted((HOME / package).rglob("*.py"))]
@@ -94,7 +94,7 @@ def test_the_package_works_where_there_are_no_posix_modules(tmp_path: Path) -> N
         "import sys\n"
         "sys.modules.update(dict.fromkeys(['fcntl', 'resource', 'pwd']))\n"
         "from cfddem.io.folder import lock\nfrom pathlib import Path\nlock(Path('.')).close()\n"
-        "import cfddem.backend.shared_cache, cfddem.run.runner\n"
+        "import cfddem.backend.compile, cfddem.run.runner\n"
         "sys.argv = ['cfddem', 'check', 'liquid-bed']\n"
         "from cfddem.cli.app import main\nmain()\n"
     )
@@ -114,7 +114,7 @@ def test_a_lock_of_windows(
             if failure is not None:
                 raise failure
 
-    monkeypatch.setattr(file_lock, "fcntl", None)
-    monkeypatch.setattr(file_lock, "msvcrt", Windows)
+    monkeypatch.setattr(files, "fcntl", None)
+    monkeypatch.setattr(files, "msvcrt", Windows)
     with (tmp_path / "lock").open("w", encoding="utf-8") as file:
-        assert file_lock.lock_file(file) is free
+        assert files.lock_file(file) is free

@@ -77,14 +77,14 @@ def test_the_pressure_drop_of_a_shallow_packed_bed_says_that_it_is_too_low(tmp_p
     """A bed of 40 mm in cells of 10 mm, and of 4 mm; one that is fluidised carries its weight in any cells."""
     fixed = BED.replace("[run]", "fixed = true\n[run]")
     for number, (text, cell, said) in enumerate(((fixed, 0.01, True), (fixed, 0.004, False), (BED, 0.01, False))):
-        found = report(made_up(tmp_path / str(number), text.replace("cell = 0.005", f"cell = {cell}")))["answers"]
+        found = report(made_up(tmp_path / str(number), text.replace("cell = 0.005", f"cell = {cell}")))["key_results"]
         (drop,) = (each for each in found if each["name"] == "pressure drop")
         assert ("too low, as the bed is only 4 cells high" in drop["verdict"]) == said
 
 
 def test_warnings_of_the_check_are_repeated_where_they_affect_the_answers(tmp_path: Path) -> None:
     soft = BED.replace("contact_modulus = 1e7", "contact_modulus = 8e4").replace("[run]", "[run]\nevery = 1e-5")
-    said = report(made_up(tmp_path / "run", soft))["advice"]["check the case: before the run, it had these warnings"]
+    said = report(made_up(tmp_path / "run", soft))["actions"]["check the case: before the run, it had these warnings"]
     assert [each.split(":")[0] for each in said] == ["material.glass.contact_modulus"]  # not that of run.every
 
 
@@ -105,7 +105,7 @@ def test_a_run_without_a_fluid_has_a_report(tmp_path: Path) -> None:
 
 def test_warnings_of_ranges_drifts_and_short_windows(tmp_path: Path) -> None:
     steady = report(made_up(tmp_path / "steady"))
-    said = "\n".join(each for group in steady["advice"].values() for each in group)
+    said = "\n".join(each for group in steady["actions"].values() for each in group)
     assert not steady["warnings"] and "the bed as a whole is inside" in said and "cfddem explain" not in said
     assert (
         "the drag law di_felice was evaluated outside of its range in 10 % of its uses (800000 times): voidage" in said

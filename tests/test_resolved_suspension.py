@@ -11,11 +11,11 @@ import pytest
 from cfddem.backend.compile import serial, use_threads
 from cfddem.coupling.forces.agitation import _advanced, _transition
 from closures.agitation import SHORT
-from scenarios.validation.resolved_suspension import fitting, matrix, pictures, verification
-from scenarios.validation.resolved_suspension.film import approach_resistance, unresolved_film
-from scenarios.validation.resolved_suspension.measures import _box_waves, autocovariance, averaged, block_mean
-from scenarios.validation.resolved_suspension.study import measured, stored
-from scenarios.validation.resolved_suspension.suspension import Point, Suspension, prepare
+from scenarios.references.resolved_suspension import fitting, matrix, study, verification
+from scenarios.references.resolved_suspension.film import approach_resistance, unresolved_film
+from scenarios.references.resolved_suspension.measures import _box_waves, autocovariance, averaged, block_mean
+from scenarios.references.resolved_suspension.study import measured, stored
+from scenarios.references.resolved_suspension.suspension import Point, Suspension, prepare
 
 SMALL = Point(2.5, 0.3, 20.0, diameter=6, box=3.0)
 
@@ -107,8 +107,8 @@ def test_a_point_of_the_matrix_is_measured_and_continues(one_thread, tmp_path: P
     assert longer["averaged"] > first["averaged"]
     assert 0.2 < longer["drag_over_tenneti"] < 3.0
     assert len(measured(longer)) == 2
-    pictures.correlations([longer], tmp_path / "correlation.png")
-    pictures.slice_of(stirred(SMALL, 1), tmp_path / "slice.png")
+    study.correlations([longer], tmp_path / "correlation.png")
+    study.slice_of(stirred(SMALL, 1), tmp_path / "slice.png")
     assert (tmp_path / "slice.png").stat().st_size > 10_000
 
 

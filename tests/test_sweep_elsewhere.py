@@ -17,7 +17,7 @@ from test_cluster_commands import TEXT
 
 from cfddem.case.gallery import overrides
 from cfddem.case.schema import Case
-from cfddem.run.sweep import cases_of
+from cfddem.studies.sweep import cases_of
 
 
 @pytest.fixture

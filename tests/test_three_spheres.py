@@ -14,10 +14,10 @@ from matplotlib.colors import to_hex
 from cfddem.backend.errors import InputError
 from closures.restitution import davis_sitison
 from scenarios.collisions.three_spheres import centres, figures, outcomes, simulate_three_spheres
-from scenarios.collisions.three_spheres import events as three_sphere_events
 from scenarios.collisions.three_spheres import validation as study
+from scenarios.references.three_spheres import events as three_sphere_events
+from scenarios.references.three_spheres.cartesian import cartesian
 from scenarios.validation.table import Row
-from scenarios.validation.wet.cartesian import cartesian
 
 
 def failed(rows: list[Row]) -> list[object]:

@@ -20,8 +20,8 @@ from cfddem.plotting import curves as plots
 from scenarios.collisions.bouncing_sphere import study as bouncing_sphere
 from scenarios.collisions.immersed_pair import checks
 from scenarios.collisions.immersed_pair import validation as study
-from scenarios.validation import table as validation
-from scenarios.validation.table import Row, replacing, validate, worst, write_histories
+from scenarios.validation.table import Row, replacing, worst, write_histories
+from scenarios.validation.targets import TARGETS, validate
 
 
 def test_a_row_fails_only_by_a_limit() -> None:
@@ -33,7 +33,7 @@ def test_a_row_fails_only_by_a_limit() -> None:
 
 def test_the_help_lists_every_target() -> None:
     told = " ".join(call("validate", "--help").out.replace("\u2502", " ").split())
-    assert all(f"{name}," in told or f"{name} or all" in told for name in validation.TARGETS)
+    assert all(f"{name}," in told or f"{name} or all" in told for name in TARGETS)
 
 
 def test_the_worst_of_many_points_is_shown_and_all_are_kept() -> None:
@@ -47,7 +47,7 @@ def target(monkeypatch: pytest.MonkeyPatch, *rows: Row) -> None:
     module = ModuleType("example_of_a_target")
     module.study = lambda folder, progress: list(rows)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    monkeypatch.setitem(validation.TARGETS, "example", module.__name__)
+    monkeypatch.setitem(TARGETS, "example", module.__name__)
 
 
 @pytest.mark.parametrize(("limit", "holds"), [(0.2, True), (0.05, False), (None, True)])

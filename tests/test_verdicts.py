@@ -12,13 +12,13 @@ import pytest
 from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.report import report
-from cfddem.plotting.sweep_figure import Point, sweep_figure
-from cfddem.run.sweep import Outcome, _measured, write_table
+from cfddem.plotting.study_figures import Point, sweep_figure
+from cfddem.studies.sweep import Outcome, _measured, write_table
 
 
 def answer(folder: Path, name: str) -> dict[str, object]:
     """One answer of a report."""
-    return next(each for each in report(folder)["answers"] if each["name"] == name)
+    return next(each for each in report(folder)["key_results"] if each["name"] == name)
 
 
 def test_a_bed_at_rest_on_the_floor_is_not_fluidised_whatever_its_inlet(tmp_path: Path) -> None:
@@ -55,7 +55,7 @@ def test_a_step_of_the_inlet_within_the_window_is_named_as_the_cause_of_a_drift(
     ramp = BED.replace("inlet_velocity = 0.05", "inlet_velocity = [[0, 0.04], [1.4, 0.04], [1.5, 0.05]]")
     for name, text, changes in (("ramp", ramp, True), ("steady", BED, False)):
         found = report(made_up(tmp_path / name, text, trend=5e-3))
-        (height,) = (each for each in found["answers"] if each["name"] == "bed height")
+        (height,) = (each for each in found["key_results"] if each["name"] == "bed height")
         assert ("in which the inlet velocity changes" in height["verdict"]) == changes
         assert (
             "the inlet velocity changes within that time, 0.04 to 0.05 m/s" in "".join(found["warnings"])

@@ -13,8 +13,8 @@ from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from closures import capillary, layer
 from scenarios.collisions.wet_wall import impact, sticking_velocity
-from scenarios.collisions.wet_wall.checks import LIQUIDS, SPHERES, independent
 from scenarios.collisions.wet_wall.materials import Ball, Liquid
+from scenarios.references.wet_wall.checks import LIQUIDS, SPHERES, independent
 
 CASES = [  # sphere, liquid, film, half-filling angle, speed, angle, spin, friction
     ("glass_1.74", "water", 100e-6, 35.0, 0.4, 0.0, 0.0, 0.0),

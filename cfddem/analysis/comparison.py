@@ -10,12 +10,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cfddem.analysis.answers import AGREES
+from cfddem.analysis.key_results import AGREES
 from cfddem.analysis.report import case_of, report
 from cfddem.analysis.report_text import WIDTH, spelled, with_error
 from cfddem.backend.errors import InputError
+from cfddem.backend.tables import table
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 
 MOST = 12
 """Largest number of runs that are compared."""
@@ -30,10 +31,10 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
     .. math:: z = \frac{x - x_1}{\sqrt{s^2 + s_1^2}}
 
     folders  of the runs; the first is the reference
-    returns  plain values: `runs` (name, folder, case, status, window), `changed` (key -> value of each run), `answers`
-             (name -> value of each run), `measures` (name -> unit, and for each run mean, error, difference, its error,
-             z = difference over its error, and a verdict in words). z is NaN where a mean still drifts, or where the
-             difference exceeds errors that are lower bounds
+    returns  plain values: `runs` (name, folder, case, status, window), `changed` (key -> value of each run),
+             `key_results` (name -> value of each run), `measures` (name -> unit, and for each run mean, error,
+             difference, its error, z = difference over its error, and a verdict in words). z is NaN where a mean
+             still drifts, or where the difference exceeds errors that are lower bounds
     errors   InputError for fewer than two or more than MOST runs
     """
     if not 2 <= len(folders) <= MOST:
@@ -54,7 +55,7 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
             for name, result in zip(run_names(folders, keys), results)
         ],
         "changed": keys,
-        "answers": _answers(results),
+        "key_results": _key_results(results),
         "measures": measures,
     }
 
@@ -120,7 +121,7 @@ def _same_files(key: str, files: Sequence[Any]) -> bool:
         return False
 
 
-def _changed_laws(runs: Sequence[Run]) -> dict[str, list[Any]]:
+def _changed_laws(runs: Sequence[RunData]) -> dict[str, list[Any]]:
     """Fingerprints of users' laws that differ, with that of each run; None where a run has no such law."""
     used: list[dict[str, Any]] = [run.provenance.get("laws", {}) for run in runs]
     kinds = dict.fromkeys(kind for each in used for kind in each)
@@ -167,20 +168,20 @@ def _judged(z: float, rows: Sequence[dict[str, Any]]) -> tuple[float, str]:
 
 
 def _numbers(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The answers of a report that are numbers, and then all other means, by their names."""
+    """The key results of a report that are numbers, and then all other means, by their names."""
     first = {
         each["name"].replace(" ", "_"): {**each, "mean": each["value"], "stationary": None}
-        for each in result["answers"]
+        for each in result["key_results"]
         if not isinstance(each["value"], str)
     }
     return first | result["measures"]
 
 
-def _answers(results: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any] | None]]:
-    """The answers of all runs by name."""
+def _key_results(results: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any] | None]]:
+    """The key results of all runs by name."""
     found: dict[str, list[dict[str, Any] | None]] = {}
     for place, result in enumerate(results):
-        for each in result["answers"]:
+        for each in result["key_results"]:
             found.setdefault(each["name"], [None] * len(results))[place] = each
     return found
 
@@ -210,9 +211,9 @@ def _runs(result: dict[str, Any]) -> Iterator[str]:
         head = "reference" if place == 0 else ""
         name = each["name"] if each["folder"].endswith(each["name"]) else f"{each['name']} ({each['folder']})"
         yield f"{head:<10} {name}: {each['status']}; means from {begin:g} to {end:g} s"
-    for name, answers in result["answers"].items():
-        if any(each is not None and isinstance(each["value"], str) for each in answers):
-            words = "; ".join(each["value"] if each else "-" for each in answers)
+    for name, row in result["key_results"].items():
+        if any(each is not None and isinstance(each["value"], str) for each in row):
+            words = "; ".join(each["value"] if each else "-" for each in row)
             yield from textwrap.wrap(f"{name:<10} {words}", WIDTH, subsequent_indent=" " * 11)
 
 
@@ -230,11 +231,9 @@ def _means(result: dict[str, Any]) -> Iterator[str]:
     for name, measure in result["measures"].items():
         yield ""
         yield spelled(name)
+        rows = []
         for place, (run, row) in enumerate(zip(names, measure["runs"])):
             value = "-" if row["mean"] is None else with_error(row, measure["unit"])
-            opening = f"  {run[:wide]:<{wide}} {value:<30}"
-            yield (
-                opening.rstrip()
-                if place == 0 or row["mean"] is None
-                else (f"{opening} {relative(row):>10}  {row['verdict']}")
-            )
+            judged = ("", "") if place == 0 or row["mean"] is None else (relative(row), f" {row['verdict']}")
+            rows.append((run[:wide], value, *judged))
+        yield from table(rows, right=(2,), widths=(wide, 30, 10), indent=2)

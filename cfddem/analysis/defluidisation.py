@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cfddem.analysis.bed_laws import weight_over_floor
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.preflight.bed_estimate import estimate_bed
 
 Series = NDArray[np.float64]
@@ -55,7 +55,7 @@ class Defluidisation:
         return f"defluidised from t = {self.time:.3g} s on: {reasons}{held}"
 
 
-def defluidisation_of(run: Run, case: Case) -> Defluidisation | None:
+def defluidisation_of(run: RunData, case: Case) -> Defluidisation | None:
     """Defluidisation of a wet bed at a velocity that fluidises it dry; None if it is fluidised at the end, or dry."""
     weight, history = weight_over_floor(case), run.history
     if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:

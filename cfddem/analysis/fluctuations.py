@@ -30,7 +30,7 @@ class Impacts(NamedTuple):
 def impacts(collisions: Mapping[str, Array], begin: float, end: float, particles: int, bins: int = 40) -> Impacts:
     """Rate and speeds of the collisions that ended within a time.
 
-    collisions  columns of the record (n,), as :attr:`cfddem.io.reading.Run.collisions`
+    collisions  columns of the record (n,), as :attr:`cfddem.io.reading.RunData.collisions`
     begin, end  [s]
     particles   number of particles
     bins        of the distribution of speeds

@@ -26,7 +26,7 @@ from cfddem.case.compare import (
 )
 from cfddem.case.data_table import Array
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 
 _ATTRIBUTES = {"voidage": "voidage", "granular_temperature": "temperature"}
 """Names of profiles in :class:`cfddem.analysis.profiles.Profiles`."""
@@ -88,7 +88,7 @@ def largest_chi2(count: int) -> float:
     return max(1.0 + 2.0 * math.sqrt(2.0 / count), 4.0 if count == 1 else 0.0)
 
 
-def compared_with_measured(run: Run, case: Case, begin: float) -> list[MeasuredComparison]:
+def compared_with_measured(run: RunData, case: Case, begin: float) -> list[MeasuredComparison]:
     """The run at the points of all measured data of its case.
 
     begin   of the averaging window [s]
@@ -112,7 +112,7 @@ def with_files(case: Case, files: Sequence[Path]) -> Case:
     return case.model_copy(update={"compare": {**case.compare, **data}})
 
 
-def compared_at(run: Run, case: Case, points: Points, begin: float) -> MeasuredComparison:
+def compared_at(run: RunData, case: Case, points: Points, begin: float) -> MeasuredComparison:
     """The run at measured points.
 
     begin   of the averaging window [s]
@@ -159,7 +159,7 @@ def _at_velocities(case: Case, points: Points, time: Array, values: Array, begin
     return MeasuredComparison(points, computed, error, (points.place[order], computed[order]))
 
 
-def _profile(run: Run, case: Case, points: Points, begin: float) -> MeasuredComparison:
+def _profile(run: RunData, case: Case, points: Points, begin: float) -> MeasuredComparison:
     """The profile of a run at measured heights."""
     if points.quantity not in PROFILES:
         limit = nearest(points.quantity, PROFILES)

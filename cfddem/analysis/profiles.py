@@ -10,7 +10,7 @@ from cfddem.analysis.measures import Mask, cells_of, granular_temperature, profi
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.fluid.grid import Grid
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.particles.state import sphere_volume
 
 MOST_SNAPSHOTS = 40
@@ -29,7 +29,7 @@ class Profiles(NamedTuple):
     temperature: np.ndarray | None  # (n,) granular temperature; NaN without particles [m2/s2]
 
 
-def profiles_of(run: Run, case: Case, begin: float) -> Profiles | None:
+def profiles_of(run: RunData, case: Case, begin: float) -> Profiles | None:
     """Profiles averaged over the snapshots from a time on.
 
     begin    of the averaging window [s]
@@ -53,7 +53,7 @@ def profiles_of(run: Run, case: Case, begin: float) -> Profiles | None:
 
 
 def _of_particles(
-    run: Run, chosen: list[int], grid: Grid, open_cells: Mask
+    run: RunData, chosen: list[int], grid: Grid, open_cells: Mask
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Upward and downward flux, and granular temperature, of the layers."""
     layers, spacing = grid.shape[0], grid.spacing

@@ -36,7 +36,7 @@ class RegimeMap(NamedTuple):
 def regime_map(collisions: Mapping[str, Array], per_decade: int = PER_DECADE) -> RegimeMap:
     """The regime map of recorded collisions.
 
-    collisions  columns of the record (n,), as :attr:`cfddem.io.reading.Run.collisions`
+    collisions  columns of the record (n,), as :attr:`cfddem.io.reading.RunData.collisions`
     per_decade  cells per decade, in both directions
     returns     RegimeMap
     errors      InputError if no collision has a film

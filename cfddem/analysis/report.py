@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.answers import DRIFTING, answers
 from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison, expansion_note
 from cfddem.analysis.fluctuations import impacts
-from cfddem.analysis.law_references import references_of
+from cfddem.analysis.key_results import DRIFTING, key_results
 from cfddem.analysis.measured import compared_with_measured, with_files
 from cfddem.analysis.regimes import RegimeMap, regime_map
 from cfddem.analysis.run_warnings import NOTE, STATE, last_value, warnings_of
@@ -21,8 +20,9 @@ from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
 from cfddem.case.compare import with_files_of
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.preflight.summary import preflight
+from closures.registry import REGISTRY, Law, load_built_in_laws
 
 NO_DRIFT = 1e-3
 """Drift over the mean up to which a mean is steady, whatever its error."""
@@ -36,11 +36,11 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
 
     folder   of the run
     data     files of measured points beside those of the case
-    returns  plain values: `case`, `status`, `window`, `films` (in words), `answers` (name, value, error, unit,
+    returns  plain values: `case`, `status`, `window`, `films` (in words), `key_results` (name, value, error, unit,
              verdict), `measures` (mean, error, unit, drift over the averaged rows and their times, stationary), `laws`
              (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
              and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
-             the window, if recorded), `warnings`, `advice` (the warnings by what to do), `wall_time`, `preflight`,
+             the window, if recorded), `warnings`, `actions` (the warnings by what to do), `wall_time`, `preflight`,
              `provenance`, `references` (kind, name and reference of each law), `measured` (scores against measured
              data)
     errors   InputError if the run has no history, or for data that cannot be read
@@ -55,7 +55,7 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
     laws = [*compared_with_bed_laws(case, measures), *drag_law]
     energy = _energy(run)
     checked = preflight(case)
-    advice = warnings_of(run, case, measures, laws, checked.issues)
+    actions = warnings_of(run, case, measures, laws, checked.issues)
     return {
         "case": case.title or folder.resolve().name,
         "folder": str(folder),
@@ -63,7 +63,7 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         "message": run.message,
         "window": [begin, end],
         "films": "" if case.bed.fixed else case.laws.film_in_words(case.fluid),
-        "answers": answers(run, case, measures, laws, STATE in advice),
+        "key_results": key_results(run, case, measures, laws, STATE in actions),
         "measures": measures,
         "measured": [each.score() for each in compared_with_measured(run, case, begin)],
         "laws": laws,
@@ -73,8 +73,8 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         "energy_lines": _energy_lines(run, energy),
         "collisions": _collisions(run, begin),
         "impacts": _impacts(run, begin, end),
-        "warnings": [each for action, group in advice.items() for each in group if action != NOTE],
-        "advice": advice,
+        "warnings": [each for action, group in actions.items() for each in group if action != NOTE],
+        "actions": actions,
         "wall_time": run.about.get("wall_time", {}),
         "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
         "preflight": checked.summary(),
@@ -83,12 +83,12 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
     }
 
 
-def case_of(run: Run) -> Case:
+def case_of(run: RunData) -> Case:
     """The case of a run."""
     return with_files_of(Case.from_text(run.case_text, str(run.folder / "case.toml"), finished=True), run.folder)
 
 
-def window_of(run: Run, case: Case) -> tuple[float, float]:
+def window_of(run: RunData, case: Case) -> tuple[float, float]:
     """Start and end of the averaging window [s]: from `run.average_from`, or the second half of the run.
 
     If the inlet velocity changes in steps, the window is the second half of the last step.
@@ -113,7 +113,7 @@ def _start_of_means(case: Case, end: float) -> float:
     return 0.5 * (max(begins[0], 0.0) + end) if begins else 0.5 * end
 
 
-def recorded_regimes(run: Run, begin: float) -> RegimeMap | None:
+def recorded_regimes(run: RunData, begin: float) -> RegimeMap | None:
     """The regime map of all collisions that ended after a time [s]; None if none with films were recorded."""
     rows = run.collisions
     if "weight" not in rows:
@@ -122,7 +122,7 @@ def recorded_regimes(run: Run, begin: float) -> RegimeMap | None:
     return regime_map({name: column[late] for name, column in rows.items()}) if late.any() else None
 
 
-def _in_group(run: Run, group: str) -> list[str]:
+def _in_group(run: RunData, group: str) -> list[str]:
     """Columns of the history whose declared group is, or starts with, the given one."""
     declared = run.quantities.get("history", {})
     return [name for name in run.history if name in declared and declared[name].group.startswith(group)]
@@ -140,7 +140,7 @@ def inlet_changes(case: Case, begin: float, end: float) -> str:
     return f"the inlet velocity changes within that time, {low:.3g} to {high:.3g} m/s" if high > low else ""
 
 
-def _measures(run: Run, begin: float, changes: str) -> dict[str, Any]:
+def _measures(run: RunData, begin: float, changes: str) -> dict[str, Any]:
     """Every measure with a value in at least half of the rows of the window: its mean and error, and its drift.
 
     Mean and drift are of the same rows. A start-up within them counts where it moves the mean.
@@ -172,7 +172,7 @@ def _measures(run: Run, begin: float, changes: str) -> dict[str, Any]:
     return measures
 
 
-def _ledger(run: Run) -> dict[str, float]:
+def _ledger(run: RunData) -> dict[str, float]:
     """Largest imbalance of each conserved quantity over the run, and the particles that are lost."""
     ledger = {
         name: float(np.nanmax(np.abs(run.history[name][1:]))) if len(run.history[name]) > 1 else math.nan
@@ -183,12 +183,12 @@ def _ledger(run: Run) -> dict[str, float]:
     return ledger | {"particles_lost": float(count[0] + moved - count[-1])}
 
 
-def _energy(run: Run) -> dict[str, float]:
+def _energy(run: RunData) -> dict[str, float]:
     """The energy budget at the end [J]; empty if the run has none."""
     return {name.removeprefix(ENERGY): float(run.history[name][-1]) for name in _in_group(run, "energy")}
 
 
-def _energy_lines(run: Run, energy: dict[str, float]) -> list[dict[str, Any]]:
+def _energy_lines(run: RunData, energy: dict[str, float]) -> list[dict[str, Any]]:
     """Lines of the energy budget in reading order: group, name, energy [J] and its fraction of the input [-].
 
     Terms that are zero are omitted.
@@ -202,7 +202,7 @@ def _energy_lines(run: Run, energy: dict[str, float]) -> list[dict[str, Any]]:
     return lines
 
 
-def _collisions(run: Run, begin: float) -> dict[str, float]:
+def _collisions(run: RunData, begin: float) -> dict[str, float]:
     """Summary of the collisions in the window; empty if none with films were recorded."""
     found = recorded_regimes(run, begin)
     if found is None:
@@ -215,9 +215,60 @@ def _collisions(run: Run, begin: float) -> dict[str, float]:
     }
 
 
-def _impacts(run: Run, begin: float, end: float) -> dict[str, float]:
+def _impacts(run: RunData, begin: float, end: float) -> dict[str, float]:
     """Rate [1/s] and mean speed [m/s] of the collisions between particles in the window; empty if not recorded."""
     if "weight" not in run.collisions or not end > begin:
         return {}
     found = impacts(run.collisions, begin, end, int(run.history["particle_count"][-1]))
     return {"rate": found.rate, "contact_rate": found.contact_rate, "mean_speed": found.mean_speed}
+
+
+# ---------------------------------------------------------------- laws that a case uses, with their sources
+
+
+FILM = {
+    "nijssen": ("film_strength",),
+    "nijssen_full": ("film_strength", "shear_resistance"),
+    "nijssen_full_twist": ("film_strength", "shear_resistance"),
+}
+"""Names of the registered laws of the built-in films."""
+
+BRIDGE = (
+    ("capillary", "pull", "pull"),
+    ("rupture", "rupture", "rupture"),
+    ("bridge", "film", "share"),
+    ("bridge", "tangential", "tangential"),
+)
+"""Kind of the laws of a bridge, key of `[liquid]` that names one, and the ending of its name in the registry."""
+
+
+def references_of(case: Case) -> list[dict[str, str]]:
+    """Kind, name and reference of each law of a case."""
+    load_built_in_laws()
+    found = [{"kind": law.kind.replace("_", " "), "name": law.name, "reference": law.reference} for law in _used(case)]
+    if not case.bed.fixed and case.particle_count > 1 and "contact" not in case.laws.missing:
+        contact = case.laws.contact_law
+        found.append({"kind": "contact law", "name": contact.name, "reference": contact.reference})
+    return [each for place, each in enumerate(found) if each not in found[:place]]
+
+
+def _used(case: Case) -> Iterator[Law]:
+    laws = case.laws
+    if case.fluid is not None:
+        given = (laws.drag_law, laws.added_mass_law, case.agitation)
+        yield from (law for law in given if isinstance(law, Law))
+        yield from (REGISTRY["history"][name] for name in (laws.history,) if name in REGISTRY["history"])
+        yield from (REGISTRY["lift"][name] for name in ("saffman_mei", "magnus") if laws.lift)
+        yield from (REGISTRY["lift"][name] for name in ("torque",) if laws.torque)
+        yield from (REGISTRY["wall_drag"][name] for name in ("towards_wall", "along_wall") if laws.wall_drag != "none")
+    if case.has_films and not case.bed.fixed:
+        yield from (REGISTRY["lubrication"][name] for name in FILM.get(str(laws.film_in(case.fluid)), ()))
+        yield laws.pair_laws.get("minimum_gap", REGISTRY["minimum_gap"]["elastohydrodynamic"])
+        yield from (law for kind, law in laws.pair_laws.items() if kind == "lubrication")
+    if case.liquid is not None:
+        for kind, key, ending in BRIDGE:
+            law = REGISTRY[kind].get(f"{getattr(case.liquid, key)}_{ending}")
+            if law is not None:
+                yield law
+        if case.liquid.rupture == "capillary":
+            yield REGISTRY["capillary"]["rupture_length"]

@@ -1,15 +1,16 @@
-"""The report of a run as text and as JSON: the answer first, then what to do about warnings, then details."""
+"""The report of a run as text, JSON and Markdown: key results first, then what to do about warnings, then details."""
 
 from __future__ import annotations
 
 import json
 import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from cfddem.analysis.bed_laws import FROM_PRESSURE
 from cfddem.analysis.run_warnings import NOTE
+from cfddem.backend.tables import table
 from cfddem.io.quantities import shown_unit
 
 WIDTH = 98
@@ -31,9 +32,9 @@ def lines(result: dict[str, Any]) -> list[str]:
     """
     return [
         *_headline(result),
-        *_answers(result["answers"]),
+        *_key_results(result["key_results"]),
         *_measured(result["measured"]),
-        *_advice(result["advice"]),
+        *_actions(result["actions"]),
         *_measures(result),
         *_laws(result["laws"], result["laws_note"]),
         *_ledger(result["ledger"]),
@@ -89,7 +90,7 @@ def number(value: float | str, error: float = math.nan, unit: str = "", at_least
 
 
 def with_error(row: dict[str, Any], unit: str | None = None) -> str:
-    """The value of an answer or the mean of a measure, with its error and unit."""
+    """The value of a key result or the mean of a measure, with its error and unit."""
     value = row["mean"] if "mean" in row else row["value"]
     return number(value, row["error"], row["unit"] if unit is None else unit, row["error_is_lower_bound"])
 
@@ -101,8 +102,8 @@ def window(result: dict[str, Any]) -> str:
 
 
 def bounds_note(result: dict[str, Any]) -> list[str]:
-    """What "at least" means, if an answer says it."""
-    bounds = (each["error_is_lower_bound"] and not math.isnan(each["error"]) for each in result["answers"])
+    """What "at least" means, if a key result says it."""
+    bounds = (each["error_is_lower_bound"] and not math.isnan(each["error"]) for each in result["key_results"])
     return [LOWER_BOUND] * any(bounds)
 
 
@@ -113,7 +114,7 @@ def _headline(result: dict[str, Any]) -> Iterator[str]:
     yield from bounds_note(result)
 
 
-def _answers(found: list[dict[str, Any]]) -> Iterator[str]:
+def _key_results(found: list[dict[str, Any]]) -> Iterator[str]:
     yield ""
     wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each["value"], str)), 0)
     for each in found:
@@ -136,32 +137,33 @@ def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
 
 
 def _measures(result: dict[str, Any]) -> Iterator[str]:
-    answered = {each["name"] for each in result["answers"]}
+    shown = {each["name"] for each in result["key_results"]}
     yield ""
     yield "  all other means"
-    others = {name: each for name, each in result["measures"].items() if spelled(name) not in answered}
-    wide = max(28, *(len(with_error(each)) for each in others.values()), 0)
-    for name, each in others.items():
-        yield f"  {spelled(name):<28} {with_error(each):<{wide}} {steadiness(each)}{REMARKS.get(name, '')}"
+    others = {name: each for name, each in result["measures"].items() if spelled(name) not in shown}
+    rows = (
+        (spelled(name), with_error(each), f"{steadiness(each)}{REMARKS.get(name, '')}") for name, each in others.items()
+    )
+    yield from table(rows, widths=(28, 28), indent=2)
 
 
 def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
     if not rows:
         return
-    wide = max(40, *(len(row["law"]) for row in rows))
     yield ""
-    yield f"  {'law':<{wide}} {'run':>10} {'law':>10} {'ratio':>7} unit"
-    for row in rows:
-        numbers = f"{row['computed']:>10.4g} {row['expected']:>10.4g} {row['ratio']:>7.3f}"
-        yield f"  {row['law']:<{wide}} {numbers} {shown_unit(row['unit'])}"
+    shown = (
+        (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
+        for row in rows
+    )
+    headings = ("law", "run", "law", "ratio", "unit")
+    yield from table(shown, headings, right=(1, 2, 3), widths=(40, 10, 10, 7), indent=2)
     yield from textwrap.wrap(note, WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
 def _ledger(ledger: dict[str, float]) -> Iterator[str]:
     yield ""
     yield "  conservation, largest relative imbalance of the run"
-    for name, value in ledger.items():
-        yield f"  {spelled(name):<26} {value:.2g}"
+    yield from table(((spelled(name), f"{value:.2g}") for name, value in ledger.items()), widths=(26,), indent=2)
 
 
 def _collisions(found: dict[str, float]) -> Iterator[str]:
@@ -186,9 +188,11 @@ def _energy(result: dict[str, Any]) -> Iterator[str]:
     if result["energy"]:
         yield ""
         yield f"  energy budget, of an input of {result['energy']['put_in']:.4g} J"
-        for row in result["energy_lines"]:
-            percent = 100.0 * row["fraction"]
-            yield f"  {row['group']:<26} {spelled(row['name']):<24} {row['energy']:>12.4g} J {percent:>9.3f} %"
+        rows = (
+            (row["group"], spelled(row["name"]), f"{row['energy']:.4g} J", f"{100.0 * row['fraction']:.3f} %")
+            for row in result["energy_lines"]
+        )
+        yield from table(rows, right=(2, 3), widths=(26, 24, 14, 11), indent=2)
 
 
 def _wall_time(seconds: dict[str, float]) -> list[str]:
@@ -201,10 +205,80 @@ def _wall_time(seconds: dict[str, float]) -> list[str]:
     return ["", *(line.replace(NO_BREAK, " ") for line in lines)]
 
 
-def _advice(grouped: dict[str, list[str]]) -> Iterator[str]:
+def _actions(grouped: dict[str, list[str]]) -> Iterator[str]:
     for action, found in grouped.items():
         yield ""
         yield f"  {action}"
         opening = "" if action == NOTE else "warning: "
         for each in found:
             yield from textwrap.wrap(f"{opening}{each}", WIDTH, initial_indent="  ", subsequent_indent="    ")
+
+
+# ---------------------------------------------------------------- Markdown
+
+
+def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -> str:
+    """The report as Markdown.
+
+    result   of :func:`cfddem.analysis.report.report`
+    figures  caption -> place of a picture
+    """
+    end = result["window"][1]
+    laws = (
+        (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
+        for row in result["laws"]
+    )
+    parts = [
+        f"# {_escaped(result['case'])}",
+        f"{result['status']} at {end:g} s; {_escaped(window(result))}",
+        *_markdown_table(("", "value", "verdict"), map(_key_result_cells, result["key_results"])),
+        *bounds_note(result),
+        *_measured_rows(result["measured"]),
+        *_action_lists(result["actions"]),
+        *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),
+        "## Means",
+        *_markdown_table(("measure", "mean", "in time"), map(_measure_cells, result["measures"].items())),
+        *(
+            ["## Published laws", *_markdown_table(("law", "run", "law", "run / law", "unit"), laws)]
+            if result["laws"]
+            else ()
+        ),
+        *([result["laws_note"]] if result["laws_note"] else ()),
+        "## Conservation",
+        *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result["ledger"].items())),
+        "## References of the laws",
+        "\n".join(f"- {_escaped(' '.join(law.values()))}" for law in result["references"]),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _key_result_cells(each: dict[str, Any]) -> tuple[str, ...]:
+    return f"**{each['name']}**", with_error(each), each["verdict"]
+
+
+def _measured_rows(found: list[dict[str, Any]]) -> list[str]:
+    rows = ((each["name"], f"{each['points']} of {spelled(each['quantity'])}", each["verdict"]) for each in found)
+    return _markdown_table(("measured data", "points", "verdict"), rows) if found else []
+
+
+def _measure_cells(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
+    name, each = item
+    return spelled(name), with_error(each), steadiness(each)
+
+
+def _action_lists(grouped: dict[str, list[str]]) -> Iterator[str]:
+    for action, found in grouped.items():
+        yield f"**{action[0].upper()}{action[1:]}**"
+        yield "\n".join(f"- {_escaped(each)}" for each in found)
+
+
+def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    lines = [head, ["---"] * len(head), *rows]
+    return ["\n".join("| " + " | ".join(map(_escaped, cells)) + " |" for cells in lines)]
+
+
+def _escaped(text: str) -> str:
+    """Text without the signs that Markdown reads; bold is kept."""
+    for sign in ("\\", "|", "<", "_", "`"):
+        text = text.replace(sign, f"\\{sign}")
+    return text

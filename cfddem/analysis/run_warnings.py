@@ -9,7 +9,7 @@ import numpy as np
 
 from cfddem.analysis.defluidisation import defluidisation_of
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.preflight import law_ranges
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.issue import Issue, percent
@@ -49,7 +49,7 @@ outside; and the share from which the words say `all`."""
 
 
 def warnings_of(
-    run: Run, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], issues: Sequence[Issue]
+    run: RunData, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], issues: Sequence[Issue]
 ) -> Grouped:
     """All warnings, one line each, by what to do.
 
@@ -77,14 +77,14 @@ def warnings_of(
     return grouped
 
 
-def _defluidised(run: Run, case: Case) -> Found:
+def _defluidised(run: RunData, case: Case) -> Found:
     """A wet bed that has come to rest, or lets the gas pass, at a velocity that fluidises the dry bed."""
     found = defluidisation_of(run, case)
     if found is not None:
         yield STATE, str(found)
 
 
-def _spray_missed(run: Run, case: Case) -> Found:
+def _spray_missed(run: RunData, case: Case) -> Found:
     """A spray that finds few particles in its zone."""
     history, none = run.history, np.zeros(1)
     missed, landed = (history.get(name, none)[-1] for name in ("liquid_missed", "liquid_sprayed"))
@@ -95,13 +95,13 @@ def _spray_missed(run: Run, case: Case) -> Found:
         yield STATE, f"{share} of the spray found no particle in its zone: {remedy}, or give a larger zone"
 
 
-def last_value(run: Run, name: str) -> int:
+def last_value(run: RunData, name: str) -> int:
     """Last value of a counting column of the history; 0 if there is none."""
     column = run.history.get(name, np.zeros(0))
     return int(column[-1]) if len(column) else 0
 
 
-def _status_warnings(run: Run) -> Found:
+def _status_warnings(run: RunData) -> Found:
     """A run that did not finish, and missing snapshots."""
     if run.status == "stopped":
         yield FINISH, f"the run was stopped: {run.message}; continue it with cfddem resume {run.folder}"
@@ -120,7 +120,7 @@ def _missing_laws(case: Case) -> Found:
         yield INSTALL, f"law {name} (laws.{kind}) is not installed here: no prediction{onset}"
 
 
-def _range_warnings(run: Run, case: Case) -> Found:
+def _range_warnings(run: RunData, case: Case) -> Found:
     """How often laws were evaluated outside of their ranges in the whole run."""
     evaluations = last_value(run, "fluid_steps") * float(run.history.get("particle_count", np.zeros(1)).mean())
     drag, agitation, pair_laws = case.laws.drag_law, case.agitation, list(case.laws.pair_laws.values())

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from closures.balance import speed_after, terminal_velocity
 
 MOST_SNAPSHOTS = 200
@@ -20,7 +20,7 @@ ALIGNED = 1e-3
 """A slip velocity is along gravity if its transverse part is below this fraction."""
 
 
-def compared_with_drag_law(run: Run, case: Case) -> Iterator[tuple[str, float, float, str]]:
+def compared_with_drag_law(run: RunData, case: Case) -> Iterator[tuple[str, float, float, str]]:
     """Name, value of the run, value of the drag law, and unit, for a run with one sphere that settles or rises.
 
     The first row is the last speed against the terminal velocity; the second the speed at the time of the largest
@@ -54,7 +54,7 @@ def compared_with_drag_law(run: Run, case: Case) -> Iterator[tuple[str, float, f
         yield name, float(speeds[worst]), exact[worst], "m/s"
 
 
-def slip_velocity(run: Run, case: Case) -> tuple[np.ndarray, np.ndarray]:
+def slip_velocity(run: RunData, case: Case) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and velocities [m/s] of the sphere relative to the mean fluid velocity, up to its first contact."""
     history = run.history
     contacts = history["time"][history["contact_count"] > 0.0]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cfddem.analysis.measures import layer_solid_fraction
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ class Waves(NamedTuple):
     deviation: float  # standard deviation in time of the solid fraction of a layer, mean over the layers [-]
 
 
-def layer_map(run: Run, case: Case, layer: float | None = None) -> LayerMap:
+def layer_map(run: RunData, case: Case, layer: float | None = None) -> LayerMap:
     """Map of a run, from the positions of the particles in all snapshots.
 
     layer  thickness of the layers [m]; 2.5 mean diameters if not given

@@ -41,9 +41,9 @@ def calibrate(
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
     from cfddem.preflight.summary import preflight
-    from cfddem.run.calibration import Trial
-    from cfddem.run.calibration import calibrate as search
-    from cfddem.run.samples import variables
+    from cfddem.studies.calibration import Trial
+    from cfddem.studies.calibration import calibrate as search
+    from cfddem.studies.samples import variables
 
     path = find_case(case)
     print_warnings(preflight(Case.from_toml(path, overrides(set or []))))

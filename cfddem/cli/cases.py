@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.tables import table
 from cfddem.cli.printing import announce_compilation, with_colour
 from cfddem.cli.ranks import on_ranks
 
@@ -43,8 +44,8 @@ def new(
     if schema:
         print(_json.dumps(Case.model_json_schema(), indent=2))
     elif name is None:
-        for known, path in gallery().items():
-            print(f"{known:<20}  {Case.from_toml(path).title}")
+        titles = [(known, Case.from_toml(path).title) for known, path in gallery().items()]
+        print("\n".join(table(titles, widths=(20,), gap=2)))
     else:
         written = copy_from_gallery(name, output)
         print(f"written to {written}; edit it, then: cfddem check {written}, cfddem run {written}")
@@ -308,15 +309,15 @@ def sweep(
     from dataclasses import asdict
 
     from cfddem.case.gallery import find_case, overrides
-    from cfddem.run.samples import chosen_values
-    from cfddem.run.sweep import Outcome, failures
-    from cfddem.run.sweep import sweep as run_all
+    from cfddem.studies.samples import chosen_values
+    from cfddem.studies.sweep import Outcome, failures
+    from cfddem.studies.sweep import sweep as run_all
 
     path = find_case(case)
     values = chosen_values(over or [], vary or [], sample, runs)
     folder = output or Path(f"{path.stem}-sweep")
     if write_jobs:
-        from cfddem.run.job_array import write_jobs as write
+        from cfddem.studies.job_array import write_jobs as write
 
         lines, script, count = write(path, values, folder, overrides(set or []))
         print(f"{count} commands written to {lines}; submit with: sbatch {script}")

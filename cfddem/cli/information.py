@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json as _json
 import sys
-import textwrap
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.tables import table
 from cfddem.cli.printing import announce_compilation
 
 
@@ -26,13 +26,12 @@ def explain(
 
     Example: cfddem explain di_felice --plot di_felice.png
     """
-    from cfddem.cli import key_page
-    from cfddem.cli import law_page as pages
+    from cfddem.cli import explain_pages as pages
     from cfddem.io.files import require_folder
 
     known, keys = pages.laws() if law is None else pages.of_kind(law), list[str]()
     if law is not None and not pages.is_law(law):
-        known, keys = known or pages.containing(law), key_page.matching(law)
+        known, keys = known or pages.containing(law), pages.matching(law)
     if known or (keys and not json):
         every = [pages.summary(each) for kind in known.values() for each in kind.values()]
         print(_json.dumps(every) if json else "\n".join([*pages.listing(known), *keys]))
@@ -64,9 +63,9 @@ def doctor(
     for answer in examine(quick):
         answers.append(answer)
         if not json:
-            for k, line in enumerate(answer.text.split("\n")):
-                head = f"{'ok' if answer.ok else 'FAILS':<7}{answer.name:<16}" if k == 0 else ""
-                print("\n".join(textwrap.wrap(f"{head:<23}{line}", 100, subsequent_indent=" " * 23)), flush=True)
+            first, *others = answer.text.split("\n")
+            rows = [("ok" if answer.ok else "FAILS", answer.name, first), *(("", "", line) for line in others)]
+            print("\n".join(table(rows, widths=(6, 15))), flush=True)
     if json:
         print(_json.dumps([asdict(each) for each in answers]))
     if not all(each.ok for each in answers):

@@ -9,6 +9,8 @@ import sys
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from cfddem.backend.tables import table
+
 _COLOURS = {"ok": "32", "warning": "33", "error": "31"}
 """Terminal colour codes of the words that state a status."""
 
@@ -34,10 +36,8 @@ def show(values: dict[str, Any], units: dict[str, str], as_json: bool) -> None:
     if as_json:
         print(_json.dumps(values))
         return
-    width = max(len(name) for name in values)
-    for name, value in values.items():
-        unit = "" if value is None else units.get(name, "")
-        print(f"{name:<{width}}  {_readable(value)} {unit}".rstrip())
+    shown = {name: "" if value is None else units.get(name, "") for name, value in values.items()}
+    print("\n".join(table([(name, f"{_readable(values[name])} {unit}") for name, unit in shown.items()], gap=2)))
 
 
 def _readable(value: Any) -> str:

@@ -33,8 +33,8 @@ def report(
     Example: cfddem report bed
     """
     from cfddem.analysis.report import report as summary
-    from cfddem.analysis.report_markdown import markdown as as_markdown
     from cfddem.analysis.report_text import as_json, lines
+    from cfddem.analysis.report_text import markdown as as_markdown
     from cfddem.io.files import require_folder
     from cfddem.io.reading import newest_run
 
@@ -123,7 +123,7 @@ def view(
     from cfddem.io.reading import newest_run
     from cfddem.plotting import curves as plots
     from cfddem.plotting import pictures, wave_figures
-    from cfddem.plotting.window import window as on_screen
+    from cfddem.plotting.scene import window as on_screen
 
     folder, panels = folder or newest_run(Path()), show or ()
     require_folder(output)

@@ -10,8 +10,10 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.tables import table
 from cfddem.cli.printing import announce_compilation
 from scenarios.validation.targets import ONLY_IF_NAMED, PIECEMEAL, TARGETS
+from scenarios.validation.targets import validate as run
 
 
 def validate(
@@ -38,8 +40,6 @@ def validate(
     """
     if not json:
         announce_compilation()
-    from scenarios.validation.table import validate as run
-
     if target != "all" and target not in TARGETS:
         raise InputError("target", target, nearest(target, [*TARGETS, "all"]))
     if data and target != "binary-collision":
@@ -83,7 +83,8 @@ def bench(
         announce_compilation()
     from scenarios.beds.gas_bed import study as gas_bed
     from scenarios.beds.wet_bed import study as wet_bed
-    from scenarios.benchmarks import dense_bed, fluid_box, scaling, table
+    from scenarios.benchmarks import dense_bed, fluid_box, scaling
+    from scenarios.benchmarks import table as all_benchmarks
 
     bed = wet_bed if bridges else gas_bed
 
@@ -97,7 +98,7 @@ def bench(
         "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),
         "bed": (lambda: bed.bench(threads), bed.rows),
         "scaling": (lambda: scaling.bench(threads), scaling.rows),
-        "all": (lambda: table.bench(threads), table.rows),
+        "all": (lambda: all_benchmarks.bench(threads), all_benchmarks.rows),
     }
     if target not in targets:
         raise InputError("target", target, nearest(target, list(targets)))
@@ -106,5 +107,4 @@ def bench(
     if json:
         print(_json.dumps(result))
     else:
-        for name, text in rows(result):
-            print(f"{name:<20}  {text}")
+        print("\n".join(table(rows(result), widths=(20,), gap=2)))

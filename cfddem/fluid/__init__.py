@@ -4,8 +4,7 @@ grid         the box, its cells and solid cells, and values at points
 cell_counts  how cells divide a box; nothing compiled
 fields       declared fields of cells and faces
 conditions   walls, inlets, outlets, periodic sides, and the times and regions in which they hold
-boundaries   the conditions as known faces and values of ghosts
-sides        arrays of one side, and the loop that applies its conditions
+boundaries   the conditions as known faces and values of ghosts; arrays of one side
 halo         fills the ghosts of padded fields
 momentum     the terms of the momentum balance (models A and B); predictor
 viscosity    effective viscosity, with the sub-grid viscosity
@@ -13,8 +12,6 @@ pressure/    the pressure equation: conjugate gradients with a multigrid precond
 stability    rates of the flow that limit a step
 step_limit   the largest stable step at these rates; nothing compiled
 checks       checks of input and of divergence
-state        the fields and their values in cells and at points
+solver       the fluid: its fields, their values in cells and at points, and the step
 budgets      momentum, drag and energy of the step just made
-work_of_terms  the work of each term of the momentum balance
-solver       the step
 """

@@ -194,6 +194,11 @@ class Grid:
         return padded[LOW : LOW + nz, LOW : LOW + ny, LOW : LOW + nx]
 
 
+def on_faces(cells: Array, axis: int) -> Array:
+    """Mean of the two cells on both sides of every face normal to `axis`, of a padded cell field."""
+    return np.asarray(0.5 * (cells + np.roll(cells, 1, axis=2 - axis)))
+
+
 def outside_cylinder(centre: Sequence[float], radius: float, axis: int = 2) -> Region:
     """Region outside an infinite cylinder along `axis` through the point `centre` [m]: the wall of a pipe."""
     return outside_cone(centre, (0.0, 1.0), (radius, radius), axis)

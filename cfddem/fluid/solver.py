@@ -28,15 +28,15 @@ import numpy as np
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.budgets import FluidBudgets
-from cfddem.fluid.checks import checked_field, checked_voidage, refuse_trapped_inflow
+from cfddem.fluid.checks import checked_field, checked_viscosity, checked_voidage, refuse_trapped_inflow
 from cfddem.fluid.conditions import Condition
-from cfddem.fluid.grid import Array, Grid
-from cfddem.fluid.momentum import predict, transport
+from cfddem.fluid.fields import FLUID_FIELDS, CellFields
+from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, on_faces, sample
+from cfddem.fluid.momentum import drag_seen, in_cells, predict, transport
 from cfddem.fluid.pressure.projection import Projection
 from cfddem.fluid.stability import FlowRates
-from cfddem.fluid.state import FluidProperties
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
+from cfddem.fluid.viscosity import EffectiveViscosity
 
 LOOSE = 1e-6
 """Pressure tolerance of the first stage: it only shapes the convecting flux of the second."""
@@ -59,7 +59,7 @@ class StepReport:
     passes: int
 
 
-class FluidSolver(FluidBudgets):
+class FluidSolver:
     """Volume-averaged incompressible flow on a grid.
 
     grid          Grid
@@ -74,6 +74,11 @@ class FluidSolver(FluidBudgets):
     tolerance     largest continuity residual of a cell over the largest flux through a face
     passes        most runs of the second stage where drag is stiff
     communicator  path to sums, extremes and decisions over all ranks
+
+    Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
+    area of a face normal to x, y, z [m2]; `open_cells` (nz, ny, nx), 1 where a cell is open, 0 where it is solid;
+    `time` [s]; `last_step`, length of the step just made [s]. Methods return plain arrays in the index order of
+    `cfddem.fluid.grid`.
     """
 
     def __init__(
@@ -102,10 +107,19 @@ class FluidSolver(FluidBudgets):
             raise InputError("fluid.tolerance", tolerance, "between 1e-13 and 1e-3")
         sides = boundaries if isinstance(boundaries, Boundaries) else Boundaries(grid, boundaries)
         refuse_trapped_inflow(grid, sides)
-        super().__init__(grid, sides, FluidProperties(density, gravity, model, smagorinsky), communicator)
+        self.grid, self.boundaries, self.communicator = grid, sides, communicator
+        self.density, self.model, self.gravity = float(density), model, np.asarray(gravity, dtype=float)
         self.tolerance, self.passes = float(tolerance), int(passes)
-        self._central = float(convection == "central")
-        self._project, self._rates = Projection(self).correct, FlowRates(self)
+        self.time, self.last_step = 0.0, 0.0
+        self.fields, self.faces = CellFields(grid, FLUID_FIELDS), sides.faces()
+        self.model_b, self._central = float(model == "B"), float(convection == "central")
+        self.inverse_spacing = 1.0 / np.array(grid.spacing)
+        self.face_areas = np.array([grid.face_area(d) for d in range(3)])
+        self.open_cells = grid.open.astype(float)
+        self._every_face = np.ones_like(self.faces.solved)
+        self._effective = EffectiveViscosity(grid, sides.halo, self.density, float(smagorinsky))
+        self._projection = Projection(sides, self.fields, communicator)
+        self._rates = FlowRates(sides, self.density, communicator)
         self.set_viscosity(viscosity)
         self.set_voidage(voidage)
         self.set_velocity((0.0, 0.0, 0.0))
@@ -138,7 +152,7 @@ class FluidSolver(FluidBudgets):
 
         # First stage: carried by the old flux, and stored with the voidage that agrees with that flux.
         self._set_cells(fields.stored_voidage, fields.owned("other_voidage") - step * fields.owned("voidage_rate"))
-        self._find_explicit_force(fields.velocity, fields.mean_voidage, fields.start_force)
+        self._find_explicit_force(fields.velocity, fields.mean_voidage, fields.start_force, self.density, self._central)
         self._predict(fields.stage_velocity, step, weight=0.0)
         scale = self._flux_scale(step)
         loose = max(LOOSE, self.tolerance)
@@ -148,7 +162,9 @@ class FluidSolver(FluidBudgets):
         np.copyto(fields.stored_voidage, fields.mean_voidage)
         tight = self.tolerance * scale
         for passes in range(1, self.passes + 1):
-            self._find_explicit_force(fields.stage_velocity, fields.other_voidage, fields.stage_force)
+            self._find_explicit_force(
+                fields.stage_velocity, fields.other_voidage, fields.stage_force, self.density, self._central
+            )
             self._predict(fields.other_velocity, step, weight=0.5)
             iterations.append(self._project(fields.other_velocity, fields.other_voidage, tight, scale, fresh=False))
             if passes == self.passes or not self._still_moves(step):
@@ -191,14 +207,20 @@ class FluidSolver(FluidBudgets):
         self.grid.inner(padded)[:] = cells
         self.boundaries.halo.fill(padded)
 
-    def _find_explicit_force(self, velocity: Array, voidage: Array, force: Array) -> None:
+    def _find_explicit_force(
+        self, velocity: Array, voidage: Array, force: Array, density: float, central: float
+    ) -> None:
         """Write convection and viscous stress on the faces [N/m3]."""
         fields = self.fields
         self._effective.update(velocity, voidage, fields.viscosity, fields.effective_viscosity)
         transport(
-            velocity, voidage, fields.effective_viscosity, self.faces.buried, self.density, self.inverse_spacing,
-            self._central, fields.flux, fields.expansion, force,
+            velocity, voidage, fields.effective_viscosity, self.faces.buried, density, self.inverse_spacing, central,
+            fields.flux, fields.expansion, force,
         )  # fmt: skip
+
+    def _project(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
+        """Correct a velocity and the pressure so that continuity holds; returns the iterations it took."""
+        return self._projection.correct(velocity, voidage, limit, scale, fresh, self.time)
 
     def _predict(self, new: Array, step: float, weight: float) -> None:
         """Write the velocity after the step with the pressure as it is; the second explicit force has this weight."""
@@ -216,8 +238,8 @@ class FluidSolver(FluidBudgets):
         """Largest volume flux [m3/s]: through a face, of the old velocity or a hundredth of the predicted one, or
         displaced by the change of voidage in a cell."""
         fields, rate = self.fields, self.fields.owned("new_voidage_rate")
-        old = self._rates.of(fields.velocity, fields.mean_voidage).flux
-        predicted = self._rates.of(fields.stage_velocity, fields.other_voidage).flux
+        old = self._rates.of(fields.velocity, fields.mean_voidage, fields.effective_viscosity).flux
+        predicted = self._rates.of(fields.stage_velocity, fields.other_voidage, fields.effective_viscosity).flux
         fastest = max(self.communicator.largest(rate), -self.communicator.smallest(rate))
         displaced = self.grid.cell_volume * fastest
         # a voidage is known to its last digits only, and so is its rate
@@ -257,7 +279,7 @@ class FluidSolver(FluidBudgets):
         """Largest rates of the flow as it is."""
         fields = self.fields
         self._effective.update(fields.velocity, fields.mean_voidage, fields.viscosity, fields.effective_viscosity)
-        return self._rates.of(fields.velocity, fields.mean_voidage)
+        return self._rates.of(fields.velocity, fields.mean_voidage, fields.effective_viscosity)
 
     def run_until(self, time: float, *, courant: float = 0.5, largest: float = np.inf, **fields: Any) -> dict[str, int]:
         """Step to `time` [s] with the largest stable steps; returns how often each criterion set the step.
@@ -328,3 +350,158 @@ class FluidSolver(FluidBudgets):
         scale = self._flux_scale(np.inf)
         self._project(fields.velocity, fields.mean_voidage, self.tolerance * scale, scale, fresh=True)
         self.pressure[:] = kept
+
+    # ------------------------------------------------------------ fields
+
+    @property
+    def pressure(self) -> Array:
+        """p' = p - rho g.x at cell centres (nz, ny, nx) [Pa], a view; zero in solid cells."""
+        return self.fields.owned("pressure")
+
+    @property
+    def static_pressure(self) -> Array:
+        """p = p' + rho g.x (nz, ny, nx) [Pa]."""
+        x, y, z = self.grid.centres()
+        head: Array = self.density * (self.gravity[0] * x + self.gravity[1] * y + self.gravity[2] * z)
+        return self.pressure + head
+
+    @property
+    def velocity(self) -> Array:
+        """Velocity at cell centres (nz, ny, nx, 3) [m/s], mean of the two faces of each component."""
+        return np.moveaxis(self._in_cells(self.fields.velocity, self._every_face), 0, -1)
+
+    @property
+    def mean_velocity(self) -> Array:
+        """Mean of the velocities before and after the last step at cell centres (nz, ny, nx, 3) [m/s]."""
+        mean = 0.5 * (self.fields.other_velocity + self.fields.velocity)
+        return np.moveaxis(self._in_cells(mean, self._every_face), 0, -1)
+
+    @property
+    def voidage(self) -> Array:
+        """Voidage at the end of the last step (nz, ny, nx), a view."""
+        return self.fields.owned("voidage")
+
+    @property
+    def mean_voidage(self) -> Array:
+        """Voidage in the middle of the last step (nz, ny, nx), the one stored with the velocity, a view."""
+        return self.fields.owned("mean_voidage")
+
+    @property
+    def viscosity(self) -> Array:
+        """mu of every cell, without the sub-grid viscosity (nz, ny, nx) [Pa s], a view; see `set_viscosity`."""
+        return self.fields.owned("viscosity")
+
+    @property
+    def viscous(self) -> bool:
+        """Whether the viscosity is above zero."""
+        return bool(self.communicator.largest(self.viscosity) > 0.0)
+
+    def whole(self, name: str) -> Array:
+        """A cell field of this class in the cells of all ranks: (nz, ny, nx), or (nz, ny, nx, 3).
+
+        name  "pressure", "velocity", "voidage", "mean_voidage", "viscosity", "static_pressure"
+        """
+        values = getattr(self, name)
+        if values.ndim == 3:
+            return self.grid.joined(values)
+        joined: Array = np.moveaxis(self.grid.joined(np.moveaxis(values, -1, 0)), 0, -1)
+        return joined
+
+    def set_viscosity(self, viscosity: Array | float) -> None:
+        """Viscosity from now on: of every cell (nz, ny, nx), or a number [Pa s]; all positive, or all zero."""
+        self.viscosity[:] = checked_viscosity(self.grid, viscosity, self.communicator)
+        self.boundaries.halo.fill(self.fields.viscosity)
+
+    def face_velocity(self, axis: int) -> Array:
+        """Component `axis` on its faces [m/s], both boundaries included, a view: (nz, ny, nx+1) for x."""
+        return self.grid.inner_faces(self.fields.velocity[axis], axis)
+
+    def volume_flux(self, axis: int) -> Array:
+        """eps u through the faces normal to `axis`, per area [m/s]; shape as `face_velocity`."""
+        voidage = on_faces(self.fields.mean_voidage, axis)
+        return self.face_velocity(axis) * self.grid.inner_faces(voidage, axis)
+
+    # ------------------------------------------------------------ checkpoint
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Time, and copies of all fields that the next step depends on, over the whole grid without ghosts."""
+        return {"time": np.array(self.time)} | self.fields.checkpoint()
+
+    def restore(self, stored: Mapping[str, Any]) -> None:
+        """Go on from a `checkpoint()` of a fluid with the same grid and boundaries, on any number of ranks; gives the
+        same bits on the same number of ranks."""
+        self.fields.restore(stored)
+        self.time = float(stored["time"])
+        fields, halo = self.fields, self.boundaries.halo
+        for cells in (fields.mean_voidage, fields.viscosity):
+            halo.fill(cells)
+        self.boundaries.fill_pressure(fields.pressure)
+        self.boundaries.set_inlets(self.time, fields.mean_voidage)
+        self.boundaries.fill_velocity(fields.velocity)
+
+    # ------------------------------------------------------------ values in cells
+
+    def cell_pressure_gradient(self) -> Array:
+        """grad p' of every cell, mean of its two faces as the momentum balance sees them (3, nz, ny, nx) [Pa/m].
+
+        Add rho g for the gradient of the static pressure.
+        """
+        return self._in_cells(self.boundaries.pressure_gradient(self.fields.pressure), self.faces.solved)
+
+    def cell_viscous_force(self) -> Array:
+        """div tau of every cell, the stress of the fluid between the particles (not times eps), mean of its two faces
+        (3, nz, ny, nx) [N/m3]."""
+        velocity = self.fields.velocity
+        return self._in_cells(self.viscous_force(velocity, np.ones_like(velocity[0])), self.faces.solved)
+
+    def drag_response(self) -> tuple[Array, Array]:
+        """How the implicit drag of the last step saw the fluid, cell by cell.
+
+        returns  W (nz, ny, nx, 3) weight, 1 where the voidage is uniform [-]; u_d (nz, ny, nx, 3) the velocity
+                 the implicit drag has seen [m/s]
+        """
+        fields = self.fields
+        weight, seen = np.empty((2, *fields.velocity.shape))
+        drag_seen(
+            fields.other_velocity, fields.velocity, fields.centred_voidage, fields.drag, self.faces.solved,
+            self.density, self.last_step, self.model_b, weight, seen,
+        )  # fmt: skip
+        return np.moveaxis(self.grid.inner(weight), 0, -1), np.moveaxis(self.grid.inner(seen), 0, -1)
+
+    def _in_cells(self, faces: Array, counted: Array) -> Array:
+        """Mean over the two faces of every cell (3, nz, ny, nx).
+
+        counted  1 for faces that count, 0 for those that take the value of the other one
+        """
+        cells = np.empty_like(faces)
+        in_cells(faces, counted, cells)
+        return self.grid.inner(cells)
+
+    def viscous_force(self, velocity: Array, voidage: Array) -> Array:
+        """div(eps tau) on the faces (3, ...) of a padded velocity with a padded voidage [N/m3]."""
+        force = np.zeros_like(velocity)
+        no_density, limited = 0.0, 0.0  # without density no convection is left
+        self._find_explicit_force(velocity, voidage, force, no_density, limited)
+        return force
+
+    # ------------------------------------------------------------ values at points
+
+    def velocity_at(self, points: Array) -> Array:
+        """Velocity at points (N, 3) [m], tri-linear between faces: (N, 3) [m/s]."""
+        return self._at(self.fields.velocity, AT_FACES, points)
+
+    def viscosity_at(self, points: Array) -> Array:
+        """mu at points (N, 3) [m], tri-linear between centres: (N,) [Pa s]."""
+        viscosity = self.fields.viscosity
+        least, most = self.communicator.smallest(viscosity), self.communicator.largest(viscosity)
+        if least == most:
+            return np.full(len(points), most)  # free of the rounding of an interpolation
+        return self._at(viscosity[None], AT_CENTRES, points)[:, 0]
+
+    def _at(self, fields: Array, place: Array, points: Array) -> Array:
+        points = np.ascontiguousarray(points, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError("points", points.shape, "of shape (N, 3)")
+        values = np.empty((len(points), len(fields)))
+        sample(fields, place, points, np.array(self.grid.origin), self.inverse_spacing, values)
+        return values

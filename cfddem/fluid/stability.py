@@ -4,31 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
+from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import prange, threaded, vector_inline
+from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import LOW, Array
-from cfddem.fluid.state import FluidState
 from cfddem.fluid.step_limit import Rates
 
 
 class FlowRates:
     """Finds the largest rates of a fluid.
 
-    fluid  with its effective viscosity
+    boundaries  of its grid
+    density     rho [kg/m3]
     """
 
-    def __init__(self, fluid: FluidState) -> None:
-        self.fluid = fluid
-        self._inverse_where_varied = fluid.inverse_spacing * [fluid.boundaries.varies_along(d) for d in range(3)]
-        self._by_plane = np.zeros((3, fluid.grid.shape[0]))
+    def __init__(self, boundaries: Boundaries, density: float, communicator: Communicator) -> None:
+        grid = boundaries.grid
+        self._density, self._communicator, self._open = density, communicator, grid.open.astype(float)
+        self._inverse_where_varied = 1.0 / np.array(grid.spacing) * [boundaries.varies_along(d) for d in range(3)]
+        self._by_plane = np.zeros((3, grid.shape[0]))
 
-    def of(self, velocity: Array, voidage: Array) -> Rates:
-        """Largest rates of a padded velocity and voidage, with the effective viscosity as it is."""
-        fluid = self.fluid
+    def of(self, velocity: Array, voidage: Array, effective_viscosity: Array) -> Rates:
+        """Largest rates of a padded velocity, voidage, and voidage times viscosity [Pa s]."""
         largest_rates(
-            velocity, voidage, fluid.fields.effective_viscosity, fluid.open_cells, fluid.density,
-            self._inverse_where_varied, *self._by_plane,
+            velocity, voidage, effective_viscosity, self._open, self._density, self._inverse_where_varied,
+            *self._by_plane,
         )  # fmt: skip
-        return Rates(*(float(rate) for rate in fluid.communicator.largest(self._by_plane, axis=1)))
+        return Rates(*(float(rate) for rate in self._communicator.largest(self._by_plane, axis=1)))
 
 
 @threaded

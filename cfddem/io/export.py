@@ -12,7 +12,7 @@ import numpy as np
 from cfddem.backend.errors import InputError, nearest
 from cfddem.io.files import require_no_links
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 
 FORMATS = ("vtu", "csv", "netcdf")
 
@@ -49,7 +49,7 @@ def export(
     return {"vtu": _vtu, "csv": _csv, "netcdf": _netcdf}[kind](run, home, places, library)
 
 
-def _vtu(run: Run, home: Path, places: list[int], meshio: Any) -> list[Path]:
+def _vtu(run: RunData, home: Path, places: list[int], meshio: Any) -> list[Path]:
     files = []
     for place in places:
         particles = run.particles(place)
@@ -66,7 +66,7 @@ def _vtu(run: Run, home: Path, places: list[int], meshio: Any) -> list[Path]:
     return files
 
 
-def _csv(run: Run, home: Path, places: list[int], pandas: Any) -> list[Path]:
+def _csv(run: RunData, home: Path, places: list[int], pandas: Any) -> list[Path]:
     tables = {f"particles-{place:08d}.csv": _flat(run, run.particles(place)) for place in places}
     tables["history.csv"] = _flat(run, run.history)
     tables["collisions.csv"] = _flat(run, run.collisions)
@@ -78,7 +78,7 @@ def _csv(run: Run, home: Path, places: list[int], pandas: Any) -> list[Path]:
     return files
 
 
-def _netcdf(run: Run, home: Path, places: list[int], xarray: Any) -> list[Path]:
+def _netcdf(run: RunData, home: Path, places: list[int], xarray: Any) -> list[Path]:
     _library("h5netcdf")
     files = []
 
@@ -116,7 +116,7 @@ def _netcdf(run: Run, home: Path, places: list[int], xarray: Any) -> list[Path]:
     return files
 
 
-def _flat(run: Run, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _flat(run: RunData, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Columns named with their units, vectors as three columns."""
     flat: dict[str, np.ndarray] = {}
     for name, values in columns.items():

@@ -1,4 +1,4 @@
-"""Write files that appear whole or not at all, and report a failing disk in one line.
+"""Write files that appear whole or not at all, report a failing disk in one line, and lock files.
 
 The content is assembled in memory, written to a temporary file, flushed to the disk, and renamed.
 """
@@ -10,9 +10,19 @@ import io
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from cfddem.backend.errors import InputError, RunFailed
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+try:
+    import msvcrt as _windows
+except ImportError:
+    _windows = None  # type: ignore[assignment]
 
 PARTIAL = ".partial"
 """Suffix of a file that is still being written. A killed process can leave one behind; it is never read."""
@@ -122,3 +132,26 @@ def _sync_folder(folder: Path) -> None:
         pass
     finally:
         os.close(descriptor)
+
+
+# ---------------------------------------------------------------- locks: fcntl on Linux and macOS, msvcrt on Windows
+
+
+msvcrt: Any = _windows
+
+
+def lock_file(file: IO[Any]) -> bool:
+    """Lock an open file; False if another process holds the lock.
+
+    A file system or machine without locks counts as free.
+    """
+    try:
+        if fcntl is not None:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        elif msvcrt is not None:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    except (BlockingIOError, PermissionError):
+        return False
+    except OSError:
+        return True
+    return True

@@ -11,8 +11,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.io.damage import damage_named, opened, require_about, require_columns
-from cfddem.io.file_lock import lock_file
-from cfddem.io.files import disk_error, reason, require_format, require_no_links
+from cfddem.io.files import disk_error, lock_file, reason, require_format, require_no_links
 from cfddem.io.index import POINTS, Layout, Snapshot
 
 FORMAT = 2

@@ -36,14 +36,14 @@ _SHOWN = ("time", "bed_height", "bed_voidage", "pressure_drop", "largest_speed",
 """Columns of the history that a notebook shows."""
 
 
-def open_run(folder: str | Path) -> Run:
+def open_run(folder: str | Path) -> RunData:
     """Open a run folder, finished or still being written.
 
     folder   of the run
-    returns  Run; fields are read on demand
+    returns  RunData; fields are read on demand
     errors   InputError if the folder holds no run or a run of another format
     """
-    return Run(Path(folder))
+    return RunData(Path(folder))
 
 
 def newest_run(place: Path) -> Path:
@@ -69,7 +69,7 @@ class Columns(dict[str, np.ndarray]):
         raise InputError("history column", name, nearest(name, self))
 
 
-class Run:
+class RunData:
     """A written run. Snapshots are numbered in time: 0 is the first, -1 the last."""
 
     def __init__(self, folder: Path) -> None:
@@ -85,7 +85,7 @@ class Run:
 
     def __repr__(self) -> str:
         ends = f"{self.times[0]:g} to {self.times[-1]:g} s" if len(self.snapshots) else "no time"
-        return f"Run({str(self.folder)!r}: {self.status}, {len(self.snapshots)} snapshots, {ends})"
+        return f"RunData({str(self.folder)!r}: {self.status}, {len(self.snapshots)} snapshots, {ends})"
 
     def _repr_html_(self) -> str:
         """Status, the last row of the history and the last snapshot, in a notebook."""

@@ -20,13 +20,14 @@ import io
 import json
 import time as clock
 from array import array
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.toml_text import read_text
 from cfddem.io import checkpoint
@@ -320,3 +321,36 @@ def _columns(table: np.ndarray | None) -> dict[str, np.ndarray]:
         return {}
     columns = {name: table[name] for name in table.dtype.names or ()}
     return {name: each.astype("u1") if each.dtype.kind == "b" else each for name, each in columns.items()}
+
+
+# ---------------------------------------------------------------- folders of several ranks
+
+
+class UnwrittenFolder(RunFolder):
+    """A run folder whose writes do nothing."""
+
+    def __init__(self, folder: Path, about: dict[str, Any], case_text: str, quantities: Quantities) -> None:
+        self.folder, self.about, self.case_text = folder, about, case_text
+        self.quantities = {block: dict(names) for block, names in quantities.items()}
+        self.snapshots, self._history = [], {}
+
+    def _nothing(self, *arguments: Any, **named: Any) -> None:
+        """Rank 0 does it."""
+
+    write_snapshot = write_index = append_history = flush_history = write_checkpoint = _nothing
+    note = drop_after = finish = _nothing
+
+
+def folder_of_ranks(communicator: Communicator, make: Callable[[], RunFolder]) -> RunFolder:
+    """The folder that rank 0 makes, and one without writing on the other ranks; where rank 0 fails, all fail.
+
+    make  called on rank 0
+    """
+    made: list[RunFolder] = []
+
+    def described() -> tuple[Path, dict[str, Any], str, Quantities]:
+        made.append(make())
+        return made[0].folder, made[0].about, made[0].case_text, made[0].quantities
+
+    about = communicator.by_first(described)
+    return made[0] if made else UnwrittenFolder(*about)

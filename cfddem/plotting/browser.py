@@ -10,15 +10,17 @@ import asyncio
 import os
 import secrets
 import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError
-from cfddem.io.reading import Run, open_run
+from cfddem.io.quantities import shown_unit
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
-from cfddem.plotting.browser_page import layout
-from cfddem.plotting.history_strip import Strip, strip, usual_columns
-from cfddem.plotting.panels import title_of
+from cfddem.plotting.curves import BLUE, blank, encoded
+from cfddem.plotting.pictures import title_of
 from cfddem.plotting.scene import NOTHING, Look, Scene
 
 HOST = "127.0.0.1"
@@ -32,6 +34,18 @@ EVERY = 2.0
 
 PACE = 0.15
 """Wall time of one snapshot while time plays [s]."""
+
+USUAL = ("bed_height", "pressure_drop", "kinetic_energy", "largest_speed")
+"""Columns that are shown at first, as far as a run has them."""
+
+_MOST, _USED = 6, 3
+_WIDTH, _PANEL, _AROUND = 4.2, 1.35, 0.5  # of the image, of a panel, of the time axis [inch]
+
+_SIDE = "width: 430px; min-width: 430px; overflow-y: auto; border-left: 1px solid #ddd; padding: 12px"
+_MARK = (
+    "`position: absolute; width: 2px; background: #e08a00; left: ${100 * mark}%; top: ${100 * strip_top}%; "
+    "height: ${100 * (strip_bottom - strip_top)}%`"
+)
 
 
 def browse(folder: str | Path, colour: str = colours.SPEED, port: int | None = None) -> None:
@@ -125,7 +139,7 @@ class Viewer:
 
     # ------------------------------------------------------------ what the page shows
 
-    def _take(self, run: Run) -> None:
+    def _take(self, run: RunData) -> None:
         """Show a run, just read."""
         self.run = run
         self.state.status = f"{run.status}: {run.message}" if run.message else run.status
@@ -137,14 +151,14 @@ class Viewer:
         if self.scene is None:
             self._begin(run)
         else:
-            self.scene.follow(run)
+            self.scene.take(run)
         self.state.last = len(run.times) - 1
         if at_end:
             self.state.snapshot = self.state.last
         self._show()
         self._draw_history()
 
-    def _begin(self, run: Run) -> None:
+    def _begin(self, run: RunData) -> None:
         """The first snapshot: which colours and layers there are; the page is built."""
         self.scene = Scene(run, off_screen=True)
         known = colours.choices(run)
@@ -248,3 +262,125 @@ def _free_port(port: int | None) -> int:
             except (OSError, OverflowError) as failure:
                 why = getattr(failure, "strerror", None) or str(failure)
     raise InputError("port", port, "a free port from 1 to 65535", why.lower())
+
+
+# ---------------------------------------------------------------- the page: view, choices, history, time
+
+
+def layout(viewer: Viewer) -> tuple[Any, Any]:
+    """Build the page; returns it, and the view in it, whose `update()` sends a new image."""
+    from trame.ui.vuetify3 import VAppLayout
+    from trame.widgets import html
+    from trame.widgets import vtk as vtk_widgets
+    from trame.widgets import vuetify3 as v3
+
+    server = viewer.server
+    server.state.trame__title = f"cfddem: {server.state.title}"
+    with VAppLayout(server) as page:
+        with v3.VAppBar(density="compact", flat=True, border=True):
+            v3.VAppBarTitle("{{ title }}")
+            html.Span("{{ status }}", classes="text-medium-emphasis mr-4", id="status")
+            v3.VBtn("front", click=viewer.turn_to_front, variant="text", id="front")
+        with v3.VMain(style="height: 100vh"), html.Div(style="display: flex; height: 100%"):
+            with html.Div(style="flex: 1; min-width: 0; position: relative"):
+                view = vtk_widgets.VtkRemoteView(
+                    viewer.scene.plotter.render_window,  # type: ignore[union-attr]
+                    interactive_ratio=1, still_quality=95,
+                )  # fmt: skip
+                v3.VAlert(
+                    "{{ problem }}", v_if="problem", type="warning", density="compact",
+                    style="position: absolute; top: 8px; left: 8px; right: 8px",
+                )  # fmt: skip
+            with html.Div(style=_SIDE):
+                _choices(v3)
+                _curves(html, v3)
+        with v3.VFooter(app=True, border=True, classes="py-1", style="gap: 12px"):
+            _time(html, v3)
+    return page, view
+
+
+def _choices(v3: Any) -> None:
+    """What the view shows."""
+    options = {"density": "compact", "hide_details": True, "variant": "outlined", "classes": "mb-3"}
+    v3.VSelect(v_model=("colour",), items=("colours",), label="colour of the spheres", id="colour", **options)
+    v3.VSelect(v_model=("layer",), items=("layers",), label="layer of the fluid", id="layer", **options)
+    v3.VSlider(
+        v_model=("place",), min=0, max=1, step=0.02, label="position of the layer", density="compact",
+        hide_details=True, id="place",
+    )  # fmt: skip
+    v3.VCheckbox(
+        v_model=("cut",), label="spheres behind the layer only", density="compact", hide_details=True, id="cut"
+    )
+
+
+def _curves(html: Any, v3: Any) -> None:
+    """The history, with a line at the time of the view."""
+    v3.VSelect(
+        v_model=("columns",), items=("known_columns",), label="history", multiple=True, chips=True, density="compact",
+        hide_details=True, variant="outlined", classes="mb-2 mt-2", id="columns",
+    )  # fmt: skip
+    with html.Div(style="position: relative", v_if="strip", id="strip"):
+        html.Img(src=("strip",), style="width: 100%; display: block")
+        html.Div(style=(_MARK,), id="mark")
+
+
+def _time(html: Any, v3: Any) -> None:
+    """Time: play, slider, clock, follow."""
+    v3.VBtn(
+        icon=("playing ? 'mdi-pause' : 'mdi-play'",), click="playing = !playing", variant="text", density="compact",
+        id="play",
+    )  # fmt: skip
+    v3.VSlider(v_model=("snapshot",), min=0, max=("last",), step=1, hide_details=True, density="compact", id="time")
+    html.Span(
+        "snapshot {{ snapshot }} of {{ last }},  t = {{ clock }}",
+        style="min-width: 230px; white-space: nowrap",
+        id="clock",
+    )
+    v3.VSwitch(v_model=("follow",), label="follow", hide_details=True, density="compact", color="primary", id="follow")
+
+
+# ---------------------------------------------------------------- the history as one narrow image
+
+
+@dataclass(frozen=True)
+class Strip:
+    """An image of curves, with the place of its time axis in parts of the image."""
+
+    image: str  # PNG as an address that holds its data
+    left: float  # of the first time
+    right: float  # of the last time
+    top: float
+    bottom: float
+    first: float  # time at `left` [s]
+    last: float  # time at `right` [s]
+
+    def place_of(self, time: float) -> float:
+        """Horizontal place of a time, 0 to 1 of the image."""
+        part = (time - self.first) / (self.last - self.first)
+        return self.left + min(max(part, 0.0), 1.0) * (self.right - self.left)
+
+
+def usual_columns(known: Sequence[str]) -> list[str]:
+    """The columns that are shown at first."""
+    return [name for name in USUAL if name in known][:_USED] or list(known[:_USED])
+
+
+def strip(run: RunData, columns: Sequence[str]) -> Strip | None:
+    """Curves of some columns against time, one below the other; None if there is nothing to draw."""
+    names = [name for name in columns if name in run.history][:_MOST]
+    if not names or len(run.history["time"]) < 2:
+        return None
+    time = run.history["time"]
+    figure, axes = blank(len(names), 1, width=_WIDTH, height=_AROUND + _PANEL * len(names), sharex=True)
+    for name, each in zip(names, axes):
+        each.plot(time, run.history[name], color=BLUE, linewidth=1.3)
+        each.set_title(f"{name.replace('_', ' ')}  [{shown_unit(run.unit(name))}]", loc="left", fontsize=10)
+        each.tick_params(labelsize=9)
+        each.locator_params(axis="y", nbins=4)
+    first, last = float(time[0]), float(time[-1])
+    axes[-1].set_xlim(first, last if last > first else first + 1.0)
+    axes[-1].set_xlabel("time  [s]", fontsize=10)
+    image = "data:image/png;base64," + encoded(figure, 200)  # lays the figure out, too
+    boxes = [each.get_position() for each in axes]
+    begin, end = axes[-1].get_xlim()
+    return Strip(image, boxes[0].x0, boxes[0].x1, 1.0 - boxes[0].y1, 1.0 - boxes[-1].y0, begin, end)

@@ -8,7 +8,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 
 SPEED = "speed"
 """Magnitude of the velocity."""
@@ -25,7 +25,7 @@ SINGLE = 0.04
 _PLACES = ("id", "position")
 
 
-def choices(run: Run) -> list[str]:
+def choices(run: RunData) -> list[str]:
     """Quantities of a run that can colour its spheres, the most useful first."""
     known = set(run.particle_fields)
     found = [SPEED] if "velocity" in known else []
@@ -34,7 +34,7 @@ def choices(run: Run) -> list[str]:
     return found + sorted(known - {"velocity", *_PLACES, *found})
 
 
-def values(run: Run, snapshot: int, colour: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
+def values(run: RunData, snapshot: int, colour: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The particles of a snapshot, and the value of each one's colour.
 
     colour  speed, collisions, or a recorded field; of a vector its magnitude
@@ -64,7 +64,7 @@ def limits(found: np.ndarray, colour: str) -> tuple[float, float]:
     return low, high if high > low else low + 1.0
 
 
-def label(run: Run, colour: str) -> str:
+def label(run: RunData, colour: str) -> str:
     """Label of the colour bar of the spheres."""
     if colour == AGGLOMERATE:
         return "agglomerate; grey: single spheres"

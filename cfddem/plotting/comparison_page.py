@@ -17,7 +17,7 @@ from cfddem.analysis.report_text import spelled, with_error
 from cfddem.backend.errors import RunFailed
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run, open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting.curves import blank, encoded, label, legend_below, line_styles, plain_ticks, save
 
 SHOWN = ("bed_height", "bed_voidage", "pressure_drop", "granular_temperature", "largest_speed")
@@ -41,13 +41,13 @@ def comparison_page(folders: Sequence[Path], output: Path, result: dict[str, Any
     figures = {"Histories": encoded(histories(runs, names))}
     if (drawn := profiles(runs, names, result)) is not None:
         figures["Profiles over the averaging window"] = encoded(drawn)
-    text = _template().render(result=result, names=names, answers=_answers(result), measures=_measures(result),
+    text = _template().render(result=result, names=names, key_results=_key_results(result), measures=_measures(result),
                               figures=figures)  # fmt: skip
     write_whole(output, text.encode())
     return output
 
 
-def histories(runs: Sequence[Run], names: Sequence[str]) -> Any:
+def histories(runs: Sequence[RunData], names: Sequence[str]) -> Any:
     """Columns of the history of all runs against time, one panel each."""
     columns = [name for name in SHOWN if all(np.isfinite(run.history.get(name, np.nan)).any() for run in runs)]
     columns = columns or ["particle_count"]
@@ -63,7 +63,7 @@ def histories(runs: Sequence[Run], names: Sequence[str]) -> Any:
     return figure
 
 
-def profiles(runs: Sequence[Run], names: Sequence[str], result: dict[str, Any]) -> Any:
+def profiles(runs: Sequence[RunData], names: Sequence[str], result: dict[str, Any]) -> Any:
     """Voidage and granular temperature of all runs against height; None if a run has no profiles."""
     found = []
     for run, each in zip(runs, result["runs"]):
@@ -98,11 +98,11 @@ def _template() -> Any:
     return Environment(loader=PackageLoader("cfddem", "plotting"), autoescape=True).get_template("comparison.html")
 
 
-def _answers(result: dict[str, Any]) -> list[tuple[str, list[str]]]:
+def _key_results(result: dict[str, Any]) -> list[tuple[str, list[str]]]:
     def words(each: dict[str, Any] | None) -> str:
         return "-" if each is None else with_error(each)
 
-    return [(name, [words(each) for each in row]) for name, row in result["answers"].items()]
+    return [(name, [words(each) for each in row]) for name, row in result["key_results"].items()]
 
 
 def _measures(result: dict[str, Any]) -> list[tuple[str, str, list[tuple[str, str, str]]]]:

@@ -6,17 +6,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError
+from cfddem.backend.errors import InputError, nearest
 from cfddem.io.files import PARTIAL
-from cfddem.io.reading import open_run
-from cfddem.plotting.curves import save
-from cfddem.plotting.panels import Stage
+from cfddem.io.reading import RunData, open_run
+from cfddem.plotting import colours, rendering
+from cfddem.plotting.curves import BLUE, ORANGE, SKY, blank, save
+from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MOST_EXAMINED = 20  # snapshots that set the colour limits of a film
 
@@ -108,3 +115,277 @@ def _write_mp4(path: Path, frames: Iterator[np.ndarray], frames_per_second: floa
     with writer:
         for each in frames:
             writer.append_data(each)
+
+
+# ---------------------------------------------------------------- panels
+
+
+BUBBLE = 0.8
+"""Voidage at the boundary of a bubble."""
+
+HEADROOM = 1.4
+"""Height of a picture over the largest bed height."""
+
+SHARP = 200
+"""Pixels of a rendered image per inch of paper."""
+
+SOLID = "#9a9a9a"
+"""Colour of solid cells."""
+
+PANELS = ("spheres", "voidage", "bubbles", "streamlines")
+
+_WIDTH, _HEIGHT, _NARROWEST = 8.0, 6.0, 0.9  # of the page, of a panel, of a panel [inch]
+_BESIDE, _AROUND, _TITLE = 1.86, 1.12, 0.42  # labels and colour bar; labels and panel title; title of the page [inch]
+_TALL = 0.9  # height over width of the bed from which panels stand side by side
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What all pictures of a run share: panels, view and colour limits."""
+
+    run: RunData
+    panels: tuple[str, ...]
+    bounds: np.ndarray  # (3, 2), lowest and highest x, y, z in view [m]
+    depth: int  # axis of the line of sight, 0 or 1
+    colour: str  # field that colours the spheres
+    cut: bool  # whether spheres in front of the middle plane are left out
+    limits: dict[str, tuple[float, float]]  # of the colours, by panel
+
+    @classmethod
+    def of(cls, run: RunData, snapshots: Sequence[int], show: Sequence[str], colour: str, cut: bool | None) -> Stage:
+        """The stage for a run.
+
+        snapshots  that set the limits of view and colours
+        show       panels; spheres and voidage as far as they are recorded if empty
+        colour     speed, or a particle field
+        cut        None cuts deep beds only
+        errors     InputError for an unknown panel or field; RunFailed if this machine cannot render
+        """
+        recorded = {"spheres": run.particle_fields, "voidage": "voidage" in run.fluid_fields}
+        panels = tuple(show) or tuple(name for name, there in recorded.items() if there)
+        for name in panels:
+            if name not in PANELS:
+                raise InputError("show", name, nearest(name, PANELS))
+        if "spheres" in panels or "bubbles" in panels:
+            rendering.require_rendering()
+        bounds = with_walls(bounds_of(run, snapshots), run) if run.grid is None else bounds_of(run, snapshots)
+        size = np.diff(bounds, axis=1).ravel()
+        depth = 0 if size[0] < size[1] else 1
+        limits: dict[str, tuple[float, float]] = {}
+        deep = False
+        if "spheres" in panels:
+            shown = [colours.values(run, each, colour) for each in snapshots]
+            limits["spheres"] = colours.limits(np.concatenate([values for _, values in shown]), colour)
+            largest = max((float(each["radius"].max(initial=0.0)) for each, _ in shown), default=0.0)
+            deep = size[depth] > 12.0 * largest
+        if "voidage" in panels:
+            lowest = min(float(run.fluid("voidage", each).min()) for each in snapshots)
+            limits["voidage"] = (min(np.floor(20.0 * lowest) / 20.0, 0.95), 1.0)
+        if "streamlines" in panels:
+            fastest = max(float(colours.magnitude(run.fluid("velocity", each)).max()) for each in snapshots)
+            limits["streamlines"] = (0.0, fastest or 1.0)
+        return cls(run, panels, bounds, depth, colour, deep if cut is None else cut, limits)
+
+    def frames(self) -> Iterator[np.ndarray]:
+        """Images of all snapshots, at most 800 pixels wide."""
+        for snapshot in range(len(self.run.times)):
+            canvas: Any = self.figure(snapshot).canvas
+            canvas.draw()
+            image = np.asarray(canvas.buffer_rgba())[..., :3]
+            yield image[: image.shape[0] // 2 * 2, : image.shape[1] // 2 * 2]  # film formats require even sizes
+
+    def figure(self, snapshot: int) -> Figure:
+        """The picture of one snapshot."""
+        tall = self._size[1] / self._size[0]
+        columns = 2 if len(self.panels) > 1 and tall >= _TALL else 1
+        rows = -(-len(self.panels) // columns)
+        width = max(min(_WIDTH / columns - _BESIDE, _HEIGHT / tall), _NARROWEST)
+        page = columns * max(width + _BESIDE, 3.4), rows * (width * tall + _AROUND) + _TITLE
+        figure, axes = blank(rows, columns, width=page[0], height=page[1], layout="compressed")
+        for name, panel in zip(self.panels, axes):
+            getattr(self, f"_{name}")(panel, snapshot, (round(width * SHARP), round(width * tall * SHARP)))
+            self._finish(panel, width, tall)
+        for unused in axes[len(self.panels) :]:
+            unused.remove()
+        title = f"{title_of(self.run)},  t = {self.run.times[snapshot]:.4g} s"
+        heading = figure.suptitle(title, fontsize=12, fontweight="bold")
+        too_wide = heading.get_window_extent().width / (0.96 * figure.bbox.width)
+        heading.set_fontsize(12 / max(1.0, too_wide))
+        return figure
+
+    # ------------------------------------------------------------ panels
+
+    def _spheres(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
+        particles, values = colours.values(self.run, snapshot, self.colour)
+        position, half = particles["position"], None
+        title, behind = "spheres\nall", np.ones(len(position), bool)
+        if self.cut:
+            middle = float(self.bounds[self.depth].mean())
+            behind = position[:, self.depth] >= middle if self.depth == 1 else position[:, self.depth] <= middle
+            title = f"spheres\nbehind {'xy'[self.depth]} = {middle:.3g} m"
+            half = self._behind(middle)
+        shades, limits = colours.colour_map(self.colour), self.limits["spheres"]
+        view = rendering.View(self.bounds, self.depth, pixels)
+        image = rendering.spheres(
+            view, position[behind], particles["radius"][behind], values[behind], limits, shades,
+            lambda plotter: add_walls(plotter, walls_of(self.run), self.bounds, self.run.times[snapshot], half),
+        )  # fmt: skip
+        axes.imshow(image, extent=self._extent, interpolation="antialiased")
+        if self.colour == colours.AGGLOMERATE:
+            title = title.replace("spheres", "agglomerates, grey: single")
+        else:
+            _colour_bar(axes, shades, limits, colours.label(self.run, self.colour))
+        axes.set_title(title, loc="left")
+
+    def _behind(self, middle: float) -> Callable[[Any], Any]:
+        """Keeps the part of a mesh behind the middle plane."""
+        origin = np.eye(3)[self.depth] * middle
+        normal = np.eye(3)[self.depth] * (1.0 if self.depth == 1 else -1.0)
+        return lambda mesh: mesh.clip(normal, origin=origin, invert=False)
+
+    def _voidage(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
+        values, where = self._slice(self.run.fluid("voidage", snapshot))
+        self._cells(axes, values, "Blues_r", self.limits["voidage"], "voidage  [-]")
+        title = f"voidage\nat {where}"
+        if values.min() < BUBBLE < values.max() and min(values.shape) > 1:
+            axes.contour(*self._centres, values, levels=[BUBBLE], colors=[ORANGE], linewidths=1.4)
+            title += f", line: {BUBBLE:g}"
+        axes.set_title(title, loc="left")
+
+    def _bubbles(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
+        bubbles, freeboard = _bubbles(self.run.fluid("voidage", snapshot), self.run.grid)
+        view = rendering.View(self.bounds, self.depth, pixels)
+        image = rendering.surfaces(view, {SKY: bubbles, "#e3e3e3": freeboard})
+        axes.imshow(image, extent=self._extent, interpolation="antialiased")
+        found = "" if bubbles.n_points else ": none"
+        axes.set_title(f"bubbles{found}\nsurface of voidage {BUBBLE:g}", loc="left")
+
+    def _streamlines(self, axes: Axes, snapshot: int, pixels: tuple[int, int]) -> None:
+        velocity, where = self._slice(self.run.fluid("velocity", snapshot))
+        speed = colours.magnitude(velocity)
+        self._cells(axes, speed, colours.part_of("YlGnBu", 0.0, 0.65), self.limits["streamlines"], "fluid speed  [m/s]")
+        if min(speed.shape) > 1 and speed.max() > 0.0:
+            across, up = velocity[..., 1 - self.depth], velocity[..., 2]
+            axes.streamplot(*self._centres, across, up, color=BLUE, linewidth=0.7, arrowsize=0.7, density=1.1)
+        axes.set_title(f"fluid\nat {where}", loc="left")
+
+    def _cells(self, axes: Axes, values: np.ndarray, shades: Any, limits: tuple[float, float], label: str) -> None:
+        """Draw a slice of cells with its colour bar."""
+        from matplotlib.colors import to_rgba
+
+        low, high = _corners(self.run)
+        extent = low[1 - self.depth], high[1 - self.depth], low[2], high[2]
+        axes.imshow(
+            values, origin="lower", extent=extent, cmap=shades, vmin=limits[0], vmax=limits[1], interpolation="nearest"
+        )
+        if "solid" in self.run.fluid_fields:
+            solid = self._slice(self.run.fluid("solid"))[0][..., None] > 0
+            axes.imshow(solid * to_rgba(SOLID), origin="lower", extent=extent, interpolation="nearest", zorder=3)
+        _colour_bar(axes, shades, limits, label)
+
+    # ------------------------------------------------------------ geometry
+
+    @property
+    def _size(self) -> tuple[float, float]:
+        """Width and height of the view [m]."""
+        size = np.diff(self.bounds, axis=1).ravel()
+        return float(size[1 - self.depth]), float(size[2])
+
+    @property
+    def _extent(self) -> tuple[float, float, float, float]:
+        return (*self.bounds[1 - self.depth], *self.bounds[2])
+
+    @property
+    def _centres(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates of the cell centres of a slice [m]."""
+        grid: Any = self.run.grid
+        lines = [x + h * (np.arange(n) + 0.5) for x, h, n in zip(grid.origin, grid.spacing, grid.cells)]
+        return lines[1 - self.depth], lines[2]
+
+    def _slice(self, field: np.ndarray) -> tuple[np.ndarray, str]:
+        """The middle layer of cells [z, across], and its position in words."""
+        grid: Any = self.run.grid
+        layer = grid.cells[self.depth] // 2
+        place = grid.origin[self.depth] + (layer + 0.5) * grid.spacing[self.depth]
+        return np.take(field, layer, axis=2 - self.depth), f"{'xy'[self.depth]} = {place:.3g} m"
+
+    def _finish(self, axes: Axes, width: float, tall: float) -> None:
+        """Limits, labels, ticks and frame of a panel of a given width [inch]."""
+        axes.set_xlim(*self._extent[:2])
+        axes.set_ylim(*self._extent[2:])
+        axes.set_xlabel(f"{'yx'[self.depth]}  [m]")
+        axes.set_ylabel("z  [m]")
+        axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=10.5)
+        axes.grid(False)
+        axes.locator_params(axis="x", nbins=max(1, int(width / 0.7)))
+        axes.locator_params(axis="y", nbins=max(2, int(width * tall / 0.5)))
+        for side in axes.spines.values():
+            side.set_visible(True)
+            side.set_color("#888888")
+
+
+# ---------------------------------------------------------------- colour bars and surfaces
+
+
+def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str) -> None:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    figure: Any = axes.figure
+    bar = figure.colorbar(ScalarMappable(Normalize(*limits), shades), ax=axes, fraction=0.08, pad=0.03, aspect=30)
+    bar.set_label(label)
+    bar.outline.set_visible(False)
+    bar.ax.locator_params(axis="y", nbins=6)
+
+
+def _corners(run: RunData) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner of the grid [m]."""
+    grid: Any = run.grid
+    low = np.array(grid.origin)
+    return low, low + np.array(grid.cells) * np.array(grid.spacing)
+
+
+def bounds_of(run: RunData, snapshots: Sequence[int]) -> np.ndarray:
+    """The space in view (3, 2) [m]: the grid up to somewhat above the highest bed, or else the particles."""
+    if run.grid is not None:
+        low, high = _corners(run)
+        heights = run.history.get("bed_height", np.zeros(0))
+        if np.isfinite(heights).any():
+            high[2] = min(high[2], low[2] + max(HEADROOM * float(np.nanmax(heights)), float((high - low)[:2].max())))
+        return np.stack([low, high], axis=1)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for each in snapshots:
+        particles = run.particles(each)
+        if len(particles["position"]):
+            reach = particles.get("radius", np.zeros(len(particles["position"])))[:, None]
+            low = np.minimum(low, (particles["position"] - reach).min(axis=0))
+            high = np.maximum(high, (particles["position"] + reach).max(axis=0))
+    if not np.isfinite(low).all():
+        raise InputError("snapshot", list(snapshots), "one with particles", "there is nothing to draw")
+    margin = 0.02 * float((high - low).max())
+    return np.stack([low - margin, high + margin], axis=1)
+
+
+def title_of(run: RunData) -> str:
+    """Title of the case, or name of the folder."""
+    name = tomllib.loads(run.case_text).get("title")
+    return name if isinstance(name, str) else run.folder.resolve().name
+
+
+def _bubbles(voidage: np.ndarray, grid: Any) -> tuple[Any, Any]:
+    """Surfaces of high voidage: those inside the bed, closed at walls and floor, and that of the freeboard."""
+    import pyvista
+
+    padded = np.pad(voidage, ((1, 0), (1, 1), (1, 1)), constant_values=float(voidage.min()))
+    first = np.array(grid.origin) - 0.5 * np.array(grid.spacing)
+    image = pyvista.ImageData(dimensions=padded.shape[::-1], spacing=grid.spacing, origin=first)
+    image.point_data["voidage"] = padded.ravel()
+    border = image.contour([BUBBLE], scalars="voidage")
+    if border.n_points == 0:
+        return border, border
+    parts = border.connectivity("all")
+    regions, faces = np.asarray(parts.point_data["RegionId"]), parts.regular_faces
+    top = parts.points[:, 2] > image.bounds[5] - 0.01 * grid.spacing[2]
+    above = np.isin(regions, np.unique(regions[top]))[faces[:, 0]]
+    closed, freeboard = (pyvista.PolyData.from_regular_faces(parts.points, faces[each]) for each in (~above, above))
+    return closed.clean(), freeboard.clean()

@@ -1,24 +1,49 @@
-"""The report of a run as one self-contained HTML page: answer, warnings by what to do, figures, details."""
+"""The report of a run as one self-contained HTML page: key results, warnings by what to do, figures, details."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from cfddem.analysis.measured import with_files
-from cfddem.analysis.report import case_of
+import numpy as np
+
+from cfddem.analysis.bed_laws import weight_over_floor
+from cfddem.analysis.fluctuations import impacts
+from cfddem.analysis.measured import MeasuredComparison, compared_with_measured, with_files
+from cfddem.analysis.profiles import Profiles, profiles_of
+from cfddem.analysis.report import case_of, recorded_regimes
 from cfddem.analysis.report import report as summary
-from cfddem.analysis.report_markdown import markdown
-from cfddem.analysis.report_text import bounds_note, spelled, steadiness, window, with_error
+from cfddem.analysis.report_text import bounds_note, markdown, spelled, steadiness, window, with_error
 from cfddem.analysis.run_warnings import NOTE
+from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
+from cfddem.backend.errors import CfddemError, RunFailed
+from cfddem.case.compare import ABSCISSAE
+from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run, open_run
-from cfddem.plotting.curves import encoded, save
-from cfddem.plotting.report_figures import figures_of
+from cfddem.io.reading import RunData, open_run
+from cfddem.plotting import rendering
+from cfddem.plotting.case_drawing import case_drawing
+from cfddem.plotting.curves import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SKY,
+    blank,
+    draw_regimes,
+    encoded,
+    label,
+    legend,
+    panels,
+    save,
+)
+from cfddem.plotting.pictures import Stage
+from cfddem.plotting.wave_figures import BED, draw_impacts, draw_map
+from cfddem.preflight.bed_waves import is_liquid_bed
 
 Rows = list[tuple[str, ...]]
 
@@ -58,7 +83,7 @@ def markdown_page(folder: Path, output: Path, result: dict[str, Any] | None = No
     return output
 
 
-def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
+def render(run: RunData, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
     """The page as text."""
     case, end, steps = with_files(case_of(run), data), result["window"][1], result["steps"]
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
@@ -68,7 +93,7 @@ def render(run: Run, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
         status=f"{result['status']} at {end:g} s; {counts}; {window(result)}",
         bounds_note=bounds_note(result),
         note=NOTE,
-        answers=_answers(result["answers"]),
+        key_results=_key_results(result["key_results"]),
         measures=_measures(result["measures"]),
         laws=_laws(result["laws"]),
         ledger=[(spelled(name), f"{value:.2g}") for name, value in result["ledger"].items()],
@@ -92,7 +117,7 @@ def _template() -> Any:
 # ---------------------------------------------------------------- tables
 
 
-def _answers(found: list[dict[str, Any]]) -> list[dict[str, str]]:
+def _key_results(found: list[dict[str, Any]]) -> list[dict[str, str]]:
     marks = {True: "good", False: "bad", None: "open"}
     return [
         {
@@ -166,3 +191,159 @@ def _words(value: Any) -> str:
     return (
         ", ".join(f"{name} {each}" for name, each in value.items() if each) if isinstance(value, dict) else str(value)
     )
+
+
+# ---------------------------------------------------------------- figures
+
+
+Figures = dict[str, tuple[Any, str]]
+"""Name of a figure, the figure, and its caption."""
+
+
+def figures_of(run: RunData, case: Case, result: dict[str, Any]) -> Figures:
+    """All figures that a run has, in reading order.
+
+    result  of :func:`cfddem.analysis.report.report`
+    """
+    return {name: (figure, caption) for name, figure, caption in _all(run, case, result)}
+
+
+def _all(run: RunData, case: Case, result: dict[str, Any]) -> Iterator[tuple[str, Any, str]]:
+    begin, end = result["window"]
+    height = result["measures"].get("bed_height", {}).get("mean")
+    if compared := compared_with_measured(run, case, begin):
+        yield "measured", measured_figure(compared), "Measured points with their standard errors, and the run."
+    if (picture := _picture(run)) is not None:
+        yield "bed", picture, f"The last snapshot, at {run.times[-1]:.4g} s."
+    yield "series", _series(run, case, begin, end), "Grey: averaging window. Orange: means."
+    if (found := _profiles(run, case, begin)) is not None:
+        caption = f"Means over {found.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: "
+        yield "profiles", _draw_profiles(found, height), f"{caption}bed height."
+    if is_liquid_bed(case) and len(run.times) >= FEWEST_TIMES and "radius" in run.particle_fields:
+        figure, axes = panels(1, width=8.0, height=3.8)
+        found_map = layer_map(run, case)
+        draw_map(axes, found_map, waves(found_map, BED[0] * height, BED[1] * height, begin), (begin, end))
+        caption = (
+            "Solid fraction of layers of 2.5 diameters in all snapshots. The line shows the speed of the waves; it "
+        )
+        yield "waves", figure, f"{caption}needs several snapshots per period."
+    if result["impacts"].get("rate", 0.0) > 0.0:
+        figure, axes = panels(1, width=6.4, height=3.8)
+        temperature = result["measures"].get("granular_temperature", {}).get("mean")
+        draw_impacts(axes, impacts(run.collisions, begin, end, int(run.history["particle_count"][-1])), temperature)
+        caption = "Normal speed of approach of collisions between particles in the averaging window, and a Maxwellian "
+        yield "impacts", figure, f"{caption}gas of the same granular temperature."
+    if (regimes := recorded_regimes(run, begin)) is not None:
+        figure, axes = panels(1, width=6.4, height=4.6)
+        draw_regimes(axes, regimes)
+        caption = (
+            f"{regimes.collisions:.0f} collisions in the averaging window. Above the dashed line the film pressure "
+            "keeps the solids apart, below it the asperities. To the right of the orange line most collisions end in "
+            "contact."
+        )
+        yield "collisions", figure, caption
+    yield "case", case_drawing(case, height), "The case before it runs, seen along y; dashed: bed height of the run."
+
+
+def _picture(run: RunData) -> Any:
+    """Spheres and voidage of the last snapshot; None if there is nothing to draw, or this machine cannot render."""
+    if not len(run.times) or rendering.why_not() is not None:
+        return None
+    try:
+        return Stage.of(run, [-1], (), "speed", None).figure(-1)
+    except CfddemError:
+        return None
+
+
+def _series(run: RunData, case: Case, begin: float, end: float) -> Any:
+    """Bed height, pressure drop over the buoyant weight, and granular temperature in time, with their means."""
+    history, weight = run.history, weight_over_floor(case)
+    curves = [("bed height\n[m]", history["bed_height"])]
+    if "pressure_drop" in history:
+        named = "pressure drop\n[Pa]" if weight is None else "pressure drop\nover weight  [-]"
+        curves.append((named, history["pressure_drop"] / (weight or 1.0)))
+    if "granular_temperature" in history:
+        curves.append(("granular\ntemperature  [m2/s2]", history["granular_temperature"]))
+    inside = history["time"] >= begin
+    curves = [each for each in curves if np.isfinite(each[1][inside]).any()]
+    figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.8 * len(curves), sharex=True)
+    for each, (name, values) in zip(axes, curves):
+        each.axvspan(begin, end, color="#f3f3f3", zorder=0)
+        each.plot(history["time"], values, color=BLUE)
+        each.hlines(np.nanmean(values[inside]), begin, end, color=ORANGE, linewidth=1.2)
+        each.set_ylabel(name)
+    axes[-1].set_xlabel("time  [s]")
+    figure.align_ylabels()
+    return figure
+
+
+def _profiles(run: RunData, case: Case, begin: float) -> Profiles | None:
+    """The profiles of a run; None if no snapshot in the window can be read, or none has a quantity to show."""
+    try:
+        found = profiles_of(run, case, begin)
+    except RunFailed:
+        return None
+    return None if found is None or (found.voidage is None and found.upward is None) else found
+
+
+def _draw_profiles(found: Profiles, bed_height: float | None) -> Any:
+    """Voidage, solids flux and granular temperature against height, as far as they are recorded."""
+    columns = (found.voidage is not None) + 2 * (found.upward is not None)
+    figure, axes = blank(1, columns, width=2.8 * columns + 0.4, height=3.8, sharey=True)
+    remaining = list(axes)
+    if found.voidage is not None and found.voidage_spread is not None:
+        panel = remaining.pop(0)
+        low, high = found.voidage - found.voidage_spread, found.voidage + found.voidage_spread
+        panel.fill_betweenx(found.height, low, high, color=SKY, alpha=0.4, linewidth=0)
+        panel.plot(found.voidage, found.height, color=BLUE)
+        label(panel, "voidage", "-", "", "")
+    if found.upward is not None and found.downward is not None and found.temperature is not None:
+        flux, temperature = remaining
+        flux.plot(found.upward, found.height, color=GREEN, label="up")
+        flux.plot(found.downward, found.height, color=ORANGE, label="down")
+        flux.legend(frameon=False, fontsize=9.5)
+        label(flux, "solids flux", "m/s", "", "")
+        temperature.plot(found.temperature, found.height, color=BLUE)
+        label(temperature, "granular temperature", "m2/s2", "", "")
+    for panel in axes:
+        panel.set_ylabel("")
+        panel.set_ylim(0.0, float(found.height[-1] + found.height[0]))
+        panel.locator_params(axis="x", nbins=4)
+        panel.xaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
+        if bed_height is not None:
+            panel.axhline(bed_height, color=GREY, linewidth=1.0, linestyle="--")
+    axes[0].set_ylabel("height  [m]")
+    return figure
+
+
+# ---------------------------------------------------------------- measured points
+
+
+def measured_figure(found: Sequence[MeasuredComparison]) -> Any:
+    """One panel for each set of measured data: the run as a line, the points with error bars."""
+    figure, axes = blank(len(found), 1, width=8.0, height=0.5 + 3.0 * len(found))
+    for each, panel in zip(found, axes):
+        points, bars = each.points, np.where(np.isfinite(each.points.error), each.points.error, 0.0)
+        name = points.quantity.replace("_", " ")
+        style: dict[str, Any] = {"fmt": "o", "color": ORANGE, "markersize": 5.0, "capsize": 2.5, "zorder": 3}
+        if points.against == "height":
+            panel.plot(each.line[1], each.line[0], color=BLUE, label="run")
+            panel.errorbar(points.value, points.place, xerr=bars, label="measured", **style)
+            label(panel, name, shown_unit(points.unit), "height", "m", points.name)
+        elif points.against:
+            marker = "o-" if points.against == "inlet_velocity" else "-"
+            panel.plot(*each.line, marker, color=BLUE, label="run")
+            panel.errorbar(points.place, points.value, yerr=bars, label="measured", **style)
+            axis = (points.against.replace("_", " "), ABSCISSAE[points.against])
+            label(panel, *axis, name, shown_unit(points.unit), points.name)
+        else:
+            place, mean = np.arange(len(points.value)) + 1.0, float(each.computed[0])
+            error = float(np.max(each.computed_error))
+            panel.axhspan(mean - error, mean + error, color=BLUE, alpha=0.2, linewidth=0)
+            panel.axhline(mean, color=BLUE, label="run")
+            panel.errorbar(place, points.value, yerr=bars, label="measured", **style)
+            label(panel, "measurement", "-", name, shown_unit(points.unit), points.name)
+            panel.set_xticks(place if len(place) <= 20 else [])
+            panel.set_xlim(0.5, len(place) + 0.5)
+        legend(panel)
+    return figure

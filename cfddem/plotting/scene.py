@@ -6,15 +6,18 @@ The window on the screen and the page in the browser show this scene.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cfddem.backend.errors import RunFailed
 from cfddem.io.quantities import shown_unit
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
-from cfddem.plotting.panels import SOLID, bounds_of
+from cfddem.plotting.pictures import SOLID, bounds_of
 from cfddem.plotting.wall_surfaces import add_walls, walls_of, with_walls
 
 NOTHING = "none"
@@ -48,7 +51,7 @@ class Scene:
     off_screen  draw to memory only
     """
 
-    def __init__(self, run: Run, off_screen: bool = False) -> None:
+    def __init__(self, run: RunData, off_screen: bool = False) -> None:
         import pyvista
 
         make: Any = pyvista.Plotter
@@ -58,10 +61,10 @@ class Scene:
         self.plotter.set_background("white", all_renderers=True)
         self.plotter.link_views()
         self._bars: dict[int, str] = {}
-        self.follow(run)
+        self.take(run)
         self.turn_to_front()
 
-    def follow(self, run: Run) -> None:
+    def take(self, run: RunData) -> None:
         """Show a run from now on: the same one, read again when it has more snapshots."""
         self.run = run
         count = len(run.times)
@@ -208,3 +211,39 @@ def _limits_of_fluid(values: np.ndarray, name: str) -> tuple[float, float]:
         return min(float(np.floor(20.0 * values.min())) / 20.0, 0.95), 1.0
     low, high = float(values.min()), float(values.max())
     return low, high if high > low else low + 1.0
+
+
+# ---------------------------------------------------------------- a window
+
+
+def window(folder: str | Path, colour: str = "speed") -> None:
+    """Show a run in a window with a time slider, until the window is closed.
+
+    folder  of a run
+    colour  of the spheres: speed, collisions, or a recorded field; of a vector its magnitude
+    errors  RunFailed if there is no screen
+    """
+    if not os.environ.get("DISPLAY"):
+        raise RunFailed(
+            "view: there is no screen (DISPLAY is not set); use --web for a page in the browser, "
+            "or leave out --window to write a picture"
+        )
+    scene(open_run(folder), colour).show()
+
+
+def scene(run: RunData, colour: str = "speed", off_screen: bool = False) -> Any:
+    """Spheres, a layer of the voidage, axes in metres and a time slider, as a pyvista Plotter."""
+    rendering.require_rendering()
+    shown = Scene(run, off_screen)
+    layer = "voidage" if "voidage" in run.fluid_fields else NOTHING
+
+    def show(time: float) -> None:
+        shown.show(Look(int(np.abs(run.times - time).argmin()), colour, layer))
+
+    show(float(run.times[-1]))
+    if len(run.times) > 1:
+        shown.plotter.add_slider_widget(
+            show, [run.times[0], run.times[-1]], value=run.times[-1], title="time [s]", color="black",
+            pointa=(0.3, 0.07), pointb=(0.7, 0.07), title_height=0.02, fmt="%.3g",
+        )  # fmt: skip
+    return shown.plotter

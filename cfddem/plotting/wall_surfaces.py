@@ -12,7 +12,7 @@ from cfddem.analysis.report import case_of
 from cfddem.backend.errors import CfddemError
 from cfddem.case.wall_geometry import extent, triangles
 from cfddem.case.walls import CaseWall
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.particles.walls.motion import Motion
 
 COLOUR, OPACITY, EDGE = "#6b6b6b", 0.18, "#3c3c3c"
@@ -25,7 +25,7 @@ SHARP = 25.0
 """Angle between two triangles from which their common edge is drawn [degrees]."""
 
 
-def walls_of(run: Run) -> tuple[CaseWall, ...]:
+def walls_of(run: RunData) -> tuple[CaseWall, ...]:
     """The walls of a run beside those of its column; none if its case or its surface files cannot be read."""
     try:
         return case_of(run).wall
@@ -33,7 +33,7 @@ def walls_of(run: Run) -> tuple[CaseWall, ...]:
         return ()
 
 
-def with_walls(bounds: np.ndarray, run: Run) -> np.ndarray:
+def with_walls(bounds: np.ndarray, run: RunData) -> np.ndarray:
     """Bounds (3, 2) [m] that also hold the walls of a run, as far as these have ends and lie in the column."""
     try:
         case = case_of(run)

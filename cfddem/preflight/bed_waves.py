@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+from cfddem.backend.tables import table
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import BedEstimate
 from cfddem.preflight.issue import Issue, plain
@@ -108,12 +109,13 @@ def lines(found: BedWaves) -> list[str]:
         temperature = made["granular_temperature"]
         share = temperature / made["slip"] ** 2
         out.append(f"Granular temperature by agitation: {temperature:.2g} m2/s2, {share:.2g} of the squared slip")
-    head = f"{'wavelength':>12}{'speed':>10}{'growth':>10}{'on cells':>10}"
-    units = f"{'mm':>12}{'m/s':>10}{'1/s':>10}{'1/s':>10}"
-    out += ["", head + f"{'agitated':>10}" * agitated, units + f"{'1/s':>10}" * agitated]
+    rows: list[tuple[str, ...]] = [("mm", "m/s", "1/s", "1/s", "1/s")]
     for row in made["waves"]:
-        text = f"{1e3 * row['wavelength']:>12.1f}{row['speed']:>10.3f}{row['growth']:>10.2f}{row['on_cells']:>10.2f}"
-        out.append(text + f"{row['agitated']:>10.2f}" * agitated)
+        rates = (f"{row[name]:.2f}" for name in ("growth", "on_cells", "agitated"))
+        rows.append((f"{1e3 * row['wavelength']:.1f}", f"{row['speed']:.3f}", *rates))
+    columns = 4 + agitated
+    headings = ("wavelength", "speed", "growth", "on cells", "agitated")[:columns]
+    out += ["", *table([row[:columns] for row in rows], headings, right=range(columns), widths=(12, 9, 9, 9, 9))]
     meaning = "growth: by theory; on cells: less the damping of the cells"
     out += ["", meaning + "; agitated: on cells, with agitation" * agitated]
     fastest = made["fastest"]

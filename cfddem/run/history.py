@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfddem.analysis import measures, mixing
+from cfddem.analysis import measures
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
@@ -276,13 +276,13 @@ def agitation_out_of_range_count(simulation: Simulation) -> float:
 @measure("1", when=_is_mixture)
 def mixing_index(simulation: Simulation) -> float:
     """Mixing index of nearest neighbours, 0 segregated, 1 randomly mixed."""
-    return mixing.neighbour_mixing_index(simulation.whole("species"), simulation.whole("position"))
+    return measures.neighbour_mixing_index(simulation.whole("species"), simulation.whole("position"))
 
 
 @measure("1", when=_is_mixture)
 def lacey_index(simulation: Simulation) -> float:
     """Mixing index of Lacey for the first species, in cells of the fluid grid."""
-    return mixing.lacey_index(simulation.whole("species") == 0, cells_of(simulation))
+    return measures.lacey_index(simulation.whole("species") == 0, cells_of(simulation))
 
 
 def _mean_height_columns(case: Case) -> dict[str, Quantity]:

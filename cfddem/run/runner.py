@@ -25,13 +25,11 @@ from cfddem.io.folder import AVERAGES_FROM, read_about
 from cfddem.io.kept_files import prepare_folder, text_with_kept_files, with_kept_files
 from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, Quantity, of_fields
-from cfddem.io.rank_folders import folder_of_ranks
-from cfddem.io.writer import RunFolder
+from cfddem.io.writer import RunFolder, folder_of_ranks
 from cfddem.model.feature import Feature, Function
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
 from cfddem.particles.guard import guard
 from cfddem.run import history
-from cfddem.run.known_means import averages_from, require_measures_of
 from cfddem.run.own_laws import record_of, require_compiled, warn_of_changes
 from cfddem.run.progress import Status
 from cfddem.run.resuming import (
@@ -42,7 +40,7 @@ from cfddem.run.resuming import (
     status_restored_on_refusal,
 )
 from cfddem.run.simulation import Callback, Simulation
-from cfddem.run.stopping import StopRequest
+from cfddem.run.stopping import StopRequest, averages_from, require_measures_of
 
 CHECKPOINT_SHARE = 0.02
 """A checkpoint is written with every snapshot, unless checkpoints would take more than this share of the wall time."""

@@ -7,7 +7,7 @@
 from pathlib import Path
 
 from cfddem.case.gallery import copy_from_gallery
-from cfddem.run.sweep import sweep
+from cfddem.studies.sweep import sweep
 
 case = Path("liquid_bed.toml")
 if not case.exists():

@@ -22,7 +22,8 @@ ROOMS = {
     "closures": ("Laws", "Physical laws as scalar functions: one function per equation."),
     "cfddem/case": ("Case", "Case files: schema, materials, input errors, the gallery."),
     "cfddem/preflight": ("Pre-run check", "Estimates, warnings and errors before a run."),
-    "cfddem/run": ("Run", "Simulation, time step, run folder, sweeps, budgets."),
+    "cfddem/run": ("Run", "Simulation, time step, run folder, history, budgets."),
+    "cfddem/studies": ("Studies", "Sweeps, samples, calibration, job arrays, a run in a notebook."),
     "cfddem/particles": (
         "Particles",
         "Discrete-element solver: contacts, films, bridges, walls, neighbours, packings.",
@@ -34,7 +35,10 @@ ROOMS = {
     "cfddem/io": ("Input and output", "Run folders, snapshots, checkpoints, reading, export."),
     "cfddem/analysis": ("Analysis", "Measures of a run, time series, bubbles, mixing, reports."),
     "cfddem/plotting": ("Plotting", "Pictures, movies and curves from run folders."),
-    "cfddem/backend": ("Backend", "Compilation and caching of loops, threads, errors, the communicator."),
+    "cfddem/backend": (
+        "Backend",
+        "Compilation and caching of loops, threads, errors, the communicator, printed tables.",
+    ),
     "scenarios": ("Scenarios", "Cases that can be run from Python."),
 }
 """Folder of modules -> title and sentence."""
@@ -47,6 +51,7 @@ TABLES = {"material": "[material.NAME]", "pair": "[pair.NAME.NAME]", "compare": 
 HIDDEN = {
     "scenarios/validation",
     "scenarios/benchmarks",
+    "scenarios/references/resolved_suspension",
     "figures.py",
     "validation.py",
     "checks.py",
@@ -264,7 +269,7 @@ def notebooks() -> list[tuple[str, str]]:
 def changes() -> str:
     """CHANGELOG.md with links to pages of the site."""
     text = (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "](")
-    return re.sub(r"\]\(scenarios/[\w/]*?(\w+)/README\.md\)", r"](gallery/\1.md)", text)
+    return re.sub(r"\]\(scenarios/[\w/]*?(\w+)/README\.md(#[\w-]*)?\)", r"](gallery/\1.md\2)", text)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:

@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cfddem.case.schema import Case
+from cfddem.fluid import budgets
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
 from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed import study as liquid_bed
@@ -197,12 +198,12 @@ def conserved(curves: Curves) -> list[Row]:
     simulation.particle_solver.refresh()
     scale = float((particles.mass * np.linalg.norm(particles.velocity, axis=1)).sum())
     drift = []
-    start = (particles.mass[:, None] * particles.velocity).sum(axis=0) + fluid.momentum()
+    start = (particles.mass[:, None] * particles.velocity).sum(axis=0) + budgets.momentum(fluid)
     volume = float((4.0 / 3.0 * math.pi * particles.radius**3).sum())
     for _ in range(1000):
         simulation.step()
         particles = simulation.particles
-        now = (particles.mass[:, None] * particles.velocity).sum(axis=0) + fluid.momentum()
+        now = (particles.mass[:, None] * particles.velocity).sum(axis=0) + budgets.momentum(fluid)
         drift.append(float(np.abs(now - start).max()) / scale)
     curves["momentum"] = {"drift": (np.array(drift), "-")}
     solids = float((1.0 - fluid.voidage).sum()) * fluid.grid.cell_volume / volume

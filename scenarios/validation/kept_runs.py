@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.case.schema import Case
-from cfddem.io.file_lock import lock_file
-from cfddem.io.reading import Run as Written
-from cfddem.io.reading import open_run
+from cfddem.io.files import lock_file
+from cfddem.io.reading import RunData, open_run
 from cfddem.run.progress import Status
 from cfddem.run.runner import Run
 from scenarios.validation.table import Progress, replacing
 
 
-def finished(case: Case, folder: Path, name: str, progress: Progress, changes: dict[str, Any]) -> Written:
+def finished(case: Case, folder: Path, name: str, progress: Progress, changes: dict[str, Any]) -> RunData:
     """The finished run of a case with changes, in its folder; runs or continues it where needed."""
     home = folder / name
 

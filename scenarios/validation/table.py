@@ -8,25 +8,15 @@ passes or fails; a row without a limit is for information.
 from __future__ import annotations
 
 import csv
-import json as _json
 import os
-import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
-from importlib import import_module, resources
-from importlib.metadata import version
+from importlib import resources
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import numpy as np
-
-from cfddem.backend.errors import InputError
-from scenarios.validation.targets import TARGETS
-
-WIDTH = 100
-"""Width of a printed table [characters]."""
 
 Progress = Callable[[str], None]
 Columns = Mapping[str, tuple[Any, str]]
@@ -94,99 +84,6 @@ def in_parts(
 def _size(difference: float) -> float:
     """Magnitude; NaN counts as infinite."""
     return float("inf") if difference != difference else abs(difference)
-
-
-def validate(
-    name: str, output: Path, json: bool = False, data: Sequence[Path] = (), hours: float | None = None
-) -> bool:
-    """Run a target, print its table and write its files into `output`/`name`.
-
-    name     one of TARGETS
-    output   folder for all targets
-    json     print the table as JSON
-    data     files of measured points, for targets that have a function `compare_data`
-    hours    after which a target of `PIECEMEAL` begins no further piece; the table is made of those there are
-    returns  whether every limit holds
-    """
-    folder = Path(output) / name
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / ".writable").touch()
-        (folder / ".writable").unlink()
-    except OSError as refusal:
-        raise InputError("output", str(output), "a folder that can be written", str(refusal)) from refusal
-    begin = perf_counter()
-    with _progress(name) as progress:
-        module = import_module(TARGETS[name])
-        compared: Sequence[Row] = [module.compare_data(folder, path) for path in data]  # wrong files end early
-        limited = {} if hours is None else {"hours": hours}
-        rows: Sequence[Row] = [*module.study(folder, progress, **limited), *compared]
-    seconds = perf_counter() - begin
-    report = {
-        "target": name,
-        "holds": all(row.verdict != "FAILS" for row in rows),
-        "seconds": round(seconds, 1),
-        "versions": {"python": platform.python_version()}
-        | {package: version(package) for package in ("cfddem", "numpy", "numba")},
-        "rows": [row.as_dict() for row in rows],
-    }
-    text = _json.dumps(_finite(report), indent=1)
-    with replacing(folder / "table.json") as path:
-        path.write_text(text + "\n", encoding="utf-8")
-    if json:
-        print(text)
-    else:
-        _show(name, rows, folder, seconds)
-    return bool(report["holds"])
-
-
-def _finite(value: Any) -> Any:
-    """The same value with None for NaN and infinity, which JSON cannot hold."""
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
-
-
-@contextmanager
-def _progress(name: str) -> Iterator[Progress]:
-    """Show on a terminal what is being computed; print nothing otherwise."""
-    from rich.console import Console
-
-    with Console(stderr=True).status(name) as status:
-        yield lambda doing: status.update(f"{name}: {doing}")
-
-
-def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
-    """Print the table, the verdict and the folder of the files."""
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    console = Console(highlight=False)
-    console = Console(highlight=False, width=min(WIDTH, console.width) if console.is_terminal else WIDTH)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("quantity (worst of n)", overflow="fold")
-    for heading in ("model", "reference", "difference", "limit"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict", no_wrap=True)
-    colour = {"holds": "green", "FAILS": "bold red", "report": "dim"}
-    for row in rows:
-        label = escape(row.quantity if row.unit == "-" else f"{row.quantity} [{row.unit}]")
-        verdict = f"[{colour[row.verdict]}]{row.verdict}"
-        table.add_row(label, *map(_number, (row.value, row.reference, row.difference, row.limit)), verdict)
-    console.print(table)
-    failed = sum(row.verdict == "FAILS" for row in rows)
-    judged = sum(row.verdict != "report" for row in rows)
-    console.print(f"{name}: {judged - failed} of {judged} limits hold; {len(rows) - judged} rows are for information.")
-    print(f"{seconds:.0f} s; figures, histories and table in {folder}")
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
 
 
 @contextmanager

@@ -1,6 +1,22 @@
-"""Targets of `cfddem validate`. Importing this module loads none of them."""
+"""Targets of `cfddem validate`, and how one is run. Importing this module loads none of them."""
 
 from __future__ import annotations
+
+import json as _json
+import platform
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+from cfddem.backend.errors import InputError
+from cfddem.backend.tables import WIDTH, grid
+
+if TYPE_CHECKING:
+    from scenarios.validation.table import Progress, Row
 
 TARGETS: dict[str, str] = {
     "binary-collision": "scenarios.collisions.immersed_pair.validation",
@@ -15,7 +31,7 @@ TARGETS: dict[str, str] = {
     "wet-beds": "scenarios.beds.wet_bed.validation",
     "waves": "scenarios.validation.bed_waves.study",
     "agitation": "scenarios.validation.agitation.study",
-    "resolved": "scenarios.validation.resolved_suspension.study",
+    "resolved": "scenarios.references.resolved_suspension.study",
 }
 """Name of each target, and the module that holds its `study`."""
 
@@ -24,3 +40,99 @@ ONLY_IF_NAMED = ("resolved", "wet-beds")
 
 PIECEMEAL = ("wet-beds",)
 """Targets that make their table of what has been computed, and go on with the rest another time."""
+
+
+def validate(
+    name: str, output: Path, json: bool = False, data: Sequence[Path] = (), hours: float | None = None
+) -> bool:
+    """Run a target, print its table and write its files into `output`/`name`.
+
+    name     one of TARGETS
+    output   folder for all targets
+    json     print the table as JSON
+    data     files of measured points, for targets that have a function `compare_data`
+    hours    after which a target of `PIECEMEAL` begins no further piece; the table is made of those there are
+    returns  whether every limit holds
+    """
+    from scenarios.validation.table import replacing
+
+    folder = Path(output) / name
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / ".writable").touch()
+        (folder / ".writable").unlink()
+    except OSError as refusal:
+        raise InputError("output", str(output), "a folder that can be written", str(refusal)) from refusal
+    begin = perf_counter()
+    with _progress(name) as progress:
+        module = import_module(TARGETS[name])
+        compared: Sequence[Row] = [module.compare_data(folder, path) for path in data]  # wrong files end early
+        limited = {} if hours is None else {"hours": hours}
+        rows: Sequence[Row] = [*module.study(folder, progress, **limited), *compared]
+    seconds = perf_counter() - begin
+    report = {
+        "target": name,
+        "holds": all(row.verdict != "FAILS" for row in rows),
+        "seconds": round(seconds, 1),
+        "versions": {"python": platform.python_version()}
+        | {package: version(package) for package in ("cfddem", "numpy", "numba")},
+        "rows": [row.as_dict() for row in rows],
+    }
+    text = _json.dumps(_finite(report), indent=1)
+    with replacing(folder / "table.json") as path:
+        path.write_text(text + "\n", encoding="utf-8")
+    if json:
+        print(text)
+    else:
+        _show(name, rows, folder, seconds)
+    return bool(report["holds"])
+
+
+def _finite(value: Any) -> Any:
+    """The same value with None for NaN and infinity, which JSON cannot hold."""
+    import numpy as np
+
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_finite(each) for each in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Progress]:
+    """Show on a terminal what is being computed; print nothing otherwise."""
+    from rich.console import Console
+
+    with Console(stderr=True).status(name) as status:
+        yield lambda doing: status.update(f"{name}: {doing}")
+
+
+def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
+    """Print the table, the verdict and the folder of the files."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console(highlight=False)
+    console = Console(highlight=False, width=min(WIDTH, console.width) if console.is_terminal else WIDTH)
+    colour = {"holds": "green", "FAILS": "bold red", "report": "dim"}
+    shown: list[Sequence[str | Text]] = [
+        (
+            row.quantity if row.unit == "-" else f"{row.quantity} [{row.unit}]",
+            *map(_number, (row.value, row.reference, row.difference, row.limit)),
+            Text(row.verdict, style=colour[row.verdict], no_wrap=True),
+        )
+        for row in rows
+    ]
+    headings = ("quantity (worst of n)", "model", "reference", "difference", "limit", "verdict")
+    console.print(grid(shown, headings, right=(1, 2, 3, 4), widths=(20, 0, 0, 0, 0, 7), gap=2))
+    failed = sum(row.verdict == "FAILS" for row in rows)
+    judged = sum(row.verdict != "report" for row in rows)
+    console.print(f"{name}: {judged - failed} of {judged} limits hold; {len(rows) - judged} rows are for information.")
+    print(f"{seconds:.0f} s; figures, histories and table in {folder}")
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"

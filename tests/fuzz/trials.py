@@ -191,7 +191,7 @@ def folder_trial(around: Surroundings, chance: random.Random) -> str:
 
     def read() -> None:
         run = open_run(folder)
-        assert repr(run).startswith("Run(")
+        assert repr(run).startswith("RunData(")
         for name in run.fluid_fields:
             run.fluid(name, 0)
         run.particles(-1), run.history, run.collisions, run.times
@@ -249,8 +249,8 @@ def called(words: list[str]) -> tuple[int, str, str]:
     out, err, code = io.StringIO(), io.StringIO(), 0
     stop = mock.Mock(side_effect=Started)
     patches = {
-        "cfddem.run.runner.Simulation": stop, "cfddem.run.sweep.on_this_machine": stop, "os.execv": stop,
-        "cfddem.plotting.browser.browse": stop, "scenarios.validation.table.validate": stop,
+        "cfddem.run.runner.Simulation": stop, "cfddem.studies.sweep.on_this_machine": stop, "os.execv": stop,
+        "cfddem.plotting.browser.browse": stop, "cfddem.cli.validation.run": stop,
         "scenarios.benchmarks.dense_bed.bench": stop, "scenarios.beds.gas_bed.study.bench": stop,
         "sys.argv": ["cfddem", *words],
     }  # fmt: skip

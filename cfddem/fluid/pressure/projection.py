@@ -12,54 +12,63 @@ from __future__ import annotations
 
 import numpy as np
 
+from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import prange, threaded
+from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import refuse_nan
+from cfddem.fluid.fields import CellFields
 from cfddem.fluid.grid import LOW, UNIT, Array
 from cfddem.fluid.momentum import inside, line, strides
 from cfddem.fluid.pressure.ranks import pressure_equation
 from cfddem.fluid.pressure.regions import ClosedRegions
-from cfddem.fluid.state import FluidState
 
 
 class Projection:
     """Corrects velocities and the pressure of a fluid so that continuity holds.
 
-    fluid  with the mobility of its faces and the new rate of change of its voidage
+    boundaries  of its grid
+    fields      with the mobility of faces and the new rate of change of the voidage
     """
 
-    def __init__(self, fluid: FluidState) -> None:
-        self.fluid, grid, communicator = fluid, fluid.grid, fluid.communicator
-        closed_regions = ClosedRegions.of(grid, fluid.boundaries, communicator)
-        outlets = fluid.boundaries.outlets
-        self._equation = pressure_equation(grid, closed_regions, communicator, fluid.boundaries.periodic, outlets)
+    def __init__(self, boundaries: Boundaries, fields: CellFields, communicator: Communicator) -> None:
+        self.boundaries, self.fields, self.communicator = boundaries, fields, communicator
+        grid = self.grid = boundaries.grid
+        closed_regions = ClosedRegions.of(grid, boundaries, communicator)
+        self._equation = pressure_equation(grid, closed_regions, communicator, boundaries.periodic, boundaries.outlets)
+        self._open = grid.open.astype(float)
+        self._areas = np.array([grid.face_area(d) for d in range(3)])
+        self._inverse = 1.0 / np.array(grid.spacing)
         self._missing = np.zeros(grid.shape)  # fluid that each cell lacks [m3/s]
 
-    def correct(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
+    def correct(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool, time: float) -> int:
         """Correct a velocity and the pressure; returns the iterations it took.
 
         velocity, voidage  padded
         limit  largest residual of a cell [m3/s]
         scale  largest volume flux [m3/s]
         fresh  whether the mobility is new, and with it the coefficients of the equation
+        time   for messages [s]
         """
-        fluid, fields, equation, missing = self.fluid, self.fluid.fields, self._equation, self._missing
+        grid, boundaries, fields, equation, missing = (
+            self.grid, self.boundaries, self.fields, self._equation, self._missing,
+        )  # fmt: skip
         ax, ay, az, anchor = equation.coefficients
         assemble(
-            velocity, fields.mobility, voidage, fields.new_voidage_rate, fluid.open_cells, fresh,
-            fluid.boundaries.halo.ends, fluid.face_areas, fluid.inverse_spacing, ax, ay, az, anchor, missing,
+            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, fresh, boundaries.halo.ends,
+            self._areas, self._inverse, ax, ay, az, anchor, missing,
         )  # fmt: skip
         if fresh:
             equation.prepare()
-        refuse_nan(fluid.grid, missing, fluid.time, fluid.communicator)
+        refuse_nan(grid, missing, time, self.communicator)
         if equation.closed_regions is not None:
-            equation.closed_regions.refuse_imbalance(missing, scale, fluid.time)
+            equation.closed_regions.refuse_imbalance(missing, scale, time)
         correction, iterations = equation.solve(missing, limit)
         if iterations:
-            fluid.grid.inner(fields.correction)[:] = correction
-            fluid.boundaries.fill_pressure(fields.correction, correction=True)
-            subtract_gradient(velocity, fields.mobility, fields.correction, fluid.inverse_spacing)
-            fluid.pressure[:] += correction
-        fluid.boundaries.fill_velocity(velocity)
+            grid.inner(fields.correction)[:] = correction
+            boundaries.fill_pressure(fields.correction, correction=True)
+            subtract_gradient(velocity, fields.mobility, fields.correction, self._inverse)
+            fields.owned("pressure")[:] += correction
+        boundaries.fill_velocity(velocity)
         return iterations
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cfddem.fluid.budgets import continuity_residual, drag_exchange
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
 
@@ -19,7 +20,7 @@ def momentum_imbalance(fluid: FluidSolver, particles: Particles) -> float:
     and outlets belongs to neither.
     """
     total = fluid.communicator.sum
-    given, got = total(fluid.drag_exchange(), axis=(0, 1, 2)), total(particles.drag_impulse, axis=0)
+    given, got = total(drag_exchange(fluid), axis=(0, 1, 2)), total(particles.drag_impulse, axis=0)
     scale = max(total(np.abs(particles.drag_impulse)), 1e-300)
     return float(max(abs(component) for component in given + got) / scale)
 
@@ -28,4 +29,4 @@ def volume_imbalance(fluid: FluidSolver) -> float:
     """Largest volume gained by a cell and not through its faces in the last step, over the largest flux [-]."""
     largest = fluid.communicator.largest
     flux = max(largest(np.abs(fluid.volume_flux(d))) * fluid.grid.face_area(d) for d in range(3))
-    return float(largest(np.abs(fluid.continuity_residual())) / max(flux, 1e-300))
+    return float(largest(np.abs(continuity_residual(fluid))) / max(flux, 1e-300))

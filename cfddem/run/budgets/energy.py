@@ -12,6 +12,7 @@ from typing import Any
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.terms import CouplingTerms
 from cfddem.coupling.work_on_particles import CouplingWork
+from cfddem.fluid import budgets
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.solver import ParticleSolver
@@ -113,7 +114,7 @@ class EnergyLedger:
     def after_fluid_step(self, terms: CouplingTerms) -> None:
         """Add the work on the fluid, after `Coupling.apply` and before the particles move."""
         assert self.fluid is not None and self._work is not None
-        fluid, sums, done = self.fluid, self.sums, self.fluid.work()
+        fluid, sums, done = self.fluid, self.sums, budgets.works(self.fluid)
         sums["inflow"] += done.inflow + done.held
         sums["driving"] += done.driving
         sums["model_b"] += done.model_b + (done.solids if fluid.model == "B" else 0.0)
@@ -219,7 +220,7 @@ class EnergyLedger:
         if self.fluid is None:
             return stored
         return stored | {
-            "fluid_kinetic": self.fluid.kinetic_energy(),
+            "fluid_kinetic": budgets.kinetic_energy(self.fluid),
             "added_mass": added_mass_energy(particles, particle_solver.communicator),
             # the fluid has used the voidage before the last step and a half
             "deferred_momentum": -(self._recent[0] + 0.5 * self._recent[1]),

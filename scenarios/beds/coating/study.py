@@ -13,7 +13,7 @@ import numpy as np
 
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def bed() -> Case:
     return Case.from_toml(gallery()["coating"])
 
 
-def coating(run: Run, snapshot: int = -1) -> Coating:
+def coating(run: RunData, snapshot: int = -1) -> Coating:
     """The coating in a snapshot of a run; `snapshot` 0 is the first, -1 the last."""
     liquid = run.particles(snapshot)["liquid_carried"]
     time = float(run.times[snapshot])
@@ -51,7 +51,7 @@ def coating(run: Run, snapshot: int = -1) -> Coating:
     )
 
 
-def distribution(run: Run, edges: np.ndarray, snapshot: int = -1) -> np.ndarray:
+def distribution(run: RunData, edges: np.ndarray, snapshot: int = -1) -> np.ndarray:
     """Share of the particles by liquid over the mean (n,) [-].
 
     edges  of the classes, of liquid over its mean (n + 1,)

@@ -17,7 +17,7 @@ from scipy.ndimage import median_filter
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run as Written
+from cfddem.io.reading import RunData
 from closures.balance import Drag, fluidising_velocity
 
 PACKED = (0.2, 0.8)
@@ -41,7 +41,7 @@ class Layers:
     voidage: np.ndarray  # (n, levels) mean over the column at each level
 
 
-def layers(run: Written) -> Layers:
+def layers(run: RunData) -> Layers:
     """Voidage profiles of a run, from its snapshots."""
     places = range(len(run.times))
     return Layers(run.times, np.array([run.fluid("voidage", place).mean(axis=(1, 2)) for place in places]))

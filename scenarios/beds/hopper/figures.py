@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.plotting.curves import BLUE, GREY, blank, label, legend, save
 from scenarios.beds.hopper.study import beverloo
 
@@ -19,7 +19,7 @@ FASTEST = 1.0
 """Speed of the brightest colour [m/s]."""
 
 
-def figure(run: Run, case: Case, path: Path) -> None:
+def figure(run: RunData, case: Case, path: Path) -> None:
     """Beads behind the middle plane, coloured by speed, between the walls; and the removed mass against time."""
     drawn, axes = blank(1, len(TIMES) + 1, width=11.0, height=4.2, gridspec_kw={"width_ratios": [1, 1, 1, 1.5]})
     for each, time in zip(axes, TIMES):
@@ -40,7 +40,7 @@ def figure(run: Run, case: Case, path: Path) -> None:
     save(drawn, path)
 
 
-def _beads(axes: Any, run: Run, case: Case, place: int) -> Any:
+def _beads(axes: Any, run: RunData, case: Case, place: int) -> Any:
     """Beads with centres behind the middle plane, the nearest on top."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Circle

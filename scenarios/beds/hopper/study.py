@@ -15,7 +15,7 @@ import numpy as np
 
 from cfddem.case.bed import POURED_SOLID_FRACTION
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from closures import discharge as laws_of_discharge
 
 
@@ -37,7 +37,7 @@ def beverloo(case: Case) -> float:
     return flat * laws_of_discharge.cone_factor(slope)
 
 
-def discharge(run: Run, case: Case) -> Discharge:
+def discharge(run: RunData, case: Case) -> Discharge:
     """Discharge of a run, from the mass that its outlet has removed."""
     begin, end = case.run.average_from or 0.5 * case.run.until, case.run.until
     middle = 0.5 * (begin + end)
@@ -45,7 +45,7 @@ def discharge(run: Run, case: Case) -> Discharge:
     return Discharge(rates[0], (rates[1], rates[2]), beverloo(case))
 
 
-def _slope(run: Run, begin: float, end: float) -> float:
+def _slope(run: RunData, begin: float, end: float) -> float:
     """Removed mass per time [kg/s]."""
     time = run.history["time"]
     inside = (time >= begin) & (time <= end)

@@ -22,8 +22,7 @@ from cfddem.analysis.regimes import regime_map
 from cfddem.analysis.report import window_of
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run as Written
-from cfddem.io.reading import open_run
+from cfddem.io.reading import RunData, open_run
 from scenarios.validation.kept_runs import finished
 from scenarios.validation.table import Progress
 
@@ -131,7 +130,7 @@ def outcomes(home: Path) -> dict[Setting, list[Outcome]]:
     return found
 
 
-def outcome(run: Written, case: Case) -> Outcome:
+def outcome(run: RunData, case: Case) -> Outcome:
     """Averages of one run."""
     begin, end = window_of(run, case)
     inside = run.history["time"] >= begin

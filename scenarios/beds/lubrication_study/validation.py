@@ -3,9 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from scenarios.beds.lubrication_study.figures import MEASURES, measures, profiles, regimes
-from scenarios.beds.lubrication_study.study import MODULI, SETTINGS, Outcome, Setting, mean, outcomes, run_beds
+import numpy as np
+
+from cfddem.analysis.regimes import regime_map
+from cfddem.io.reading import open_run
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, blank, draw_regimes, label, legend, save
+from scenarios.beds.lubrication_study.study import (
+    MODULI,
+    SEEDS,
+    SETTINGS,
+    SPHERES,
+    VISCOSITIES,
+    Outcome,
+    Setting,
+    folder_of,
+    mean,
+    outcomes,
+    run_beds,
+)
 from scenarios.validation.table import Progress, Row
 
 STIFFER = 0.05
@@ -49,3 +66,88 @@ def _of_bed(setting: Setting, beds: list[Outcome]) -> list[Row]:
 def _named(setting: Setting) -> str:
     moved = "" if setting.agitation == "none" else ", with agitation"
     return f"{setting.spheres}, {1e3 * setting.viscosity:g} mPa s{moved}"
+
+
+# ---------------------------------------------------------------- figures
+
+
+COLOURS = dict(zip(SPHERES, (GREY, BLUE, ORANGE, GREEN)))
+MEASURES = {
+    "bed_height": ("bed height", "mm", 1e3),
+    "granular_temperature": ("granular temperature", "mm2/s2", 1e6),
+    "collisions": ("collisions of a sphere", "1/s", 1.0),
+}
+"""Name, unit, and factor from SI to that unit."""
+
+MOST = 8.0
+"""Density of the darkest shade of the maps [1/decade2]."""
+
+Found = dict[Setting, list[Outcome]]
+
+
+def measures(found: Found, path: Path) -> None:
+    """Means with errors for every kind of sphere and both viscosities; stiffer contacts as hollow points."""
+    figure, axes = blank(1, len(MEASURES), width=11.0, height=3.9)
+    for each, (what, (name, unit, factor)) in zip(axes, MEASURES.items()):
+        for place, viscosity in enumerate(VISCOSITIES):
+            for number, spheres in enumerate(SPHERES):
+                for shift, modulus in zip((-0.09, 0.09), MODULI):
+                    beds = found.get(Setting(spheres, viscosity, modulus))
+                    if not beds:
+                        continue
+                    value, error, _ = mean(beds, what)
+                    style: Any = {"mfc": "white"} if modulus != MODULI[0] else {}
+                    named = spheres if place == 0 and modulus == MODULI[0] else None
+                    each.errorbar(
+                        5 * place + number + shift, factor * value, factor * error, fmt="o", capsize=3,
+                        color=COLOURS[spheres], label=named, **style,
+                    )  # fmt: skip
+        label(each, "viscosity", "mPa s", name, unit)
+        each.set_xticks([1.5, 6.5], [f"{1e3 * viscosity:g}" for viscosity in VISCOSITIES])
+        each.set_ylim(0.0, 1.08 * each.get_ylim()[1])
+        each.grid(False, axis="x")
+    legend(axes[0], loc="lower left", ncols=2)
+    save(figure, path)
+
+
+def profiles(found: Found, path: Path) -> None:
+    """Voidage against height, with the error of the mean over seeds."""
+    figure, axes = blank(1, len(VISCOSITIES), width=8.0, height=4.2, sharey=True)
+    for each, viscosity in zip(axes, VISCOSITIES):
+        for spheres in SPHERES:
+            beds = found.get(Setting(spheres, viscosity, MODULI[0]))
+            if not beds:
+                continue
+            value, error, _ = mean(beds, "voidage")
+            height = 1e3 * beds[0].level
+            each.errorbar(value, height, xerr=error, color=COLOURS[spheres], label=spheres, capsize=2, linewidth=1.2)
+        label(each, "voidage", "-", "height", "mm", f"{1e3 * viscosity:g} mPa s")
+    axes[1].set_ylabel("")
+    legend(axes[0], loc="upper left")
+    save(figure, path)
+
+
+def regimes(home: Path, path: Path) -> None:
+    """The regime maps of smooth, rough and soft spheres in both viscosities, all seeds together."""
+    kinds = [spheres for spheres in SPHERES if spheres != "no film"]
+    figure, axes = blank(len(VISCOSITIES), len(kinds), width=11.0, height=6.6, sharex=True, sharey=True)
+    shades: Any = None
+    for place, (viscosity, spheres) in enumerate((v, s) for v in VISCOSITIES for s in kinds):
+        rows: dict[str, list[np.ndarray]] = {}
+        for seed in SEEDS:
+            folder = folder_of(home, Setting(spheres, viscosity, MODULI[0]), seed)
+            if not (folder / "run.json").exists():
+                continue
+            run = open_run(folder)
+            late = run.collisions["end"] >= run.times[-1] / 3.0
+            for name, column in run.collisions.items():
+                rows.setdefault(name, []).append(column[late])
+        found = regime_map({name: np.concatenate(each) for name, each in rows.items()})
+        shades = draw_regimes(axes[place], found, f"{spheres}, {1e3 * viscosity:g} mPa s", most=MOST)
+    for place, each in enumerate(axes):
+        each.set(xlim=(0.03, 300.0), ylim=(1e-5, 100.0))
+        each.set_ylabel("" if place % len(kinds) else "elastohydrodynamic gap\nover roughness  [-]")
+        if place < len(kinds):
+            each.set_xlabel("")
+    figure.colorbar(shades, ax=axes.tolist(), label="density of collisions  [1/decade2]", shrink=0.8)
+    save(figure, path)

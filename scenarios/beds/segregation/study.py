@@ -16,7 +16,7 @@ import numpy as np
 from cfddem.analysis.bed_laws import expansion_exponents
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.mixture import net_downward_forces
@@ -76,7 +76,7 @@ def separation(history: Mapping[str, np.ndarray], names: tuple[str, str], begin:
     return float((2.0 * (above - below) / history["bed_height"][window]).mean())
 
 
-def figure(runs: Mapping[float, Run], path: Path) -> None:
+def figure(runs: Mapping[float, RunData], path: Path) -> None:
     """Two species from the side at the end of each run, and the mean heights of both in time.
 
     runs  by superficial velocity [m/s]
@@ -107,7 +107,7 @@ def figure(runs: Mapping[float, Run], path: Path) -> None:
     save(picture, path)
 
 
-def _width(run: Run) -> float:
+def _width(run: RunData) -> float:
     """Width of the column of a run [m]."""
     assert run.grid is not None
     return run.grid.spacing[0] * run.grid.cells[0]

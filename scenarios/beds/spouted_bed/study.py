@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 
 BED_HEIGHT = 0.2
 """H0, height of the bed at rest in the experiment [m]."""
@@ -45,7 +45,7 @@ def bed() -> Case:
 
 
 def profiles(
-    run: Run, width: float, begin: float, heights: Sequence[float] = HEIGHTS, bin_width: float = 0.008,
+    run: RunData, width: float, begin: float, heights: Sequence[float] = HEIGHTS, bin_width: float = 0.008,
 ) -> list[Profile]:  # fmt: skip
     """Particle velocities across the bed at some heights, averaged over the snapshots of a run.
 

@@ -16,7 +16,7 @@ import numpy as np
 from cfddem.backend.compile import use_threads
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run
+from cfddem.io.reading import RunData
 from cfddem.run.simulation import Simulation
 
 LIQUIDS: dict[str, dict[str, float] | None] = {
@@ -60,7 +60,7 @@ def wide_bed(state: str = "oil 0.1 %") -> Case:
     return bed(state).with_(**changes)
 
 
-def effects(run: Run, begin: float) -> Effects:
+def effects(run: RunData, begin: float) -> Effects:
     """Means of a run from a time on [s]."""
     history = run.history
     late = history["time"] >= begin

@@ -24,11 +24,10 @@ from cfddem.analysis.series import block_average
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run as Written
-from cfddem.io.reading import open_run
+from cfddem.io.reading import RunData, open_run
+from cfddem.plotting.curves import BLUE, GREEN, ORANGE, label, legend, line_styles, panels, save
 from scenarios.beds.defluidisation.study import layers, onset
 from scenarios.beds.gas_bed.study import mueller
-from scenarios.beds.wet_bed.figures import QUANTITIES, Estimate, Ramp, draw
 from scenarios.validation.kept_runs import advanced, taken
 from scenarios.validation.table import Progress, Row
 
@@ -204,7 +203,7 @@ def windows(folder: Path) -> dict[str, dict[int, float]]:
     return ends
 
 
-def rest(run: Written, case: Case) -> float:
+def rest(run: RunData, case: Case) -> float:
     """Time from which on a wet bed is not fluidised [s]; infinite if it is at the end."""
     found = defluidisation_of(run, case)
     return math.inf if found is None else found.time
@@ -283,7 +282,7 @@ def over_packings(runs: Sequence[Means], quantity: str) -> Estimate:
 # ---------------------------------------------------------------- one run
 
 
-def means(run: Written, begin: float, end: float = math.inf) -> Means:
+def means(run: RunData, begin: float, end: float = math.inf) -> Means:
     """Means of a run between two times [s]."""
     inside = (run.history["time"] >= begin) & (run.history["time"] <= end * (1.0 + 1e-9))
     history = {name: column[inside] for name, column in run.history.items()}
@@ -309,7 +308,7 @@ def _deviation(values: np.ndarray) -> Estimate:
     return math.sqrt(square), error / (2.0 * math.sqrt(square)) if square > 0.0 else 0.0
 
 
-def mean_bubble(run: Written, begin: float, end: float = math.inf) -> Estimate:
+def mean_bubble(run: RunData, begin: float, end: float = math.inf) -> Estimate:
     """Diameter of the bubbles in the snapshots between two times, weighted by their areas [m]; NaN without any.
 
     The error takes bubbles of different snapshots as independent. Snapshots are closer than a bubble lives: it is a
@@ -340,3 +339,60 @@ def falling(name: str, folder: Path) -> Ramp:
         return Ramp(time, velocity, share, onset(case, run.history, layers(run), rising=False).velocity)
     except InputError as missing:
         return Ramp(time, velocity, share, math.nan, str(missing))
+
+
+# ---------------------------------------------------------------- figures
+
+
+Estimate = tuple[float, float]
+"""A mean and its standard error."""
+
+QUANTITIES = (
+    ("bubble", "bubble diameter", BLUE, "o"),
+    ("pressure_deviation", "pressure fluctuation", ORANGE, "s"),
+    ("temperature", "granular temperature", GREEN, "^"),
+)
+"""Quantities whose ratios to the dry bed are drawn: name, words, colour, marker."""
+
+SMOOTHED = 0.4
+"""Time over which the curves of the ramps are averaged [s]."""
+
+
+class Ramp(NamedTuple):
+    """A bed while its gas velocity falls."""
+
+    time: np.ndarray  # (n,) [s]
+    velocity: np.ndarray  # (n,) superficial [m/s]
+    share: np.ndarray  # (n,) pressure drop over the weight
+    onset: float  # minimum fluidisation [m/s]; NaN if not found
+    note: str = ""  # why it was not found
+
+
+def draw(
+    path: Path, pulls: Sequence[float], ratios: Mapping[str, Sequence[Estimate]], ramps: Mapping[str, Ramp]
+) -> None:
+    """Ratios to the dry bed against the pull of a bridge, and the pressure drop of the ramps.
+
+    pulls   of each state over the weight of a particle
+    ratios  quantity -> its mean in each state over that of the dry bed
+    ramps   by state
+    """
+    figure, (left, right) = panels(2, width=10.0, height=4.4)
+    for name, words, colour, marker in QUANTITIES:
+        values, errors = np.array(ratios[name]).T
+        left.errorbar(pulls, values, 2.0 * errors, color=colour, marker=marker, capsize=3.0, label=words)
+    left.set_yscale("log")
+    left.set_yticks((0.3, 0.5, 1.0, 2.0), ("0.3", "0.5", "1", "2"))
+    left.minorticks_off()
+    label(left, "pull of a bridge over weight", "-", "over that of the dry bed", "-", "In the bubbling bed")
+    legend(left)
+    for style, (name, ramp) in zip(line_styles(len(ramps)), ramps.items()):
+        width = max(round(SMOOTHED / float(np.median(np.diff(ramp.time)))), 1)
+        kernel = np.full(width, 1.0 / width)
+        velocity, share = (np.convolve(each, kernel, "valid") for each in (ramp.velocity, ramp.share))
+        right.plot(velocity, share, label=name, **style)
+        right.plot([ramp.onset], [1.0], "o", color=style["color"], markersize=7.0)
+    label(right, "gas velocity", "m/s", "pressure drop over weight", "-", "While the velocity falls")
+    if ramps:
+        legend(right)
+    save(figure, path)

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 
 from cfddem.plotting.curves import blank
-from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
-from scenarios.collisions.film_impact.record import Record
-from scenarios.collisions.film_impact.result import FilmImpact, Frame
-from scenarios.collisions.film_impact.solver import Impact
+from scenarios.collisions.film_impact.result import FilmImpact, Frame, Record
+from scenarios.collisions.film_impact.solver import GridImpact
 from scenarios.collisions.film_impact.study import impact
+from scenarios.references.isph.impact import SmoothedImpact
 
 FRAMES, FRAMES_PER_SECOND = 30, 12
 """Frames in the time in which the bead would fall through the film at constant speed, and how fast they are shown."""
@@ -44,7 +43,7 @@ def movie(
     frames: list[Frame] = []
     turning: list[int] = []
 
-    def keep(run: Impact | SmoothedImpact) -> None:
+    def keep(run: GridImpact | SmoothedImpact) -> None:
         turning.extend([run.steps] * (run.contacts > 0 and len(turning) < AFTER_CONTACT))
         due = run.time * velocity / film >= (len(frames) - len(turning)) / FRAMES
         if len(frames) < MOST and (due or turning[-1:] == [run.steps]):

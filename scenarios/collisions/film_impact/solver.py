@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenarios.collisions.film_impact import faces, ledger, liquid, pressure, surface, viscosity, volume, wetting
+from scenarios.collisions.film_impact import faces, ledger, liquid, pressure, surface, viscosity, volume
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.pressure import Bead
 
 FALL = 0.02
 """Longest step of a bead that its weight accelerates, over sqrt(film/g)."""
+
+MISSING = 0.5
+"""The outermost wetted column may lack this share of its volume, summed from the axis [-]."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +25,7 @@ class Settings:
     minimum_gap: float = 1e-6  # at which the solids touch [m]
     flip: float = 0.97  # share of its own velocity that a particle keeps [-]
     per_side: int = 3  # particles along each side of a cell
-    missing: float = wetting.MISSING  # of the wetted radius
+    missing: float = MISSING  # of the wetted radius
     guessed: float | None = None  # share of the guessed wetted radius, instead of the tracked one
     courant: float = 0.5
     contact: bool = True  # the bead rebounds at the minimum gap
@@ -30,7 +34,7 @@ class Settings:
 
 
 @dataclass
-class Impact:
+class GridImpact:
     """State of an impact, advanced by :meth:`step`."""
 
     grid: Grid
@@ -109,9 +113,9 @@ class Impact:
         self.filled = liquid.filled_share(grid, self.particles, self.volume, self.whole)
         if s.guessed is None:
             column = liquid.in_columns(grid, self.particles, self.volume)
-            self.wetted = wetting.wetted_columns(grid, column, bead.radius, s.missing)
+            self.wetted = wetted_columns(grid, column, bead.radius, s.missing)
         else:
-            self.wetted = wetting.guessed_columns(grid, s.guessed, bead.radius, bead.gap, self.film)
+            self.wetted = guessed_columns(grid, s.guessed, bead.radius, bead.gap, self.film)
         self.liquid = self.filled > 0.5
         self.liquid[: self.wetted] |= grid.open_cell[: self.wetted] > 0.0
 
@@ -233,3 +237,28 @@ class Impact:
         thin = viscosity.heights(self.grid, bead.radius, bead.gap) < viscosity.THIN * self.grid.dx
         volume.spread_out(self.particles, self.grid.dx, self.filled, self.grid.open_cell, int(thin.sum()))
         liquid.move(self.particles, self.grid.dx, dt, self.u, self.w, bead.radius, bead.gap)
+
+
+# ---------------------------------------------------------------- wetting
+
+
+def wetted_columns(grid: Grid, column: np.ndarray, radius: float, missing: float = MISSING) -> int:
+    """Number of columns from the axis whose gap is full.
+
+    column   volume of the liquid in each column [m3]
+    radius   of the bead [m]
+    missing  share of its volume that the outermost wetted column may lack
+    """
+    below = min(int(radius / grid.dx), grid.radial)
+    room = (grid.ring * grid.dx)[:below] * grid.open_cell[:below].sum(axis=1)
+    lacking = np.cumsum(room - column[:below])
+    full = np.flatnonzero(lacking <= missing * room)
+    return int(full[-1]) + 1 if len(full) else 0
+
+
+def guessed_columns(grid: Grid, share: float, radius: float, gap: float, film: float) -> int:
+    """The same from a guess instead: a share of the radius of an undisturbed layer of twice its depth, for comparison.
+
+    .. math:: r_w = s \\sqrt{2 R (2 d - z_0 - d)} = s \\sqrt{D (d - z_0)}
+    """
+    return int(share * math.sqrt(max(2.0 * radius * (film - gap), 0.0)) / grid.dx)

@@ -23,14 +23,13 @@ from cfddem.case.materials import Material
 from closures.film_impact import film_added_mass
 from scenarios.collisions.film_impact.cavitation import EXCHANGES
 from scenarios.collisions.film_impact.grid import Grid
-from scenarios.collisions.film_impact.isph.impact import SmoothedImpact
 from scenarios.collisions.film_impact.materials import GLASS, Liquid, liquid_named, touching_gap
 from scenarios.collisions.film_impact.pressure import Bead
-from scenarios.collisions.film_impact.record import Record
-from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact
-from scenarios.collisions.film_impact.solver import Impact, Settings
+from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact, Record
+from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.surface import Tension
 from scenarios.collisions.film_impact.volume import overfilled
+from scenarios.references.isph.impact import SmoothedImpact
 
 METHODS = {"grid": 20, "isph": 5}
 """Method -> cells or layers of particles in the film, if not given."""
@@ -65,7 +64,7 @@ def impact(
     surface_tension: float = 0.0,
     contact_angle: float = 0.0,
     gravity: float = 9.81,
-    progress: Callable[[Impact | SmoothedImpact], None] | None = None,
+    progress: Callable[[GridImpact | SmoothedImpact], None] | None = None,
 ) -> FilmImpact:
     """Let a bead fall through a liquid film onto a plate.
 
@@ -118,9 +117,9 @@ def impact(
     bead = Bead(0.5 * diameter, solid.density * math.pi / 6.0 * diameter**3, film, -velocity)
     of_liquid = (poured.density, poured.viscosity, solid.restitution, gravity, settings)
     if method == "isph":
-        return follow(SmoothedImpact(bead, film, cells, *of_liquid), velocity, solid.density, progress)
-    run = Impact(grid_for(diameter, film, cells, domain), bead, film, *of_liquid)
-    return follow(run, velocity, solid.density, progress)
+        return integrate(SmoothedImpact(bead, film, cells, *of_liquid), velocity, solid.density, progress)
+    run = GridImpact(grid_for(diameter, film, cells, domain), bead, film, *of_liquid)
+    return integrate(run, velocity, solid.density, progress)
 
 
 def _tension(sigma: float, angle: float) -> Tension | None:
@@ -145,11 +144,11 @@ def grid_for(diameter: float, film: float, cells: int, domain: float = 1.0) -> G
     return Grid(math.ceil(domain * width / dx), 5 * cells, dx)
 
 
-def follow(
-    run: Impact | SmoothedImpact,
+def integrate(
+    run: GridImpact | SmoothedImpact,
     velocity: float,
     density: float,
-    progress: Callable[[Impact | SmoothedImpact], None] | None,
+    progress: Callable[[GridImpact | SmoothedImpact], None] | None,
 ) -> FilmImpact:
     """Step until the bead passes the undisturbed surface again, or sticks."""
     begin, record, bead = process_time(), Record(run), run.bead
@@ -184,13 +183,13 @@ def sweep(
     return results
 
 
-def _stuck(run: Impact | SmoothedImpact, velocity: float) -> bool:
+def _stuck(run: GridImpact | SmoothedImpact, velocity: float) -> bool:
     """Whether the bead has turned back before it left, stands still, or bounces without end."""
     fallen_back = run.contacts > 0 and run.bead.velocity <= 0.0 and run.bead.gap > 0.1 * run.film
     return fallen_back or run.contacts >= BOUNCES or run.time > LONGEST * run.film / velocity
 
 
-def _result(run: Impact | SmoothedImpact, record: Record, density: float, seconds: float) -> FilmImpact:
+def _result(run: GridImpact | SmoothedImpact, record: Record, density: float, seconds: float) -> FilmImpact:
     """The result from the end of the run and its record."""
     bead, history, speed = run.bead, record.history(), -record.p1.velocity
     rebounds, energy = math.isfinite(record.p4.velocity), 0.5 * bead.mass * speed**2
@@ -215,7 +214,7 @@ def _result(run: Impact | SmoothedImpact, record: Record, density: float, second
         p3=record.p3,
         p4=record.p4,
         turned_speed=record.turned,
-        turning_energy=run.turning if isinstance(run, Impact) else (math.nan, math.nan),
+        turning_energy=run.turning if isinstance(run, GridImpact) else (math.nan, math.nan),
         fastest=float(-history["velocity"].min()),
         energies=energies,
         ledger_error=lost - sum(energies.values()),
@@ -235,9 +234,9 @@ def _result(run: Impact | SmoothedImpact, record: Record, density: float, second
     )
 
 
-def _warnings(run: Impact | SmoothedImpact) -> tuple[str, ...]:
+def _warnings(run: GridImpact | SmoothedImpact) -> tuple[str, ...]:
     """What the user of the result has to know."""
-    if isinstance(run, Impact) and run.voids is not None and run.voids.unsettled:
+    if isinstance(run, GridImpact) and run.voids is not None and run.voids.unsettled:
         some = f"in {run.voids.unsettled} of {run.steps} steps the cells that cavitate were not found"
         return (
             f"{some} in {EXCHANGES} trials; the pressure may be below {run.voids.floor:g} Pa. Use a smaller courant.",

@@ -124,7 +124,7 @@ def tables(curves: Curves) -> list[Row]:
 
 
 @dataclass(frozen=True)
-class Impact:
+class RandomImpact:
     """A head-on impact drawn at random."""
 
     material: Material
@@ -142,7 +142,7 @@ class Impact:
         return collide(self.material, diameter=self.diameter, velocity=self.speed, stokes=self.stokes, **options)
 
 
-def drawn(count: int, seed: int, restitution: tuple[float, float]) -> Iterator[Impact]:
+def drawn(count: int, seed: int, restitution: tuple[float, float]) -> Iterator[RandomImpact]:
     """Impacts over 0.2 to 13 mm, 50 MPa to 190 GPa, either mechanism, and a range of dry restitution."""
     random = np.random.default_rng(seed)
 
@@ -158,7 +158,7 @@ def drawn(count: int, seed: int, restitution: tuple[float, float]) -> Iterator[I
             restitution=random.uniform(*restitution),
             roughness=between(5e-9, 3e-6) * math.sqrt(diameter / 13e-3),
         )
-        yield Impact(material, diameter, between(0.02, 1.0), between(15.0, 1000.0))
+        yield RandomImpact(material, diameter, between(0.02, 1.0), between(15.0, 1000.0))
 
 
 def integrators(curves: Curves) -> list[Row]:
@@ -215,7 +215,7 @@ class Integrated:
     deformed: int = 0
     refused: int = 0
 
-    def add(self, impact: Impact) -> None:
+    def add(self, impact: RandomImpact) -> None:
         """Run an impact with a converged step, with the drift integrator, and with Verlet unless that is refused."""
         self.deformed += impact.deformed
         exact = impact.collide(step_fraction=CONVERGED).restitution

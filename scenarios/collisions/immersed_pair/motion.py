@@ -124,7 +124,7 @@ AT_REST = 1e-4
 """A pair in contact is at rest when it is slower in three steps, over the impact speed; a rebound is never."""
 
 
-def follow(
+def integrate(
     simulation: ParticleSolver,
     setting: Setting,
     full: bool,

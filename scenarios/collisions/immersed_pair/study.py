@@ -29,7 +29,7 @@ from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
 from closures.kinds import GAP_ARGUMENTS
 from closures.minimum_gap import elastohydrodynamic
-from scenarios.collisions.immersed_pair.motion import Setting, follow, stage
+from scenarios.collisions.immersed_pair.motion import Setting, integrate, stage
 from scenarios.collisions.immersed_pair.surroundings import chosen_forces, fluid_around
 from scenarios.collisions.results import plain
 
@@ -168,7 +168,7 @@ def collide(
     caveats = _check_film_step(setting, laws, step_fraction)
     simulation = stage(setting, table, bodies.materials, laws, full, spin)
     fluid = fluid_around(simulation, chosen_forces(surroundings), fluid_density, viscosity, gravity, against == "wall")
-    history = follow(simulation, setting, full, fluid, until)
+    history = integrate(simulation, setting, full, fluid, until)
     return _result(simulation, setting, table, history, laws, full, caveats)
 
 

@@ -21,8 +21,8 @@ from cfddem.particles.state import make_particles
 from closures import contact, timescales
 from closures.bridge import constant_capillary, davis_tangential, deforming_potential, deforming_share
 from closures.lubrication import film_strength
-from scenarios.collisions.three_spheres.events import CONTACT, MEET, SEPARATE, Path
-from scenarios.collisions.three_spheres.motion import APART, FIRST, JOINED, SECOND, SPINS, STATE, Numbers
+from scenarios.references.three_spheres.events import CONTACT, MEET, SEPARATE, Path
+from scenarios.references.three_spheres.motion import APART, FIRST, JOINED, SECOND, SPINS, STATE, Numbers
 
 DIAMETER, DENSITY, SPEED = 0.01, 2000.0, 1.0
 """Scales of the run; outcomes depend on dimensionless numbers only [m, kg/m3, m/s]."""
@@ -52,10 +52,10 @@ def _pull(gap: float, film: float, surface_tension: float, reduced_radius: float
     return constant_capillary(surface_tension, reduced_radius - 0.25 * touch) if gap < film else 0.0
 
 
-def follow(state: np.ndarray, numbers: Numbers, until: float, overlap: float) -> Path:
+def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float) -> Path:
     """Integrate to the end in the particle engine.
 
-    state    at the start, as in :mod:`scenarios.collisions.three_spheres.motion`
+    state    at the start, as in :mod:`scenarios.references.three_spheres.motion`
     until    end, in delta_12 / v_n0 [-]
     overlap  deepest overlap of an impact without a film over the minimum gap: how soft the solids are [-]
     """

@@ -24,9 +24,9 @@ from joblib import Parallel, delayed
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.launch import safe_workers
-from scenarios.collisions.three_spheres.engine import follow as follow_in_engine
-from scenarios.collisions.three_spheres.events import RELEASE, Path, follow
-from scenarios.collisions.three_spheres.motion import APART, JOINED, STATE, Numbers, view
+from scenarios.collisions.three_spheres.engine import integrate as integrate_in_engine
+from scenarios.references.three_spheres.events import RELEASE, Path, integrate
+from scenarios.references.three_spheres.motion import APART, JOINED, STATE, Numbers, view
 
 PAIRS = (12, 23, 13)
 OUTCOMES = ("FA", "PA1", "PA2", "PA3", "FS")
@@ -148,9 +148,9 @@ def simulate_three_spheres(
 
     diameters = math.cos(one) / film_ratio  # time v_n0 t / delta_12 over time v_10 t / diameter
     if solver == "equations":
-        path = follow(state, modes, numbers, until * diameters, tolerance)
+        path = integrate(state, modes, numbers, until * diameters, tolerance)
     else:
-        path = follow_in_engine(state, numbers, until * diameters, overlap)
+        path = integrate_in_engine(state, numbers, until * diameters, overlap)
     events = tuple(
         Event(kind, PAIRS[pair], time, time / diameters, speed)
         for kind, pair, time, speed in path.events

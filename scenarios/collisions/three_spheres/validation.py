@@ -17,8 +17,8 @@ from cfddem.plotting.curves import save
 from closures.restitution import davis_sitison
 from scenarios.collisions.three_spheres import figures
 from scenarios.collisions.three_spheres.study import Triplet, outcomes, simulate_three_spheres
+from scenarios.references.three_spheres.cartesian import cartesian
 from scenarios.validation.table import Columns, Row, reference, worst
-from scenarios.validation.wet.cartesian import cartesian
 
 Curves = dict[str, Columns]
 

@@ -16,7 +16,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from closures import timescales
 from closures.contact import hertz_stiffness
-from scenarios.collisions.wet_pair.motion import Motion, Pair
+from scenarios.references.wet_pair import Motion, Pair
 
 FILM_STEP = 1e-3
 """Step where the solids are apart, over the time in which the pair crosses the film at its present speed."""
@@ -30,7 +30,7 @@ IMPACT_STEP = 0.01
 MOST_STEPS = 2_000_000
 
 
-def follow(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, duration: float) -> Motion:
+def integrate(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, duration: float) -> Motion:
     """Integrate in the particle engine until the bridge has ruptured or the time is over.
 
     liquid    laws of the bridge

@@ -24,8 +24,8 @@ from cfddem.particles.interactions.bridge_law import CUTS, TANGENTIALS, BridgeLa
 from closures import contact
 from closures.lubrication import film_strength
 from closures.minimum_gap import glass_transition
-from scenarios.collisions.wet_pair.engine import follow as follow_in_engine
-from scenarios.collisions.wet_pair.motion import Motion, Pair, follow
+from scenarios.collisions.wet_pair.engine import integrate as integrate_in_engine
+from scenarios.references.wet_pair import Motion, Pair, integrate
 
 BRIDGES = ("deforming", "static")
 SOLVERS = ("equations", "particles")
@@ -117,13 +117,13 @@ def collide_wet(
     laws = _laws(given)
     pair = _pair(given, laws)
     if solver == "equations":
-        motion = follow(pair, laws, angle, duration)
+        motion = integrate(pair, laws, angle, duration)
     else:
         solid = Material(
             density=density, youngs_modulus=youngs_modulus, poisson=poisson, restitution=restitution, friction=friction
         )
-        motion = follow_in_engine(pair, laws, solid, angle, duration)
-    bounces = motion.separated and (angle == 0.0 or follow(pair, laws, 0.0, duration).separated)
+        motion = integrate_in_engine(pair, laws, solid, angle, duration)
+    bounces = motion.separated and (angle == 0.0 or integrate(pair, laws, 0.0, duration).separated)
     return WetPair(
         outcome="bounce" if bounces else "stick_rotate_separate" if motion.separated else "stick",
         restitution=-float(motion.approach[-1]) / pair.speed if motion.separated else 0.0,

@@ -1,6 +1,6 @@
 """A wet impact on a wall in the particle engine: its contact, and a liquid bridge between a particle and a wall.
 
-The bridge has the forces of :mod:`scenarios.collisions.wet_wall.motion` along the normal, as laws of the engine. What
+The bridge has the forces of :mod:`scenarios.references.wet_wall.motion` along the normal, as laws of the engine. What
 the layer does along the wall is added between the steps.
 """
 
@@ -19,7 +19,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import capillary, timescales
-from scenarios.collisions.wet_wall.motion import (
+from scenarios.references.wet_wall.motion import (
     BOUNCES,
     LONGEST,
     PHASES,
@@ -91,7 +91,7 @@ def _rupture(
     return length_from + capillary.rupture_length(capillary_number, contact_angle, liquid)
 
 
-def follow(wet: Wet, solids: tuple[Material, Material], speed: float, along: float, spin: float) -> Path:
+def integrate(wet: Wet, solids: tuple[Material, Material], speed: float, along: float, spin: float) -> Path:
     """Move a sphere that arrives at the surface of the layer, or of a dry wall.
 
     solids  of the sphere and of the wall

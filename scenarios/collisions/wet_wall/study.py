@@ -23,10 +23,10 @@ from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
 from closures import capillary, contact, timescales
 from scenarios.collisions.results import plain
-from scenarios.collisions.wet_wall import motion
-from scenarios.collisions.wet_wall.engine import follow as follow_in_engine
+from scenarios.collisions.wet_wall.engine import integrate as integrate_in_engine
 from scenarios.collisions.wet_wall.materials import BALLS, GLASS, LIQUIDS, Ball, Liquid, half_filling, sliding_friction
-from scenarios.collisions.wet_wall.motion import COLUMNS, Path, Wet, follow
+from scenarios.references.wet_wall import motion
+from scenarios.references.wet_wall.motion import COLUMNS, Path, Wet, integrate
 
 PULLED_IN = {"always": ("I", "III", "IV"), "rebound": ("III", "IV"), "bridge": ("IV",)}
 """Phases with a capillary force, by name; the source does not say whether the first is among them."""
@@ -139,9 +139,9 @@ def impact(
         wet = wet._replace(cutting_time=CUTTING * timescales.hertz_time(wet.mass, wet.stiffness, velocity))
     if _named("solver", solver, {"equations": False, "particles": True}):
         _refuse_other_readings(wet, oblique)
-        path = follow_in_engine(wet, (ball.material, wall), velocity, along, spin)
+        path = integrate_in_engine(wet, (ball.material, wall), velocity, along, spin)
     else:
-        path = follow(wet, velocity, along, spin, tolerance)
+        path = integrate(wet, velocity, along, spin, tolerance)
     return replace(_result(path, wet, velocity, along, spin, filled, rubs), warnings=_nearly_singular(wet))
 
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank, label, legend, panels, save, shades
 from scenarios.collisions.immersed_pair.study import collide
-from scenarios.collisions.wet_wall.checks import independent
 from scenarios.collisions.wet_wall.materials import ALUMINA, FRICTION, GLASS
 from scenarios.collisions.wet_wall.study import Impact, impact, sticking_velocity
+from scenarios.references.wet_wall.checks import independent
 from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
 
 Curves = dict[str, Columns]

@@ -19,12 +19,12 @@ import numpy as np
 from cfddem.backend.compile import use_threads
 from closures.agitation import SHARES, TIMES, free_spheres
 from scenarios.beds.liquid_bed.study import STUDIES, FluidisedBed, Study, coarse_glass, fluidise
+from scenarios.references.resolved_suspension import matrix
+from scenarios.references.resolved_suspension.fitting import fit_levels, fit_shares
+from scenarios.references.resolved_suspension.study import stored
+from scenarios.references.resolved_suspension.suspension import Point
 from scenarios.validation.agitation.unresolved import run
 from scenarios.validation.kept_runs import kept
-from scenarios.validation.resolved_suspension import matrix
-from scenarios.validation.resolved_suspension.fitting import fit_levels, fit_shares
-from scenarios.validation.resolved_suspension.study import stored
-from scenarios.validation.resolved_suspension.suspension import Point
 from scenarios.validation.table import Progress, Row
 
 FITTED_UP_TO = 60.0

@@ -16,9 +16,9 @@ import numpy as np
 from cfddem.case.schema import Case
 from cfddem.run.simulation import Simulation
 from closures.drag_resolved import tenneti
-from scenarios.validation.resolved_suspension.impacts import new_impacts
-from scenarios.validation.resolved_suspension.measures import Series, measure
-from scenarios.validation.resolved_suspension.suspension import OVERLAP, Point, random_arrangement
+from scenarios.references.resolved_suspension.impacts import new_impacts
+from scenarios.references.resolved_suspension.measures import Series, measure
+from scenarios.references.resolved_suspension.suspension import OVERLAP, Point, random_arrangement
 
 DIAMETER, SLIP, DENSITY = 1e-3, 0.05, 1000.0
 """Diameter [m], mean slip [m/s] and fluid density [kg/m3] of the case; results are made dimensionless by them."""

@@ -19,8 +19,7 @@ import numpy as np
 from cfddem.analysis.series import Average, block_average
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run as Written
-from cfddem.io.reading import open_run
+from cfddem.io.reading import RunData, open_run
 from cfddem.run.history import pressure_drop
 from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed.study import alginate
@@ -121,7 +120,7 @@ def _home(name: str, change: str) -> str:
     return f"refinement_{name}_{change}".replace(" ", "_")
 
 
-def same_particles(bed: RefinementBed, run: Written) -> list[Row]:
+def same_particles(bed: RefinementBed, run: RunData) -> list[Row]:
     """Ratios of the pressure drop, and of its deviation, of the particles of the snapshots in finer and finer cells."""
     factors = (1.0, FINER, 2.0 * FINER)
     drops = [instantaneous_drops(bed.case, run, bed.averaged_from, factor) for factor in factors]
@@ -138,7 +137,7 @@ def same_particles(bed: RefinementBed, run: Written) -> list[Row]:
     return rows
 
 
-def instantaneous_drops(case: Case, run: Written, begin: float, factor: float) -> np.ndarray:
+def instantaneous_drops(case: Case, run: RunData, begin: float, factor: float) -> np.ndarray:
     """Pressure drop over the particles of every snapshot from a time on [s], in cells that are finer by a factor."""
     drops = []
     for place in np.flatnonzero(run.times > begin):
@@ -161,7 +160,7 @@ def placed(case: Case, particles: Mapping[str, np.ndarray], factor: float) -> Si
     return simulation
 
 
-def means(run: Written, begin: float) -> Means:
+def means(run: RunData, begin: float) -> Means:
     """Means of a run from a time on [s]."""
     history: Mapping[str, np.ndarray] = run.history
     window = history["time"] > begin

@@ -16,7 +16,7 @@ from cfddem.analysis.measures import pressure_drop
 from cfddem.analysis.series import block_average, even, mean_frequency, spectrum
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.io.reading import Run as Written
+from cfddem.io.reading import RunData
 from closures.bed import exponent_richardson_zaki
 from scenarios.beds.defluidisation.study import layers, onsets
 from scenarios.beds.gas_bed.study import mueller, van_wachem
@@ -188,7 +188,7 @@ def frequency(quantity: str, interval: float, values: np.ndarray) -> Row:
     return Row(f"van Wachem: mean frequency of the {quantity}", here.frequency, there.frequency, limit, "Hz", note)
 
 
-def bubbles(run: Written, begin: float) -> BubbleProfile:
+def bubbles(run: RunData, begin: float) -> BubbleProfile:
     """Bubbles of a flat bed against height, from a time on [s]."""
     assert run.grid is not None
     places = np.flatnonzero(run.times > begin)
@@ -211,7 +211,7 @@ def growing(profile: BubbleProfile) -> list[Row]:
     return [*rows, Row("van Wachem: intervals of height in which bubbles are not larger than below", shrinks, 0.0, 0.0)]
 
 
-def probe(run: Written, begin: float, height: float = PROBE) -> tuple[np.ndarray, np.ndarray]:
+def probe(run: RunData, begin: float, height: float = PROBE) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and pressure at a height over that at the top [Pa], from the snapshots of a run."""
     assert run.grid is not None
     top = run.grid.spacing[2] * run.grid.cells[2]

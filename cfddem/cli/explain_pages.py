@@ -1,0 +1,389 @@
+"""What `cfddem explain` shows: laws with equation, arguments, range, reference and plot, and keys of a case."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import math
+import re
+import textwrap
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic.fields import FieldInfo
+from pylatexenc.latex2text import LatexNodes2Text, MacroTextSpec
+from pylatexenc.latex2text import get_default_latex_context_db as text_of_macros
+from pylatexenc.latexwalker import LatexWalker
+from pylatexenc.latexwalker import get_default_latex_context_db as arguments_of_macros
+from pylatexenc.macrospec import MacroSpec
+
+from cfddem.backend.errors import InputError, nearest
+from cfddem.case.input_errors import sections_of
+from cfddem.case.schema import Case
+from cfddem.cli.scenario_commands import descriptions
+from cfddem.particles.interactions.contact_law import ContactLaw, all_contact_laws, contact_named
+from closures import registry
+from closures.registry import Law
+
+WIDTH = 100
+"""Columns of printed text."""
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
+CONTACT_LAW = "contact_law"
+"""Kind of the contact laws that a run can use."""
+
+OF_CFDEM = {
+    "meilift": "laws.lift",
+    "virtualmassforce": "laws.added_mass",
+    "viscforce": "laws.viscous_stress",
+    "gradpforce": "laws.model: the force of the pressure is always included",
+    "archimedes": "laws.gravity: buoyancy is always included",
+}
+"""Key for each force model of CFDEM that is not a law."""
+
+CURVES = 4
+"""Curves in a plot, one for each value of the second argument."""
+
+
+def laws() -> dict[str, dict[str, Law]]:
+    """All laws by kind and name, including those of installed packages; a contact law by its force."""
+    registry.load_built_in_laws()
+    registry.load_package_laws()
+    contacts = {
+        each.name: Law(each.name, CONTACT_LAW, each.reference, function=each.force) for each in all_contact_laws()
+    }
+    return {**registry.REGISTRY, CONTACT_LAW: contacts}
+
+
+def of_kind(name: str) -> dict[str, dict[str, Law]]:
+    """The laws of a kind; empty if there is no such kind.
+
+    >>> "di_felice" in of_kind("drag")["drag"], of_kind("di_felice")
+    (True, {})
+    """
+    kind = name.replace("-", "_")
+    return {kind: found} if (found := laws().get(kind)) else {}
+
+
+def is_law(name: str) -> bool:
+    """Whether a law has a name, which may begin with its kind."""
+    name = name.replace("-", "_")
+    return any(name in (law.name, f"{law.kind}.{law.name}") for those in laws().values() for law in those.values())
+
+
+def containing(word: str) -> dict[str, dict[str, Law]]:
+    """The laws whose name, first sentence or reference contains a word, by kind.
+
+    >>> "exponent_richardson_zaki" in containing("richardson")["bed"]
+    True
+    """
+    found: dict[str, dict[str, Law]] = {}
+    for law in (law for those in laws().values() for law in those.values()):
+        if word.lower() in f"{law.name} {summary(law)['sentence']} {law.reference}".lower():
+            found.setdefault(law.kind, {})[law.name] = law
+    return found
+
+
+def find(name: str) -> Law:
+    """A law by its name, or by its kind and name where two laws share the name.
+
+    >>> find("di_felice").kind, find("drag.stokes").kind
+    ('drag', 'drag')
+    """
+    kind, _, word = name.replace("-", "_").rpartition(".")
+    every = [law for those in laws().values() for law in those.values()]
+    found = [law for law in every if law.name == word and kind in ("", law.kind)]
+    if not found:
+        closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
+        raise InputError("law", name, f"a name listed by `cfddem explain`{closest}")
+    if len(found) > 1:
+        raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")
+    return found[0]
+
+
+def _closest(word: str, known: list[str]) -> str:
+    """A question for the closest known name, or the key that stands for a force of CFDEM; empty without one."""
+    if word.lower() in OF_CFDEM:
+        return f"; see {OF_CFDEM[word.lower()]}"
+    found = nearest(word, known).partition("did you mean ")[2]
+    return f" (did you mean {found}" if found else ""
+
+
+def summary(law: Law) -> dict[str, Any]:
+    """Documentation of a law as plain values."""
+    text = inspect.getdoc(law.function) or ""
+    equation = re.search(r"\.\. math:: (.*?)\n\n", text + "\n\n", re.DOTALL)
+    return {
+        "name": law.name,
+        "kind": law.kind,
+        "sentence": text.split("\n\n")[0].replace("\n", " "),
+        "equation": " ".join(equation[1].split()) if equation else None,
+        "arguments": list(inspect.signature(law.function).parameters),
+        "ranges": {name: [low, high] for name, (low, high) in law.ranges.items()},
+        "reference": law.reference,
+        "module": law.function.__module__,
+    }
+
+
+def page(law: Law) -> list[str]:
+    """Documentation of a law as text, at most 100 columns wide."""
+    out = [f"{law.name}, {law.kind}   ({law.function.__module__})", ""]
+    text = inspect.getdoc(law.function) or ""
+    paragraphs: list[str] = [each for each in text.split("\n\n") if not each.lstrip().startswith(">>>")]
+    for paragraph in paragraphs:
+        if paragraph.startswith(".. math::"):
+            out += _equation_lines(" ".join(paragraph.removeprefix(".. math::").split()))
+        elif re.match(r"\w+(, \w+)*  +\S", paragraph):
+            for line in plain_words(paragraph).split("\n"):
+                indent = len(line) - len(re.sub(r"^(\w+(, \w+)*)?  +", "", line))
+                out += textwrap.wrap(line, WIDTH, subsequent_indent=" " * indent, drop_whitespace=True) or [""]
+        else:
+            out += textwrap.wrap(" ".join(plain_words(paragraph).split()), WIDTH)
+        out.append("")
+    if law.kind == CONTACT_LAW:
+        out += _contact_lines(contact_named(law.name))
+    for name, (low, high) in law.ranges.items():
+        out.append(f"range of {name}: {low:g} to {high:g}")
+    out += textwrap.wrap(f"reference: {law.reference}", WIDTH, subsequent_indent="  ")
+    return out
+
+
+def _contact_lines(law: ContactLaw) -> list[str]:
+    """Parameters and memory of a contact law."""
+    parameters = ", ".join(f"{name} = {value:g}" for name, value in law.parameters.items())
+    memory = ", ".join(f"{each.name} [{each.unit}]" for each in law.memory)
+    lines = [f"in a case: [laws] contact = {law.name!r}".replace("'", '"')]
+    lines += [f"parameters, in [laws.contact_parameters]: {parameters}"] * bool(parameters)
+    lines += [f"memory of a pair: {memory}"] * bool(memory)
+    return [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
+
+
+def _equation_lines(equation: str) -> list[str]:
+    """An equation in LaTeX as lines of text: one for each part between wide spaces."""
+    out = []
+    for part in re.split(r"\\q?quad|\\\\", equation):
+        text = _solid_brackets(equation_text(part.strip()))
+        out += textwrap.wrap(text, WIDTH - 4, initial_indent="    ", subsequent_indent="        ")
+    return [line.replace(NO_BREAK, " ") for line in out]
+
+
+def _solid_brackets(equation: str) -> str:
+    """An equation without places for a line break inside brackets."""
+    depth, out = 0, ""
+    for letter in equation:
+        depth += (letter in "([") - (letter in ")]")
+        out += NO_BREAK if letter == " " and depth > 0 else letter
+    return out
+
+
+def listing(known: Mapping[str, Mapping[str, Law]]) -> list[str]:
+    """Laws by kind: one line each, and one for the range if there is one, at most 100 columns wide."""
+    out: list[str] = []
+    for kind, those in sorted(known.items()):
+        out += ["", kind.replace("_", " ")]
+        for law in those.values():
+            sentence = plain_words(summary(law)["sentence"])
+            out.append(textwrap.shorten(f"{law.name:.<36} {sentence}", WIDTH - 2, placeholder=" ..."))
+            out[-1] = "  " + re.sub(r"\.{2,}(?= )", lambda dots: " " * len(dots[0]), out[-1], count=1)
+            if law.ranges:
+                out += textwrap.wrap(
+                    f"for {law.range_in_words}", WIDTH, initial_indent=" " * 39, subsequent_indent=" " * 43
+                )
+    return out[1:]
+
+
+def plain_words(text: str) -> str:
+    """Text of a docstring without markup."""
+    text = re.sub(r":\w+:`~?([^`]*)`", r"\1", text)
+    return text.replace("``", "").replace("`", "")
+
+
+# ---------------------------------------------------------------- plot
+
+
+def plot(law: Law, output: Path) -> Path:
+    """Plot a law over its first argument, with one curve for each value of the second.
+
+    output   PNG file
+    returns  the file
+    """
+    from cfddem.plotting import curves as plots
+
+    names = list(inspect.signature(law.function).parameters)
+    spans = {name: _span(law, name) for name in names}
+    middle = {name: values[len(values) // 2] for name, values in spans.items()}
+    figure, axes = plots.panels(width=6.4, height=4.4)
+    others = spans[names[1]] if len(names) > 1 else [math.nan]
+    chosen = [others[round(k * (len(others) - 1) / (CURVES - 1))] for k in range(CURVES)] if len(names) > 1 else others
+    for value, colour in zip(chosen, plots.shades(len(chosen))):
+        fixed = middle | ({names[1]: value} if len(names) > 1 else {})
+        curve = [_value(law, fixed | {names[0]: x}) for x in spans[names[0]]]
+        named = _setting(law, names[1], value) if len(names) > 1 else None
+        axes.plot(spans[names[0]], curve, color=colour, label=named)
+    if spans[names[0]][-1] > 100.0 * spans[names[0]][0] > 0.0:
+        axes.set_xscale("log")
+    low, high = axes.dataLim.intervaly
+    if high > 100.0 * low > 0.0:
+        axes.set_yscale("log")
+    plots.label(axes, names[0].replace("_", " "), unit(law, names[0]), law.name.replace("_", " "), unit(law, "returns"))
+    if len(names) > 1:
+        plots.legend(axes)
+    rest = [_setting(law, name, middle[name]) for name in names[2:]]
+    axes.set_title("\n".join(textwrap.wrap(", ".join(rest), 70)) or law.kind, loc="left", fontsize=9)
+    plots.save(figure, output)
+    return output
+
+
+def unit(law: Law, name: str) -> str:
+    """Unit of an argument, or of what a law returns, from the docstring of the law.
+
+    >>> unit(find("reduced_modulus"), "modulus_j"), unit(find("reduced_modulus"), "returns")
+    ('Pa', 'Pa')
+    """
+    return " or ".join(re.findall(r"\[([^\]]*)\]", descriptions(law.function).get(name, ""))) or "unit not given"
+
+
+def _setting(law: Law, name: str, value: float) -> str:
+    """An argument that is held at a value, as in `viscosity = 0.001 Pa s`."""
+    of = unit(law, name)
+    return f"{name.replace('_', ' ')} = {value:.3g}" + f" {of}" * (of not in ("-", "unit not given"))
+
+
+def _span(law: Law, name: str) -> list[float]:
+    """Values at which an argument is plotted."""
+    from closures.check import samples
+
+    return samples(law, name, 121)
+
+
+def _value(law: Law, arguments: dict[str, float]) -> float:
+    try:
+        return float(law.function(**arguments))
+    except (ArithmeticError, ValueError):
+        return math.nan
+
+
+# ---------------------------------------------------------------- equations on a terminal
+
+
+_FRACTIONS = ("frac", "tfrac", "dfrac")
+_NAME = r"(?:\d+(?:\.\d+)?|[A-Z][a-z]+|\w)"
+_ATOM = re.compile(rf"{_NAME}(?:\^\*)?(?:_\w|_\{{\w+\}})?(?:\^[\w*]|\^\{{\w+\}})?")
+"""Text that needs no brackets in a fraction: a number or symbol with its indices."""
+
+
+def equation_text(equation: str) -> str:
+    r"""An equation in LaTeX as plain text; fractions of sums and products get square brackets.
+
+    >>> equation_text(r"h_\varepsilon = 0.37\,(\eta v / E^*)^{2/5}\,R^{*\,3/5}")
+    'h_ε = 0.37 (η v / E*)^(2/5) R*^(3/5)'
+    >>> equation_text(r"Ar = \frac{g\,\rho_f(\rho_p-\rho_f)d^3}{\eta^2} + \tfrac12")
+    'Ar = [g ρ_f(ρ_p-ρ_f)d^3]/η^2 + 1/2'
+    """
+    source = re.sub(r"\\[,;: ]", "~", equation.replace(r"^\circ", "°").replace("&", ""))
+    nodes, _, _ = LatexWalker(source, latex_context=_parser_macros()).get_latex_nodes()
+    return _plain_indices(_converter().nodelist_to_text(nodes))
+
+
+@cache
+def _parser_macros() -> Any:
+    macros = arguments_of_macros()
+    macros.add_context_category("fractions", macros=[MacroSpec(name, "{{") for name in _FRACTIONS], prepend=True)
+    return macros
+
+
+@cache
+def _converter() -> LatexNodes2Text:
+    macros = text_of_macros()
+    specs = [MacroTextSpec(name, simplify_repl=_fraction) for name in _FRACTIONS]
+    specs += [MacroTextSpec(name, simplify_repl="") for name in ("bigl", "bigr", "Bigl", "Bigr", "!")]
+    macros.add_context_category("equations", macros=specs, prepend=True)
+    return LatexNodes2Text(
+        latex_context=macros,
+        math_mode="text",
+        strict_latex_spaces="based-on-source",
+        keep_braced_groups=True,
+        keep_braced_groups_minlen=2,
+    )
+
+
+def _fraction(node: Any, l2tobj: LatexNodes2Text) -> str:
+    over, under = (_bracketed(l2tobj.nodelist_to_text([each])) for each in node.nodeargd.argnlist)
+    return f" {over}/{under} "
+
+
+def _bracketed(part: str) -> str:
+    """Numerator or denominator, in brackets unless it is a single symbol or number."""
+    part = part.strip()
+    if part.startswith("{") and part.endswith("}"):
+        part = part[1:-1].strip()
+    return part if _ATOM.fullmatch(part) else f"[{part}]"
+
+
+def _plain_indices(text: str) -> str:
+    """Text with braces after ^ and _ replaced by round brackets, or by nothing around a word or a number."""
+    while found := re.search(r"([\^_]?)\{([^{}]*)\}", text):
+        mark, inner = found[1], found[2].strip()
+        bare = not mark or len(inner) == 1 or (inner.isalnum() if mark == "_" else inner.isdigit())
+        text = text[: found.start()] + mark + (inner if bare else f"({inner})") + text[found.end() :]
+    text = re.sub(r"\^\(\* ?(\w)\)", r"*^\1", text)
+    text = re.sub(r"\^\(\* ?([^()]*)\)", r"*^(\1)", text).replace("^*", "*")
+    return re.sub(r"(?<=[\[(]) | (?=[\]),])", "", " ".join(text.split()))
+
+
+# ---------------------------------------------------------------- keys of a case
+
+
+SEVERAL = {name: f"{name}.NAME" for name in ("material", "compare")} | {"pair": "pair.NAME.NAME"}
+SEVERAL |= {name: f"{name}.NUMBER" for name in ("wall", "feed", "outlet")}
+"""Tables that a case has several of, by the place of their keys."""
+
+
+def matching(name: str) -> list[str]:
+    """Documentation of a key, of all keys of a table, or of all keys that contain a word.
+
+    returns  lines of at most 100 columns; empty if nothing matches
+
+    >>> matching("bed.jet.velocity"), matching("run.until")[0][:34]
+    (['bed.jet.velocity = (required)     superficial velocity, upward [m/s]'], 'run.until = (required)            ')
+    """
+    every, word = dict(_keys()), name.lower()
+    plain = {key: re.sub(r"\.(NAME|NUMBER)\b", "", key).lower() for key in every}
+    found = [
+        key for key in every if any(each == word or each.startswith(f"{word}.") for each in (key.lower(), plain[key]))
+    ]
+    found = found or [key for key in every if word in key.lower()]
+    return [line for key in found for line in _lines(key, every[key])]
+
+
+def every_key() -> list[str]:
+    """Names of all keys, with their tables."""
+    return [key for key, _ in _keys()]
+
+
+def _keys() -> Iterator[tuple[str, FieldInfo]]:
+    """Every key with its table."""
+    for name, field in Case.model_fields.items():
+        parts = sections_of(field)
+        if not parts:
+            yield name, field
+            continue
+        for key, each in parts[0].model_fields.items():
+            yield f"{SEVERAL.get(name, name)}.{key}", each
+            below = f"{SEVERAL.get(name, name)}.{key}{'.NAME' * str(each.annotation).startswith('dict')}"
+            for part in sections_of(each):
+                yield from ((f"{below}.{inner}", rest) for inner, rest in part.model_fields.items())
+
+
+def _lines(key: str, field: FieldInfo) -> list[str]:
+    """A key, its default and its meaning."""
+    default = None if field.is_required() else field.get_default()
+    if any(getattr(rule, "gt", None) == default for rule in field.metadata):  # it stands for a key that is left out
+        default = None
+    shown = " = (required)" if field.is_required() else "" if default is None else f" = {json.dumps(default)}"
+    choices = re.findall(r"Literal\[([^\]]*)\]", str(field.annotation))
+    meaning = (field.description or "") + (f"; one of {choices[0]}" if choices else "")
+    return textwrap.wrap(f"{key + shown:<33} {meaning}", WIDTH, subsequent_indent=" " * 34)

@@ -1,0 +1,209 @@
+"""Figures of a sweep, means against the first key that was changed, and of a calibration."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+
+from cfddem.case.compare import ABSCISSAE, Points
+from cfddem.case.input_errors import field_of
+from cfddem.case.schema import Case
+from cfddem.io.quantities import shown_unit
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, SKY, blank, label, legend, legend_below, save, shades
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SHOWN = ("bed_height", "bed_voidage", "pressure_drop")
+"""Measures in the figure."""
+
+VELOCITY = "bed.inlet_velocity"
+"""Key of a sweep beside which measured curves are drawn."""
+
+MOST_LABELLED = 8
+"""Largest number of curves with a legend."""
+
+
+class Point(NamedTuple):
+    """One finished run."""
+
+    values: Mapping[str, Any]  # of the changed keys
+    measures: Mapping[str, tuple[float, float, str]]  # mean, error, unit
+
+
+def sweep_figure(points: Sequence[Point], path: Path, measured: Sequence[Points] = ()) -> bool:
+    """Draw the means against the first key with numbers, one curve for each combination of the other keys.
+
+    Where all keys have words, each word of the first key has its place, and its points are not joined.
+
+    measured  curves against the inlet velocity, for a sweep of it
+    returns   whether there was anything to draw
+    """
+    names = [name for name in SHOWN if points and all(name in each.measures for each in points)]
+    if not names:
+        return False
+    keys = list(points[0].values)
+    first = next((key for key in keys if _is_numeric(points, key)), keys[0])
+    numeric, others = _is_numeric(points, first), [key for key in keys if key != first]
+    groups: dict[str, list[Point]] = {}
+    for each in points:
+        group = ", ".join(f"{key.split('.')[-1]} = {each.values[key]}" for key in others)
+        groups.setdefault(group, []).append(each)
+    ticks = {value: k for k, value in enumerate(dict.fromkeys(str(each.values[first]) for each in points))}
+    figure, panels = blank(1, len(names), width=4.2 * len(names), height=4.0)
+    for name, panel in zip(names, panels):
+        for (group, members), colour in zip(groups.items(), shades(len(groups))):
+            x = [each.values[first] if numeric else ticks[str(each.values[first])] for each in members]
+            mean, error = zip(*(each.measures[name][:2] for each in members))
+            bars = [0.0 if math.isnan(each) else each for each in error]
+            style = "o-" if numeric else "o"
+            panel.errorbar(x, mean, yerr=bars, fmt=style, color=colour, capsize=2.0, label=group or None)
+            if name == "bed_voidage" and numeric and not others:
+                _draw_laws(panel, x, members)
+        if first == VELOCITY:
+            _draw_measured(panel, [each for each in measured if each.quantity == name])
+        unit = shown_unit(points[0].measures[name][2])
+        label(panel, first, unit_of(first), name.replace("_", " "), unit)
+        if not numeric:
+            panel.set_xticks(range(len(ticks)), list(ticks))
+            panel.set_xlabel(first)
+            panel.margins(x=0.2)
+    if others and len(groups) <= MOST_LABELLED:
+        legend_below(figure, panels[0])
+    save(figure, path)
+    return True
+
+
+def _is_numeric(points: Sequence[Point], key: str) -> bool:
+    """Whether all values of a key are numbers."""
+    return all(isinstance(each.values[key], int | float) for each in points)
+
+
+def _draw_measured(panel: Any, measured: Sequence[Points]) -> None:
+    """Draw measured points with their errors."""
+    for each in measured:
+        bars = np.where(np.isfinite(each.error), each.error, 0.0)
+        style = {"color": ORANGE, "markersize": 5.0, "capsize": 2.5, "zorder": 3}
+        panel.errorbar(each.place, each.value, yerr=bars, fmt="s", label=f"measured: {each.name}", **style)
+    if measured:
+        legend(panel)
+
+
+def _draw_laws(panel: Any, x: Sequence[Any], points: Sequence[Point]) -> None:
+    """Draw the voidages by published laws that all points have."""
+    laws = [name for name in points[0].measures if name.startswith("voidage by ")]
+    for name, style in zip(laws, ("--", ":", "-.")):
+        if all(name in each.measures for each in points):
+            panel.plot(x, [each.measures[name][0] for each in points], style, color="0.4", label=name[11:])
+    if laws:
+        legend(panel)
+
+
+def sample_figure(points: Sequence[Point], path: Path) -> bool:
+    """Draw the means of runs with sampled values: a row for each measure, a column for each key.
+
+    returns  whether there was anything to draw
+    """
+    names = [name for name in SHOWN if points and all(name in each.measures for each in points)]
+    if not names:
+        return False
+    keys = list(points[0].values)
+    figure, panels = blank(
+        len(names), len(keys), width=0.6 + 3.4 * len(keys), height=0.6 + 2.8 * len(names), sharex="col", sharey="row"
+    )
+    for place, panel in enumerate(panels):
+        name, key = names[place // len(keys)], keys[place % len(keys)]
+        mean, error = zip(*(each.measures[name][:2] for each in points))
+        bars = [0.0 if math.isnan(each) else each for each in error]
+        panel.errorbar([each.values[key] for each in points], mean, yerr=bars, fmt="o", color=BLUE, capsize=2.0)
+        label(panel, key, unit_of(key), name.replace("_", " "), shown_unit(points[0].measures[name][2]))
+        panel.label_outer()
+    save(figure, path)
+    return True
+
+
+def unit_of(key: str) -> str:
+    """Unit of a key of a case, from its description."""
+    found = re.search(r"\[([^\]]*)\]$", field_of(Case, key.split(".")) or "")
+    return found[1] if found else "-"
+
+
+# ---------------------------------------------------------------- calibration
+
+
+class Found(Protocol):
+    """What the figure needs of a calibration."""
+
+    @property
+    def variables(self) -> Any: ...
+    @property
+    def data(self) -> Any: ...
+    @property
+    def finished(self) -> Any: ...
+    @property
+    def best(self) -> Any: ...
+    def estimates(self) -> list[dict[str, Any]]: ...
+
+
+def calibration_figure(found: Found, path: Path) -> None:
+    """Write the figure."""
+    columns = len(found.variables) + len(found.data)
+    rows = -(-columns // 3)
+    figure, axes = blank(rows, min(columns, 3), width=3.7 * min(columns, 3), height=3.6 * rows)
+    estimates = {each["key"]: each for each in found.estimates()}
+    for each, panel in zip(found.variables, axes):
+        values = [trial.values[each.key] for trial in found.finished]
+        panel.plot(values, [trial.chi2 for trial in found.finished], "o", color=BLUE, markersize=4.5, alpha=0.8)
+        if (estimate := estimates.get(each.key)) is not None:
+            low, high = estimate["value"] - estimate["error"], estimate["value"] + estimate["error"]
+            panel.axvspan(low, high, color=ORANGE, alpha=0.25, linewidth=0)
+            panel.axvline(estimate["value"], color=ORANGE)
+        panel.set(yscale="log", xlim=(each.low, each.high), **({"xscale": "log"} if each.logarithmic else {}))
+        label(panel, each.key.split(".")[-1].replace("_", " "), unit_of(each.key), "mean square difference", "errors²")
+    begin = 0
+    for each, panel in zip(found.data, axes[len(found.variables) :]):
+        end = begin + len(each.value)
+        if each.against:
+            _series(panel, found, each, slice(begin, end))
+        else:
+            _mean(panel, found, each, slice(begin, end))
+        legend(panel)
+        begin = end
+    for panel in axes[:columns]:
+        if panel.get_xscale() == "linear":
+            panel.locator_params(axis="x", nbins=4)
+            panel.ticklabel_format(axis="x", scilimits=(-2, 4), useMathText=True)
+    for panel in axes[columns:]:
+        panel.remove()
+    axes[0].axhline(1.0, color=GREY, linewidth=1.0, linestyle="--")
+    save(figure, path)
+
+
+def _series(panel: Axes, found: Found, data: Points, part: slice) -> None:
+    """Points in time or height beside all trials."""
+    for trial in found.finished:
+        panel.plot(data.place, trial.computed[part], color=SKY, alpha=0.35, linewidth=0.8, marker=".", markersize=3)
+    panel.plot([], [], color=SKY, label="all trials")
+    panel.plot(data.place, found.best.computed[part], color=BLUE, marker=".", label="best trial")
+    style: dict[str, Any] = {"fmt": "o", "color": ORANGE, "capsize": 2.5, "zorder": 3}
+    panel.errorbar(data.place, data.value, yerr=data.error, label="measured", **style)
+    axis = (data.against.replace("_", " "), ABSCISSAE[data.against])
+    label(panel, *axis, data.quantity.replace("_", " "), shown_unit(data.unit))
+
+
+def _mean(panel: Axes, found: Found, data: Points, part: slice) -> None:
+    """Means of all trials against the key that the data identify best, and the measured ones as bands."""
+    shares = [each["error"] / (each["high"] - each["low"]) for each in found.estimates()]
+    key = found.variables[int(np.argmin(shares)) if shares else 0]
+    values = [trial.values[key.key] for trial in found.finished]
+    panel.plot(values, [trial.computed[part][0] for trial in found.finished], "o", color=BLUE, label="trials")
+    for value, error in zip(data.value, data.error):
+        panel.axhspan(value - error, value + error, color=ORANGE, alpha=0.25, linewidth=0)
+        panel.axhline(value, color=ORANGE, label="measured" if value == data.value[0] else None)
+    label(panel, key.key.split(".")[-1].replace("_", " "), unit_of(key.key), data.quantity.replace("_", " "),
+          shown_unit(data.unit))  # fmt: skip

@@ -1,0 +1,361 @@
+"""Calibration: find values of keys for which a case agrees with measured data, and say which the data identify.
+
+Trials are proposed by Optuna (tree-structured Parzen estimator) after a sample of Sobol; every second one lies where
+a smooth fit to all trials has its best point. The journal in the folder holds all trials: the same command continues
+a stopped calibration. A trial that fails is recorded as failed, and the search goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import signal
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.analysis.measured import compared_at, largest_chi2, with_files
+from cfddem.analysis.report import window_of
+from cfddem.analysis.response import Response, fewest_runs, response
+from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.case.compare import Points, held, points_of, require_measured_units, steps_of
+from cfddem.case.schema import Case
+from cfddem.io.files import write_whole
+from cfddem.io.reading import open_run
+from cfddem.run import history
+from cfddem.studies import sweep
+from cfddem.studies.samples import Array, Variable, unit_samples
+
+STUDY = "calibration"
+
+SEED = "bed.seed"
+"""Every trial starts from another random bed, so that the scatter of runs is part of the errors."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One trial that has ended."""
+
+    number: int
+    values: dict[str, float]
+    status: str  # finished, or why it has no value
+    computed: tuple[float, ...]  # of the run at all measured points; empty if it failed
+    chi2: float  # mean square difference in errors of the data; NaN if it failed
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The result of a calibration."""
+
+    variables: tuple[Variable, ...]
+    data: tuple[Points, ...]
+    trials: tuple[Trial, ...]
+    response: Response | None  # None with too few finished trials
+
+    @property
+    def finished(self) -> list[Trial]:
+        """Trials with a value."""
+        return [each for each in self.trials if each.computed]
+
+    @property
+    def best(self) -> Trial | None:
+        """The trial that differs least from the data."""
+        return min(self.finished, key=lambda each: each.chi2, default=None)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the best values agree with the data, in words; empty without a finished trial."""
+        if self.best is None:
+            return ""
+        agrees, chi2, most = self._agrees()
+        if agrees:
+            return "the case agrees with the data at its best values"
+        return (
+            f"no values in these ranges agree with the data: reduced chi-squared {chi2:.3g}, by chance at most "
+            f"{most:.2g}; the estimates are the closest values, not measured ones: check case, data and ranges"
+        )
+
+    def _agrees(self) -> tuple[bool, float, float]:
+        """Whether the best values agree with the data, their reduced chi-squared, and the largest one by chance."""
+        points, chi2 = sum(len(each.value) for each in self.data), min(each.chi2 for each in self.finished)
+        most = largest_chi2(points)
+        if chi2 > most and self.response is not None:
+            chi2, most = self.response.chi2, largest_chi2(max(points - len(self.variables), 1))
+        return chi2 <= most, chi2, most
+
+    def estimates(self) -> list[dict[str, Any]]:
+        """Best value, standard error and verdict of each key, as plain values."""
+        if (found := self.response) is None:
+            return []
+        rows, agrees = [], self._agrees()[0]
+        for place, each in enumerate(self.variables):
+            share, error = float(found.best[place]), float(found.error[place])
+            low, high = (each.value(min(max(end, 0.0), 1.0)) for end in (share - error, share + error))
+            tied = [
+                f"{self.variables[b if a == place else a].key} ({r:+.2f})"
+                for a, b, r in found.tied() if place in (a, b)
+            ]  # fmt: skip
+            identified = bool(found.identified[place])
+            rows.append({
+                "key": each.key, "value": each.value(share), "error": 0.5 * (high - low) if each.logarithmic
+                else error * (each.high - each.low), "low": each.low, "high": each.high,
+                "identified": identified, "tied": tied, "at_limit": min(share, 1.0 - share) < 0.01,
+                "verdict": _verdict(identified, tied, min(share, 1.0 - share) < 0.01, agrees),
+            })  # fmt: skip
+        return rows
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        best = self.best
+        return {
+            "estimates": self.estimates(),
+            "chi2": None if self.response is None else self.response.chi2,
+            "verdict": self.verdict,
+            "best": None if best is None else {"trial": best.number, "values": best.values, "chi2": best.chi2},
+            "trials": len(self.trials),
+            "failed": len(self.trials) - len(self.finished),
+            "data": [{"name": each.name, "quantity": each.quantity, "points": len(each.value)} for each in self.data],
+        }
+
+
+def calibrate(
+    path: Path,
+    match: Sequence[Path],
+    varied: Sequence[Variable],
+    output: Path,
+    *,
+    trials: int = 30,
+    jobs: int = 1,
+    overrides: Mapping[str, Any] | None = None,
+    progress: Callable[[Trial], None] = lambda _: None,
+) -> Calibration:
+    """Search for the values of keys for which a case agrees with measured data.
+
+    path       of the case file
+    match      files of measured points, beside those of `[compare]` in the case
+    varied     keys and their ranges
+    output     folder: `journal.log`, one folder per trial, and the results
+    trials     number of all trials, with those of earlier calls
+    jobs       number of concurrent trials
+    overrides  values that all trials share
+    progress   called after every trial
+    errors     InputError before any trial starts
+    """
+    if trials < 1 or jobs < 1:
+        raise InputError("--trials" if trials < 1 else "--jobs", min(trials, jobs), "at least 1")
+    case = with_files(Case.from_toml(path, overrides), match)
+    data = _data(case)
+    require_measured_units(case, history.units_of(case))
+    for low_or_high in (0.0, 1.0):  # both ends of all ranges are valid values
+        case.with_(**{each.key: each.value(low_or_high) for each in varied})
+    sweep.make_output(output)
+    study = _study(output, _fingerprint(case, varied, data))
+    done = [_trial(each) for each in study.get_trials(deepcopy=False) if "status" in each.user_attrs]
+    search = _Search(study, varied, data, done)
+    while len(search.done) < trials:
+        asked = search.ask(min(jobs, trials - len(search.done)))
+        work = []
+        for number, values in asked:
+            folder = output / f"trial-{number:04d}"
+            try:
+                work.append((case.with_(**values, **_seed(case, varied, number)), values, folder, jobs > 1))
+            except InputError as failure:  # a value or a combination that no case can have
+                progress(search.tell(number, sweep.Outcome(str(folder), values, "refused", str(failure)), ()))
+        for outcome in sweep.on_this_machine(work, jobs):
+            number = int(outcome.name.removeprefix("trial-"))
+            if outcome.status == "stopped":
+                raise RunStopped("calibration stopped; the same command continues it", signal.SIGINT)
+            progress(search.tell(number, outcome, _computed(outcome, case, data)))
+    found = Calibration(tuple(varied), tuple(data), tuple(search.done), _response(varied, data, search.done))
+    write_results(found, output)
+    return found
+
+
+def _data(case: Case) -> list[Points]:
+    data = [points_of(name, each) for name, each in case.compare.items()]
+    if not data:
+        raise InputError("--match", None, "given, or [compare] in the case", "there is nothing to calibrate against")
+    for each in data:
+        if not np.isfinite(each.error).all():  # local: of measured points
+            remedy = "add a column error, or relative_error in [compare] of the case"
+            raise InputError(f"data {each.name}", None, "given with standard errors", remedy)
+        if each.against == "inlet_velocity" and not held(case, each.place).all():  # local: measured points
+            missing = float(each.place[~held(case, each.place)][0])
+            remedy = f"for all points: {steps_of(each.place, case.run.until)}"
+            raise InputError(f"data {each.name} inlet_velocity", missing, "a velocity that the case holds", remedy)
+    return data
+
+
+def _seed(case: Case, varied: Sequence[Variable], number: int) -> dict[str, int]:
+    return {} if SEED in [each.key for each in varied] else {SEED: case.bed.seed + number}
+
+
+# ---------------------------------------------------------------- the search
+
+
+class _Search:
+    """Proposes trials, and keeps those that have ended."""
+
+    def __init__(self, study: Any, varied: Sequence[Variable], data: Sequence[Points], done: list[Trial]) -> None:
+        self.study, self.varied, self.data, self.done = study, varied, data, done
+        self.first = unit_samples(len(varied), 2 * fewest_runs(len(varied)), "sobol")
+        self._open: dict[int, Any] = {}
+
+    def ask(self, count: int) -> Iterator[tuple[int, dict[str, float]]]:
+        """Number and values of the next trials."""
+        import optuna
+
+        ranges = {
+            each.key: optuna.distributions.FloatDistribution(each.low, each.high, log=each.logarithmic)
+            for each in self.varied
+        }
+        for place in range(count):
+            self._enqueue(len(self.done) + place)
+            trial = self.study.ask(ranges)
+            self._open[trial.number] = trial
+            yield trial.number, dict(trial.params)
+
+    def tell(self, number: int, outcome: sweep.Outcome, computed: tuple[float, ...]) -> Trial:
+        """Record a trial that has ended."""
+        import optuna
+
+        trial = self._open.pop(number)
+        status = "finished" if computed else f"{outcome.status}: {outcome.message}".removesuffix(": ")
+        trial.set_user_attr("computed", computed)
+        trial.set_user_attr("status", status)
+        if computed:
+            self.study.tell(trial, chi2_of(computed, self.data))
+        else:
+            self.study.tell(trial, state=optuna.trial.TrialState.FAIL)
+        made = Trial(number, dict(trial.params), status, computed, chi2_of(computed, self.data))
+        self.done.append(made)
+        return made
+
+    def _enqueue(self, place: int) -> None:
+        """Fix the values of the trial at a place: a sample first, then each second one at the best of the fit."""
+        if place < len(self.first):
+            shares = self.first[place]
+        elif place % 2 and (found := _response(self.varied, self.data, self.done)) is not None:
+            spread = np.random.default_rng(place).normal(size=len(found.best))
+            shares = (found.best + 0.5 * found.error * spread).clip(0.0, 1.0)
+        else:
+            return
+        self.study.enqueue_trial({each.key: each.value(share) for each, share in zip(self.varied, shares)})
+
+
+def _study(output: Path, fingerprint: str) -> Any:
+    """The study in a folder; one that another calibration has begun is refused."""
+    if find_spec("optuna") is None:
+        raise InputError("calibrate", None, "used with Optuna", "pip install 'cfddem[calibrate]'")
+    import optuna
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    file = str(output / "journal.log")
+    storage = JournalStorage(JournalFileBackend(file, lock_obj=JournalFileOpenLock(file)))
+    warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
+    sampler = optuna.samplers.TPESampler(seed=1, n_startup_trials=1, multivariate=True)
+    study = optuna.create_study(storage=storage, study_name=STUDY, load_if_exists=True, sampler=sampler)
+    known = study.user_attrs.get("fingerprint")
+    if known not in (None, fingerprint):
+        limit = "a folder of the same case, data and ranges"
+        raise InputError("output", str(output), limit, "choose another folder with -o")
+    study.set_user_attr("fingerprint", fingerprint)
+    for each in study.get_trials(deepcopy=False):
+        if each.state == optuna.trial.TrialState.RUNNING:  # of a process that was killed; it does not count
+            study.tell(each.number, state=optuna.trial.TrialState.FAIL)
+    sampler.reseed_rng()
+    return study
+
+
+def _trial(frozen: Any) -> Trial:
+    computed = tuple(frozen.user_attrs.get("computed", ()))
+    status = frozen.user_attrs["status"]
+    return Trial(
+        frozen.number, dict(frozen.params), status, computed, math.nan if frozen.value is None else frozen.value
+    )
+
+
+def _fingerprint(case: Case, varied: Sequence[Variable], data: Sequence[Points]) -> str:
+    """A number that changes with case, ranges or data."""
+    plain = case.model_copy(update={"compare": {}})
+    points = [
+        [each.name, each.quantity, each.against, each.weight]
+        + [column.tolist() for column in (each.place, each.value, each.error)]
+        for each in data
+    ]
+    text = json.dumps([plain.to_toml(), [list(each) for each in varied], points])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _computed(outcome: sweep.Outcome, case: Case, data: Sequence[Points]) -> tuple[float, ...]:
+    """Values of a run at all measured points; none if it failed, or lacks a value."""
+    if outcome.status != "finished":
+        return ()
+    run = open_run(outcome.folder)
+    begin, _ = window_of(run, case)
+    try:
+        values = np.concatenate([compared_at(run, case, each, begin).computed for each in data])
+    except CfddemError:
+        return ()
+    return tuple(values.tolist()) if np.isfinite(values).all() else ()  # local: of measured points
+
+
+def chi2_of(computed: Sequence[float], data: Sequence[Points]) -> float:
+    """Mean square difference in errors of the data, with the weights of the data; NaN without values."""
+    if not len(computed):
+        return math.nan
+    value, error, weight = _joined(data)
+    squares = ((np.array(computed) - value) / error) ** 2
+    return float((weight * squares).sum() / weight.sum())  # local: of measured points
+
+
+def _joined(data: Sequence[Points]) -> tuple[Array, Array, Array]:
+    """Value, error and weight of all points."""
+    weights = [np.full(len(each.value), each.weight) for each in data]
+    return (
+        np.concatenate([each.value for each in data]), np.concatenate([each.error for each in data]),
+        np.concatenate(weights),
+    )  # fmt: skip
+
+
+def _response(varied: Sequence[Variable], data: Sequence[Points], done: Sequence[Trial]) -> Response | None:
+    if not (good := [each for each in done if each.computed]):
+        return None
+    shares = np.array([[each.share(trial.values[each.key]) for each in varied] for trial in good])
+    return response(shares, np.array([trial.computed for trial in good]), *_joined(data))
+
+
+def _verdict(identified: bool, tied: Sequence[str], at_limit: bool, agrees: bool) -> str:
+    if tied:
+        return f"only together with {', '.join(tied)}: these keys cannot be told apart by the data"
+    if not identified and agrees:
+        return "not identified: the data hardly depend on it within its range"
+    if not identified:
+        return "not known: no value in its range agrees with the data" + "; widen it, the best is at its end" * at_limit
+    return "identified" + (", at the end of its range: widen it" if at_limit else "")
+
+
+# ---------------------------------------------------------------- results
+
+
+def write_results(found: Calibration, output: Path) -> None:
+    """Write `calibration.json`, `trials.csv` and `calibration.png`."""
+    from cfddem.analysis.report_text import as_json
+    from cfddem.plotting.study_figures import calibration_figure
+
+    write_whole(output / "calibration.json", as_json(found.summary()).encode())
+    lines = [",".join(["trial", *(each.key for each in found.variables), "chi2", "status"])]
+    for each in found.trials:
+        words = each.status.replace('"', "'")
+        lines.append(",".join([str(each.number), *map(str, each.values.values()), f"{each.chi2:.6g}", f'"{words}"']))
+    write_whole(output / "trials.csv", ("\n".join(lines) + "\n").encode())
+    if found.finished:
+        calibration_figure(found, output / "calibration.png")

@@ -1,0 +1,296 @@
+"""Sweeps: run one case for many values of some keys; one folder per run, one table, one figure.
+
+A stopped sweep can be continued: finished runs are kept, incomplete runs are resumed. A run that fails
+is listed at the end; the others are kept.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import re
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.backend.launch import safe_workers
+from cfddem.case.compare import Points, points_of
+from cfddem.case.gallery import full_key, read_value
+from cfddem.case.schema import Case
+from cfddem.io.files import require_no_links
+from cfddem.io.kept_files import holds_surfaces_of, text_with_kept_files
+from cfddem.io.quantities import shown_unit
+from cfddem.preflight.summary import preflight
+
+Over = Mapping[str, Sequence[Any]] | Sequence[Mapping[str, Any]]
+"""Values by key, of which all combinations are run; or sets of values."""
+
+PUBLISHED = "voidage by "
+"""Beginning of the names of voidages by published laws, which stand beside the measures of a run."""
+
+MOST = 10_000
+"""Largest number of runs."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of one run."""
+
+    folder: str
+    values: dict[str, Any]  # of the changed keys
+    status: str  # finished, failed, stopped, refused (before it began) or waiting
+    message: str = ""
+    measures: dict[str, tuple[float, float, str]] = field(default_factory=dict)  # mean, error, unit
+    seconds: float = 0.0
+    kept: bool = False  # it was finished before this sweep
+
+    @property
+    def name(self) -> str:
+        """Name of the run."""
+        return Path(self.folder).name
+
+
+def ranges(given: Sequence[str]) -> dict[str, list[Any]]:
+    """Keys and their values from texts such as `fluid.viscosity=1e-3,2e-3` and `seed=1..5`.
+
+    errors  InputError for an unknown key, a key without values or too many runs
+
+    >>> ranges(["viscosity=1e-3,2e-3", "seed=1..3", "laws.drag=wen_yu,di_felice"])
+    {'fluid.viscosity': [0.001, 0.002], 'bed.seed': [1, 2, 3], 'laws.drag': ['wen_yu', 'di_felice']}
+    """
+    found: dict[str, list[Any]] = {}
+    for each in given:
+        key, equals, text = each.partition("=")
+        if not equals or not text.strip():
+            raise InputError("--over", each, "key=value,value,... or key=first..last, such as seed=1..5")
+        key = full_key(key.strip())
+        if key in found:
+            raise InputError("--over", key, "given once")
+        span = re.fullmatch(r"\s*(-?\d{1,9})\.\.(-?\d{1,9})\s*", text)
+        values = list(range(int(span[1]), int(span[2]) + 1)) if span else _values(text)
+        if not values:
+            raise InputError("--over", each, "a range of at least one number, smaller first")
+        found[key] = values
+    count = math.prod(len(values) for values in found.values())
+    if not found or count > MOST:
+        raise InputError("--over", None, f"given, for at most {MOST} runs", f"here {count if found else 0}")
+    return found
+
+
+def _values(text: str) -> list[Any]:
+    """Values separated by commas, which may be lists in brackets."""
+    whole = read_value(f"[{text}]")
+    return whole if isinstance(whole, list) else [read_value(each.strip()) for each in text.split(",")]
+
+
+def run_name(values: Mapping[str, Any]) -> str:
+    """Name of a run: last words of the keys, and values.
+
+    >>> run_name({"fluid.viscosity": 0.001, "bed.seed": 2})
+    'viscosity-0.001_seed-2'
+    """
+    parts = [f"{key.split('.')[-1]}-{value}" for key, value in values.items()]
+    return re.sub(r"[^\w.+-]+", "-", "_".join(parts)).strip("-")[:120]
+
+
+def sweep(
+    path: Path,
+    over: Over,
+    output: Path,
+    *,
+    overrides: Mapping[str, Any] | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Callable[[Outcome], None] = lambda _: None,
+) -> list[Outcome]:
+    """Run a case for every combination of values, or for every set of values.
+
+    path       of the case file
+    over       values by key, of which all combinations are run; or sets of values
+    output     folder of the sweep: one folder per run, `sweep.csv`, `sweep.png`
+    overrides  values that all runs share
+    jobs       number of concurrent runs; if more than one, each uses one thread
+    scheduler  address of a dask scheduler whose workers make the runs, instead of this machine; they need the same
+               folders and packages
+    progress   called after every run
+    returns    outcomes, in the order of the values
+    errors     InputError before any run starts
+    """
+    if jobs < 1:
+        raise InputError("--jobs", jobs, "at least 1")
+    runs = cases_of(path, over, overrides or {})
+    measured = _curves(case for case, _ in runs.values())
+    make_output(output)
+    place = output.absolute() if scheduler else output  # workers have other working folders
+    outcomes: dict[str, Outcome] = {}
+    work = [(case, values, place / name, jobs > 1) for name, (case, values) in runs.items()]
+    for outcome in on_this_machine(work, jobs) if scheduler is None else _on_workers(work, scheduler):
+        outcomes[outcome.name] = outcome
+        progress(outcome)
+        if outcome.status == "stopped":  # stopping one run stops the sweep
+            break
+    waiting = "not started; the same command continues the sweep"
+    ordered = [
+        outcomes.get(name, Outcome(str(output / name), values, "waiting", waiting))
+        for name, (_, values) in runs.items()
+    ]
+    write_table(ordered, output / "sweep.csv")
+    _write_figure(ordered, output / "sweep.png", not isinstance(over, Mapping), measured)
+    return ordered
+
+
+def make_output(output: Path) -> None:
+    """Make the folder of a sweep if it does not exist."""
+    if output.exists() and not output.is_dir():
+        raise InputError("output", str(output), "a folder", "a file of that name exists")
+    output.mkdir(parents=True, exist_ok=True)
+    require_no_links(output)
+
+
+_Work = list[tuple[Case, dict[str, Any], Path, bool]]
+"""Arguments of `_one` for each run."""
+
+
+def on_this_machine(work: _Work, jobs: int) -> Iterator[Outcome]:
+    """Outcomes as runs end, several runs at a time."""
+    from joblib import Parallel, delayed
+
+    with safe_workers():
+        yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_one)(*each) for each in work)
+
+
+def _on_workers(work: _Work, scheduler: str) -> Iterator[Outcome]:
+    """Outcomes as runs end on the workers of a dask scheduler, which decide how many run at a time."""
+    if find_spec("distributed") is None:
+        raise InputError("--scheduler", scheduler, "used with dask", "pip install 'cfddem[cluster]'")
+    from distributed import Client, as_completed
+
+    try:
+        client = Client(scheduler, timeout=30)
+    except (OSError, ValueError) as failure:
+        raise InputError(
+            "--scheduler", scheduler, "the address of a dask scheduler that answers", str(failure)
+        ) from None
+    with client:
+        futures = [client.submit(_one, *each[:3], True, pure=False, retries=1) for each in work]
+        for done in as_completed(futures):
+            yield done.result()
+
+
+def cases_of(path: Path, over: Over, overrides: Mapping[str, Any]) -> dict[str, tuple[Case, dict[str, Any]]]:
+    """Case and changed values of every run, by its name."""
+    runs: dict[str, tuple[Case, dict[str, Any]]] = {}
+    for values in _sets(over):
+        case, name = Case.from_toml(path, {**overrides, **values}), run_name(values)
+        if name in runs:
+            raise InputError("--over", name, "a different name for every run", "a value is given twice")
+        runs[name] = case, values
+    return runs
+
+
+def _sets(over: Over) -> Iterator[dict[str, Any]]:
+    """Values of every run."""
+    if isinstance(over, Mapping):
+        for combination in itertools.product(*over.values()):
+            yield dict(zip(over, combination))
+    else:
+        yield from map(dict, over)
+
+
+def _one(case: Case, values: dict[str, Any], folder: Path, one_thread: bool) -> Outcome:
+    """Run or resume one run, or keep it if it is finished; any failure becomes part of the outcome."""
+    from cfddem.backend.compile import use_threads
+    from cfddem.io.reading import open_run
+    from cfddem.run.runner import Run
+
+    begun, kept = time.monotonic(), False
+    try:
+        if one_thread:
+            use_threads(1)
+        checked = preflight(case)
+        if checked.status == "error":
+            reasons = "; ".join(f"{each.key}: {each.reason}" for each in checked.issues if each.severity == "error")
+            return Outcome(str(folder), values, "refused", reasons)
+        if not (folder / "run.json").exists():
+            Run.begin(case, folder).go()
+        else:
+            before = open_run(folder)
+            same = _without_data(before.case_text) == _without_data(text_with_kept_files(case))
+            if not same or not holds_surfaces_of(case, folder):
+                raise InputError("output", str(folder), "a folder of the same case", "choose another folder")
+            kept = before.status == "finished"
+            if not kept:
+                Run.resume(folder).go()
+        outcome = Outcome(str(folder), values, open_run(folder).status)
+    except CfddemError as failure:
+        status = "stopped" if isinstance(failure, RunStopped) else "failed"
+        outcome = Outcome(str(folder), values, status, str(failure).replace("\n", "; "))
+    except Exception as failure:  # a failed run must not end the sweep
+        outcome = Outcome(str(folder), values, "failed", f"{type(failure).__name__}: {failure}")
+    return _measured(outcome, time.monotonic() - begun, kept)
+
+
+def _without_data(text: str) -> Case:
+    """A case as a run folder holds it, without measured data, which change nothing in a run."""
+    return Case.from_text(text).model_copy(update={"compare": {}})
+
+
+def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
+    """The outcome with its means, if the run finished."""
+    from cfddem.analysis.report import report
+
+    values = asdict(outcome) | {"seconds": seconds, "kept": kept}
+    if outcome.status == "finished":
+        found = report(Path(outcome.folder))
+        means = {name: (each["mean"], each["error"], each["unit"]) for name, each in found["measures"].items()}
+        laws = {row["law"]: (row["expected"], math.nan, row["unit"]) for row in found["laws"]}
+        values["measures"] = means | {name: law for name, law in laws.items() if name.startswith(PUBLISHED)}
+    return Outcome(**values)
+
+
+def write_table(outcomes: Sequence[Outcome], path: Path) -> None:
+    """Write one line per run: name, changed values, status, means with errors, message."""
+    units = {name: unit for each in outcomes for name, (_, _, unit) in each.measures.items()}
+    fresh = path.with_name(f".{path.name}")
+    with fresh.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file)
+        measures = [(f"{name} [{shown_unit(unit)}]", f"{name} error")[: _width(name)] for name, unit in units.items()]
+        table.writerow(["run", *outcomes[0].values, "status", *itertools.chain(*measures), "message"])
+        for each in outcomes:
+            pairs = [each.measures.get(name, ("", "", ""))[: _width(name)] for name in units]
+            row = [each.name, *each.values.values(), each.status, *itertools.chain(*pairs), each.message]
+            table.writerow(row)
+    fresh.replace(path)
+
+
+def _width(name: str) -> int:
+    """Columns of a measure in the table: its mean and error, or the value of a law."""
+    return 1 if name.startswith(PUBLISHED) else 2
+
+
+def _curves(cases: Iterable[Case]) -> list[Points]:
+    """Measured curves against the inlet velocity that the first case names."""
+    found = [points_of(name, each) for case in itertools.islice(cases, 1) for name, each in case.compare.items()]
+    return [each for each in found if each.against == "inlet_velocity"]
+
+
+def _write_figure(outcomes: Sequence[Outcome], path: Path, sampled: bool, measured: Sequence[Points]) -> None:
+    from cfddem.plotting.study_figures import Point, sample_figure, sweep_figure
+
+    points = [Point(each.values, each.measures) for each in outcomes if each.measures]
+    if sampled:
+        sample_figure(points, path)
+    else:
+        sweep_figure(points, path, measured)
+
+
+def failures(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """One line for every run that did not finish."""
+    for each in outcomes:
+        if each.status != "finished":
+            yield f"{each.name}: {each.status}; {each.message}"

@@ -1,0 +1,1 @@
+"""What only tests and comparisons use: resolved simulations, and second solutions of collisions of a few spheres."""
