@@ -22,6 +22,7 @@ ROOMS = (
     "io",
     "analysis",
     "plotting",
+    "features",
     "run",
     "cli",
 )
