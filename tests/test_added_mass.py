@@ -8,6 +8,7 @@ from test_coupling import momentum, stirred, suspension
 
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import PseudoTurbulence
+from cfddem.features.energy import EnergyLedger
 from cfddem.particles.state import make_particles
 from cfddem.run.simulation import Simulation
 from closures.added_mass import zuber
@@ -167,13 +168,13 @@ def test_a_change_of_the_added_mass_is_in_the_energy_ledger() -> None:
     simulation = stirred(suspension(**{"laws.added_mass": 0.5, "run.energy_budget": True}))
     simulation.step()
     particles, coupling = simulation.particles, simulation.coupling
-    assert simulation.energy is not None and coupling is not None
-    before = simulation.energy.row()["energy_remainder"]
+    assert coupling is not None
+    before = simulation.feature(EnergyLedger).row()["energy_remainder"]
     added = float((0.5 * 1000.0 * particles.volume[:, None] * particles.velocity**2).sum())
     simulation.forces["added_mass"]._fill = lambda voidage, values: values.fill(1.5)
     particles.sampled_velocity[:] = np.nan
     simulation.step()
-    assert abs(simulation.energy.row()["energy_remainder"] - before) < 0.02 * added
+    assert abs(simulation.feature(EnergyLedger).row()["energy_remainder"] - before) < 0.02 * added
 
 
 @pytest.mark.parametrize("added_mass", [0.5, "zuber"])
@@ -182,11 +183,11 @@ def test_removed_particles_take_the_energy_of_their_added_mass(added_mass: float
     simulation = stirred(suspension(**{"laws.added_mass": added_mass, "run.energy_budget": True}))
     for _ in range(3):
         simulation.step()
-    assert simulation.energy is not None and simulation.coupling is not None
-    solver, before = simulation.particle_solver, simulation.energy.row()
+    assert simulation.coupling is not None
+    solver, before = simulation.particle_solver, simulation.feature(EnergyLedger).row()
     gone = simulation.particles.id % 3 == 0
     taken = solver.remove(gone)
-    after = simulation.energy.row()
+    after = simulation.feature(EnergyLedger).row()
     lost = 0.5 * float((simulation.forces["added_mass"].mass(taken)[:, None] * taken.velocity**2).sum())
     assert lost > 0.1 * -after["energy_fed"]
     assert before["energy_added_mass"] - after["energy_added_mass"] == pytest.approx(lost, rel=1e-9)

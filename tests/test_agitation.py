@@ -13,6 +13,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.agitation import _advanced, _transition
 from cfddem.coupling.forces.agitation_terms import AgitationTerms
+from cfddem.features.energy import EnergyLedger
 from cfddem.fluid import budgets
 from cfddem.preflight.bed_waves import uniform_bed, with_agitation
 from cfddem.run.simulation import Simulation
@@ -172,7 +173,7 @@ def test_the_power_of_agitation_is_a_line_of_the_energy_ledger() -> None:
     """
     still = {"material__glass__restitution": 1.0, "material__glass__friction": 0.0}
     simulation = suspension(run__energy_budget=True, laws__agitation_drag_along=1.0, **still)
-    particles, coupling, ledger = simulation.particles, simulation.coupling, simulation.energy
+    particles, coupling, ledger = simulation.particles, simulation.coupling, simulation.feature(EnergyLedger)
     for _ in range(150):
         simulation.step()
     resistance = coupling.prepare(particles, simulation.last_step).conductance("drag")

@@ -15,6 +15,7 @@ from cfddem.analysis import measures
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.schema import Case
+from cfddem.features.feeds import Feeds
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
 from cfddem.run.liquid_bed_measures import bed_height, bed_solids
@@ -59,7 +60,7 @@ def state(simulation: Simulation) -> dict[str, np.ndarray]:
     order = np.argsort(particles.id)
     found = {name: particles[name][order] for name in ("id", "position", "velocity", "spin", "radius", "force")}
     walls = simulation.particle_solver.walls
-    counts = [simulation.equipment.fed, simulation.equipment.waiting, *simulation.equipment.removed]
+    counts = [simulation.feature(Feeds).fed, simulation.feature(Feeds).waiting, *simulation.feature(Feeds).removed]
     return found | {"walls": walls.shift.copy(), "turned": walls.turned.copy(), "counts": np.array(counts)}
 
 
@@ -70,7 +71,7 @@ def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> bool:
 def test_feed_outlet_and_moving_walls_do_what_the_case_says(tmp_path: Path) -> None:
     simulation = Simulation(full_case(tmp_path))
     simulation.until(0.04)
-    equipment, walls = simulation.equipment, simulation.particle_solver.walls
+    equipment, walls = simulation.feature(Feeds), simulation.particle_solver.walls
     assert equipment.fed + equipment.waiting == int(400.0 * 0.04)
     left, mass = equipment.removed
     assert left > 0 and mass == pytest.approx(left * 2500.0 * np.pi / 6.0 * 4e-3**3)
@@ -158,7 +159,7 @@ def test_fed_particles_of_a_mixture_have_their_species() -> None:
     simulation = Simulation(Case.from_text(text, "h.toml", {"run.until": 0.01}))
     simulation.until(0.01)
     species = simulation.particles.species
-    assert (species == 1).sum() == 1 + simulation.equipment.fed > 15
+    assert (species == 1).sum() == 1 + simulation.feature(Feeds).fed > 15
     assert simulation.particles.radius[species == 1] == pytest.approx(1e-3)
 
 

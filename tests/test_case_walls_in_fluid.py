@@ -14,6 +14,7 @@ from cfddem.analysis.bed_laws import weight_over_floor
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
+from cfddem.features.feeds import Feeds
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
 from cfddem.preflight.summary import preflight
@@ -157,7 +158,7 @@ def test_feeds_in_a_fluid_displace_none_and_resume_bit_for_bit(tmp_path: Path) -
     while straight.time < 0.006:
         straight.step()
         fastest.append(float(np.abs(straight.fluid.velocity).max()))
-    assert straight.equipment.fed > 15
+    assert straight.feature(Feeds).fed > 15
     through = 2e-3**3 * np.pi / 6.0 / straight.last_step / 0.005**2  # if one bead pushed the fluid out of one cell
     assert max(fastest) < 0.1 * through
     (tmp_path / "kept").mkdir()
@@ -171,7 +172,8 @@ def test_feeds_in_a_fluid_displace_none_and_resume_bit_for_bit(tmp_path: Path) -
     Run.begin(straight.case, tmp_path / "run")
     solid = open_run(tmp_path / "run").fluid("solid")
     assert solid.any() and np.array_equal(solid > 0, ~grid_of(straight.case).open)
-    assert again.equipment.fed == straight.equipment.fed > 30 and again.equipment.removed == straight.equipment.removed
+    now, then = again.feature(Feeds), straight.feature(Feeds)
+    assert now.fed == then.fed > 30 and now.removed == then.removed
 
 
 def test_two_ranks_share_walls_and_feeds_in_a_fluid() -> None:
@@ -185,12 +187,12 @@ def test_two_ranks_share_walls_and_feeds_in_a_fluid() -> None:
         simulation.until(0.002)
         assert simulation.fluid is not None
         owned = simulation.owned
-        return owned.id.copy(), owned.position.copy(), simulation.equipment.fed, simulation.fluid.whole("velocity")
+        return owned.id.copy(), owned.position.copy(), simulation.feature(Feeds).fed, simulation.fluid.whole("velocity")
 
     parts = on_ranks(2, part)
     ids = np.concatenate([each[0] for each in parts])
     places = np.concatenate([each[1] for each in parts])[np.argsort(ids)]
-    assert {each[2] for each in parts} == {alone.equipment.fed} == {8}
+    assert {each[2] for each in parts} == {alone.feature(Feeds).fed} == {8}
     assert places == pytest.approx(alone.particles.position[np.argsort(alone.particles.id)], rel=1e-12)
     assert alone.fluid is not None
     assert np.abs(parts[0][3] - alone.fluid.velocity).max() < 1e-12

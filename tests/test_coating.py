@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cfddem.features.spray import SprayZone, spray_zone_share
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run.simulation import Simulation
-from cfddem.run.wet_measures import spray_zone_share
 from scenarios.beds.coating import bed, coating, distribution
 
 RUN = SimpleNamespace(
@@ -38,8 +38,7 @@ def test_the_share_in_the_spray_zone_is_measured_from_the_start() -> None:
     """Drops that begin later do not change where the particles are."""
     case = bed().with_(**{"spray.nozzle": [0.025, 0.005, 0.060]})
     simulation = Simulation(case)
-    assert simulation.spray is not None
-    inside = simulation.spray.zone(simulation.owned.position)
+    inside = simulation.feature(SprayZone).spray.zone(simulation.owned.position)
     assert 0 < inside.sum() < case.bed.count
     assert spray_zone_share(simulation) == inside.mean()
 

@@ -13,6 +13,7 @@ from test_coupling import momentum, stirred, suspension
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
+from cfddem.features.energy import EnergyLedger
 from cfddem.run.simulation import Simulation
 from closures import history as laws
 from scenarios.beds.settling import study as settling
@@ -242,8 +243,7 @@ def test_the_energy_of_the_history_force_is_a_line_of_the_budget() -> None:
         simulation = stirred(case)
         for _ in range(20):
             simulation.step()
-        assert simulation.energy is not None
-        row = simulation.energy.row()
+        row = simulation.feature(EnergyLedger).row()
         shares.append(abs(row["energy_remainder"]) / row["energy_put_in"])
         assert ("energy_history" in row) == (history != "none")
     assert row["energy_history"] > 0.05 * row["energy_drag"]

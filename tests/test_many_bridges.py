@@ -9,12 +9,12 @@ from wet_spheres import RADIUS, SYRUP, TENSION, THIN, bridged, swarm
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
+from cfddem.features.drops import Spray, box
 from cfddem.particles import listing
 from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.spray import Spray, box
 from cfddem.particles.state import kinetic_energy, make_particles, particles_in
 
 

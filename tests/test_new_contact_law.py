@@ -17,6 +17,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
+from cfddem.features.energy import EnergyLedger
 from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named, register
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
@@ -155,7 +156,7 @@ def test_a_registered_law_is_chosen_by_its_name_in_a_case() -> None:
     assert "contact modulus / real" not in numbers["collisions and film"]
     simulation = Simulation(case.with_(**{"run.energy_budget": True}))
     simulation.until(1e-3)
-    assert simulation.energy is not None and simulation.energy.row()["energy_hysteresis"] == 0.0  # no collision yet
+    assert simulation.feature(EnergyLedger).row()["energy_hysteresis"] == 0.0  # no collision yet
     assert "largest_overlap" in simulation.particle_solver.edges.fields
     numbers_of_law = simulation.particle_solver.system.parameters.contact
     assert (numbers_of_law.loading_stiffness, numbers_of_law.unloading_stiffness) == (400.0, 500.0)

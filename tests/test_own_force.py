@@ -17,6 +17,7 @@ from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.drag import Drag
+from cfddem.features.energy import EnergyLedger
 from cfddem.fluid import budgets
 from cfddem.model.feature import Equipment, On
 from cfddem.particles.state import Particles
@@ -142,21 +143,19 @@ def test_a_change_of_applied_is_refused_in_one_line(changes: dict[str, Any]) -> 
 def test_the_work_of_a_force_is_a_line_of_the_energy_budget(on: On) -> None:
     """The remainder stays below 1 % of it; without the line it would be as large as the work."""
     simulation = Simulation(suspension(run__energy_budget=True), features=[OwnForce(electric, on)])
-    assert simulation.energy is not None
     for _ in range(20):
         simulation.step()
-    row = simulation.energy.row()
+    row = simulation.feature(EnergyLedger).row()
     assert row["energy_external"] > 0.5 * row["energy_kinetic"] > 0.0
     assert abs(row["energy_remainder"]) < 0.01 * row["energy_external"]
 
 
 def test_the_work_of_a_force_without_a_fluid_is_that_of_the_displacement() -> None:
     simulation = Simulation(case_of(**DRY, run__energy_budget=True), features=[electric])
-    assert simulation.energy is not None
     begin = simulation.particles.position[0].copy()
     for _ in range(5):
         simulation.step()
-    row, work = simulation.energy.row(), FORCE @ (simulation.particles.position[0] - begin)
+    row, work = simulation.feature(EnergyLedger).row(), FORCE @ (simulation.particles.position[0] - begin)
     assert row["energy_external"] == pytest.approx(work, rel=1e-9)
     assert row["energy_external"] == pytest.approx(row["energy_kinetic"], rel=1e-9)
 

@@ -25,6 +25,7 @@ ROOMS = (
     "io",
     "analysis",
     "plotting",
+    "features",
     "run",
     "studies",
     "cli",

@@ -14,6 +14,7 @@ from in_process_ranks import on_ranks
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.case.liquid import Liquid
 from cfddem.case.schema import Case
+from cfddem.features.energy import EnergyLedger
 from cfddem.particles.interactions import bridge_law
 from cfddem.run import history
 from cfddem.run.build import bridge_laws_of
@@ -112,10 +113,10 @@ def test_the_energy_budget_of_a_kicked_bed_closes() -> None:
     """Change of the stored energy that no line explains: 0.0006 of the energy put in; a quarter at half the step."""
     simulation = Simulation(Case.from_text(BED).with_(**{"run.energy_budget": True}))
     simulation.particles.velocity += np.random.default_rng(1).normal(0.0, 0.2, (1100, 3))
-    simulation.energy = simulation._ledger()
+    ledger = EnergyLedger(simulation.case, simulation)  # of the kicked bed
+    simulation.features[simulation.features.index(simulation.feature(EnergyLedger))] = ledger
     simulation.until(END)
-    assert simulation.energy is not None
-    row = simulation.energy.row()
+    row = ledger.row()
     assert row["energy_bridge"] > 0.3 * row["energy_put_in"]
     assert abs(row["energy_remainder"]) < 1e-3 * row["energy_put_in"], row
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cfddem.backend.communicator import SERIAL
+from cfddem.features.zone_times import FIELDS, mean_round, mean_visit, note_visits
 from cfddem.particles.state import Particles, make_particles
-from cfddem.particles.zone_times import FIELDS, mean_round, mean_visit, note_visits
 
 HISTORY = {  # time -> which of three particles are in the zone
     0.0: (False, True, False),

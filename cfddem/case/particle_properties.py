@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Species
 from cfddem.case.schema import Case
+from cfddem.data.fields import Field
 from cfddem.particles.initial.packing import Seed, from_table, log_normal, mono, normal
 
 Array = NDArray[np.float64]
+
+SPECIES = Field("species", dtype=np.int32, snapshot=True, meaning="number of the species, in the order of the case")
+"""Declared on the particles of a mixture."""
 
 
 class ParticleProperties(NamedTuple):

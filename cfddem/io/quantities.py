@@ -6,7 +6,8 @@ columns of the history from their measures. They are kept in `run.json` and on e
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import inspect
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from cfddem.backend.errors import InputError
@@ -50,6 +51,12 @@ def of_fields(fields: Iterable[Declaration]) -> dict[str, Quantity]:
     {'radius': Quantity(unit='m', meaning='radius', group='')}
     """
     return {field.name: Quantity(field.unit, field.meaning or field.name.replace("_", " ")) for field in fields}
+
+
+def of_function(function: Callable[..., Any], unit: str, group: str) -> Quantity:
+    """The quantity that a measure gives; its meaning is the first line of the function's docstring."""
+    meaning = (inspect.getdoc(function) or function.__name__.replace("_", " ")).split("\n")[0].rstrip(".")
+    return Quantity(unit, meaning[:1].lower() + meaning[1:], group)
 
 
 def from_json(blocks: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Quantity]]:

@@ -41,6 +41,14 @@ class Feature:
 class Equipment(Feature):
     """What acts around the steps of a simulation: it may move, feed, measure or write."""
 
+    @property
+    def step_limits(self) -> dict[str, float]:
+        """Longest fluid step that it allows, by criterion [s]."""
+        return {}
+
+    def before_snapshot(self, simulation: Any) -> None:
+        """Find what only snapshots hold."""
+
     def before(self, simulation: Any, step: float) -> None:
         """Act before the particles make their steps, over `step` [s]."""
 

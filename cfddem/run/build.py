@@ -14,9 +14,11 @@ from cfddem.backend.errors import InputError
 from cfddem.case.bed import Jet
 from cfddem.case.column_grid import grid_of, open_floor
 from cfddem.case.materials import pair_overrides
+from cfddem.case.particle_properties import SPECIES
 from cfddem.case.schema import Case, Column
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.features.moving_walls import case_walls
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
@@ -26,12 +28,10 @@ from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
-from cfddem.particles.spray import Spray, box, cone
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
-from cfddem.run.equipment import case_walls
 from cfddem.run.forces import forces_of, sampler_of, wall_drag_of
-from cfddem.run.initial_particles import SPECIES, particles_of, periodic_box, periodic_directions
+from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
 
 
 @dataclass(frozen=True)
@@ -212,20 +212,6 @@ def bridge_laws_of(case: Case) -> BridgeLaws | None:
         wall_film=liquid.wall_thickness,
         wall_patch=case.bed.diameter if liquid.wall_share > 0.0 else 0.0,
     )
-
-
-def spray_of(case: Case, communicator: Communicator = SERIAL) -> Spray | None:
-    """The spray of a case; None without one."""
-    given = case.spray
-    if given is None:
-        return None
-    first, second = given.extremes
-    if given.zone == "cone":
-        zone = cone(first, given.axis, math.radians(given.angle), given.length or 0.0)
-    else:
-        zone = box(first, second - first)
-    end = math.inf if given.end is None else given.end
-    return Spray(given.rate, given.drop_volume, zone, case.bed.seed, given.begin, end, communicator=communicator)
 
 
 def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

@@ -14,7 +14,6 @@ error in the report.
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,11 +24,11 @@ from cfddem.analysis import measures
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
-from cfddem.io.quantities import TIME, Quantity
+from cfddem.features import FEATURES, CaseFeature
+from cfddem.io.quantities import TIME, Quantity, of_function
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
-from cfddem.run import equipment_measures, liquid_bed_measures, wet_measures
-from cfddem.run.budgets import conservation, energy
+from cfddem.run import conservation, liquid_bed_measures
 from cfddem.run.liquid_bed_measures import BED, bed_solids, cells_of, open_area, open_volume
 from cfddem.run.simulation import Simulation
 
@@ -76,8 +75,7 @@ def measure(
 
     def declare(function: Function) -> Function:
         name = function.__name__
-        meaning = (inspect.getdoc(function) or name.replace("_", " ")).split("\n")[0].rstrip(".")
-        quantity = Quantity(unit, meaning[:1].lower() + meaning[1:], group)
+        quantity = of_function(function, unit, group)
 
         def columns(case: Case) -> Mapping[str, Quantity]:
             return {name: quantity} if when(case) else {}
@@ -150,22 +148,6 @@ def _is_agitated(case: Case) -> bool:
 
 def _is_mixture(case: Case) -> bool:
     return bool(case.bed.species)
-
-
-def _is_wet(case: Case) -> bool:
-    return case.liquid is not None
-
-
-def _is_sprayed(case: Case) -> bool:
-    return case.spray is not None
-
-
-def _is_fed(case: Case) -> bool:
-    return bool(case.feed)
-
-
-def _has_outlets(case: Case) -> bool:
-    return bool(case.outlet)
 
 
 # ---------------------------------------------------------------- the bed
@@ -307,17 +289,6 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
 _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
 
 
-# ---------------------------------------------------------------- liquid, feeds and outlets
-
-
-for _kind, _found in (
-    (_is_wet, wet_measures.MEASURES), (_is_sprayed, wet_measures.OF_SPRAY),
-    (_is_fed, equipment_measures.OF_FEEDS), (_has_outlets, equipment_measures.OF_OUTLETS),
-):  # fmt: skip
-    for _unit, _group, _function in _found:
-        measure(_unit, group=_group, when=_kind)(_function)
-
-
 # ---------------------------------------------------------------- conservation
 
 
@@ -335,25 +306,20 @@ def volume_imbalance(simulation: Simulation) -> float:
     return conservation.volume_imbalance(simulation.fluid)
 
 
-_ENERGY_GROUPS = {"stored": energy.STORED, "gained": energy.GAINED, "lost": energy.LOST, "exchanged": energy.PASSED}
+# ---------------------------------------------------------------- features
 
 
-def _energy_columns(case: Case) -> dict[str, Quantity]:
-    if not case.run.energy_budget:
-        return {}
-    group_of = {f"energy_{name}": group for group, names in _ENERGY_GROUPS.items() for name in names}
-    return {
-        name: Quantity(unit, meaning, f"energy: {group_of.get(name, 'balance')}")
-        for name, (unit, meaning) in energy.FIELDS.items()
-    }
+def _declare_feature(kind: type[CaseFeature]) -> None:
+    """Declare the columns that a feature of a case gives."""
+
+    def columns(case: Case) -> Mapping[str, Quantity]:
+        return kind.columns(case) if kind.is_in(case) else {}
+
+    _declare(kind.name, Measure(columns, lambda simulation: simulation.feature(kind).values(simulation)))
 
 
-def energy_budget(simulation: Simulation) -> dict[str, float]:
-    """The energy budget since the start [J]."""
-    return {} if simulation.energy is None else simulation.energy.row()
-
-
-_declare("energy_budget", Measure(_energy_columns, energy_budget))
+for _kind in FEATURES:
+    _declare_feature(_kind)
 
 
 _BUILT_IN.update(MEASURES)

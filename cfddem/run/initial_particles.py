@@ -10,10 +10,9 @@ import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.case.liquid import Liquid
-from cfddem.case.particle_properties import ParticleProperties, particle_properties
+from cfddem.case.particle_properties import SPECIES, ParticleProperties, particle_properties
 from cfddem.case.schema import Case
 from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, start_box
-from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import clear_of_walls, loose_places
 from cfddem.particles.initial.packing import lattice, random_packing
@@ -25,9 +24,6 @@ from cfddem.particles.state import make_particles as make_bodies
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
 from cfddem.particles.walls.shapes import Wall
 from cfddem.preflight.bed_estimate import estimate_bed
-
-SPECIES = Field("species", dtype=np.int32, snapshot=True, meaning="number of the species, in the order of the case")
-"""Declared on the particles of a mixture."""
 
 LARGEST_EXPANDED_FRACTION = 0.55
 """Largest solid fraction of an expanded start [-]; a random packing takes long to find near 0.64."""

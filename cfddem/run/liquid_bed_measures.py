@@ -11,7 +11,7 @@ from cfddem.analysis import measures
 from cfddem.analysis.waves import FEWEST_LAYERS, LAYER
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
-from cfddem.run.equipment import LANDED
+from cfddem.features.feeds import LANDED
 from cfddem.run.simulation import Simulation
 
 BED = (0.2, 0.8)

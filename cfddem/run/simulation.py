@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,24 +16,16 @@ from cfddem.case.schema import Case
 from cfddem.coupling.force_list import ForceList, require_features
 from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
+from cfddem.features import FEATURES
 from cfddem.model.feature import Equipment, Feature, FluidForce, Function, On, OwnForce
 from cfddem.particles.state import Particles, particles_in
-from cfddem.particles.zone_times import FIELDS as ZONE_FIELDS
-from cfddem.particles.zone_times import note_visits
-from cfddem.run.budgets.energy import EnergyLedger
-from cfddem.run.budgets.liquid import LiquidBudget
-from cfddem.run.build import parts_of, spray_of
-from cfddem.run.equipment import CaseEquipment
+from cfddem.run.build import parts_of
 from cfddem.run.time_steps import TimeSteps
-from cfddem.run.wet_state import SNAPSHOT_FIELDS, fill_snapshot_fields
+
+Kind = TypeVar("Kind", bound=Equipment)
 
 Callback = Callable[["Simulation"], None]
 """Function that is called after every fluid step, with the simulation."""
-
-
-def _fields_of(case: Case) -> list[Field]:
-    """Fields of the particles that measures and snapshots of a case need."""
-    return [*(SNAPSHOT_FIELDS if case.liquid is not None else ()), *(ZONE_FIELDS if case.spray is not None else ())]
 
 
 class Simulation:
@@ -62,25 +54,29 @@ class Simulation:
     ) -> None:
         keep_freed_memory()
         self.case, self.gravity, self.communicator = case, np.array(case.laws.gravity), communicator
-        self.callbacks, fields = list(callbacks), [*fields, *_fields_of(case)]
+        kinds = [each for each in FEATURES if each.is_in(case)]
+        self.callbacks, fields = (
+            list(callbacks),
+            [*fields, *(field for each in kinds for field in each.fields_of(case))],
+        )
         particles = None if state is None else particles_in(state["particles"]["particles"])
         parts = parts_of(case, progress, particles, communicator)
         self.particle_solver, self.fluid, self.coupling = parts.particle_solver, parts.fluid, parts.coupling
         self.wall = self.particle_solver.wall
-        self.spray = spray_of(case, communicator)
-        self.equipment = CaseEquipment(case, self.particle_solver)
-        self.liquid = None if case.liquid is None else LiquidBudget(self.particle_solver, self.spray)
+        self.terms: ForceTerms | None = None  # of the last step between fluid and particles
         self.forces = ForceList(self.particles) if self.coupling is None else self.coupling.forces
         self.features: list[Equipment] = []
+        self._own = 0  # number of them that a user has added
         for feature in features:
             self.add(feature)
         self.steps, self.last_step = 0, 0.0
         particle_step = None if state is None else self._restore(state, fields)
         for field in fields:
             self.particles.declare(field)
-        self.energy = self._ledger(state)
+        self.features[:0] = [kind(case, self) for kind in kinds]
+        self._restore_features({} if state is None else state.get("features", {}))
         self.time_steps = TimeSteps(
-            case, self.particle_solver, self.fluid, particle_step, communicator, self.equipment.motions.largest_step
+            case, self.particle_solver, self.fluid, particle_step, communicator, self._step_limits
         )
 
     def add(self, feature: Feature | Function, on: On = "particles") -> None:
@@ -98,10 +94,21 @@ class Simulation:
             self.forces.add(added, self.particles)
         elif isinstance(added, Equipment) and added.name not in {"", *(each.name for each in self.features)}:
             self.features.append(added)
+            self._own += 1
             for field in added.fields:
                 self.particles.declare(field)
         else:
             raise InputError("feature", added.name, "a FluidForce, or an Equipment, with a name of its own")
+
+    def feature(self, kind: type[Kind]) -> Kind:
+        """The feature of a kind that the simulation has.
+
+        errors  InputError if it has none
+        """
+        for each in self.features:
+            if isinstance(each, kind):
+                return each
+        raise InputError("feature", kind.__name__, "one of " + ", ".join(type(each).__name__ for each in self.features))
 
     @property
     def particles(self) -> Particles:
@@ -129,8 +136,8 @@ class Simulation:
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The fields of the particles that a snapshot contains; those of all ranks on rank 0, no rows on the others."""
-        if self.liquid is not None:
-            fill_snapshot_fields(self.particle_solver)
+        for feature in self.features:
+            feature.before_snapshot(self)
         return {name: self.communicator.gathered(array) for name, array in self.owned.snapshot().items()}
 
     def step(self, until: float = math.inf) -> None:
@@ -146,43 +153,25 @@ class Simulation:
                 self.fluid.step(step, *terms.fields)
             with part("forces of the fluid"):
                 self.coupling.apply(owned, terms)
-            if self.energy is not None:
-                with part("energies"):
-                    self.energy.after_fluid_step(terms)
+            self.terms = terms
         else:
-            alone = ForceTerms(self.owned, step, self.last_step)
-            self.forces.act(alone)
-            self.forces.finish(alone)
+            self.terms = ForceTerms(self.owned, step, self.last_step)
+            self.forces.act(self.terms)
+            self.forces.finish(self.terms)
         for feature in self.features:
             with part(feature.name):
                 feature.before(self, step)
-        self.equipment.move_walls(self.particle_solver, step)
         self.particle_solver.advance(step / substeps, substeps)
-        if self.spray is not None:
-            with part("spray"):
-                owned = self.owned
-                self.spray(owned, self.time)
-                note_visits(owned, self.spray.zone(owned.position), self.time)
-        if self.energy is not None:
-            with part("energies"):
-                self.energy.after_particle_steps()
-        if self.equipment.exchanges:
-            with part("feeds and outlets"):
-                self._exchange_particles()
+        for feature in self.features[: len(self.features) - self._own]:
+            with part(feature.name):
+                feature.after(self)
         self.steps, self.last_step = self.steps + 1, step
-        for feature in self.features:
+        for feature in self.features[len(self.features) - self._own :]:
             with part(feature.name):
                 feature.after(self)
         for callback in self.callbacks:
             with part(f"callback {getattr(callback, '__name__', 'without a name')}"):
                 callback(self)
-
-    def _exchange_particles(self) -> None:
-        """Let particles enter and leave; each replaces fluid of its own volume, or leaves room for it."""
-        before = self.owned
-        moved = self.equipment.exchange_particles(self.particle_solver)
-        if moved and self.fluid is not None and self.coupling is not None:
-            self.fluid.add_voidage(self.coupling.solid_fraction(before) - self.coupling.solid_fraction(self.owned))
 
     def until(self, time: float) -> None:
         """Continue until a time [s]."""
@@ -216,12 +205,6 @@ class Simulation:
             parts |= {"forces": forces}
         if kept := {each.name: state for each in self.features if (state := each.checkpoint())}:
             parts |= {"features": kept}
-        if self.energy is not None:
-            parts |= {"energy": self.energy.checkpoint()}
-        if self.liquid is not None:
-            parts |= {"liquid": self.liquid.checkpoint()}
-        if self.equipment.exchanges:
-            parts |= {"equipment": self.equipment.checkpoint()}
         return parts
 
     @classmethod
@@ -248,27 +231,20 @@ class Simulation:
             self.fluid.restore(state["fluid"])
             self.coupling.restore(state["coupling"])
         self.forces.restore(state.get("forces", {}), self.communicator)
-        kept = state.get("features", {})
+        self.steps = int(state["steps"])
+        return float(state["particle_step"])
+
+    def _restore_features(self, kept: dict[str, Any]) -> None:
+        """Take over what a checkpoint keeps of the features."""
         require_features(kept, [each.name for each in self.features])
         for feature in self.features:
             if feature.name in kept:
                 feature.restore(kept[feature.name])
-        if self.liquid is not None:
-            self.liquid.restore(state["liquid"])
-        if self.equipment.exchanges:
-            self.equipment.restore(state["equipment"])
-        self.steps = int(state["steps"])
-        return float(state["particle_step"])
 
-    def _is_acted_on(self) -> bool:
+    def _step_limits(self) -> dict[str, float]:
+        """Longest fluid step that the features allow, by criterion [s]."""
+        return {name: longest for each in self.features for name, longest in each.step_limits.items()}
+
+    def is_acted_on(self) -> bool:
         """Whether a user's function may put energy in."""
-        return bool(self.callbacks or self.features) or "external" in self.forces.lines
-
-    def _ledger(self, state: dict[str, Any] | None = None) -> EnergyLedger | None:
-        """The energy ledger, where the case asks for one."""
-        if not self.case.run.energy_budget:
-            return None
-        ledger = EnergyLedger(self.particle_solver, self.fluid, self.coupling, self._is_acted_on)
-        if state is not None:
-            ledger.restore(state["energy"])
-        return ledger
+        return bool(self.callbacks or self._own) or "external" in self.forces.lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
@@ -28,7 +29,7 @@ class TimeSteps:
     fluid            limits the fluid step; None without a fluid
     particle_step    of an earlier part of the run; evaluated if None [s]
     communicator     path to sums, extremes and decisions over all ranks
-    oscillation      longest step for the oscillation of walls; infinite without one [s]
+    features         gives the longest steps that features allow, by criterion [s]
 
     limiting  criterion of the last fluid step
     """
@@ -40,9 +41,9 @@ class TimeSteps:
         fluid: FluidSolver | None,
         particle_step: float | None = None,
         communicator: Communicator = SERIAL,
-        oscillation: float = math.inf,
+        features: Callable[[], dict[str, float]] = dict,
     ) -> None:
-        self.oscillation = oscillation
+        self.features = features
         self.case, self.particle_solver, self.fluid = case, particle_solver, fluid
         self.communicator = communicator
         self.particle_step = self._largest_particle_step() if particle_step is None else particle_step
@@ -79,12 +80,12 @@ class TimeSteps:
 
     def _flow_limits(self) -> dict[str, float]:
         """Limits of the fluid step by fluid, inlet and moving particles [s]."""
-        walls = {"wall oscillation": self.oscillation} if math.isfinite(self.oscillation) else {}
+        limits = self.features()
         if self.fluid is None:
-            return walls
+            return limits
         spacing, flow = self.fluid.grid.spacing, self.fluid.largest_step(COURANT)
         crossing = crossing_rate(self.particle_solver.particles.velocity, spacing, self.communicator)
-        return walls | {
+        return limits | {
             flow.criterion: flow.step,
             "inlet Courant": courant_step(self.case.bed.fastest_inflow, spacing),
             "particle Courant": COURANT / max(crossing, 1e-300),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from example_case import MIXTURE
 
+from cfddem.features.energy import EnergyLedger
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
@@ -138,8 +139,7 @@ def liquid_bed_divided() -> State:
 def liquid_bed_counted() -> State:
     """Energies counted, collisions recorded."""
     simulation = coupled(BEADS, run__energy_budget=True, run__record_collisions=True)
-    assert simulation.energy is not None
-    row = simulation.energy.row()
+    row = simulation.feature(EnergyLedger).row()
     ledger = {"ledger": np.array([row[name] for name in sorted(row)])}
     return state_of(simulation) | counted(simulation.particle_solver) | collisions(simulation.particle_solver) | ledger
 

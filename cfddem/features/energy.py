@@ -6,16 +6,16 @@ independently. The remainder is the change of the stored energy that gains and l
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import Any
 
-from cfddem.coupling.coupling import Coupling
+from cfddem.case.schema import Case
 from cfddem.coupling.terms import CouplingTerms
 from cfddem.coupling.work_on_particles import CouplingWork
+from cfddem.features.case_feature import CaseFeature
 from cfddem.fluid import budgets
-from cfddem.fluid.solver import FluidSolver
+from cfddem.io.quantities import Quantity
 from cfddem.particles.energy_of_contacts import CHANNELS
-from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 
 STORED = {
@@ -90,26 +90,53 @@ FIELDS = {
 """Columns of history."""
 
 
-class EnergyLedger:
-    """Sums the energy of a simulation: every force returns its work, and the ledger adds it to a line.
+_GROUPS = {
+    f"energy_{name}": group
+    for group, names in {"stored": STORED, "gained": GAINED, "lost": LOST, "exchanged": PASSED}.items()
+    for name in names
+}
 
-    particle_solver  counts its own work, `energies=True`
-    fluid, coupling  of a run with a fluid
-    acted_on         whether a user acts on the run, so that the line of forces from outside is shown
-    """
 
-    def __init__(
-        self,
-        particle_solver: ParticleSolver,
-        fluid: FluidSolver | None,
-        coupling: Coupling | None,
-        acted_on: Callable[[], bool] = lambda: False,
-    ) -> None:
-        self.particle_solver, self.fluid, self.coupling, self._acted_on = particle_solver, fluid, coupling, acted_on
-        self._work = None if coupling is None else CouplingWork(particle_solver.particles, coupling)
+class EnergyLedger(CaseFeature):
+    """Sums the energy of a simulation: every force returns its work, and the ledger adds it to a line."""
+
+    name = "energies"
+
+    def __init__(self, case: Case, simulation: Any) -> None:
+        self.particle_solver, self.fluid, self.coupling = (
+            simulation.particle_solver, simulation.fluid, simulation.coupling,
+        )  # fmt: skip
+        self._acted_on = simulation.is_acted_on  # whether the line of forces from outside is shown
+        self._work = None if self.coupling is None else CouplingWork(self.particle_solver.particles, self.coupling)
         self._recent = (0.0, 0.0)  # work of the pressure on the displaced volume in the last two fluid steps [J]
         self.sums = dict.fromkeys([*GAINED, *LOST, *PASSED, "fallen"], 0.0)
         self.start = self._stored()
+
+    @classmethod
+    def is_in(cls, case: Case) -> bool:
+        """Whether the case asks for the budget."""
+        return case.run.energy_budget
+
+    @classmethod
+    def columns(cls, case: Case) -> Mapping[str, Quantity]:
+        """A column for each line of the ledger."""
+        return {
+            name: Quantity(unit, meaning, f"energy: {_GROUPS.get(name, 'balance')}")
+            for name, (unit, meaning) in FIELDS.items()
+        }
+
+    def values(self, simulation: Any) -> Mapping[str, float]:
+        """The ledger now [J]."""
+        return self.row()
+
+    def before(self, simulation: Any, step: float) -> None:
+        """Add the work on the fluid, which has made its step."""
+        if self._work is not None:
+            self.after_fluid_step(simulation.terms)
+
+    def after(self, simulation: Any) -> None:
+        """Add the work of the fluid on the particles, which have made their steps."""
+        self.after_particle_steps()
 
     def after_fluid_step(self, terms: CouplingTerms) -> None:
         """Add the work on the fluid, after `Coupling.apply` and before the particles move."""

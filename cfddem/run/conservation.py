@@ -1,7 +1,7 @@
 """Conservation of momentum and volume, each counted independently of the step that transfers it.
 
 Momentum that the particles received is summed over particles, momentum that the fluid gave over cells; volume is summed
-over the faces of cells. Energy is in :mod:`cfddem.run.budgets.energy`.
+over the faces of cells. Energy is in :mod:`cfddem.features.energy`.
 """
 
 from __future__ import annotations

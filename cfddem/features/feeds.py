@@ -1,4 +1,4 @@
-"""Walls, feeds and outlets of a case as the particle solver takes them, and what they do around every step."""
+"""Feeds and outlets of a case: particles that enter and leave during a run."""
 
 from __future__ import annotations
 
@@ -8,57 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.errors import RunFailed
 from cfddem.case.bed import Species
 from cfddem.case.feeds import CaseFeed, fed_species, feed_rate
-from cfddem.case.particle_properties import diameters_of
+from cfddem.case.particle_properties import SPECIES, diameters_of
 from cfddem.case.schema import Case
-from cfddem.case.walls import CaseWall
 from cfddem.data.fields import Field
+from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.particles.feeding import Feed, ParticleOutlet
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
-from cfddem.particles.walls.motion import Motion, WallMotions
-from cfddem.particles.walls.shapes import Cone, Cylinder, Mesh, Plane, Wall
-from cfddem.run.initial_particles import SPECIES
 
 _FED = 2
 """Random numbers of the feeds; others use the seed alone, or with other numbers."""
-
-
-def case_walls(case: Case, default: int) -> list[Wall]:
-    """The walls of a case beside those of the column.
-
-    default  row of the pair table of walls without a material
-    """
-    names = list(case.material)
-    return [
-        wall_of(wall, default if wall.material is None else names.index(wall.material), f"wall.{number}")
-        for number, wall in enumerate(case.wall)
-    ]
-
-
-def wall_of(given: CaseWall, material: int, key: str) -> Wall:
-    """A wall of a case as the solver takes it."""
-    velocity = tuple(np.array(given.velocity) + given.swing)
-    common: dict[str, Any] = {"velocity": velocity, "spin": given.spin, "centre": given.centre, "material": material}
-    try:
-        if given.shape == "plane":
-            return Plane(point=given.point, normal=given.normal, **common)
-        if given.shape == "cylinder":
-            return Cylinder(
-                point=given.point, axis=given.axis, radius=given.radius or 0.0, length=given.length, caps=given.caps,
-                outside=given.outside, **common,
-            )  # fmt: skip
-        if given.shape == "cone":
-            return Cone(
-                point=given.point, axis=given.axis, radius=given.radius or 0.0, top_radius=given.top_radius or 0.0,
-                length=given.length or 0.0, **common,
-            )  # fmt: skip
-        return Mesh.from_stl(given.file or "", scale=given.scale, place=given.point, **common)
-    except InputError as failure:
-        raise InputError(f"{key}.{failure.field}", failure.value, failure.limit, failure.remedy) from None
-
 
 LANDED = Field(
     "landed", role="memory", initial=1.0, dtype=np.int8, meaning="1, or 0 before the first contact of a fed particle"
@@ -66,41 +28,43 @@ LANDED = Field(
 """Declared on the particles of a run with feeds."""
 
 
-class CaseEquipment:
-    """Moving walls, feeds and outlets of a case.
+class Feeds(CaseFeature):
+    """Feeds and outlets of a case. A particle that enters replaces fluid of its own volume, or leaves room for it."""
 
-    case    with tables [[wall]], [[feed]] and [[outlet]]
-    solver  of its particles; the walls of the case are its last ones
-    """
+    name = "feeds and outlets"
 
-    def __init__(self, case: Case, solver: ParticleSolver) -> None:
-        first = len(solver.walls.sweep) - len(case.wall)
-        self.motions = WallMotions([
-            Motion(
-                first + number, each.velocity, each.spin, each.amplitude, each.frequency, each.begin,
-                math.inf if each.end is None else each.end,
-            )
-            for number, each in enumerate(case.wall)
-            if each.has_schedule
-        ])  # fmt: skip
+    def __init__(self, case: Case, simulation: Any) -> None:
         self.feeds = [_feed(case, each, number) for number, each in enumerate(case.feed)]
-        if self.feeds:
-            solver.particles.declare(LANDED)
         self.outlets = [
             ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True) for each in case.outlet
         ]
 
-    @property
-    def exchanges(self) -> bool:
-        """Whether particles may enter or leave."""
-        return bool(self.feeds or self.outlets)
+    @classmethod
+    def is_in(cls, case: Case) -> bool:
+        """Whether the case has a feed or an outlet."""
+        return bool(case.feed or case.outlet)
 
-    def move_walls(self, solver: ParticleSolver, step: float) -> None:
-        """Set the velocities of the walls for the coming step [s]."""
-        self.motions(solver, step)
+    @classmethod
+    def fields_of(cls, case: Case) -> tuple[Field, ...]:
+        """What the particles of a case with feeds remember."""
+        return (LANDED,) if case.feed else ()
 
-    def exchange_particles(self, solver: ParticleSolver) -> bool:
-        """Insert the particles that are due, and remove those that have left; returns whether there were any."""
+    @classmethod
+    def measures(cls, case: Case) -> tuple[Measured, ...]:
+        """Numbers of particles that have entered and left."""
+        of_feeds = Measured("1", "recorded", fed_count), Measured("1", "recorded", waiting_count)
+        of_outlets = Measured("1", "recorded", removed_count), Measured("kg", "recorded", removed_mass)
+        return (of_feeds if case.feed else ()) + (of_outlets if case.outlet else ())
+
+    def after(self, simulation: Any) -> None:
+        """Insert the particles that are due, and remove those that have left."""
+        before = simulation.owned
+        if self._exchange(simulation.particle_solver) and simulation.fluid is not None:
+            solids = simulation.coupling.solid_fraction
+            simulation.fluid.add_voidage(solids(before) - solids(simulation.owned))
+
+    def _exchange(self, solver: ParticleSolver) -> bool:
+        """Let particles enter and leave; returns whether there were any."""
         if self.feeds:
             _note_landings(solver)
         moved = sum(feed(solver) for feed in self.feeds)
@@ -130,7 +94,7 @@ class CaseEquipment:
         return sum(each.left for each in self.outlets), sum(each.mass for each in self.outlets)
 
     def checkpoint(self) -> dict[str, Any]:
-        """What feeds and outlets have done so far; the places of walls are in the state of the solver."""
+        """What feeds and outlets have done so far."""
         return {name: each.checkpoint() for name, each in self._by_name()}
 
     def restore(self, state: dict[str, Any]) -> None:
@@ -142,6 +106,26 @@ class CaseEquipment:
         """All feeds and outlets by name."""
         yield from ((f"feed_{number}", each) for number, each in enumerate(self.feeds))
         yield from ((f"outlet_{number}", each) for number, each in enumerate(self.outlets))
+
+
+def fed_count(simulation: Any) -> float:
+    """Number of particles that feeds have inserted so far."""
+    return simulation.feature(Feeds).fed
+
+
+def waiting_count(simulation: Any) -> float:
+    """Number of particles that are due, and wait for a free place in the box of a feed."""
+    return simulation.feature(Feeds).waiting
+
+
+def removed_count(simulation: Any) -> float:
+    """Number of particles that outlets have removed so far."""
+    return simulation.feature(Feeds).removed[0]
+
+
+def removed_mass(simulation: Any) -> float:
+    """Mass of the particles that outlets have removed so far."""
+    return simulation.feature(Feeds).removed[1]
 
 
 def _feed(case: Case, given: CaseFeed, number: int) -> Feed:

@@ -1,0 +1,56 @@
+"""Equipment that a case can have: when it has it, and the columns of the history that it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from cfddem.case.schema import Case
+from cfddem.data.fields import Field
+from cfddem.io.quantities import Quantity, of_function
+from cfddem.model.feature import Equipment
+
+
+class Measured(NamedTuple):
+    """A column of the history: a number for the present state of a simulation."""
+
+    unit: str  # SI, `1` for a plain number
+    group: str  # how the report shows it: "measure", "imbalance" or "recorded"
+    function: Callable[[Any], float]  # of a simulation; its name is that of the column
+
+
+class CaseFeature(Equipment):
+    """Equipment that a case can have.
+
+    case        that has it
+    simulation  of the case; particles and solvers are ready, and in their state at the start
+    """
+
+    def __init__(self, case: Case, simulation: Any) -> None:
+        """Prepare what acts in every step."""
+
+    @classmethod
+    def is_in(cls, case: Case) -> bool:
+        """Whether a case has it."""
+        return False
+
+    @classmethod
+    def fields_of(cls, case: Case) -> tuple[Field, ...]:
+        """Fields of the particles that it needs in a case."""
+        return cls.fields
+
+    @classmethod
+    def measures(cls, case: Case) -> tuple[Measured, ...]:
+        """What it measures in a case."""
+        return ()
+
+    @classmethod
+    def columns(cls, case: Case) -> Mapping[str, Quantity]:
+        """Columns of the history that it gives, by name."""
+        return {
+            each.function.__name__: of_function(each.function, each.unit, each.group) for each in cls.measures(case)
+        }
+
+    def values(self, simulation: Any) -> Mapping[str, float]:
+        """Numbers for its columns."""
+        return {each.function.__name__: float(each.function(simulation)) for each in self.measures(simulation.case)}
