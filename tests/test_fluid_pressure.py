@@ -133,6 +133,7 @@ def test_continuity_holds_in_each_of_two_separate_closed_regions():
 
 RUN = """
 import numpy as np
+from cfddem.fluid import budgets
 from cfddem.fluid.conditions import Inlet, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver

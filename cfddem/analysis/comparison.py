@@ -234,6 +234,6 @@ def _means(result: dict[str, Any]) -> Iterator[str]:
         rows = []
         for place, (run, row) in enumerate(zip(names, measure["runs"])):
             value = "-" if row["mean"] is None else with_error(row, measure["unit"])
-            judged = ("", "") if place == 0 or row["mean"] is None else (relative(row), row["verdict"])
+            judged = ("", "") if place == 0 or row["mean"] is None else (relative(row), f" {row['verdict']}")
             rows.append((run[:wide], value, *judged))
         yield from table(rows, right=(2,), widths=(wide, 30, 10), indent=2)

@@ -269,7 +269,7 @@ def notebooks() -> list[tuple[str, str]]:
 def changes() -> str:
     """CHANGELOG.md with links to pages of the site."""
     text = (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "](")
-    return re.sub(r"\]\(scenarios/[\w/]*?(\w+)/README\.md\)", r"](gallery/\1.md)", text)
+    return re.sub(r"\]\(scenarios/[\w/]*?(\w+)/README\.md(#[\w-]*)?\)", r"](gallery/\1.md\2)", text)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
