@@ -201,7 +201,7 @@ def test_gallery_pages_follow_one_pattern(page: Path) -> None:
     assert set(NUMBER.findall(top["headline"])) <= set(NUMBER.findall(text[top.end() :])), (
         "a number that the page lacks"
     )
-    row = f"| {top['headline']} | {top['command']} | {top['time']} |"
+    row = f"| {' '.join(top['headline'].split())} | {top['command']} | {top['time']} |"
     assert row in (ROOT / "scenarios" / "README.md").read_text()
 
 

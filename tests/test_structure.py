@@ -51,6 +51,12 @@ COMPILED = ("serial", "threaded", "either", "part", "inline", "vector_inline", "
 LOOP_FILES = re.compile(r"(_loops|/integrate|/neighbours|/filling)\.py$")
 """Files of functions that are compiled elsewhere, with a law set or when they are first called."""
 
+LONGEST_SENTENCE, LONGEST_LINE = 38, 120
+"""Words of a sentence and characters of a line on a page. Code, an equation or a link counts as its words or as one."""
+
+SET_APART = re.compile(r"^ *```.*?^ *```$|<!--.*?-->|\$\$.*?\$\$|(?<=\n\n)(?: {4}[^\n]*\n)+(?=\n|\Z)", re.M | re.S)
+"""Blocks of code, comments and displayed equations on a page."""
+
 OLD_WORDS = re.compile(
     r"own_wind|\bmoisten|\bsqueeze_out|never_faster|\bRedCard\b|\bgrains_of\b|"
     r"\bFootprint\b|\bPlacement\b|swept_along|left_behind|under_way\b|\bshelf\b|\bnewcomers?\b|\brehears|"
@@ -238,3 +244,73 @@ def test_replaced_words_are_gone() -> None:
                 if OLD_WORDS.search(line):
                     found.append(f"{file}:{number}: {line.strip()}")
     assert not found, "\n".join(found)
+
+
+# ---------------------------------------------------------------- sentences and lines of pages
+
+PAGES = sorted([*(HOME / "docs").rglob("*.md"), *(HOME / "scenarios").rglob("*.md"), *HOME.glob("*.md")])
+
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(HOME)))
+
+
+def lines_of_text(text: str) -> list[str]:
+    """Lines of a page; those of blocks of code, comments and displayed equations are empty."""
+    return SET_APART.sub(lambda block: "\n" * block[0].count("\n"), text).splitlines()
+
+
+def sentences(text: str) -> Iterator[tuple[int, str]]:
+    """Sentences of a page with the line in which their paragraph, item or cell begins. A colon or `;` ends none."""
+    paragraphs: list[tuple[int, str]] = [(0, "")]
+    for number, line in enumerate(lines_of_text(text), 1):
+        line = re.sub(r"`[^`]+`|\$[^$]+\$", "X", line.strip())
+        if line.startswith("|"):
+            paragraphs += [(number, cell) for cell in line.split("|")]
+        elif not line or re.match(r"[-*+] |\d+\. |#", line) or not paragraphs[-1][1]:
+            paragraphs.append((number, line))
+        else:
+            paragraphs[-1] = (paragraphs[-1][0], f"{paragraphs[-1][1]} {line}")
+    for number, paragraph in paragraphs:
+        words = re.sub(r"!?\[([^]]*)\](?:\([^)]*\)|\[[^]]*\])", r"\1", paragraph)
+        words = re.sub(r"\bal\.(?= [a-z(\d])", "al", words)
+        for sentence in re.split(r"(?<=[.!?]) |(?<=[.!?][)*\"]) |(?<=[.!?]\*\*) ", words):
+            yield number, sentence
+
+
+def long_sentences(text: str) -> list[str]:
+    """Sentences with too many words, each with its line and number of words."""
+    counted = [(number, len(re.findall(r"\S*\w\S*", sentence)), sentence) for number, sentence in sentences(text)]
+    return [f"{number}: {words} words: {sentence}" for number, words, sentence in counted if words > LONGEST_SENTENCE]
+
+
+def long_lines(text: str) -> list[str]:
+    """Lines with too many characters that could be broken: no rows of tables, and no lone link, picture or equation."""
+    parts = re.compile(r"(?:`[^`]*`|\$[^$]*\$|!?\[[^]]*\]\([^)]*\)|\S)+")
+    return [
+        f"{number}: {len(line)} characters: {line}"
+        for number, line in enumerate(lines_of_text(text), 1)
+        if len(line) > LONGEST_LINE and not line.lstrip().startswith("|") and len(parts.findall(line)) > 1
+    ]
+
+
+@each_page
+def test_no_sentence_of_a_page_is_too_long(page: Path) -> None:
+    found = long_sentences(page.read_text(encoding="utf-8"))
+    assert not found, "\n".join(found)
+
+
+@each_page
+def test_no_line_of_a_page_is_too_long(page: Path) -> None:
+    found = long_lines(page.read_text(encoding="utf-8"))
+    assert not found, "\n".join(found)
+
+
+def test_long_sentences_and_lines_are_found() -> None:
+    """Clauses after a semicolon count, and so do broken lines, items and cells; code, equations and tables do not."""
+    clause = "one two three four five six seven eight nine ten"
+    long = f"{clause}; {clause}: {clause}\n{clause}"
+    for page in (long, f"- {long}", f"1. {long}", f"    {long}", f"| a | {long.replace(chr(10), ' ')} |"):
+        assert len(long_sentences(page)) == 1, page
+    for page in (f"```sh\n{long}\n```", f"{clause}. {clause}.\n\n{clause} {clause}", f"a\n\n    {clause * 5}\n"):
+        assert not long_sentences(page), page
+    assert len(long_lines("word " * 25)) == 1
+    assert not long_lines(f"`{'word ' * 25}`\n\n| {'word ' * 25} |\n\n$$ {'word ' * 25} $$\n\n![{'word ' * 25}](a.png)")

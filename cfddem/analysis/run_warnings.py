@@ -43,9 +43,12 @@ MISSED = 0.1
 """Share of the spray that may miss the particles without a warning."""
 
 AGITATION_SHARE, LOCAL_SHARE, ALL = 0.25, 0.25, 0.995
-"""Share of the uses of a law of agitation outside of its range above which a warning is given, because surface and
-floor of every bed are outside; that of a drag law, if the bed as a whole is inside, because dense and loose places are
-outside; and the share from which the words say `all`."""
+"""Shares of the uses of a law outside of its range.
+
+Above the first, a law of agitation gives a warning: surface and floor of every bed are outside. Above the second, a
+drag law does if the bed as a whole is inside: dense and loose places are outside. From the third on, the words say
+`all`.
+"""
 
 
 def warnings_of(

@@ -38,9 +38,9 @@ class CaseLaws(Checked):
     )
     lubrication: str | Callable[..., float] = Field(
         "auto",
-        description="lubrication film between close spheres: auto (nijssen in a liquid, none in a gas, lighter than "
-        "100 kg/m3), nijssen (along the line of centres), nijssen_full (also against sliding and rolling), "
-        "nijssen_full_twist (and twisting), none, a law's name, or a function",
+        description="lubrication film between close spheres: auto (nijssen in a liquid, none below 100 kg/m3), nijssen "
+        "(along the line of centres), nijssen_full (also against sliding and rolling), nijssen_full_twist (and "
+        "twisting), none, a law's name, or a function",
     )
     minimum_gap: str | Callable[..., float] = Field(
         "elastohydrodynamic",
@@ -77,7 +77,7 @@ class CaseLaws(Checked):
     wall_drag: Literal["none", "nearest", "all"] = Field(
         "none",
         description="extra drag of a single sphere beside the nearest wall or all walls, by Brenner and by Goldman, "
-        "Cox and Brenner, less what the films apply; prefer nearest: in a box, all lets measured spheres fall at 0.73 "
+        "Cox and Brenner, less what the films apply. Prefer nearest: in a box, all lets measured spheres fall at 0.73 "
         "to 0.89 of their largest speed, nearest within 2.5 %",
     )
     lift: bool = Field(False, description="Saffman-Mei shear lift and Magnus spin lift")

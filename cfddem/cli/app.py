@@ -28,8 +28,8 @@ app = App(
 
 A first run: cfddem new liquid-bed, then cfddem check, cfddem run, cfddem report, cfddem view
 
-Exit codes: 0 success; 1 a limit is exceeded (validate), warnings with --strict (check), or the machine is not ready
-(doctor); 2 wrong input, or a case with errors; 3 the run failed; 130 stopped from the keyboard, 143 by SIGTERM;
+Exit codes: 0 success. 1 a limit is exceeded (validate), warnings with --strict (check), or the machine is not ready
+(doctor). 2 wrong input, or a case with errors. 3 the run failed. 130 stopped from the keyboard, 143 by SIGTERM.
 128 and the number of the signal where one of several processes was killed, 137 by SIGKILL.
 """,
     help_flags=["--help", "-h"],

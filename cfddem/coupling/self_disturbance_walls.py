@@ -2,9 +2,9 @@ r"""What walls leave of the self-disturbance: the flow of a force beside a wall 
 
 A wall stops a part of the flow that a particle drives in the cells, all the more the closer it is and the longer the
 waves. A law of the drag beside walls contains this effect, so it must not act on the slip a second time. The flow
-beside a wall is known, as that far from walls is: along the wall it is a sum over waves; from the wall up, the
-eigenvectors of the discrete Stokes equations between the wall and a distant plane without friction are found for every
-wave. A stream function at the faces, with :math:`w = K\psi` and :math:`u = D\psi`, satisfies continuity:
+beside a wall is known, as that far from walls is. Along the wall it is a sum over waves. From the wall up, the
+eigenvectors of the discrete Stokes equations are found for every wave, between the wall and a distant plane without
+friction. A stream function at the faces, with :math:`w = K\psi` and :math:`u = D\psi`, satisfies continuity:
 
 .. math:: \left[K^2(K^2 + L_w) + D^T(K^2 + L_u)D\right]\phi = \Lambda\left[K^2 + D^TD\right]\phi
 

@@ -17,7 +17,7 @@ through the conductance :math:`b`, and receives :math:`f` from everything else:
 
 which is of second order for small lambda and never passes the value of the fluid for large lambda. f is the mean over
 the step before. The fluid takes b* and v* into its own implicit step. What it has given in each cell is returned to
-the particles by the weights of the deposit, so that the sum over particles is the opposite of the sum over cells to
+the particles by the weights of the deposit. So the sum over particles is the opposite of the sum over cells to
 round-off, for any stiffness of either side.
 """
 

@@ -26,9 +26,11 @@ Role = Literal["state", "memory", "scratch"]
 Checkpoints hold state and memory, not scratch."""
 
 Phase = Literal["start", "shear", "far", "film", "bridge", "motion", "liquid", "work"]
-"""When ghost rows receive values: at the start of an advance, before the impulses of films against sliding, those of
-far films, those of other films and those of bridges, after the drift, before new bridges fill, and before work is
-counted."""
+"""When ghost rows receive values.
+
+In order: at the start of an advance, before the impulses of films against sliding, of far films, of other films and of
+bridges, after the drift, before new bridges fill, and before work is counted.
+"""
 
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]
 """Value in new rows: a number, or a function of the table and the new rows (k,) that returns their values."""

@@ -25,11 +25,11 @@ is that of the model chosen. With uniform eps and no drag both give the same vel
 :math:`p_B' = \varepsilon p_A'`. Where eps varies, :math:`-\varepsilon\nabla p = -\nabla(\varepsilon p) +
 p\nabla\varepsilon`: model A gives the second part to the particles, and a ledger of the fluid must count it.
 
-In time (step h, from n to n+1) storage is centred, convection and viscous stress follow Heun's two stages,
-the pressure is the one that makes the new velocity satisfy continuity, and drag acts on
+In time (step h, from n to n+1) storage is centred, and convection and viscous stress follow Heun's two stages.
+The pressure is the one that makes the new velocity satisfy continuity. Drag acts on
 :math:`u_\theta = \theta u^{n+1} + (1-\theta)u^n` with :math:`\theta = (1+z)/(2+z)` and
-:math:`z=\beta h/(\varepsilon\rho)`: second order for small z, fully implicit for large z; a velocity relaxes by
-1/(1 + z + z^2/2), never past its target.
+:math:`z=\beta h/(\varepsilon\rho)`. It is of second order for small z, and fully implicit for large z. A velocity
+relaxes by 1/(1 + z + z^2/2), never past its target.
 """
 
 from __future__ import annotations

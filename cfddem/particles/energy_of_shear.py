@@ -1,6 +1,6 @@
 """Energy lost to films that resist sliding, rolling and twisting.
 
-The work of an impulse is its product with the mean of the motion before and after all impulses of the step: so the work
+The work of an impulse is its product with the mean of the motion before and after all impulses of the step. So the work
 of all impulses adds up to the change of the kinetic energy to round-off.
 """
 

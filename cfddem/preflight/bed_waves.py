@@ -21,8 +21,8 @@ GRID_DAMPING = 5.0
 r"""Factor of the damping of a wave by cells of the height h, :math:`5\,(c/\lambda)\,(h/\lambda)^2`.
 
 Measured with single waves in periodic boxes of alumina in water, 2 to 4 packings each
-(`scenarios/validation/bed_waves`): with 4 cells in a wavelength of 32, 48 and 64 mm the growth is 0.9, 1.1 and 1.1 1/s
-below the theory (standard error 0.3 to 0.6); with 6 to 12 cells no damping can be told from the scatter.
+(`scenarios/validation/bed_waves`). With 4 cells in a wavelength of 32, 48 and 64 mm the growth is 0.9, 1.1 and 1.1 1/s
+below the theory (standard error 0.3 to 0.6). With 6 to 12 cells no damping can be told from the scatter.
 """
 
 WARN_AT = 3.0

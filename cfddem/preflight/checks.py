@@ -23,8 +23,8 @@ from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 SOFT_OVERLAP, NOTED_OVERLAP, LARGEST_OVERLAP = 0.02, 0.04, 0.1
 """Overlap over the diameter: above the first a warning, above the last an error [-].
 
-Between the first two it is a note where only the fastest collisions overlap so far, or the flow carries the bed:
-contacts four times stiffer change mean height and pressure drop of a slugging bed (gallery case `defluidisation`) by
+Between the first two it is a note where only the fastest collisions overlap so far, or the flow carries the bed.
+Contacts four times stiffer change mean height and pressure drop of a slugging bed (gallery case `defluidisation`) by
 less than 1.5 %.
 """
 
@@ -32,7 +32,7 @@ LONG_STEP = 2.0
 """Particle step over the recommended one above which there is a warning [-].
 
 At 4 % of the Hertz time, the normal rebound of a pair with e = 0.9 differs by 0.002 of the approach speed from that of
-a fine step, and its sliding by 0.005 of the first sliding speed; at 8 % by 0.004 and 0.011.
+a fine step, and its sliding by 0.005 of the first sliding speed. At 8 % they differ by 0.004 and 0.011.
 """
 
 LONG_RUN, DAY, YEAR = 600.0, 86_400.0, 365.0 * 86_400.0

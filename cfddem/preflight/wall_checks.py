@@ -41,8 +41,8 @@ MOST_CELLS = 5_000_000
 """Cells above which the pre-run check does not look for those that walls close."""
 
 MOST_LEAKS, BETWEEN, LEAKS = 200_000, 8, 0.25
-"""Cells above which the check does not look for walls thinner than a cell, places between the centres of two cells
-at which it looks, and the share of a wall that may let the fluid pass without a warning [-]."""
+"""The check does not look for walls thinner than a cell above so many cells. It looks at so many places between the
+centres of two cells. This share of a wall may let the fluid pass without a warning [-]."""
 
 SAMPLES, MOSTLY = 400, 0.5
 """Places tried in the box of a feed, and share of them that must be free of walls [-]."""

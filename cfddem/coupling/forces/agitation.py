@@ -7,10 +7,10 @@ slip :math:`w`. The force is
 .. math:: F'' = b\,\mathsf a_d u'' + a_i\,\frac{m'\,(1 + C)\,m_f}{m + C m_f}\,\frac{du''}{dt}
 
 The first part is the drag of the fluctuation and goes through the implicit transfer; :math:`\mathsf a_d` has one value
-along and one across the mean slip. The second is the response of a body to the acceleration of the fluid around it (m'
-the inertia of the particle in the run, m its mass, m_f the mass of the displaced fluid, C the coefficient of the run's
-added mass or, without added mass, Zuber's). u'' is not part of the velocity whose change drives the added-mass force of
-the run, so that no acceleration is counted twice.
+along and one across the mean slip. The second is the response of a body to the acceleration of the fluid around
+it. Here m' is the inertia of the particle in the run, m its mass, and m_f the mass of the displaced fluid. C is the
+coefficient of the run's added mass or, without added mass, Zuber's. u'' is not part of the velocity whose change drives
+the added-mass force of the run, so that no acceleration is counted twice.
 
 **Fluctuating force** after Lattanzi et al. (2022): :math:`dF'' = -F''\,dt/\tau_F + \sigma_F\sqrt{2/\tau_F}\,dW`.
 

@@ -215,8 +215,8 @@ def _not_at_rest(run: ParticleSolver, left: float, time: float, limit: float) ->
     share = (unbalanced(run) > _UNBALANCED).mean()
     return (
         f"the poured bed is not at rest after {time:.3g} s: it holds {left:.2g} of the energy of its fall (limit "
-        f"{limit:g}), {share:.2%} of the particles are out of balance, the fastest one at ({place}) m;\n"
-        'raise friction or lower restitution of its material, set laws.rolling_resistance, or bed.start = "suspended"'
+        f"{limit:g}), {share:.2%} of the particles are out of balance, the fastest one at ({place}) m.\n"
+        'Raise friction or lower restitution of its material, set laws.rolling_resistance, or bed.start = "suspended"'
     )
 
 

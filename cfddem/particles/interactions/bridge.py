@@ -3,7 +3,7 @@
 Every particle carries liquid, the field `liquid`. A bridge joins two particles, or a particle and a wall, from where
 their films touch until it is stretched too far (:mod:`~cfddem.particles.interactions.bridge_changes`).
 
-The resistance of a bridge acts by impulses between the kick and the drift, as films do: each body gives each of its
+The resistance of a bridge acts by impulses between the kick and the drift, as films do. Each body gives each of its
 bridges the part of its mass that the bridge has in the body's total resistance, and the pair so made is solved. Along
 the line of centres the resistance is integrated over the gap, so that impulses add up to the potential between the
 first gap and the last. Across it the solution is exact for a fixed gap. The pull is an ordinary force.

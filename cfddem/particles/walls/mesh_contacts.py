@@ -2,7 +2,7 @@
 
 A sphere may touch many triangles of one smooth surface at once. Two rules make them act as the surface does.
 First, a triangle is inactive if its nearest point lies on a corner or an edge that it shares with a nearer triangle.
-Second, two triangles that are both touched on their faces, as in a hollow, have a contact each; but where the common
+Second, two triangles that are both touched on their faces, as in a hollow, have a contact each. But where the common
 edge is itself inside the overlap they share one contact, in the ratio of the distances of their nearest points from
 that edge. So a force does not jump when a face is entered, and does not count twice where the faces are nearly in one
 plane. An inactive triangle keeps a copy of the memory of the contact beside it, and continues from it when it becomes

@@ -1,7 +1,7 @@
 r"""Energy of an impact: what bead and liquid have, and what each step takes from them.
 
-The losses are those of the discrete equations. With u* before the pressure and u after it, and the mass of liquid m_f
-of a face, the pressure's work on the liquid is that on the bead with the other sign, and the kinetic energy falls by
+The losses are those of the discrete equations. The pressure's work on the liquid is that on the bead with the other
+sign. With u* before the pressure and u after it, and the mass of liquid m_f of a face, the kinetic energy falls by
 
 .. math:: \tfrac12\sum_f m_f (u^*-u)^2 + \tfrac12 m (V^*-V)^2 + \sum_f m_f (1/b_f - 1)\,u^2
 

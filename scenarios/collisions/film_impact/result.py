@@ -78,9 +78,12 @@ class FilmImpact:
 
 
 ENERGIES = ("liquid_kinetic", "liquid_potential", "contact", "viscous", "impulsive", "exchange", "voids", "surface")
-"""Where the energy of the bead goes: what the liquid has at the end, the dry contact, viscous stress, sudden changes of
-the flow (above all at contact), and what particles and grid lose in exchange, an error of the method; the voids
-of a liquid that cavitates; and the surface of one with surface tension."""
+"""Where the energy of the bead goes, in this order.
+
+It goes to what the liquid has at the end, the dry contact, viscous stress, and sudden changes of the flow (above all at
+contact). Particles and grid lose some in exchange, an error of the method. The last two are the voids of a liquid that
+cavitates, and the surface of one with surface tension.
+"""
 
 COLUMNS = {
     "time": "s",

@@ -5,7 +5,7 @@ Each cell holds 19 populations :math:`f_i`, stored without their values at rest.
 .. math:: f_i(x + c_i, t + 1) = f_i + (1 - B)\,(\Omega_i + S_i) + B\,\Omega^s_i .
 
 :math:`B` is the solid weight of the cell (0 in fluid, 1 in solid). :math:`\Omega` relaxes the even and the odd part of
-the populations to the incompressible equilibrium of He & Luo (1997) at their own rates; :math:`S` is the body force of
+the populations to the incompressible equilibrium of He & Luo (1997) at their own rates. :math:`S` is the body force of
 Guo, Zheng & Shi (2002), its odd part at the odd rate. :math:`\Omega^s` is the solid operator of Noble & Torczynski
 (1998): non-equilibrium bounce-back at the velocity of the solid. It changes the momentum of the cell by exactly
 :math:`B (u_s - m)`, :math:`m = \sum_i c_i f_i`. Units are those of the lattice: cell, step, and density of the fluid 1.

@@ -2,7 +2,7 @@ r"""Free spheres and the flow around them: the resolved flow, and contacts and f
 
 In one step the flow first exchanges momentum with every sphere (implicitly, :mod:`.spheres`). The particle engine then
 moves the spheres with their contacts and films in smaller steps. The impulses of contacts and films enter the next
-exchange. Gravity acts on the excess mass of the spheres alone, and a uniform force on all cells balances it: the
+exchange. Gravity acts on the excess mass of the spheres alone, and a uniform force on all cells balances it. The
 mixture has no mean acceleration, its total momentum stays zero, and the mean slip follows from the balance of forces.
 """
 

@@ -1,8 +1,9 @@
 """An independent second solution of a wet impact on a wall, for comparison.
 
-Buck et al. (2018), eqs (5) to (43), with the signs of Goldman, Cox & Brenner (1967), the gap as height less radius, the
-capillary force in phases I, III and IV, and the length of the bridge from the surface of the layer. Nothing of
-`closures` is used. The state is height, velocity, tangential velocity, spin and tangential displacement.
+The equations are those of Buck et al. (2018), eqs (5) to (43), with the signs of Goldman, Cox & Brenner (1967). The gap
+is height less radius. The capillary force acts in phases I, III and IV. The length of the bridge counts from the
+surface of the layer. Nothing of `closures` is used. The state is height, velocity, tangential velocity, spin and
+tangential displacement.
 """
 
 from __future__ import annotations

@@ -41,8 +41,11 @@ COLUMNS = {
     "lost_capillary": "J/kg",
     "lost_gravity": "J/kg",
 }
-"""Columns of the history with units: height of the centre above the wall and its rate, the same along the wall, spin,
-tangential displacement of the contact point, and the energy dissipated by each kind of force, over the mass."""
+"""Columns of the history with units.
+
+They are height of the centre above the wall and its rate, the same along the wall, spin, and tangential displacement of
+the contact point. The others are the energy dissipated by each kind of force, over the mass.
+"""
 
 HEIGHT, SPEED, DISTANCE, ALONG, SPIN, DISPLACEMENT = range(6)
 CONTACT, VISCOUS, CAPILLARY, GRAVITY = range(6, 10)
