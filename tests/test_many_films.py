@@ -27,12 +27,12 @@ from scenarios.validation.particles.suspensions import films_alone, shear
     ],
 )
 def test_films_never_raise_kinetic_energy(fraction: float, step: float) -> None:
-    """Films alone, in 1 Pa s: kinetic energy falls in every single step; contacts are taken away.
+    """Films alone, in 1 Pa s: kinetic energy falls in every single step, to 1e-15 of itself; contacts are taken away.
 
     A film time m* h_min/(6 pi eta R*^2) is 5.5e-9 s.
     """
     crowd = films_alone(fraction, 60, step, count=400)
-    assert (np.diff(crowd.energy) <= 0.0).all()
+    assert (np.diff(crowd.energy) <= 1e-15 * crowd.energy[:-1]).all()
 
 
 @pytest.mark.parametrize("step", [5e-9, 5e-7, 5e-6])

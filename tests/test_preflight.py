@@ -233,7 +233,6 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
         ({"run.average_from": 5.0}, "warning", "run.average_from", "not before the end"),
         ({"bed.diameter": 1e-200}, "error", "bed.diameter", "SI units"),
         ({"laws.contact": "jkr"}, "error", "laws.contact", "but films form"),
-        ({"laws.far_film_steps": 5, "laws.lubrication": "nijssen_full"}, "error", "laws.far_film_steps", "every step"),
         (
             {"laws.rolling_resistance": "spring_dashpot"},
             "warning",

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 import pytest
 from in_process_ranks import on_ranks
-from scipy.linalg import expm
 from test_ghosts import WET, assert_same_bits, divided, finished, joined, settings, state
 from test_momentum import angular_momentum, momentum
 
@@ -22,7 +21,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
-from cfddem.particles.interactions.shear_film import impulse_factors, logarithm
+from cfddem.particles.interactions.shear_film import logarithm
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles
@@ -111,34 +110,6 @@ def test_logarithm_of_the_loops() -> None:
     """Within 4e-15 of the library's, from 1e-12 to 1e6."""
     for value in 10.0 ** np.random.default_rng(1).uniform(-12.0, 6.0, 1000):
         assert logarithm.py_func(value) == pytest.approx(math.log(value), abs=4e-15, rel=4e-16)
-
-
-@pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e3, 1e9, 1e15])
-def test_a_pair_loses_energy_at_any_stiffness(stiffness: float) -> None:
-    """Slip and roll of unequal spheres: the energy falls, no mode turns round; exact to second order where soft."""
-    draw = np.random.default_rng(2)
-    for _ in range(50):
-        reduced, asymmetry = 10.0 ** draw.uniform(-1.0, 1.0), draw.uniform(-1.0, 1.0)
-        rate, turns, arms = draw.uniform(0.1, 1.0), draw.uniform(0.1, 1.0, 2), draw.uniform(1.0, 3.0, 2)
-        inverse = np.array([
-            [rate + turns @ arms**2, arms[0] * turns[0] - arms[1] * turns[1]],
-            [arms[0] * turns[0] - arms[1] * turns[1], turns.sum()],
-        ])  # fmt: skip
-        resistance, motion = stiffness, draw.normal(size=2)
-        determinant = rate * turns.sum() + arms.sum() ** 2 * turns.prod()
-        rates = (*(resistance * inverse[0]), resistance * inverse[1, 1], resistance**2 * determinant)
-        factors = impulse_factors.py_func(rates, reduced, asymmetry, 1.0)
-        given = resistance * np.array([factors[:2], factors[1:]]) @ motion
-        after, inertia = motion + inverse @ given, np.linalg.inv(inverse)
-        left, had = after @ inertia @ after, motion @ inertia @ motion
-        assert left <= had * (1.0 + 1e-9)
-        assert after @ inertia @ motion >= -1e-9 * had
-        if stiffness == 1e-3:
-            shear = film.shear_resistance(1.0, reduced, asymmetry)
-            both = film.shear_roll_resistance(1.0, reduced, asymmetry) / shear
-            matrix = resistance * np.array([[1.0, both], [both, film.roll_resistance(1.0, reduced) / shear]])
-            x = inverse @ matrix
-            assert after == pytest.approx(expm(-x) @ motion, abs=np.linalg.norm(x) ** 3 * np.linalg.norm(motion))
 
 
 # ---------------------------------------------------------------- in the particle solver

@@ -52,12 +52,6 @@ class CaseLaws(Checked):
     contact_parameters: dict[str, NonNegative] = Field(
         {}, description="parameters of the contact law: normal_stiffness of linear [N/m], ..."
     )
-    far_film_steps: int = Field(
-        1,
-        ge=1,
-        description="films of pairs that cannot touch before the next neighbour list act once in this many steps; 1 "
-        "with liquid bridges and with films that resist sliding",
-    )
     friction_onset: Literal["film", "overlap"] = Field(
         "film", description="friction begins at the minimum gap of the film, or at overlap of the solids"
     )

@@ -95,6 +95,9 @@ class CaseRun(Checked):
     reference_speed: Positive | None = Field(
         None, description="expected highest collision speed, which sets the time step; default: estimated [m/s]"
     )
+    film_tolerance: float = Field(
+        1e-3, gt=0, le=1, description="to which the films of a step are solved together; energy falls at any value [-]"
+    )
     energy_budget: bool = Field(
         False, description="record the energy budget, force by force; takes up to 50 % more time"
     )

@@ -61,9 +61,6 @@ def bench(
     threads: Annotated[int, Parameter(help="of each code")] = 1,
     film: Annotated[bool, Parameter(help="dem with the film of water", negative="")] = False,
     films: Annotated[Literal["full"] | None, Parameter(help="with films that resist sliding and rolling, too")] = None,
-    far_film_steps: Annotated[
-        int, Parameter(help="films of pairs that cannot touch act once in this many steps; with --film")
-    ] = 1,
     bridges: Annotated[
         bool,
         Parameter(
@@ -90,9 +87,7 @@ def bench(
 
     targets = {
         "dem": (
-            lambda: dense_bed.bench(
-                particles, threads, film, bridges, full=films == "full", far_film_steps=far_film_steps
-            ),
+            lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"),
             dense_bed.rows,
         ),
         "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),

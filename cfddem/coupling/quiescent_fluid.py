@@ -26,7 +26,6 @@ from cfddem.coupling.transfer import after_source, implicit_coefficients
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
-from cfddem.particles.far_films import rates_of_films
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Plane
@@ -70,8 +69,6 @@ class AddedMassBesideWall(FluidForce):
             self._push = -0.5 * (displaced * gradient * (particles.velocity @ normal) ** 2)[:, None] * normal
         free = particles.inverse_mass > 0.0
         after = np.where(free, 1.0 / (particles.mass + coefficient * displaced), 0.0)
-        for rate in rates_of_films(particles):
-            rate[free] *= after[free] / particles.inverse_mass[free]
         particles.inverse_mass[:] = after
 
     def act(self, terms: ForceTerms) -> None:

@@ -76,9 +76,7 @@ class Energies:
             self._pass(solver, 0.0, 0.0, 0.5 * step if first else 0.0)
             if self._bridges is not None and not first:
                 self._bridges.count(solver, 0.0, 0.0, 0.5 * step)  # a new list forgets the half kick that follows
-        particles, edges = solver.particles, solver.edges
-        if solver.laws.far_film_steps > 1:
-            edges.impulse[edges.near : edges.between_particles] = 0.0  # far films act in some steps only
+        particles = solver.particles
         ahead = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
         keep_motion(self._count, particles, step, ahead)
         if self._bridges is not None:

@@ -22,9 +22,8 @@ from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Phase
-from cfddem.particles.far_films import far_kick
-from cfddem.particles.integrate import film_kick, find_bridge_changes, finish_step, move, start_step, start_steps
-from cfddem.particles.interactions.shear_film import shear_kick
+from cfddem.particles.films_with_ghosts import FilmsWithGhosts
+from cfddem.particles.integrate import find_bridge_changes, finish_step, move, start_step, start_steps
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 from cfddem.particles.system import System
@@ -255,55 +254,38 @@ class StepsWithGhosts:
     """
 
     def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Whole, communicator: Communicator) -> None:
-        loops = (start_steps, start_step, far_kick, film_kick, move, find_bridge_changes, finish_step, shear_kick)
-        made = [specialise(loop, choices, threads) for loop in loops]
-        self.begin, self.start, self.far_kick, self.film_kick, self.move = made[:5]
-        self.find_bridge_changes, self.finish, self.shear_kick = made[5:]
-        self.films, self.bridges, self.recording = choices["DRIFTING"], choices["BRIDGE"], choices["RECORD"]
-        self.shear, self.far, self.ghosts, self.communicator = choices["SHEAR"], choices["FAR"], ghosts, communicator
+        loops = (start_steps, start_step, move, find_bridge_changes, finish_step)
+        self.begin, self.start, self.move, self.find_bridge_changes, self.finish = (
+            specialise(loop, choices, threads) for loop in loops
+        )
+        self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["DRIFTING"] else None
+        self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
+        self.ghosts, self.communicator = ghosts, communicator
 
     def __call__(
-        self, system: System, step: float, steps: int, taken: int, origin: np.ndarray, reach: float, time: float,
-        log: np.ndarray,
-    ) -> tuple[int, float, int]:  # fmt: skip
+        self, system: System, step: float, steps: int, origin: np.ndarray, reach: float, time: float, log: np.ndarray
+    ) -> tuple[int, float, int]:
         """Arguments and results of `integrate`."""
-        every = system.parameters.far_film_steps
         self.ghosts.refresh("start")
         if self.bridges:
             self.begin(system.particles)
         largest, done, noted, full = 0.0, 0, 0, False
         if steps == 0:
-            self.finish(self._changes(system), system, True, 0.0, time, log, noted)
+            self.finish(self._changes(system), system, 0.0, time, log, noted)
         while done < steps and not full and largest < reach * reach:
             self.start(system.particles, step)
-            self._impulses(system, step, every if self.far and (taken + done) % every == 0 else 0)
+            if self.films is not None:
+                self.films(system, step)
+            if self.bridges:
+                self.ghosts.refresh("bridge")
             moved = self.move(system, step, origin)
             self.ghosts.refresh("motion")
             done += 1
             changes = self._changes(system)
-            far = not self.far or (taken + done) % every == 0
-            noted = self.finish(changes, system, far, step, time + done * step, log, noted)
+            noted = self.finish(changes, system, step, time + done * step, log, noted)
             largest = self.communicator.largest([largest, moved])
             full = self.recording and self.communicator.any(len(log) - noted < len(system.edges.first))
         return done, largest, noted
-
-    def _impulses(self, system: System, step: float, far_steps: int) -> None:
-        """Give ghosts what film and bridge impulses need; with both, films act here, else as particles move.
-
-        far_steps  number of steps for which far films act now
-        """
-        if self.shear:
-            self.ghosts.refresh("shear")
-            self.shear_kick(system, step)
-        if far_steps:
-            self.ghosts.refresh("far")
-            self.far_kick(system, far_steps * step)
-        if self.films:
-            self.ghosts.refresh("film")
-        if self.bridges and self.films:
-            self.film_kick(system, step)
-        if self.bridges:
-            self.ghosts.refresh("bridge")
 
     def _changes(self, system: System) -> int:
         """Number of bridges that form and break, found before ghosts receive liquid; -1 without bridges."""

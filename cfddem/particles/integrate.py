@@ -3,14 +3,11 @@
 A step consists of these phases:
 
     kick                 half a step by the forces of the last step
-    [halo: velocity, spin, load of films]
-    shear impulses       of films that resist sliding: of every pair, then of every particle
-    [halo: velocity, far rate]
-    far kick             of films between pairs that cannot touch, where they act once in several steps
-    [halo: velocity, film rate]
-    film impulses        of every pair, then of every particle
+    [halo: velocity, spin]
+    film impulses        of weak films, of every pair and then of every particle; then of all others together,
+                         see `joint_solution`
     [halo: velocity, spin, rates of bridges]
-    bridge impulses      likewise
+    bridge impulses      of every pair, then of every particle
     drift                new positions; walls move
     [halo: position, velocity, spin, thickness of the liquid]
     walls                geometry of every particle and wall
@@ -32,62 +29,38 @@ import numpy as np
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
-from cfddem.particles.far_films import far_kick
 from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
-from cfddem.particles.interactions.film import film_force, film_impulse, update_edge_film
+from cfddem.particles.interactions.film import film_force, update_edge_film
+from cfddem.particles.interactions.joint_solution import film_kick
 from cfddem.particles.interactions.kinematics import wall_kinematics
 from cfddem.particles.interactions.pair_loops import edge_contact
-from cfddem.particles.interactions.shear_film import shear_kick
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
     DRIFTING,
-    FAR,
     FILM,
     RECORD,
     ROLLING,
-    SHEAR,
     TRIANGLES,
     WALLS,
     clear_contact,
-    film_impulses,
     pair_forces,
     update_films,
 )
 from cfddem.particles.motion import (
-    apply_all_film_impulses,
     drift_particles,
     gather_forces,
     kick,
     kick_particles,
     larger,
 )
-from cfddem.particles.pair_graph import is_far
 from cfddem.particles.vectors import NOTHING, at, plus, put
 from cfddem.particles.walls.mesh_contacts import share_memory, wall_contacts
 from cfddem.particles.walls.nearest_point import advance_walls, portion, touched_distance
 
 # ---------------------------------------------------------------- phases
-
-
-@inline
-def find_film_impulses(system, step):
-    """Impulses of all films over the coming step."""
-    edges = system.edges
-    film_impulses(0, edges.near if FAR else edges.between_particles, system, step)
-    find_hard_impulses(system, step)
-
-
-@part
-def find_hard_impulses(system, step):
-    """Impulses of the films that change much in this step, and of films at walls."""
-    edges, memory = system.edges, system.memory
-    pairs = edges.between_particles
-    for k in prange(len(edges.first)):
-        if k >= pairs or (memory.hard[k] and not (FAR and is_far(k, edges))):
-            film_impulse(k, system, step)
 
 
 @inline
@@ -135,17 +108,15 @@ def may_touch(edges):
 
 
 @inline
-def find_forces(system, far, step):
+def find_forces(system, step):
     """Films, contacts and rolling of all edges at the present positions.
 
-    far   find films of pairs that cannot touch, too
     step  by which springs have moved since the last forces; 0 at the start [s]
     """
     edges = system.edges
     pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
     if FILM:
-        if far:
-            update_films(near, pairs, system)
+        update_films(near, pairs, system)
         for k in range(pairs, number):
             update_edge_film(k, system)
     pair_forces(0, near, system, step)
@@ -157,12 +128,12 @@ def find_forces(system, far, step):
 
 
 @part
-def sum_forces(system, far, step):
+def sum_forces(system, step):
     """Sum the forces on the particles, and kick them by half a step."""
     particles, edges = system.particles, system.edges
     near = may_touch(edges)
     for i in prange(particles.owned):
-        gather_forces(i, system, near, far)
+        gather_forces(i, system, near)
         if step > 0.0:
             kick(i, particles, step)
 
@@ -171,18 +142,9 @@ def sum_forces(system, far, step):
 
 
 @serial
-def film_kick(system, step):
-    """Give the particles the impulses of their films, where those of bridges follow."""
-    find_film_impulses(system, step)
-    apply_all_film_impulses(system, False)
-
-
-@serial
 def move(system, step, origin):
     """Impulses and drift, and the motion of walls; returns the square of the largest displacement."""
     walls = system.walls
-    if DRIFTING and not BRIDGE:
-        find_film_impulses(system, step)
     if BRIDGE:
         find_bridge_impulses(system, step)
         apply_bridge_impulses(system)
@@ -212,10 +174,10 @@ def act_bridges(changes, system):
 
 
 @inline
-def act(system, far, step):
+def act(system, step):
     """Pairs and sums at the present positions, and the second half of the kick."""
-    find_forces(system, far, step)
-    sum_forces(system, far, step)
+    find_forces(system, step)
+    sum_forces(system, step)
 
 
 @inline
@@ -231,28 +193,23 @@ def record(system, time, log, noted):
 
 
 @serial
-def integrate(system, step, steps, taken, origin, reach, time, log):
+def integrate(system, step, steps, origin, reach, time, log):
     """Find the forces at the present positions, then advance by up to `steps` steps.
 
     With `steps` = 0 nothing moves. With `steps` > 0 the first kick uses the forces of the last step. The loop stops
     early when a particle has moved by `reach` from `origin`, or when `log`, the record of collisions ended since
-    `time`, could overflow. With the choice FAR, films of pairs that cannot touch act once in `far_film_steps`,
-    counted from the first step of the run; `taken` steps have been made. Returns the number of steps made, the
-    largest squared displacement (NaN if a position is NaN) and the number of rows written.
+    `time`, could overflow. Returns the number of steps made, the largest squared displacement (NaN if a position is
+    NaN) and the number of rows written.
     """
     particles, edges = system.particles, system.edges
-    largest, done, noted, full, every = 0.0, 0, 0, False, system.parameters.far_film_steps
+    largest, done, noted, full = 0.0, 0, 0, False
     half = step if steps > 0 else 0.0
     if BRIDGE:
         renew_thickness(particles)
     while True:
         if steps > 0:
             kick_particles(particles, step)
-            if SHEAR:
-                shear_kick(system, step)
-            if FAR and (taken + done) % every == 0:
-                far_kick(system, every * step)
-            if DRIFTING and BRIDGE:
+            if DRIFTING:
                 film_kick(system, step)
             moved = move(system, step, origin)
             largest = larger(largest, moved)
@@ -260,8 +217,7 @@ def integrate(system, step, steps, taken, origin, reach, time, log):
         changes = find_bridge_changes(system)
         if BRIDGE:
             act_bridges(changes, system)
-        far = not FAR or steps == 0 or (taken + done) % every == 0
-        act(system, far, half)
+        act(system, half)
         if RECORD:
             now = time + done * step
             noted = record(system, now, log, noted)
@@ -287,13 +243,13 @@ def start_step(particles, step):
 
 
 @serial
-def finish_step(changes, system, far, step, time, log, noted):
+def finish_step(changes, system, step, time, log, noted):
     """Find and act on bridges, unless found (`changes`); act, and record; returns the number of rows written."""
     if changes < 0:
         changes = find_bridge_changes(system)
     if BRIDGE:
         act_bridges(changes, system)
-    act(system, far, step)
+    act(system, step)
     if RECORD:
         noted = record(system, time, log, noted)
     return noted

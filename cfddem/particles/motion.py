@@ -5,37 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
-from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FAR, FILM, ROLLING, SHEAR
-from cfddem.particles.pair_graph import edge_role, is_far, places_of
+from cfddem.particles.interactions.slots import BRIDGE, FILM, ROLLING
+from cfddem.particles.pair_graph import edge_role, places_of
 from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 
 
 @inline
-def gather_forces(i, system, near, far):
+def gather_forces(i, system, near):
     """Sum what the edges of particle i do to it, with weight and outside force.
 
     near  number of leading pairs that may touch
-    far   far films have been found anew, see `far_films`
     """
     particles, edges, memory = system.particles, system.edges, system.memory
-    force, couple, moment, resistance = at(particles.applied, i), NOTHING, NOTHING, 0.0
-    load = shear_load = far_resistance = 0.0
+    force, couple, moment, load = at(particles.applied, i), NOTHING, NOTHING, 0.0
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
-        if FAR and is_far(k, edges):
-            if not far:
-                break  # far pairs come last
-            far_resistance += memory.resistance[k]
-            continue
         if BRIDGE:  # zero without a bridge, which costs less than to look
             load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))
-        if FILM:
-            resistance += memory.resistance[k]
-        if SHEAR:
-            shear_load += memory.shear_resistance[k]
         if (FILM or BRIDGE) and near <= k < edges.between_particles:
-            continue
+            if BRIDGE:
+                continue
+            break  # pairs that cannot touch come last
         force = plus(force, times(sign, at(memory.force, k)))
         couple = plus(couple, at(memory.couple, k))
         if ROLLING:
@@ -44,13 +35,6 @@ def gather_forces(i, system, near, far):
         force = plus(force, times(1.0 / particles.inverse_mass[i], system.parameters.gravity))
     put(particles.force, i, force)
     put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
-    if FILM:
-        particles.film_rate[i] = particles.inverse_mass[i] * resistance
-    if FAR and far:
-        particles.far_rate[i] = particles.inverse_mass[i] * far_resistance
-    if SHEAR:
-        particles.slip_rate[i] = particles.inverse_mass[i] * shear_load
-        particles.turn_rate[i] = particles.inverse_inertia[i] * shear_load
     if BRIDGE:
         particles.bridge_rate[i] = particles.inverse_mass[i] * load
         particles.bridge_turn_rate[i] = particles.radius[i] * particles.radius[i] * particles.inverse_inertia[i] * load
@@ -63,21 +47,6 @@ def kick(i, particles, step):
     put(particles.velocity, i, plus(at(particles.velocity, i), gain))
     gain = times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i))
     put(particles.spin, i, plus(at(particles.spin, i), gain))
-
-
-@inline
-def apply_film_impulses(i, system, far):
-    """Give particle i the impulses of its films: of the far ones (`far_films`), or of all others."""
-    particles, edges, memory = system.particles, system.edges, system.memory
-    impulse = NOTHING
-    for place in places_of(i, edges):
-        k, sign = edge_role(edges.incident[place])
-        if FAR and is_far(k, edges) != far:
-            if not far:
-                break  # far pairs come last
-            continue
-        impulse = plus(impulse, times(sign, at(memory.impulse, k)))
-    put(particles.velocity, i, plus(at(particles.velocity, i), times(particles.inverse_mass[i], impulse)))
 
 
 @inline
@@ -107,23 +76,13 @@ def kick_particles(particles, step):
 
 
 @part
-def apply_all_film_impulses(system, far):
-    """Give every particle the impulses of its far films, or of all others, before what acts on the velocities left."""
-    particles = system.particles
-    for i in prange(particles.owned):
-        apply_film_impulses(i, system, far)
-
-
-@part
 def drift_particles(system, step, origin):
-    """Apply the impulses of films and move the particles; returns the largest squared distance from the origin."""
+    """Move the particles; returns the largest squared distance from the origin."""
     particles = system.particles
     farthest, count = np.zeros(CHUNKS), particles.owned
     for chunk in prange(CHUNKS):
         far = 0.0
         for i in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            if DRIFTING and not BRIDGE:
-                apply_film_impulses(i, system, False)
             far = larger(far, drift(i, particles, system.parameters.free, step, origin))
         farthest[chunk] = far
     largest = 0.0

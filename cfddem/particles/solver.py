@@ -16,7 +16,6 @@ from cfddem.particles.collision_events import COLLISION, WET_COLLISION, WET_FIEL
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.energy_count import Energies
-from cfddem.particles.far_films import sort_films
 from cfddem.particles.ghosts import Slabs, StepsWithGhosts
 from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
@@ -103,9 +102,8 @@ class ParticleSolver:
         choices["TRIANGLES"] = len(self.walls.cell_member) > 0
         self.parameters = self.laws.parameters(gravity, free)
         self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
-        self._loop, self._threads = _NO_LOOP, False
+        self._loop, self._threads, self.film_counts = _NO_LOOP, False, np.zeros(4)
         self._touch_walls = specialise(wall_contacts, self.choices)
-        self._sort_films = specialise(sort_films, self.choices) if self.laws.far_film_steps > 1 else _NO_LOOP
         self.gravity, self.free = gravity, free
         self.domain = None if domain is None else np.array(domain, float)
         self._checking, self._accepted = check_steps, 0.0
@@ -260,7 +258,7 @@ class ParticleSolver:
                 self._loop = StepsWithGhosts(self.choices, self._threads, self.lists.ghosts, self.communicator)
         log = _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first))
         return self._loop(  # type: ignore[no-any-return]
-            self.system, step, steps, self.steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log
+            self.system, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log
         )
 
     def _take_list(self, edges: Edges) -> None:
@@ -271,7 +269,7 @@ class ParticleSolver:
         self._origin, self._listed_walls = self.particles.position.copy(), checkpoint_walls(self.walls)
         self.system = System(
             self.particles.view_with(self.laws.particle_fields()), edges.flat_graph, edges.memory, flat(self.walls),
-            shifts(self.box).reshape(-1), self.table, self.parameters,
+            shifts(self.box).reshape(-1), self.table, self.parameters, self.film_counts,
         )  # fmt: skip
         self.walls.travel[:] = 0.0
         if len(self.walls.kind):
@@ -282,8 +280,6 @@ class ParticleSolver:
         self._reach = self._find_reach()
         self.particles.drop_ghosts()
         self._renew(np.arange(self.particles.count, dtype=np.int32), self.steps)
-        if self.laws.far_film_steps > 1:
-            self._sort_films(self.system)
         if self.lists.made % CHECK_EVERY == 0:
             self._accepted = 0.0
 

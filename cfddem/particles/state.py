@@ -24,7 +24,7 @@ PARTICLE_FIELDS = (
         "velocity",
         "m/s",
         3,
-        halo=("start", "shear", "far", "film", "bridge", "motion", "work"),
+        halo=("start", "film", "joint_film", "bridge", "motion", "work"),
         snapshot=True,
         meaning="velocity",
     ),
@@ -32,7 +32,7 @@ PARTICLE_FIELDS = (
         "spin",
         "rad/s",
         3,
-        halo=("start", "shear", "bridge", "motion", "work"),
+        halo=("start", "film", "joint_film", "bridge", "motion", "work"),
         snapshot=True,
         meaning="angular velocity",
     ),
@@ -46,7 +46,6 @@ PARTICLE_FIELDS = (
     Field("applied", "N", 3, meaning="external force; gravity of the particle solver is added to it"),
     Field("force", "N", 3, halo=("work",), snapshot=True, meaning="sum of all forces at the last step"),
     Field("torque", "N m", 3, halo=("work",), meaning="sum of all torques at the last step"),
-    Field("film_rate", "1/s", halo=("film",), meaning="resistance of all films of the particle over its mass"),
 )
 """Fields of every particle; laws and users may declare more.
 

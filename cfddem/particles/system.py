@@ -19,7 +19,7 @@ class Parameters(NamedTuple):
     gravity: tuple[float, float, float]  # [m/s2]
     free: tuple[float, float, float]  # 1 for each axis along which particles can move, else 0
     cutoff_ratio: float  # reach of films over R*; 0 without films [-]
-    far_film_steps: int  # films of pairs that cannot touch act once in this many steps
+    film_tolerance: float  # of the impulses of films that are solved together [-]
     rolling_damping: float  # of the rolling dashpot, over critical [-]
     contact: Any  # of the contact law, by the names that it has declared
     bridge: Any  # `BridgeNumbers` of the laws of liquid bridges; nothing without them
@@ -42,6 +42,7 @@ class System(NamedTuple):
     shift: np.ndarray  # of the separation for each image of a periodic box [m]
     table: np.ndarray  # of pairs of materials
     parameters: Parameters
+    film_counts: np.ndarray  # steps in which films were solved together, iterations, passes and films of these
 
 
 class PairSystem(NamedTuple):

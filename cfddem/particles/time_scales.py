@@ -66,7 +66,7 @@ def time_scales(
     remembered = ("minimum_gap", *of_bridges, *(field.name for field in laws.contact_law.memory))
     memory = named_arrays("Memory", remembered)(*(edges[name] for name in remembered))
     nowhere = np.zeros(0)  # gaps are known
-    system = System(particles.view, edges.flat_graph, memory, walls, nowhere, table, laws.parameters())
+    system = System(particles.view, edges.flat_graph, memory, walls, nowhere, table, laws.parameters(), np.zeros(4))
     rate = largest_rate(system, gap)
     overlap = STABLE / math.sqrt(max(rate, 1e-300))
     crossing = crossing_step(communicator.smallest(particles.radius), speed)

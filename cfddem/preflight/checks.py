@@ -162,12 +162,6 @@ def check_surface_laws(case: Case) -> Iterator[Issue]:
             "error", "laws.contact", f"{contact.name} holds for dry solids, but {liquid} form between particles",
             f"{remedy}, or another contact law",
         )  # fmt: skip
-    slides = laws.film_in(case.fluid) in ("nijssen_full", "nijssen_full_twist")
-    if laws.far_film_steps > 1 and (slides or case.liquid is not None):
-        yield Issue(
-            "error", "laws.far_film_steps", "liquid bridges and films that resist sliding act in every step",
-            "leave it out",
-        )  # fmt: skip
     if case.run.energy_budget and contact.energy is None:
         yield Issue(
             "error", "run.energy_budget", f"the contact law {contact.name} does not give its energy",

@@ -179,7 +179,7 @@ def laws_of(case: Case) -> Laws:
     own: dict[str, Any] = {kind: law.function for kind, law in laws.pair_laws.items()} if case.has_films else {}
     return Laws(
         film=case.has_films,
-        far_film_steps=laws.far_film_steps if case.has_films else 1,
+        film_tolerance=case.run.film_tolerance,
         friction_onset=laws.friction_onset,
         contact=laws.contact_law,
         rolling=laws.rolling_resistance,

@@ -69,13 +69,11 @@ def bed(
     bridges: bool = False,
     motions: str = "normal",
     reach: float = 1.0,
-    far_film_steps: int = 1,
 ) -> ParticleSolver:
     """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges.
 
-    motions         that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
-    reach           of films over the reduced radius
-    far_film_steps  in which films of pairs that cannot touch act once
+    motions  that films resist, see :class:`~cfddem.particles.interactions.laws.Laws`
+    reach    of films over the reduced radius
     """
     centres, (width, depth) = positions(count)
     grains = make_particles(centres, 0.5 * DIAMETER, GRAIN.density, viscosity=1e-3 if film else 0.0)
@@ -90,7 +88,6 @@ def bed(
             film_motions=motions,
             cutoff_ratio=reach,
             bridge=WATER if bridges else None,
-            far_film_steps=far_film_steps,
         ),
         gravity=(0.0, 0.0, -9.81),
         box=(width, depth, None),
@@ -105,32 +102,28 @@ def bench(
     rounds: int = 3,
     steps: int | None = None,
     full: bool = False,
-    far_film_steps: int = 1,
 ) -> dict[str, Any]:
     """Million particle-steps a second on this machine, and that of LAMMPS where it is installed.
 
-    count           particles: 1 000, 10 000, 100 000 or 1 000 000
-    threads         of both codes
-    film            with the film of water; the same bed without films is a peer
-    bridges         with a liquid bridge on every contact, of a film of 0.2 % of the diameter; the bed without is a peer
-    rounds          measurements of each code, taken in turn; their medians count
-    steps           of one measurement
-    full            with films that resist sliding and rolling, too; the bed with normal films is a further peer
-    far_film_steps  films of pairs that cannot touch act once in this many steps
-    returns         what was run, the medians, the speed over that of each LAMMPS style or why it did not run
-                    (`lammps`), and the bytes that a step must move with the share of the memory speed that this is
+    count    particles: 1 000, 10 000, 100 000 or 1 000 000
+    threads  of both codes
+    film     with the film of water; the same bed without films is a peer
+    bridges  with a liquid bridge on every contact, of a film of 0.2 % of the diameter; the bed without is a peer
+    rounds   measurements of each code, taken in turn; their medians count
+    steps    of one measurement
+    full     with films that resist sliding and rolling, too; the bed with normal films is a further peer
+    returns  what was run, the medians, the speed over that of each LAMMPS style or why it did not run (`lammps`), and
+             the bytes that a step must move with the share of the memory speed that this is
     """
     steps = steps or max(20, 20_000_000 // count)
     bandwidth = triad(threads)
     use_threads(threads)
-    films: dict[str, Any] = {"motions": "full" if full else "normal", "far_film_steps": far_film_steps}
+    films: dict[str, Any] = {"motions": "full" if full else "normal"}
     runs = {"cfddem": bed(count, film or full, bridges, **films)}
     if film or full:
         runs["without films"] = bed(count, bridges=bridges)
     if full:
         runs["normal films"] = bed(count, True, bridges)
-    if far_film_steps > 1:
-        runs["films in every step"] = bed(count, film, bridges)
     if bridges:
         runs["without bridges"] = bed(count, film or full, **films)
     dry = not (film or full or bridges)
@@ -156,7 +149,6 @@ def bench(
         "threads": threads,
         "film": film or full,
         "films that resist sliding": full,
-        "steps of far films": far_film_steps,
         "bridges per particle": 0.0 if run.bridges is None else run.bridges.count / count,
         "steps": steps,
         "listed pairs per particle": run.edges.between_particles / count,
@@ -181,8 +173,6 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """A result as lines of a table."""
     water = ", film of water" if result["film"] else ""
     water += " that resists sliding and rolling" if result["films that resist sliding"] else ""
-    if result["steps of far films"] > 1:
-        water += f", far films once in {result['steps of far films']} steps"
     if result["bridges per particle"]:
         water += f", {result['bridges per particle']:.1f} liquid bridges per sphere"
     yield "bed", f"{result['particles']} spheres, {result['threads']} thread(s){water}, {result['steps']} steps a round"

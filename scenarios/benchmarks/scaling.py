@@ -28,8 +28,6 @@ RATIOS = (1, 2, 4, 8)
 """Large diameter over small diameter; half of the volume each."""
 REACHES = (0.05, 0.2, 1.0)
 """Reach of the film over the reduced radius."""
-FAR_FILM_STEPS = 10
-"""Steps in which films of pairs that cannot touch act once."""
 EDGES = (32, 48, 64, 96)
 """Cells along the edge of a cube of fluid."""
 
@@ -52,15 +50,6 @@ def bench(threads: int = 2) -> dict[str, Any]:
             for film in (False, True) for size in SIZES]  # fmt: skip
     rows += [
         _particles("reach of films", f"{reach:g} R*", bed(10_000, film=True, reach=reach), speed) for reach in REACHES
-    ]
-    rows += [
-        _particles(
-            "far films",
-            f"{size}, once in {FAR_FILM_STEPS} steps",
-            bed(size, True, far_film_steps=FAR_FILM_STEPS),
-            speed,
-        )
-        for size in SIZES[1:]
     ]
     rows += [_particles("ratio of sizes", f"{ratio}", _two_sizes(ratio), speed) for ratio in RATIOS]
     rows += [_fluid(edge, speed) for edge in EDGES]
@@ -97,8 +86,6 @@ def _particles(group: str, name: str, run: ParticleSolver, speed: float) -> dict
     count = run.particles.count
     steps = max(20, 4_000_000 // count)
     run.advance(STEP, max(5, steps // 4))
-    while run.laws.far_film_steps > 1 and run.lists.made < 1:  # a new list takes a loop of its own
-        run.advance(STEP, max(5, steps // 4))
     begin = time.perf_counter()
     run.advance(STEP, steps)
     seconds = (time.perf_counter() - begin) / steps / count

@@ -26,9 +26,18 @@ def particle_state(run: ParticleSolver) -> State:
     if run.walls.wall.size:
         state["wall_force"] = run.wall_force
     if run.laws.film:
-        state["film_rate"] = made.film_rate[order]
+        state["film_resistance"] = _resistances(run, order)
         state["film_minimum_gap"] = _thickest(run, order)
     return state | _pairs(run)
+
+
+def _resistances(run: ParticleSolver, order: np.ndarray) -> np.ndarray:
+    """Sum of the resistances of the films that each particle has, in order [kg/s]."""
+    edges, total = run.edges, np.zeros(run.particles.count)
+    pairs = slice(edges.between_particles)
+    np.add.at(total, edges.first, edges.resistance)
+    np.add.at(total, edges.second[pairs], edges.resistance[pairs])
+    return total[order]
 
 
 def _thickest(run: ParticleSolver, order: np.ndarray) -> np.ndarray:

@@ -40,7 +40,6 @@ from cfddem.coupling.terms import CouplingTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
-from cfddem.particles.far_films import rates_of_films
 from cfddem.particles.state import Particles, added_mass
 from closures.registry import Law
 
@@ -128,8 +127,6 @@ class AddedMass(FluidForce):
             ratio = self.coefficient(voidage[rows]) * self.density / particles.density[rows]
             after = 1.0 / particles.mass[rows] / (1.0 + ratio)
             particles.inverse_mass[rows] = after
-            for rate in rates_of_films(particles):
-                rate[rows] *= after / before  # a resistance over the inertia
             change[rows] = 1.0 / after - 1.0 / before
         return change
 

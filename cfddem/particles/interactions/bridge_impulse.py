@@ -7,8 +7,7 @@ import math
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.interactions.bridge import bridge_state, capillary_number_of, resistance_across
 from cfddem.particles.interactions.bridge_loops import closed_speed, shared_inverse_masses
-from cfddem.particles.interactions.bridge_solution import at_gap, held_gap, speed_after_bridge
-from cfddem.particles.interactions.film import clamp_speed
+from cfddem.particles.interactions.bridge_solution import at_gap, clamp_speed, held_gap, speed_after_bridge
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
 from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_INERTIA, BRIDGE_SLIDING, WALLS, bridge_impulses
 from cfddem.particles.pair_graph import edge_role, geometry, places_of

@@ -14,8 +14,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.particles.interactions.bridge import bridge_state
-from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP, held_gap
-from cfddem.particles.interactions.film import clamp_speed
+from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP, clamp_speed, held_gap
 from cfddem.particles.interactions.slots import BRIDGE_FILM, BRIDGE_PULL, BRIDGE_SLIDING, bridge_pull
 from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times

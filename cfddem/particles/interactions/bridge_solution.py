@@ -152,3 +152,9 @@ def pull_energy(state):
             total += half * _WEIGHTS[n] * bridge_pull(at_gap(state, low + half * (1.0 + _NODES[n])))
         low = high
     return total
+
+
+@inline
+def clamp_speed(new_speed, speed):
+    """A bridge neither speeds a pair up nor turns its motion round."""
+    return min(max(new_speed, 0.0), speed) if speed > 0.0 else max(min(new_speed, 0.0), speed)

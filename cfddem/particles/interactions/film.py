@@ -1,4 +1,4 @@
-"""Lubrication film between two bodies: its resistance, and its impulse over a step.
+"""Lubrication film between two bodies: its resistance, and what it remembers.
 
 A film remembers its approach, from when the pair comes within reach until it leaves it. Functions of numbers without
 branches work on several pairs at once; the others work on one edge.
@@ -21,7 +21,6 @@ from cfddem.particles.interactions.shear_film import edge_asymmetry, renew_shear
 from cfddem.particles.interactions.slots import (
     COUNT_FILM,
     COUNT_GAP,
-    FAR,
     SHEAR,
     USER_GAP,
     FilmState,
@@ -30,23 +29,21 @@ from cfddem.particles.interactions.slots import (
     film_outside,
     film_resistance,
     gap_outside,
-    speed_after_film,
-    speed_after_short_film,
     user_minimum_gap,
 )
-from cfddem.particles.pair_graph import THICKEST, geometry, is_far
-from cfddem.particles.vectors import LEAST, dot, put, times
+from cfddem.particles.pair_graph import THICKEST, geometry
+from cfddem.particles.vectors import dot, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
 
 FIELDS = (
     Field("resistance", "kg/s", role="memory", meaning="resistance of the film without lever; 0 out of its reach"),
     Field("approach_speed", "m/s", role="memory", meaning="largest approach speed since the film began"),
-    Field("accounted_gap", "m", role="memory", initial=np.inf, meaning="gap up to which the impulse has been given"),
+    Field("accounted_gap", "m", role="memory", initial=np.inf, meaning="gap from which the film acts in this step"),
     Field("film_gap", "m", role="memory", meaning="gap of two particles at the present positions"),
     Field("film_normal", "1", 3, "memory", meaning="direction from the second particle to the first"),
-    Field("impulse", "N s", 3, "scratch", meaning="impulse of the film in this step, on the first body"),
-    Field("hard", role="scratch", dtype=bool, meaning="the film changes too much in this step for the short solution"),
+    Field("impulse", "N s", 3, "memory", meaning="impulse of the film in the last step, on the first body"),
+    Field("faster", role="scratch", dtype=bool, meaning="the bodies approach faster than before in this film"),
 )
 
 OUTSIDE = Field("outside", role="scratch", dtype=int, meaning="uses of a law outside of its range")
@@ -77,7 +74,7 @@ def update_film(gap, viscosity, reduced_radius, memory, row, cutoff_ratio):
     minimum_gap = roughness if begins or (unknown and not within) else minimum_gap
     if USER_GAP:
         minimum_gap = minimum_gap_of(0.0, viscosity, reduced_radius, row) if begins else minimum_gap
-    accounted_gap = gap if not within or (begins and unknown) else accounted_gap
+    accounted_gap = accounted_gap if begins and not unknown else gap  # a film begins where it was in the last step
     state = FilmState(max(gap, minimum_gap), viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
     return film_resistance(state) if within else 0.0, approach_speed, minimum_gap, accounted_gap
 
@@ -146,73 +143,3 @@ def film_force(k, system):
     if COUNT_FILM and memory.resistance[k] > 0.0:
         memory.outside[k] += film_outside(at_least(film))
     return times(-portion(edges, k) * explicit_resistance(film) * normal_speed, normal)
-
-
-@inline
-def clamp_speed(new_speed, speed):
-    """A film neither speeds a pair up nor turns its motion round."""
-    return min(max(new_speed, 0.0), speed) if speed > 0.0 else max(min(new_speed, 0.0), speed)
-
-
-@inline
-def film_impulse_short(speed, film, rate, memory, far, step):
-    """Impulse of a film over the coming step and the gap up to which it is given, where the gap hardly changes.
-
-    film     :class:`~cfddem.particles.interactions.slots.FilmState`
-    rate     resistance of all films over the mass, summed over both particles [1/s]
-    memory   resistance, approach speed and accounted gap
-    far      the film acts once in several steps; then it may return what it has taken too much
-    returns  impulse [N s], accounted gap [m], and whether `film_impulse` must find them instead
-    """
-    resistance, approach_speed, accounted_gap = memory
-    within = resistance > 0.0
-    strength_per_mass, inverse_mass = rate * max(film.gap, film.minimum_gap), rate / max(resistance, LEAST)
-    new_speed = speed_after_short_film(speed, film, accounted_gap, step, strength_per_mass, inverse_mass)
-    faster = -speed > approach_speed and film.gap > film.minimum_gap
-    found = new_speed == new_speed and not faster
-    ahead = FAR and not far and abs(new_speed) > abs(speed)
-    new_speed = new_speed if far else clamp_speed(new_speed, speed)
-    impulse = (new_speed - speed) * resistance / max(rate, LEAST)
-    return (
-        impulse if within and found else 0.0,
-        film.gap + step * new_speed if within and found and not ahead else accounted_gap,
-        within and not found,
-    )
-
-
-@inline
-def film_impulse(k, system, step):
-    """Impulse of the film of edge k over the coming step.
-
-    Each body gives this film the part of its mass that the film has in the body's total resistance. The
-    pair so made is solved exactly; the sum over all films conserves momentum and never raises energy.
-    """
-    particles, edges, memory = system.particles, system.edges, system.memory
-    i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, system)
-    normal = times(1.0 / distance, separation)
-    if memory.resistance[k] == 0.0:
-        put(memory.impulse, k, times(0.0, normal))
-        return
-    normal_speed = dot(relative_velocity(k, system), normal)
-    reduced_radius, _ = pair_mass_and_radius(k, system)
-    rates = particles.far_rate if FAR and is_far(k, edges) else particles.film_rate
-    rate = rates[i]
-    if k < edges.between_particles:
-        rate += rates[j]
-    strength_per_mass = rate * max(gap, memory.minimum_gap[k])
-    inverse_mass = rate * portion(edges, k) / memory.resistance[k]
-    viscosity, row = pair_viscosity(k, system), pair_row(k, system)
-    record_approach(k, memory, normal_speed, gap, viscosity, reduced_radius, row)
-    cutoff_gap = system.parameters.cutoff_ratio * reduced_radius
-    film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_gap)
-    given = memory.accounted_gap[k]
-    new_speed = speed_after_film(normal_speed, film, given, step, strength_per_mass, inverse_mass)
-    if COUNT_FILM:
-        memory.outside[k] += film_outside(at_least(film))
-    far = FAR and is_far(k, edges)
-    ahead = FAR and not far and abs(new_speed) > abs(normal_speed)
-    new_speed = new_speed if far else clamp_speed(new_speed, normal_speed)
-    if not ahead:  # the impulse of a far film has been given for several steps, and the pair is in another list now
-        memory.accounted_gap[k] = gap + step * new_speed
-    put(memory.impulse, k, times((new_speed - normal_speed) * memory.resistance[k] / rate, normal))

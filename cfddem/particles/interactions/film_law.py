@@ -128,7 +128,7 @@ def gap_choices(law: Callable[..., float]) -> dict[str, Any]:
 
 
 @inline
-def _at(film, gap):
+def at_gap(film, gap):
     """The same film at another gap."""
     return FilmState(gap, film.viscosity, film.reduced_radius, film.minimum_gap, film.cutoff_gap)
 
@@ -136,7 +136,7 @@ def _at(film, gap):
 @inline
 def at_least(film):
     """The film at its gap or h_min, where its law is evaluated."""
-    return _at(film, max(film.gap, film.minimum_gap))
+    return at_gap(film, max(film.gap, film.minimum_gap))
 
 
 @inline
@@ -162,8 +162,8 @@ def _short_integral(gap, end, film, least):
         inside = user_short_potential(gap, end, film)
     else:
         middle, aside = 0.5 * (gap + end), 0.5 * _ASIDE * (end - gap)
-        ends = user_resistance(_at(film, middle - aside)) + user_resistance(_at(film, middle + aside))
-        inside = (end - gap) * (5.0 * ends + 8.0 * user_resistance(_at(film, middle))) * (1.0 / 18.0)
+        ends = user_resistance(at_gap(film, middle - aside)) + user_resistance(at_gap(film, middle + aside))
+        inside = (end - gap) * (5.0 * ends + 8.0 * user_resistance(at_gap(film, middle))) * (1.0 / 18.0)
     a, b = max(gap, 0.0), max(end, 0.0)
     below = least * (b - a) * (b + a) * 0.5 / film.minimum_gap
     return inside if film.gap > film.minimum_gap else below
@@ -180,7 +180,7 @@ def speed_after_short_step(speed, film, accounted_gap, step, strength_per_mass, 
     """
     gap, minimum_gap = film.gap, film.minimum_gap
     inside = gap > minimum_gap
-    resistance = user_resistance(_at(film, max(gap, minimum_gap)))
+    resistance = user_resistance(at_gap(film, max(gap, minimum_gap)))
     weight = step * inverse_mass
     lever = 1.0 / minimum_gap
     total = speed + inverse_mass * _short_integral(gap, accounted_gap, film, resistance)
@@ -189,7 +189,7 @@ def speed_after_short_step(speed, film, accounted_gap, step, strength_per_mass, 
     for _ in range(2):
         end = gap + step * guess
         excess = guess + inverse_mass * _short_integral(gap, end, film, resistance) - total
-        slope = user_resistance(_at(film, max(end, minimum_gap))) if inside else resistance * lever * max(end, 0.0)
+        slope = user_resistance(at_gap(film, max(end, minimum_gap))) if inside else resistance * lever * max(end, 0.0)
         last = excess / (1.0 + weight * slope)
         guess -= last
     end = gap + step * guess
@@ -214,14 +214,14 @@ def _integral(gap, end, film):
     minimum_gap, cutoff = film.minimum_gap, film.cutoff_gap
     total, a, b = 0.0, min(max(gap, 0.0), minimum_gap), min(max(end, 0.0), minimum_gap)
     if a != b:
-        total = 0.5 * user_resistance(_at(film, minimum_gap)) * (b - a) * (b + a) / minimum_gap
+        total = 0.5 * user_resistance(at_gap(film, minimum_gap)) * (b - a) * (b + a) / minimum_gap
     a, b = min(max(gap, minimum_gap), cutoff), min(max(end, minimum_gap), cutoff)
     if a == b:
         return total
     if POTENTIAL:
         return total + user_potential(a, b, film)
     if abs(b - a) < LARGEST_SAMPLED_CHANGE * a:
-        return total + _short_integral(a, b, _at(film, max(a, 2.0 * minimum_gap)), 0.0)
+        return total + _short_integral(a, b, at_gap(film, max(a, 2.0 * minimum_gap)), 0.0)
     a = math.log(a)
     way = math.log(b) - a
     pieces = int(abs(way)) + 1
@@ -230,7 +230,7 @@ def _integral(gap, end, film):
         middle = a + (2 * piece + 1) * half
         for k in range(len(_NODES)):
             at = math.exp(middle + half * _NODES[k])
-            total += half * _WEIGHTS[k] * at * user_resistance(_at(film, at))
+            total += half * _WEIGHTS[k] * at * user_resistance(at_gap(film, at))
     return total
 
 
@@ -247,7 +247,7 @@ def speed_after_step(speed, film, accounted_gap, step, strength_per_mass, invers
         excess = guess + inverse_mass * _integral(gap, gap + step * guess, film) - total
         if abs(excess) <= 1e-14 * (abs(total) + abs(guess)):
             return guess
-        slope = resistance_with_lever(_at(film, gap + step * guess))
+        slope = resistance_with_lever(at_gap(film, gap + step * guess))
         following, low, high = next_guess(guess, excess, 1.0 + step * inverse_mass * slope, low, high)
         if following == guess:
             return guess

@@ -10,8 +10,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
-from cfddem.particles import far_films
-from cfddem.particles.interactions import bridge, contact, film, rolling, shear_film
+from cfddem.particles.interactions import bridge, contact, film, joint_films, rolling, shear_film
 from cfddem.particles.interactions.bridge_law import NO_BRIDGE, BridgeLaws
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
@@ -45,7 +44,7 @@ class Laws(NamedTuple):
                           :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
     film_motions          motions that films resist: along the line of centres ("normal"), and sliding and rolling
                           ("full"), and twisting ("full_twist")
-    far_film_steps        films of pairs that cannot touch before the next list act once in this many steps
+    film_tolerance        of the impulses of films that are solved together, over the first residual [-]
     bridge                laws of liquid bridges, where particles carry liquid
     """
 
@@ -61,13 +60,11 @@ class Laws(NamedTuple):
     lubrication: Callable[..., float] | FilmLaw | None = None
     bridge: BridgeLaws | None = None
     film_motions: str = "normal"
-    far_film_steps: int = 1
+    film_tolerance: float = 1e-3
 
     def dry(self) -> Laws:
         """The same laws without films and bridges."""
-        return self._replace(
-            film=False, minimum_gap=None, lubrication=None, bridge=None, film_motions="normal", far_film_steps=1
-        )
+        return self._replace(film=False, minimum_gap=None, lubrication=None, bridge=None, film_motions="normal")
 
     def check(self) -> None:
         """Refuse unknown words, laws that cannot be compiled, and choices that exclude each other."""
@@ -82,14 +79,8 @@ class Laws(NamedTuple):
             raise InputError(
                 "film_motions", self.film_motions, '"normal" without films, and with the integrator "verlet"'
             )
-        if self.far_film_steps < 1:
-            raise InputError("far_film_steps", self.far_film_steps, "at least 1")
-        if self.far_film_steps > 1 and (not self.film or self.integrator != "drift" or self.shears or self.bridge):
-            raise InputError(
-                "far_film_steps",
-                self.far_film_steps,
-                "1 unless films act by impulses, along the line of centres, without bridges",
-            )
+        if not 0.0 < self.film_tolerance <= 1.0:
+            raise InputError("film_tolerance", self.film_tolerance, "above 0 and at most 1")
         if self.bridge is not None:
             self.bridge.check()
         for kind in OF_THE_PAIR_LOOP:
@@ -114,6 +105,11 @@ class Laws(NamedTuple):
         return self.film_motions != "normal"
 
     @property
+    def drifting(self) -> bool:
+        """Whether films act by impulses."""
+        return bool(self.film) and self.integrator == "drift"
+
+    @property
     def film_law(self) -> FilmLaw | None:
         """The user's film law; None where the built-in one holds or there is no film."""
         if self.lubrication is None or isinstance(self.lubrication, FilmLaw):
@@ -132,7 +128,7 @@ class Laws(NamedTuple):
             gravity=_three(gravity),
             free=_three(free),
             cutoff_ratio=float(self.cutoff_ratio) if self.film else 0.0,
-            far_film_steps=self.far_film_steps,
+            film_tolerance=float(self.film_tolerance),
             rolling_damping=float(self.rolling_damping),
             contact=numbers(self.contact_law.parameters),
             bridge=numbers({}) if self.bridge is None else self.bridge.numbers,
@@ -144,8 +140,10 @@ class Laws(NamedTuple):
         fields = [*contact.FIELDS, *self.contact_law.memory]
         if self.film:
             fields += film.FIELDS
+        if self.drifting:
+            fields += joint_films.FIELDS
         if self.shears:
-            fields += shear_film.FIELDS
+            fields += [*shear_film.FIELDS, *joint_films.SHEAR_FIELDS]
         if self.rolling != "none":
             fields += rolling.FIELDS
         if self.bridge is not None:
@@ -159,17 +157,17 @@ class Laws(NamedTuple):
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
         of_bridges = () if self.bridge is None else bridge.PARTICLE_FIELDS
-        of_far_films = far_films.FIELDS if self.far_film_steps > 1 else ()
-        return (*of_bridges, *of_far_films, *(shear_film.PARTICLE_FIELDS if self.shears else ()))
+        return (*of_bridges, *(joint_films.PARTICLE_FIELDS if self.drifting else ()))
 
     @property
     def kept_apart(self) -> set[str]:
-        """Fields that inactive triangles do not take over: there is one bridge, at the nearest of them."""
-        return set() if self.bridge is None else {field.name for field in (*bridge.FIELDS, *bridge.INERTIA_FIELDS)}
+        """Fields that inactive triangles do not take over: one film and one bridge act, at the nearest of them."""
+        of_bridges = () if self.bridge is None else (*bridge.FIELDS, *bridge.INERTIA_FIELDS)
+        return {"impulse", "shear_impulse", *(field.name for field in of_bridges)}
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
-        return _choices(self.contact_law, self._replace(contact="", far_film_steps=min(self.far_film_steps, 2)))
+        return _choices(self.contact_law, self._replace(contact="", film_tolerance=0.0))
 
 
 def _three(values: Sequence[float]) -> tuple[float, float, float]:
@@ -182,13 +180,12 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
     made = {
         **contact_choices(contact_law),
         "FILM": bool(laws.film),
-        "DRIFTING": bool(laws.film) and laws.integrator == "drift",
+        "DRIFTING": laws.drifting,
         "RESCALED": laws.spring == "rescaled",
         "FROM_OVERLAP": laws.friction_onset == "overlap",
         "ROLLING": laws.rolling != "none",
         "rolling_torque": rolling.ROLLINGS[laws.rolling],
         **(built_in() if laws.film else {}),
-        "FAR": laws.far_film_steps > 1,
         "POTENTIAL": False,
         "SHEAR": laws.shears,
         "TWIST": laws.film_motions == "full_twist",

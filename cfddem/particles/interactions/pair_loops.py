@@ -18,36 +18,27 @@ from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
-from cfddem.particles.interactions.film import film_impulse_short, renew_film
-from cfddem.particles.interactions.film_law import at_least
+from cfddem.particles.interactions.film import renew_film
+from cfddem.particles.interactions.joint_films import weak_pair
 from cfddem.particles.interactions.kinematics import sphere_kinematics
 from cfddem.particles.interactions.rolling import resist_rolling
-from cfddem.particles.interactions.shear_film import pair_shear, renew_shear
+from cfddem.particles.interactions.shear_film import renew_shear
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
-    COUNT_FILM,
     FILM,
     ROLLING,
     SHEAR,
-    FilmState,
     adhesive_reach,
-    film_outside,
     read_memory,
     write_memory,
 )
 from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.system import PairSystem, Parameters
-from cfddem.particles.vectors import NOTHING, at, dot, minus, put, times
+from cfddem.particles.vectors import NOTHING, at, put, times
 
-PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity film_rate")
+PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity")
 """Arrays of the particles that loops over pairs read."""
-
-ShearParticles = namedtuple("ShearParticles", "velocity spin radius viscosity slip_rate turn_rate")
-"""The same of the loop over films that resist sliding."""
-
-FarParticles = namedtuple("FarParticles", "velocity radius viscosity far_rate")
-"""The same of the loop over films of pairs that cannot touch."""
 
 PairEnds = namedtuple("PairEnds", "first second image")
 """Arrays of the graph that loops over pairs read."""
@@ -122,41 +113,6 @@ def keep_geometry(k, separation, distance, gap, memory):
     put(memory.film_normal, k, times(1.0 / distance, separation))
 
 
-@inline
-def pair_impulse(n, system, step):
-    """Impulse of the film of one pair of particles."""
-    impulse_of_pair(np.uint64(n), system, system.particles.film_rate, False, step)
-
-
-@inline
-def far_impulse(n, system, step):
-    """The same of one pair that cannot touch, where its film acts once in several steps."""
-    impulse_of_pair(np.uint64(n), system, system.particles.far_rate, True, step)
-
-
-@inline
-def impulse_of_pair(k, system, rates, far, step):
-    """Impulse of the film of edge k; `rates` are the resistances of films over the mass that share out the mass."""
-    particles, edges, memory = system.particles, system.edges, system.memory
-    i, j = edges.first[k], edges.second[k]
-    normal, gap = at(memory.film_normal, k), memory.film_gap[k]
-    reduced_radius = particles.radius[i] * particles.radius[j] / (particles.radius[i] + particles.radius[j])
-    speed = dot(minus(at(particles.velocity, i), at(particles.velocity, j)), normal)
-    viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-    film = FilmState(
-        gap, viscosity, reduced_radius, memory.minimum_gap[k], system.parameters.cutoff_ratio * reduced_radius
-    )
-    resistance = memory.resistance[k]
-    then = (resistance, memory.approach_speed[k], memory.accounted_gap[k])
-    rate = rates[i] + rates[j]
-    size, given, left = film_impulse_short(speed, film, rate, then, far, step)
-    if COUNT_FILM:
-        memory.outside[k] += film_outside(at_least(film)) if resistance > 0.0 and not left else 0
-    memory.accounted_gap[k] = given
-    memory.hard[k] = left
-    put(memory.impulse, k, times(size, normal))
-
-
 class PairLoop(NamedTuple):
     """A loop over pairs."""
 
@@ -169,9 +125,7 @@ class PairLoop(NamedTuple):
 LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force),
     "update_films": PairLoop(pair_film, rest="", needed_by="FILM"),
-    "film_impulses": PairLoop(pair_impulse, needed_by="FILM"),
-    "far_impulses": PairLoop(far_impulse, particles=FarParticles, needed_by="FAR"),
-    "shear_impulses": PairLoop(pair_shear, particles=ShearParticles, needed_by="SHEAR"),
+    "film_impulses": PairLoop(weak_pair, needed_by="DRIFTING"),
     "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
     "bridge_impulses": PairLoop(pair_bridge_impulse, particles=WetParticles, needed_by="BRIDGE"),
 }

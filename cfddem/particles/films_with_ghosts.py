@@ -1,0 +1,95 @@
+"""Films that are solved together where several processes share the particles: one phase after the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from cfddem.backend.communicator import Communicator
+from cfddem.backend.law_set import specialise
+from cfddem.particles.interactions.joint_equations import SLIGHT
+from cfddem.particles.interactions.joint_solution import (
+    MOST_ITERATIONS,
+    NEAR,
+    PASSES,
+    along_direction,
+    begin_solution,
+    finish_solution,
+    largest_of,
+    new_direction,
+    new_product,
+    new_residual,
+    new_scale,
+    renew_change,
+    scale_of,
+    start_films,
+    units_of,
+)
+from cfddem.particles.system import System
+
+
+class FilmsWithGhosts:
+    """The loop of :func:`cfddem.particles.interactions.joint_solution.film_kick` on one rank of several.
+
+    Arguments as of :class:`cfddem.particles.ghosts.StepsWithGhosts`.
+    """
+
+    def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Any, communicator: Communicator) -> None:
+        self.ghosts, self.communicator = ghosts, communicator
+        loops = (start_films, begin_solution, finish_solution, renew_change, new_residual, new_scale)
+        more = (new_direction, new_product, along_direction, largest_of, units_of)
+        made = [specialise(loop, choices, threads) for loop in (*loops, *more)]
+        self.start, self.begin, self.finish, self.renew_change, self.new_residual, self.new_scale = made[: len(loops)]
+        self.new_direction, self.new_product, self.along, self.largest_of, self.units_of = made[len(loops) :]
+
+    def __call__(self, system: System, step: float) -> None:
+        """Arguments of `film_kick`."""
+        self.ghosts.refresh("film")
+        count, owned = self.start(system, step)
+        number = int(self.communicator.sum([owned]))
+        if number == 0:
+            return
+        self.ghosts.refresh("joint_film")
+        tolerance = system.parameters.film_tolerance
+        self.begin(system, count, step)
+        self.ghosts.refresh("film_change")
+        iterations, passes = 0, 0
+        while passes < PASSES:
+            self.new_residual(system, count, step, True)
+            by_wanted, by_residual = (self._total(system, count, number, column) for column in (2, 3))
+            if by_wanted + by_residual < 0.0:
+                self.new_scale(system, count, by_wanted / (by_wanted - by_residual))
+                self.new_residual(system, count, step, False)
+            left, whole = (self._total(system, count, number, column) for column in (0, 1))
+            limit = tolerance * tolerance * whole
+            if not left > (4.0 * limit if passes > 0 else limit):
+                break
+            change = self.communicator.largest([self.largest_of(system, count, 4)])
+            last = passes == 0 and left < NEAR * whole and change < SLIGHT
+            passes += 1
+            share = 0.0
+            for _ in range(MOST_ITERATIONS):
+                self.new_direction(system, count, share)
+                self.ghosts.refresh("film_change")
+                self.new_product(system, count)
+                self.along(system, count, left / self._total(system, count, number, 0))
+                before, left = left, self._total(system, count, number, 0)
+                iterations += 1
+                share = left / before
+                if not left > limit:
+                    break
+            self.renew_change(system)
+            self.ghosts.refresh("film_change")
+            if last:
+                break
+        self.finish(system, count)
+        system.film_counts[:] += (1.0, iterations, passes, owned)
+
+    def _total(self, system: System, count: int, number: int, column: int) -> float:
+        """Sum of a column of the terms of all films on all ranks, see `total_of`."""
+        largest = self.communicator.largest([self.largest_of(system, count, column)])
+        if not 0.0 < largest < math.inf:
+            return largest
+        power = scale_of.py_func(largest, number)
+        return math.ldexp(float(self.communicator.sum([self.units_of(system, count, column, power)])), -power)

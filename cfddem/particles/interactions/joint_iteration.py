@@ -1,0 +1,134 @@
+"""What an iteration of films that are solved together does to each film.
+
+See `cfddem.particles.interactions.joint_solution`.
+"""
+
+from __future__ import annotations
+
+from cfddem.backend.compile import inline, part, prange
+from cfddem.particles.interactions.joint_equations import four_of, own, put_two, rates_of, two
+from cfddem.particles.interactions.joint_films import by_blocks, couples
+from cfddem.particles.interactions.shear_film import write_impulse
+from cfddem.particles.interactions.slots import SHEAR
+from cfddem.particles.vectors import at, dot, minus, plus, put, times
+
+
+@inline
+def film_direction(e, system, share):
+    """New direction of film e."""
+    memory = system.memory
+    steepest = memory.joint_residual[e] / (memory.joint_compliance[e] + memory.joint_weight[e])
+    memory.joint_direction[e] = steepest + share * memory.joint_direction[e] if share > 0.0 else steepest
+    if SHEAR:
+        s, q = two(memory.joint_shear_residual, e)
+        s, q = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
+        if share > 0.0:
+            a, b = two(memory.joint_shear_direction, e)
+            s, q = plus(s, times(share, a)), plus(q, times(share, b))
+        put_two(memory.joint_shear_direction, e, s, q)
+
+
+@part
+def find_direction(system, count, share):
+    """New direction: preconditioned residual, and a share of the last direction."""
+    for e in prange(count):
+        film_direction(e, system, share)
+
+
+@inline
+def film_product(e, system):
+    """Matrix times direction of film e."""
+    particles, memory = system.particles, system.memory
+    product, slip, roll = rates_of(e, particles.film_change, particles.film_turn, False, system)
+    direction = memory.joint_direction[e]
+    product += memory.joint_compliance[e] * direction
+    memory.joint_product[e] = product
+    term = direction * product
+    if SHEAR:
+        push, couple = two(memory.joint_shear_direction, e)
+        s, q = by_blocks(four_of(memory.joint_sliding, e), push, couple, at(memory.joint_normal, e))
+        s, q = plus(slip, s), plus(roll, q)
+        put_two(memory.joint_shear_product, e, s, q)
+        term += dot(push, s) + dot(couple, q)
+    memory.joint_terms[e] = term if own(e, system) else 0.0
+
+
+@part
+def find_product(system, count):
+    """Matrix times direction, and the terms of its product with the direction."""
+    for e in prange(count):
+        film_product(e, system)
+
+
+@inline
+def film_follows(e, system, length):
+    """New impulse and residual of film e."""
+    memory = system.memory
+    memory.joint_impulse[e] += length * memory.joint_direction[e]
+    residual = memory.joint_residual[e] - length * memory.joint_product[e]
+    memory.joint_residual[e] = residual
+    term = residual * residual / (memory.joint_compliance[e] + memory.joint_weight[e])
+    if SHEAR:
+        push, couple = two(memory.joint_shear_impulse, e)
+        s, q = two(memory.joint_shear_direction, e)
+        put_two(memory.joint_shear_impulse, e, plus(push, times(length, s)), plus(couple, times(length, q)))
+        a, b = two(memory.joint_shear_product, e)
+        s, q = two(memory.joint_shear_residual, e)
+        s, q = minus(s, times(length, a)), minus(q, times(length, b))
+        put_two(memory.joint_shear_residual, e, s, q)
+        a, b = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
+        term += dot(a, s) + dot(b, q)
+    memory.joint_terms[e] = term if own(e, system) else 0.0
+
+
+@part
+def follow_direction(system, count, length):
+    """New impulses and residuals at a length along the direction, and the terms of the square of the residual."""
+    for e in prange(count):
+        film_follows(e, system, length)
+
+
+@inline
+def scale_film(e, system, factor):
+    """Multiply the impulse of film e."""
+    memory = system.memory
+    memory.joint_impulse[e] *= factor
+    if SHEAR:
+        push, couple = two(memory.joint_shear_impulse, e)
+        put_two(memory.joint_shear_impulse, e, times(factor, push), times(factor, couple))
+
+
+@part
+def scale_impulses(system, count, factor):
+    """Multiply all impulses, and what they do to the particles."""
+    particles = system.particles
+    for e in prange(count):
+        scale_film(e, system, factor)
+    for i in prange(len(particles.radius)):
+        put(particles.film_change, i, times(factor, at(particles.film_change, i)))
+        if SHEAR:
+            put(particles.film_turn, i, times(factor, at(particles.film_turn, i)))
+
+
+@inline
+def keep_film(e, system):
+    """Keep the impulse of film e."""
+    memory = system.memory
+    k, normal = memory.joint_edge[e], at(memory.joint_normal, e)
+    put(memory.impulse, k, times(memory.joint_impulse[e], normal))
+    if SHEAR:
+        push, roll = two(memory.joint_shear_impulse, e)
+        first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
+        write_impulse(k, memory, push, first, second)
+
+
+@part
+def give_joint(system, count):
+    """Give the particles the impulses found, and keep these."""
+    particles = system.particles
+    for e in prange(count):
+        keep_film(e, system)
+    for i in prange(particles.owned):
+        put(particles.velocity, i, plus(at(particles.velocity, i), at(particles.film_change, i)))
+        if SHEAR:
+            put(particles.spin, i, plus(at(particles.spin, i), at(particles.film_turn, i)))

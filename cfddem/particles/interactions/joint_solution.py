@@ -1,0 +1,225 @@
+"""The impulses of all films over a step, solved together.
+
+Films of a body act on each other through its motion. Their impulses J follow from one system of equations,
+
+    (C^-1/dt + G M^-1 G^T) J = -G v + C^-1/dt J_d,        v' = v + M^-1 G^T J
+
+with the velocities v after the half kick and v' after the films; G, which takes velocities to the rates at which the
+bodies of a film approach, slide and roll; the inverse masses M^-1, zero for walls and bodies that are held; and the
+resistances C. The normal film is nonlinear: its resistance is the mean over its way in this step, which its closed
+form gives for the motion that all other films leave to the pair. J_d is what a film that begins has missed on its way
+from its cut-off gap.
+
+Preconditioned conjugate gradients start from the impulses of the last step. Each iterate consists of impulses of pairs,
+so momentum stays to round-off, and energy falls with every iterate, however early the iteration ends. Films with a
+damping number X = c dt (1/m1 + 1/m2) below `WEAK` stay outside: their impulses are explicit and come first.
+
+A loop over particles sums what the films of each do to it, in a fixed order, and a loop over films finds the rates.
+Sums over all films are sums of integers (`scale_of`): they have the same bits in any order, on any number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
+from cfddem.particles.interactions.joint_equations import SLIGHT, find_residual, own, prepare, spread
+from cfddem.particles.interactions.joint_films import collect, give_weak
+from cfddem.particles.interactions.joint_iteration import (
+    find_direction,
+    find_product,
+    follow_direction,
+    give_joint,
+    scale_impulses,
+)
+from cfddem.particles.interactions.slots import film_impulses
+
+PASSES = 3
+"""Most times that the resistances of a step are found anew."""
+
+MOST_ITERATIONS = 400
+"""Of one pass; energy falls also where the iteration ends here."""
+
+NEAR = 1e-2
+"""Square of the first residual over that without impulses below which the impulses of the last step are close: where
+all gaps change by less than `SLIGHT`, too, resistances need not be found anew."""
+
+
+# ---------------------------------------------------------------- sums with the same bits in any order
+
+
+@part
+def largest_term(system, count, column):
+    """Largest absolute value of one of the terms of all films; NaN if one of them is NaN."""
+    terms, tops, largest, begin = system.memory.joint_terms, np.zeros(CHUNKS), 0.0, column * len(system.edges.first)
+    for chunk in prange(CHUNKS):
+        top = 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            size = abs(terms[begin + e])
+            top = size if size > top or size != size else top
+        tops[chunk] = top
+    for chunk in range(CHUNKS):
+        largest = tops[chunk] if tops[chunk] > largest or tops[chunk] != tops[chunk] else largest
+    return largest
+
+
+@inline
+def scale_of(largest, number):
+    """Number of units of a sum of `number` terms in 1, a power of two: no sum of so many integers is too large.
+
+    largest  absolute value of all terms, above 0
+    """
+    _, power = math.frexp(largest)
+    _, digits = math.frexp(float(number))
+    return min(61 - digits - power, 1000)
+
+
+@part
+def sum_of_terms(system, count, column, power):
+    """Sum of one of the four terms of all films, in units of 2^-power, each rounded to a whole number of them."""
+    terms, sums, total, begin = (
+        system.memory.joint_terms,
+        np.zeros(CHUNKS, np.int64),
+        0,
+        column * len(system.edges.first),
+    )
+    scale = math.ldexp(1.0, power)
+    for chunk in prange(CHUNKS):
+        whole = 0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            whole += np.int64(np.rint(scale * terms[begin + e]))
+        sums[chunk] = whole
+    for chunk in range(CHUNKS):
+        total += sums[chunk]
+    return total
+
+
+# ---------------------------------------------------------------- phases of the solution, each before a halo or a sum
+
+
+@serial
+def start_films(system, step):
+    """Weak films act, and all others are listed; returns their number, and that of those that are counted here."""
+    film_impulses(0, system.edges.between_particles, system, step)
+    count = collect(system, step)
+    give_weak(system)
+    owned = 0
+    for e in range(count):
+        owned += 1 if own(e, system) else 0
+    return count, owned
+
+
+@serial
+def begin_solution(system, count, step):
+    """The equations, and what the impulses of the last step do to the particles."""
+    prepare(system, count, step)
+    spread(system, False)
+
+
+@serial
+def new_residual(system, count, step, renew):
+    """See `find_residual`."""
+    find_residual(system, count, step, renew)
+
+
+@serial
+def new_scale(system, count, factor):
+    """See `scale_impulses`."""
+    scale_impulses(system, count, factor)
+
+
+@serial
+def new_direction(system, count, share):
+    """A new direction, and what it does to the particles."""
+    find_direction(system, count, share)
+    spread(system, True)
+
+
+@serial
+def new_product(system, count):
+    """See `find_product`."""
+    find_product(system, count)
+
+
+@serial
+def along_direction(system, count, length):
+    """See `follow_direction`."""
+    follow_direction(system, count, length)
+
+
+@serial
+def renew_change(system):
+    """What the impulses do to the particles."""
+    spread(system, False)
+
+
+@serial
+def finish_solution(system, count):
+    """See `give_joint`."""
+    give_joint(system, count)
+
+
+@serial
+def largest_of(system, count, column):
+    """See `largest_term`."""
+    return largest_term(system, count, column)
+
+
+@serial
+def units_of(system, count, column, power):
+    """See `sum_of_terms`."""
+    return sum_of_terms(system, count, column, power)
+
+
+@serial
+def total_of(system, count, column):
+    """Sum of one of the four terms of all films."""
+    largest = largest_of(system, count, column)
+    if not 0.0 < largest < math.inf:
+        return largest
+    power = scale_of(largest, count)
+    return math.ldexp(float(units_of(system, count, column, power)), -power)
+
+
+@serial
+def film_kick(system, step):
+    """Give the particles the impulses of all films over the coming step."""
+    count, _ = start_films(system, step)
+    if count == 0:
+        return
+    tolerance = system.parameters.film_tolerance
+    begin_solution(system, count, step)
+    iterations, passes = 0, 0
+    while passes < PASSES:
+        new_residual(system, count, step, True)
+        by_wanted, by_residual = total_of(system, count, 2), total_of(system, count, 3)
+        if by_wanted + by_residual < 0.0:  # these impulses could add energy; a part of them takes the most
+            new_scale(system, count, by_wanted / (by_wanted - by_residual))
+            new_residual(system, count, step, False)
+        left, whole = total_of(system, count, 0), total_of(system, count, 1)
+        limit = tolerance * tolerance * whole
+        if not left > (4.0 * limit if passes > 0 else limit):
+            break
+        last = passes == 0 and left < NEAR * whole and largest_of(system, count, 4) < SLIGHT
+        passes += 1
+        share = 0.0
+        for _ in range(MOST_ITERATIONS):
+            new_direction(system, count, share)
+            new_product(system, count)
+            along_direction(system, count, left / total_of(system, count, 0))
+            before, left = left, total_of(system, count, 0)
+            iterations += 1
+            share = left / before
+            if not left > limit:
+                break
+        renew_change(system)
+        if last:
+            break
+    finish_solution(system, count)
+    counts = system.film_counts
+    counts[0] += 1.0
+    counts[1] += iterations
+    counts[2] += passes
+    counts[3] += count
