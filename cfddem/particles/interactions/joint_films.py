@@ -148,9 +148,10 @@ def explicit_sliding(k, resistance, twist, motion, normal, arms, reduced_radius,
     blocks = (-step * resistance, -step * resistance * both, -step * resistance * rolling, -step * twist)
     push, roll = by_blocks(blocks, motion[0], motion[1], normal)
     first, second = couples(push, roll, normal, arms)
-    last = impulses_of(k, memory)
-    write_impulse(k, memory, either(strong, last[0], push), either(strong, last[1], first),
-                  either(strong, last[2], second))  # fmt: skip
+    kept, kept_first, kept_second = impulses_of(k, memory)
+    write_impulse(
+        k, memory, either(strong, kept, push), either(strong, kept_first, first), either(strong, kept_second, second)
+    )
 
 
 @inline
@@ -191,7 +192,7 @@ def weak_pair(n, system, step):
     then = (memory.resistance[k], memory.approach_speed[k], memory.accounted_gap[k])
     impulse, strong, faster = apart(dot(velocity, normal), film, weight, 1.0, then, step)
     if COUNT_FILM:
-        memory.outside[k] += film_outside(at_least(film)) if then[0] > 0.0 else 0
+        memory.outside[k] += film_outside(at_least(film)) if memory.resistance[k] > 0.0 else 0
     memory.joint_row[k] = 1 if strong else 0
     memory.faster[k] = faster
     put(memory.impulse, k, either(strong, at(memory.impulse, k), times(impulse, normal)))
