@@ -7,14 +7,15 @@ members are read where they are used. No member changes while a loop runs, so th
     @struct
     class System(NamedTuple): ...
 
-The named tuples among its members are read by reference, too. Loops over arrays that must not overlap need each array
-as an argument of its own (`cfddem.particles.interactions.pair_loops`).
+The named tuples among its members are read by reference, too, and those of numbers alone by value. Loops over arrays
+that must not overlap need each array as an argument of its own (`cfddem.particles.interactions.pair_loops`).
 """
 
 from __future__ import annotations
 
 import hashlib
-from functools import partial
+from functools import cache, partial
+from numbers import Number
 from typing import Any, TypeVar
 
 from llvmlite import ir
@@ -53,10 +54,15 @@ def struct(made: Made) -> Made:
     return made
 
 
-def _type_of(value: Any, context: Any) -> types.Type:
-    if hasattr(value, "_fields"):
-        return Struct(type(value), tuple(_type_of(each, context) for each in value))
+def _type_of(value: Any, context: Any, whole: bool = True) -> types.Type:
+    """Type of a structure, or of a member where `whole` is not set: numbers without arrays are read by value."""
+    if hasattr(value, "_fields") and (whole or not _of_numbers(value)):
+        return Struct(type(value), tuple(_type_of(each, context, False) for each in value))
     return typeof_impl(value, context)
+
+
+def _of_numbers(value: Any) -> bool:
+    return all(map(_of_numbers, value)) if isinstance(value, tuple) else isinstance(value, Number)
 
 
 def _content(manager: Any, of: types.Type) -> Any:
@@ -71,7 +77,22 @@ class _Model(models.PrimitiveModel):  # type: ignore[misc]
     """The address of the members, which lie one after the other."""
 
     def __init__(self, manager: Any, of: Struct) -> None:
-        super().__init__(manager, of, _content(manager, of).as_pointer())
+        super().__init__(manager, of, cgutils.voidptr_t)
+
+
+@cache
+def _offset(context: Any, of: Struct, place: int) -> Any:
+    """Bytes from the address of a structure to a member."""
+    content = _content(context.data_model_manager, of)
+    return cgutils.intp_t(content.get_element_offset(context.target_data, place))
+
+
+def _member(context: Any, builder: Any, of: Struct, address: Any, place: int) -> Any:
+    """Address of a member. It has no type where the member is a structure: the text of types grows with each level."""
+    inner, member = builder.gep(address, [_offset(context, of, place)], inbounds=True), of.members[place]
+    if isinstance(member, Struct):
+        return inner
+    return builder.bitcast(inner, _content(context.data_model_manager, member).as_pointer())
 
 
 @infer_getattr
@@ -88,10 +109,12 @@ class _Members(AttributeTemplate):  # type: ignore[misc]
 def _read(context: Any, builder: Any, of: Struct, address: Any, name: str) -> Any:
     """A member: what it holds, or its address where it is a structure."""
     place = of.made._fields.index(name)  # type: ignore[attr-defined]
-    member, inner = of.members[place], cgutils.gep_inbounds(builder, address, 0, place)
+    member, inner = of.members[place], _member(context, builder, of, address, place)
     if isinstance(member, Struct):
         return inner
-    return impl_ret_borrowed(context, builder, member, _loaded(builder, inner))
+    row = isinstance(member, types.Array) and member.ndim == 1 and member.layout == "C"
+    value = _loaded_row(context, builder, member, inner) if row else _loaded(builder, inner)
+    return impl_ret_borrowed(context, builder, member, value)
 
 
 def _loaded(builder: Any, address: Any) -> Any:
@@ -107,10 +130,26 @@ def _loaded(builder: Any, address: Any) -> Any:
     return number
 
 
+def _loaded_row(context: Any, builder: Any, member: types.Array, address: Any) -> Any:
+    """An array with one axis: only what its type does not tell is read, as most of the text of a loop is such reads."""
+    model, row = context.data_model_manager[member], address.type.pointee
+    size = cgutils.intp_t(context.get_abi_sizeof(context.get_data_type(member.dtype)))
+    known = {"itemsize": size, "strides": ir.Constant(row.elements[model.get_field_position("strides")], [size])}
+    names = [model.get_field_position(name) for name in ("meminfo", "data", "nitems", "shape")]
+    parts = [ir.Constant(each, None) for each in row.elements]
+    for name, number in known.items():
+        parts[model.get_field_position(name)] = number
+    value = ir.Constant(row, parts)
+    for place in names:
+        value = builder.insert_value(value, _loaded(builder, cgutils.gep_inbounds(builder, address, 0, place)), place)
+    return value
+
+
 @unbox(Struct)
 def _taken(of: Struct, value: Any, c: Any) -> NativeValue:
     """Lay out the members of an instance for the time of a call."""
-    address = cgutils.alloca_once(c.builder, _content(c.context.data_model_manager, of))
+    room = cgutils.alloca_once(c.builder, _content(c.context.data_model_manager, of))
+    address = c.builder.bitcast(room, cgutils.voidptr_t)
     failures: list[Any] = []
     releases: list[Any] = []
     _fill(of, value, address, c, failures, releases)
@@ -127,7 +166,7 @@ def _taken(of: Struct, value: Any, c: Any) -> NativeValue:
 
 def _fill(of: Struct, value: Any, address: Any, c: Any, failures: list[Any], releases: list[Any]) -> None:
     for n, member in enumerate(of.members):
-        item, inner = c.pyapi.tuple_getitem(value, n), cgutils.gep_inbounds(c.builder, address, 0, n)
+        item, inner = c.pyapi.tuple_getitem(value, n), _member(c.context, c.builder, of, address, n)
         if isinstance(member, Struct):
             _fill(member, item, inner, c, failures, releases)
             continue
