@@ -13,10 +13,10 @@ from cfddem.particles.interactions.joint_films import (
     by_blocks,
     couples,
     film_at,
-    in_the_middle,
     normal_and_gap,
     note_approach,
     pair_arms,
+    passing_rate,
     slip_and_roll,
 )
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
@@ -60,9 +60,11 @@ def prepare_film(e, system, step):
     edges, memory, radius = system.edges, system.memory, system.particles.radius
     k = memory.joint_edge[e]
     normal, gap = normal_and_gap(k, system)
+    passing = 0.0
     if k < edges.between_particles:
         distance = radius[edges.first[k]] + radius[edges.second[k]] + gap
-        normal = in_the_middle(normal, distance, relative_velocity(k, system), system.parameters.free, step)
+        passing = passing_rate(normal, distance, relative_velocity(k, system), system.parameters.free, step)
+    memory.joint_passing[e] = passing
     _, weight = pair_mass_and_radius(k, system)
     share = portion(edges, k)
     memory.joint_least[e] = _NONE / (step * weight)
@@ -231,6 +233,7 @@ def film_residual(e, system, step, renew):
     """Resistance of film e, if it is to be found anew, its residual, and its terms of four sums."""
     particles, memory = system.particles, system.memory
     before, slip, roll = rates_of(e, particles.velocity, particles.spin, True, system)
+    before += memory.joint_passing[e]
     given, slipped, rolled = rates_of(e, particles.film_change, particles.film_turn, False, system)
     if renew:
         resistance = mean_resistance(before + given, e, system, step)

@@ -1,12 +1,9 @@
 """Films whose impulses act over a step: their fields, the weak ones, and the list of all others.
 
-Weak films act explicitly; all others are solved together (`cfddem.particles.interactions.joint_solution`). All
-directions are those in the middle of the step. So a film takes what its gap changes, also where spheres pass by.
+Weak films act explicitly; all others are solved together (`cfddem.particles.interactions.joint_solution`).
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -47,6 +44,7 @@ FIELDS = (
     Field("joint_incident", "1", 2, "scratch", dtype=np.int32, meaning="films solved together of each particle"),
     Field("joint_normal", "1", 3, "scratch", meaning="direction from the second body to the first"),
     Field("joint_weight", "1/kg", role="scratch", meaning="sum of the inverse masses"),
+    Field("joint_passing", "m/s", role="scratch", meaning="rate at which bodies that pass each other part"),
     Field("joint_gap", "m", role="scratch", meaning="gap at the beginning of the step"),
     Field("joint_least", "kg/s", role="scratch", meaning="least resistance of the film"),
     Field("joint_compliance", "1/kg", role="scratch", meaning="1/(resistance times step)"),
@@ -162,16 +160,16 @@ def pair_arms(i, j, radius, gap):
 
 
 @inline
-def in_the_middle(normal, distance, velocity, free, step):
-    """Direction from the second sphere to the first in the middle of the step.
+def passing_rate(normal, distance, velocity, free, step):
+    """Mean rate at which two spheres that pass each other part in a step beyond the speed along their normal.
 
-    The speed along it is that at which the gap changes, also where spheres pass each other.
+    At most that speed: so a film takes what its gap changes, and gives no energy to a pair that turns as a whole.
 
     velocity  of the first centre relative to the second
     """
-    half = 0.5 * step / distance
-    aside = across((half * free[0] * velocity[0], half * free[1] * velocity[1], half * free[2] * velocity[2]), normal)
-    return times(1.0 / math.sqrt(1.0 + dot(aside, aside)), plus(normal, aside))
+    moving = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
+    aside = across(moving, normal)
+    return min(0.5 * step * dot(aside, aside) / distance, abs(dot(velocity, normal)))
 
 
 @inline
@@ -184,15 +182,16 @@ def weak_pair(n, system, step):
     inverse_sum = 1.0 / (radius[i] + radius[j])
     reduced_radius = radius[i] * radius[j] * inverse_sum
     velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
-    normal = in_the_middle(normal, radius[i] + radius[j] + gap, velocity, system.parameters.free, step)
+    passing = passing_rate(normal, radius[i] + radius[j] + gap, velocity, system.parameters.free, step)
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     cutoff_gap = system.parameters.cutoff_ratio * reduced_radius
     film = FilmState(gap, viscosity, reduced_radius, memory.minimum_gap[k], cutoff_gap)
     weight = particles.inverse_mass[i] + particles.inverse_mass[j]
-    then = (memory.resistance[k], memory.approach_speed[k], memory.accounted_gap[k])
-    impulse, strong, faster = apart(dot(velocity, normal), film, weight, 1.0, then, step)
+    within = memory.resistance[k]
+    then = (within, memory.approach_speed[k], memory.accounted_gap[k])
+    impulse, strong, faster = apart(dot(velocity, normal) + passing, film, weight, 1.0, then, step)
     if COUNT_FILM:
-        memory.outside[k] += film_outside(at_least(film)) if memory.resistance[k] > 0.0 else 0
+        memory.outside[k] += film_outside(at_least(film)) if within > 0.0 else 0
     memory.joint_row[k] = 1 if strong else 0
     memory.faster[k] = faster
     put(memory.impulse, k, either(strong, at(memory.impulse, k), times(impulse, normal)))
