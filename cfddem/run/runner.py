@@ -351,7 +351,7 @@ def _no_empty_folder(folder: Path) -> Iterator[None]:
             (folder / "data").rmdir()
             folder.rmdir()
         if isinstance(failure, KeyboardInterrupt):
-            message = "stopped by SIGINT before the first step: nothing is kept; the same command begins anew"
+            message = "stopped by SIGINT before the first step; the same command begins anew"
             raise RunStopped(message, signal.SIGINT) from None
         raise
 

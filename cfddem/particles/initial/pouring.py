@@ -35,6 +35,9 @@ ROLLING, _ROLLS = 10.0, 1e-3
 """After this many times of a fall, particles that gain less than this share of the power of their weight are stopped,
 too: nothing else slows a sphere that rolls on a flat floor."""
 
+_BEFORE_RELEASE = 0.3
+"""Particles are stopped until the bed has this share of the energy that it may have without stops."""
+
 NEARLY_AT_REST = 1e-4
 """Share of the energy that may be left if a fluid stirs the bed anyway; a few particles may still roll."""
 
@@ -145,7 +148,7 @@ class _Pouring:
         # in a shallow bed particles take longer to roll to their places than to fall
         reach = max(height, *np.ptp(run.particles.position[:, :2], axis=0))
         self.longest = patience * math.sqrt(2.0 * reach / gravity)
-        self.time = 0.0
+        self.time, self.start = 0.0, self._potential()
         self.slow = 0.1 * math.sqrt(gravity * float(run.particles.radius.min()))
 
     def go(self, step: float, steps: int) -> None:
@@ -158,12 +161,17 @@ class _Pouring:
         self.run.advance(step, steps)
         self.time += steps * step
         if self.time > self.longest:
-            raise RunFailed(_not_at_rest(self.run, self.left, self.time, self.at_rest))
+            raise RunFailed(_not_at_rest(self.run, self.left, self.time, _BEFORE_RELEASE * self.at_rest))
 
     @property
     def left(self) -> float:
-        """Remaining share of the energy of the fall."""
-        return kinetic_energy(self.run.particles) / self.brought
+        """Remaining share of the energy of the fall: through the box, or further to where the particles are now."""
+        return kinetic_energy(self.run.particles) / max(self.brought, self.start - self._potential())
+
+    def _potential(self) -> float:
+        """Energy of the weight above z = 0 [J]."""
+        made = self.run.particles
+        return float(np.sum(made.mass * self.gravity * made.position[:, 2]))
 
     def report_progress(self) -> None:
         if self.progress is not None:
@@ -194,7 +202,7 @@ class _Pouring:
                 made.spin[back] = 0.0
             self.report_progress()
             few = _FEW if self.at_rest <= AT_REST else _SOME
-            if self.left < 0.3 * self.at_rest and (unbalanced(self.run) > _UNBALANCED).mean() <= few:
+            if self.left < _BEFORE_RELEASE * self.at_rest and (unbalanced(self.run) > _UNBALANCED).mean() <= few:
                 return
 
     def release(self) -> float:

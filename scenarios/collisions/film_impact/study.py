@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError, RunFailed, nearest
 from cfddem.case.materials import Material
 from closures.film_impact import film_added_mass
 from scenarios.collisions.film_impact.cavitation import EXCHANGES
@@ -154,7 +154,11 @@ def integrate(
     begin, record, bead = process_time(), Record(run), run.bead
     while True:
         before = run.contacts, bead.velocity
-        run.step()
+        try:
+            run.step()
+        except np.linalg.LinAlgError as failure:
+            where = f"t = {run.time:.3g} s, with the bead {bead.gap:.3g} m above the plate"
+            raise RunFailed(f"{where}: {failure}; use a larger domain, or more cells") from failure
         record.add(*before)
         if progress is not None:
             progress(run)
