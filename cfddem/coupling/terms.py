@@ -48,7 +48,7 @@ class ForceTerms:
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
-        self.added = np.zeros(0)  # change of the added mass at the start of the step (N,) [kg]; empty for none
+        self.added: Array = np.zeros(particles.count)  # change of the added mass at the start of the step (N,) [kg]
         self.spin_work = 0.0  # kinetic energy that torques of the fluid have given to the particles [J]
 
     def resist(self, line: str, conductance: Array) -> None:

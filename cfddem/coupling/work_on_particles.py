@@ -79,7 +79,7 @@ class CouplingWork:
         self._pressure = self.coupling.kernel.smooth(pressure)
         self._on_fluid = self._implicit_work(particles, terms)
         particles[FLUCTUATING.name][:] = self._on_fluid.fluctuating
-        self._added = total(0.5 * terms.added[:, None] * particles.velocity**2) if len(terms.added) else 0.0
+        self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
         for line, field in FORCES.items():
             particles[field.name][:] = terms.force(line)
         particles.pressure_before = self._pressure_at(particles)
