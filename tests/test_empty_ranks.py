@@ -161,14 +161,24 @@ def test_a_folder_of_ranks_without_a_particle_is_that_of_one_process(tmp_path: P
                 assert second["particles"][field][()] == pytest.approx(values, rel=1e-4, abs=1e-9), field
 
 
+FEED = "\n[[feed]]\ncorner = [0.002, 0.002, 0.03]\nsize = [0.005, 0.005, 0.005]\nrate = 1500.0\n"
+
+
 @needs_mpi
 @pytest.mark.slow
-def test_settling_runs_on_two_ranks(tmp_path: Path) -> None:
-    """The case of the gallery, one bead."""
-    done = cfddem("run", "settling", "--ranks", "2", "--set", "run.until=0.002", "-o", "two", folder=tmp_path)
+@pytest.mark.parametrize(("more", "fed"), [("", 0), (FEED, 3)], ids=["one bead", "with a feed"])
+def test_settling_runs_on_two_ranks(tmp_path: Path, more: str, fed: int) -> None:
+    """The case of the gallery, one bead; the same with a feed, which begins on a rank without a particle."""
+    assert cfddem("new", "settling", folder=tmp_path).returncode == 0
+    (tmp_path / "settling.toml").write_text((tmp_path / "settling.toml").read_text() + more)
+    words = ["settling.toml", "--ranks", "2", "--set", "run.until=0.002", "-o", "two"]
+    if fed:  # the added mass and the history force need the past of a particle
+        words += ["--set", "laws.added_mass=0", "--set", "laws.history=none"]
+    done = cfddem("run", *words, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     run = open_run(tmp_path / "two")
-    assert run.status == "finished" and run.history["particle_count"][-1] == 1.0
+    assert run.status == "finished" and run.history["particle_count"][-1] == 1.0 + fed
+    assert cfddem("resume", "two", "--until", "0.003", "--ranks", "3", folder=tmp_path).returncode == 0
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
