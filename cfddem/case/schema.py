@@ -18,6 +18,7 @@ from cfddem.backend.law_choice import chosen
 from cfddem.case.bed import AT_RANDOM, POURED_SOLID_FRACTION, Bed, Name, Point, Positive, Species
 from cfddem.case.case_laws import AgitationFactors, CaseLaws
 from cfddem.case.compare import CaseData, with_files_of
+from cfddem.case.feature_table import FeatureTable, with_feature_tables
 from cfddem.case.feeds import CaseFeed, CaseOutlet, refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
 from cfddem.case.liquid import Liquid, Spray, check_wet
@@ -110,6 +111,7 @@ HEAVY = 2.0
 """Density ratio from which agitation is a default: lighter beads are at the edge of what was measured."""
 
 
+@with_feature_tables
 class Case(Checked):
     """The complete description of a run.
 
@@ -167,6 +169,18 @@ class Case(Checked):
     def _liquid_goes_with_the_rest(self) -> Case:
         check_wet(self)
         return self
+
+    @model_validator(mode="after")
+    def _tables_of_features_go_with_the_rest(self) -> Case:
+        for table in self.feature_tables:
+            table.refuse(self)
+        return self
+
+    @property
+    def feature_tables(self) -> list[FeatureTable]:
+        """Tables of this case that features own."""
+        values = (getattr(self, name) for name in type(self).model_fields)
+        return [each for each in values if isinstance(each, FeatureTable)]
 
     @property
     def species(self) -> dict[str, Species]:

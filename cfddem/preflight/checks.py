@@ -71,6 +71,7 @@ def find_issues(
         *check_cost(case, cost),
         *check_stiffness(case, bed, collision, cost),
         *check_data(case),
+        *(Issue(*each) for table in case.feature_tables for each in table.issues(case)),
     ]
     if case.fluid is not None:
         found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]

@@ -24,7 +24,8 @@ from cfddem.analysis import measures
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
-from cfddem.features import FEATURES, CaseFeature
+from cfddem.features.case_feature import CaseFeature
+from cfddem.features.feature_list import FEATURES
 from cfddem.io.quantities import TIME, Quantity, of_function
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed

@@ -16,7 +16,7 @@ from cfddem.case.schema import Case
 from cfddem.coupling.force_list import ForceList, require_features
 from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
-from cfddem.features import FEATURES
+from cfddem.features.feature_list import FEATURES
 from cfddem.model.feature import Equipment, Feature, FluidForce, Function, On, OwnForce
 from cfddem.particles.state import Particles, particles_in
 from cfddem.run.build import parts_of
