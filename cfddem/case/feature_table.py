@@ -10,15 +10,12 @@ import importlib
 import pkgutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from cfddem.case.materials import Checked
-
-if TYPE_CHECKING:
-    from typing import Literal
 
 ROOM = Path(__file__).parents[1] / "features"
 
