@@ -22,7 +22,7 @@ def ranz_marshall(reynolds: float, prandtl: float) -> float:
     Range: 0 < Re < 200, 0.6 < Pr < 400; often used far beyond. The range is from memory and has not been compared with
     the paper. Heat conduction into a fluid at rest gives the 2.
 
-    The number of the convection test of MFIX, of J. Musser, is 17.81:
+    A sphere of 3.6 mm at 6 m/s in the air of the convection test of MFIX (Re and Pr of its inputs):
 
     >>> round(ranz_marshall(1376.0, 0.358), 2), ranz_marshall(0.0, 1.0)
     (17.81, 2.0)
