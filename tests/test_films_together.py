@@ -87,6 +87,19 @@ def test_two_plates_that_close_feel_the_sum_of_the_gaps(damping: float, between:
     assert force * gaps_of(run).sum() / (STRENGTH * speed) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_impulses_that_are_lost_beside_the_new_ones_do_no_harm() -> None:
+    """A pair at rest in its film, with impulses of 1e-40 of the next ones, is pulled apart: as if they were zero."""
+    speeds = []
+    for last in (0.0, 1e-40, -1e-40):
+        run = row_of(2, [], tolerance=1e-3)
+        run.particles.velocity[run.particles.id == 1, 0] = 1e-3
+        run.edges.impulse[0, 0] = last
+        run.advance(10.0 * STEP_OF_ONE)
+        speeds.append(run.particles.velocity.copy())
+    assert 0.0 < np.ptp(speeds[0][:, 0]) < 1e-3
+    assert all(np.array_equal(each, speeds[0]) for each in speeds)
+
+
 @pytest.mark.parametrize("damping", [0.1, 10.0, 1000.0])
 def test_a_sphere_between_two_that_approach_stays(damping: float) -> None:
     """Two held spheres that approach by U each: the middle one does not move, and each side feels A 2U/(2h)."""

@@ -113,6 +113,12 @@ def test_wrong_input_is_refused_in_one_line(changes: dict[str, Any], message: st
     assert len(str(failure.value).splitlines()) == 1
 
 
+def test_a_fluid_without_viscosity_is_refused() -> None:
+    """It has no Reynolds number; temperatures would be NaN."""
+    with pytest.raises(InputError, match=r"fluid.viscosity.*above 0 with \[heat\]"):
+        case_of(fluid__viscosity=0.0)
+
+
 def test_check_warns_of_a_large_biot_number() -> None:
     def keys(conductivity: float) -> list[str]:
         case = case_of(heat=SPHERE | {"solid_conductivity": {"metal": conductivity}})

@@ -132,6 +132,31 @@ def test_a_checkpoint_with_a_valid_checksum_and_an_impossible_size_is_refused(
         checkpoint.newest(tmp_path)
 
 
+def elsewhere(kind: str, group: Any, secret: Path) -> None:
+    """An array `stolen` that lies in another file."""
+    if kind == "external":
+        group.create_dataset("stolen", (4,), "u1", external=[(str(secret), 0, 4)])
+    elif kind == "link":
+        group["stolen"] = h5py.ExternalLink(str(secret), "values")
+    else:
+        layout = h5py.VirtualLayout((4,), "f8")
+        layout[:] = h5py.VirtualSource(str(secret), "values", (4,))
+        group.create_virtual_dataset("stolen", layout)
+
+
+@pytest.mark.parametrize("kind", ["external", "link", "virtual"])
+def test_an_array_of_another_file_is_not_read(kind: str, tmp_path: Path) -> None:
+    """A run folder could name any file of the reader; what is in it would be exported, drawn and passed on."""
+    secret = tmp_path / "secret.h5"
+    with h5py.File(secret, "w") as file:
+        file["values"] = np.arange(4.0)
+    folder = made_up(tmp_path / "run", rows=101)
+    with h5py.File(folder / "history.h5", "r+") as file:
+        elsewhere(kind, file, secret)
+    with pytest.raises(RunFailed, match=r"history.h5: the file is damaged \(\w+ lies in another file\)"):
+        _ = open_run(folder).history
+
+
 def test_a_snapshot_with_an_impossible_number_is_refused(tmp_path: Path) -> None:
     folder = made_up(tmp_path / "run", rows=101)
     (folder / "data" / "99999999.h5").write_bytes((folder / "data" / "00000000.h5").read_bytes())

@@ -279,7 +279,37 @@ def test_equipment_acts_before_and_after_every_step_and_is_resumed() -> None:
         Simulation.restored(simulation.case, simulation.checkpoint())
 
 
+class Doubled(FluidForce):
+    """A force that is twice as large from the second step on."""
+
+    name, lines, needs_fluid = "doubled", ("external",), False
+
+    def act(self, terms: Any) -> None:
+        terms.push("external", np.tile(FORCE, (terms.particles.count, 1)) * (2.0 if terms.last_step > 0.0 else 1.0))
+
+
+@pytest.mark.parametrize("changes", [{}, DRY], ids=["in a fluid", "dry"])
+def test_a_resumed_run_knows_its_last_step(changes: dict[str, Any]) -> None:
+    whole = Simulation(case_of(**changes), features=[Doubled()])
+    whole.step()
+    resumed = Simulation.restored(whole.case, whole.checkpoint(), features=[Doubled()])
+    assert resumed.last_step == whole.last_step > 0.0
+    for simulation in (whole, resumed):
+        simulation.step()
+    assert np.array_equal(whole.particles.velocity, resumed.particles.velocity)
+
+
 def test_two_features_of_one_name_are_refused() -> None:
     simulation = Simulation(case_of(), features=[electric])
     with pytest.raises(InputError, match=r"electric.*no other"):
         simulation.add(electric)
+
+
+def test_a_name_that_the_case_has_or_no_checkpoint_can_hold_is_refused() -> None:
+    """Before the run begins, also where the feature of the case comes later."""
+    case = case_of(**DRY, run__energy_budget=True)
+    for kind, name in ((Tally, EnergyLedger.name), (Tally, "a/b"), (Doubled, "a/b")):
+        added = kind()
+        added.name = name
+        with pytest.raises(InputError, match=f"name.*{name}|{name}.*name"):
+            Simulation(case, features=[added])

@@ -40,8 +40,8 @@ class ForceList:
 
     def add(self, force: FluidForce, particles: Particles) -> None:
         """Add a force, and declare its fields."""
-        if force.name in self or not force.name:
-            raise InputError("name of a force", force.name, "a name that no other force of the run has")
+        if force.name in self or not force.name or "/" in force.name:
+            raise InputError("name of a force", force.name, "a name without '/' that no other force of the run has")
         if not set(force.lines) <= set(LINES):
             raise InputError(f"lines of the force {force.name}", force.lines, f"some of {', '.join(LINES)}")
         for field in force.fields:

@@ -38,9 +38,11 @@ class Heat(FeatureTable):
     )
 
     def refuse(self, case: Any) -> None:
-        """Refuse particles without a heat capacity, unknown materials, and a case without a fluid."""
+        """Refuse particles without a heat capacity, unknown materials, and a case without a viscous fluid."""
         if case.fluid is None:
             raise InputError("heat", None, "left out without a [fluid]", "add the table [fluid]")
+        if case.fluid.viscosity == 0.0:
+            raise InputError("fluid.viscosity", 0.0, "above 0 with [heat]", "the law of heat needs a Reynolds number")
         for table in ("heat_capacity", "solid_conductivity"):
             if unknown := sorted(getattr(self, table).keys() - case.material.keys()):
                 known = ", ".join(case.material)

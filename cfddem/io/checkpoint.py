@@ -152,6 +152,6 @@ def _get(group: Any, data: ArrayFile) -> dict[str, Any]:
         if isinstance(each, h5py.Group):
             values[name] = _get(each, data)
         else:
-            data.require_size(each)
+            data.require_own(each)
             values[name] = json.loads(each[()]) if "json" in each.attrs else each[()]
     return values

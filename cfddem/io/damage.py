@@ -49,7 +49,10 @@ def memory() -> float:
 
 
 class ArrayFile:
-    """An open HDF5 file of a run. Arrays are read only as long as their sizes fit the size of the file."""
+    """An open HDF5 file of a run.
+
+    Arrays are read only if they lie in the file itself, and as long as their sizes fit the size of the file.
+    """
 
     def __init__(self, path: Path, file: Any) -> None:
         self.file = file
@@ -58,11 +61,13 @@ class ArrayFile:
         self._why = f"a file of {size:.4g} bytes holds" if self._limit < most else "the memory of this machine holds"
         self._used = 0
 
-    def require_size(self, dataset: Any) -> None:
-        """Refuse an array that, with all others that were read, is larger than the file can hold.
+    def require_own(self, dataset: Any) -> None:
+        """Refuse an array of another file, or one that with all others that were read is larger than this can hold.
 
         errors  ValueError
         """
+        if dataset.external or dataset.is_virtual or dataset.file.filename != self.file.filename:
+            raise ValueError(f"{dataset.name.lstrip('/')} lies in another file")
         self._used += dataset.nbytes
         if self._used > self._limit:
             name, shape = dataset.name.lstrip("/"), " x ".join(map(str, dataset.shape))
@@ -75,7 +80,7 @@ class ArrayFile:
 
         errors  ValueError if it is too large
         """
-        self.require_size(dataset)
+        self.require_own(dataset)
         return np.asarray(dataset[rows])
 
 

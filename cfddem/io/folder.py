@@ -87,7 +87,7 @@ def read_snapshot_header(path: Path) -> tuple[Snapshot, Layout]:
         file = data.file
         fluid, particles = file.get("fluid", {}), file.get("particles", {})
         for each in (*fluid.values(), *particles.values()):
-            data.require_size(each)
+            data.require_own(each)
         count = len(particles[POINTS]) if POINTS in particles else 0
         snapshot = Snapshot(path.name, float(file.attrs["time"]), int(file.attrs["step"]), count)
         return snapshot, Layout.of(fluid, particles)

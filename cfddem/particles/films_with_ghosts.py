@@ -15,6 +15,7 @@ from cfddem.particles.interactions.joint_solution import (
     PASSES,
     along_direction,
     begin_solution,
+    best_factor,
     finish_solution,
     largest_of,
     new_direction,
@@ -59,7 +60,7 @@ class FilmsWithGhosts:
             self.new_residual(system, count, step, True)
             by_wanted, by_residual = (self._total(system, count, number, column) for column in (2, 3))
             if by_wanted + by_residual < 0.0:
-                self.new_scale(system, count, by_wanted / (by_wanted - by_residual))
+                self.new_scale(system, count, best_factor.py_func(by_wanted, by_residual))
                 self.new_residual(system, count, step, False)
             left, whole = (self._total(system, count, number, column) for column in (0, 1))
             limit = tolerance * tolerance * whole

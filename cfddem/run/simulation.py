@@ -92,13 +92,20 @@ class Simulation:
                 remedy = 'add it on="particles", or give the case a [fluid]'
                 raise InputError(f"force {added.name}", "on the fluid", "a force of a run with a fluid", remedy)
             self.forces.add(added, self.particles)
-        elif isinstance(added, Equipment) and added.name not in {"", *(each.name for each in self.features)}:
+        elif isinstance(added, Equipment) and added.name not in self._taken and "/" not in added.name:
             self.features.append(added)
             self._own += 1
             for field in added.fields:
                 self.particles.declare(field)
         else:
-            raise InputError("feature", added.name, "a FluidForce, or an Equipment, with a name of its own")
+            limit = "a FluidForce, or an Equipment, with a name of its own, without '/'"
+            raise InputError("feature", added.name, limit)
+
+    @property
+    def _taken(self) -> set[str]:
+        """Names that equipment cannot have: those of the features of the case, which may come later, and of others."""
+        of_case = (each.name for each in FEATURES if each.is_in(self.case))
+        return {"", *of_case, *(each.name for each in self.features)}
 
     def feature(self, kind: type[Kind]) -> Kind:
         """The feature of a kind that the simulation has.
@@ -196,6 +203,7 @@ class Simulation:
         """Everything that the next step depends on."""
         parts: dict[str, Any] = {
             "steps": self.steps,
+            "last_step": self.last_step,
             "particle_step": self.time_steps.particle_step,
             "particles": self.particle_solver.checkpoint(),
         }
@@ -231,7 +239,7 @@ class Simulation:
             self.fluid.restore(state["fluid"])
             self.coupling.restore(state["coupling"])
         self.forces.restore(state.get("forces", {}), self.communicator)
-        self.steps = int(state["steps"])
+        self.steps, self.last_step = int(state["steps"]), float(state.get("last_step", 0.0))
         return float(state["particle_step"])
 
     def _restore_features(self, kept: dict[str, Any]) -> None:

@@ -46,6 +46,9 @@ NEAR = 1e-2
 """Square of the first residual over that without impulses below which the impulses of the last step are close: where
 all gaps change by less than `SLIGHT`, too, resistances need not be found anew."""
 
+LOST = 1e-9
+"""Part of one sum of two below which their difference is lost in rounding."""
+
 
 # ---------------------------------------------------------------- sums with the same bits in any order
 
@@ -74,6 +77,16 @@ def scale_of(largest, number):
     _, power = math.frexp(largest)
     _, digits = math.frexp(float(number))
     return min(61 - digits - power, 1000)
+
+
+@inline
+def best_factor(by_wanted, by_residual):
+    """Factor at which the impulses of the last step take the most energy; 0 where rounding hides it.
+
+    by_wanted, by_residual  impulses times the right-hand side, and times the residual
+    """
+    square = by_wanted - by_residual
+    return by_wanted / square if square > LOST * abs(by_wanted) else 0.0
 
 
 @part
@@ -196,7 +209,7 @@ def film_kick(system, step):
         new_residual(system, count, step, True)
         by_wanted, by_residual = total_of(system, count, 2), total_of(system, count, 3)
         if by_wanted + by_residual < 0.0:  # these impulses could add energy; a part of them takes the most
-            new_scale(system, count, by_wanted / (by_wanted - by_residual))
+            new_scale(system, count, best_factor(by_wanted, by_residual))
             new_residual(system, count, step, False)
         left, whole = total_of(system, count, 0), total_of(system, count, 1)
         limit = tolerance * tolerance * whole
