@@ -25,6 +25,6 @@ def ranz_marshall(reynolds: float, prandtl: float) -> float:
     A sphere of 3.6 mm at 6 m/s in the air of the convection test of MFIX (Re and Pr of its inputs):
 
     >>> round(ranz_marshall(1376.0, 0.358), 2), ranz_marshall(0.0, 1.0)
-    (17.81, 2.0)
+    (17.8, 2.0)
     """
     return float(2.0 + 0.6 * math.sqrt(reynolds) * prandtl ** (1.0 / 3.0))

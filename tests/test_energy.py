@@ -15,6 +15,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
+from cfddem.features.energy import EnergyLedger
 from cfddem.fluid import budgets
 from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.initial.packing import lattice
@@ -216,11 +217,11 @@ def test_spin_lost_to_the_fluid_is_in_the_ledger() -> None:
     run = Simulation(Case.from_text(LIQUID).with_(**changes))
     run.particles.spin[:] = [300.0, 0.0, 100.0]
     run.particle_solver.refresh()
-    run.energy = run._ledger()
-    assert run.energy is not None
+    ledger = EnergyLedger(run.case, run)  # of the spinning beads
+    run.features[run.features.index(run.feature(EnergyLedger))] = ledger
     for _ in range(10):
         run.step()
-    row = run.energy.row()
+    row = ledger.row()
     spheres = run.particles
     started = 0.2 * float((spheres.mass * spheres.radius**2).sum()) * (300.0**2 + 100.0**2)
     left = 0.2 * float((spheres.mass * spheres.radius**2 * (spheres.spin**2).sum(axis=1)).sum())

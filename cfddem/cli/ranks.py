@@ -53,7 +53,7 @@ def on_ranks(ranks: int | None, threads: int | None, folder: Path) -> Communicat
         use_threads(threads or 1)
     found = communicator()
     if PROCESSES in os.environ:
-        (Path(os.environ[PROCESSES]) / str(os.getpid())).write_text(str(found.rank))
+        (Path(os.environ[PROCESSES]) / str(os.getpid())).write_text(str(found.rank), encoding="utf-8")
     return found
 
 
@@ -85,7 +85,8 @@ def _end_with_parent() -> None:
     """Let the launcher end where this process is killed, and the ranks with it."""
     import ctypes
 
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
 
 
 def _forward_signals(launcher: subprocess.Popen[bytes]) -> None:
@@ -140,7 +141,7 @@ def _killed(text: str, number: int, processes: Path, folder: Path) -> str:
     """What to say of a killed rank."""
     found = re.search(r"PID (\d+) RUNNING AT", text)
     file = processes / found[1] if found else processes
-    which = f"rank {file.read_text()}" if file.is_file() else "a rank"
+    which = f"rank {file.read_text(encoding='utf-8')}" if file.is_file() else "a rank"
     name = signal.Signals(number).name if number in set(signal.Signals) else f"signal {number}"
     why = ", by hand or because memory ran out" if number == signal.SIGKILL else ""
     remedy = f"continue with: cfddem resume {folder}" if (folder / "run.json").exists() else "run it again"

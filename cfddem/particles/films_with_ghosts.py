@@ -13,6 +13,7 @@ from cfddem.particles.interactions.joint_solution import (
     MOST_ITERATIONS,
     NEAR,
     PASSES,
+    SETTLED,
     along_direction,
     begin_solution,
     best_factor,
@@ -64,7 +65,7 @@ class FilmsWithGhosts:
                 self.new_residual(system, count, step, False)
             left, whole = (self._total(system, count, number, column) for column in (0, 1))
             limit = tolerance * tolerance * whole
-            if not left > (4.0 * limit if passes > 0 else limit):
+            if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
                 break
             change = self.communicator.largest([self.largest_of(system, count, 4)])
             last = passes == 0 and left < NEAR * whole and change < SLIGHT

@@ -46,6 +46,10 @@ NEAR = 1e-2
 """Square of the first residual over that without impulses below which the impulses of the last step are close: where
 all gaps change by less than `SLIGHT`, too, resistances need not be found anew."""
 
+SETTLED = 1e-14
+"""Square of the first residual over that without impulses below which the impulses of the last step stay. It is small
+because what a step leaves is left in the same direction by the next: a pair that slows down would stop too late."""
+
 LOST = 1e-9
 """Part of one sum of two below which their difference is lost in rounding."""
 
@@ -213,7 +217,7 @@ def film_kick(system, step):
             new_residual(system, count, step, False)
         left, whole = total_of(system, count, 0), total_of(system, count, 1)
         limit = tolerance * tolerance * whole
-        if not left > (4.0 * limit if passes > 0 else limit):
+        if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
             break
         last = passes == 0 and left < NEAR * whole and largest_of(system, count, 4) < SLIGHT
         passes += 1
