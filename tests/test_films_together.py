@@ -10,10 +10,13 @@ import pytest
 import scipy.sparse as sparse
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from in_process_ranks import on_ranks
 from scipy.sparse.linalg import spsolve
 
+from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import use_threads
 from cfddem.case.materials import Material
+from cfddem.particles.ghosts import Slabs
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -87,17 +90,27 @@ def test_two_plates_that_close_feel_the_sum_of_the_gaps(damping: float, between:
     assert force * gaps_of(run).sum() / (STRENGTH * speed) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_impulses_that_are_lost_beside_the_new_ones_do_no_harm() -> None:
-    """A pair at rest in its film, with impulses of 1e-40 of the next ones, is pulled apart: as if they were zero."""
-    speeds = []
-    for last in (0.0, 1e-40, -1e-40):
-        run = row_of(2, [], tolerance=1e-3)
-        run.particles.velocity[run.particles.id == 1, 0] = 1e-3
-        run.edges.impulse[0, 0] = last
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_impulses_that_are_lost_beside_the_new_ones_do_no_harm(ranks: int) -> None:
+    """A row at rest in its films, with impulses of 1e-40 of the next ones, is pulled apart: as if they were zero.
+
+    Two ranks share the row, with a film between them: the same bits.
+    """
+
+    def speeds(last: float, communicator: Communicator) -> np.ndarray:
+        division = Slabs(0, [3.0 * RADIUS]) if communicator.size > 1 else None
+        run = row_of(4, [], tolerance=1e-3, communicator=communicator, division=division)
+        run.particles.velocity[:, 0] = np.where(run.particles.id == 3, 1e-3, 0.0)
+        run.edges.impulse[:, 0] = last
         run.advance(10.0 * STEP_OF_ONE)
-        speeds.append(run.particles.velocity.copy())
-    assert 0.0 < np.ptp(speeds[0][:, 0]) < 1e-3
-    assert all(np.array_equal(each, speeds[0]) for each in speeds)
+        owned = run.particles.without_ghosts()
+        return owned.velocity[np.argsort(owned.id)]
+
+    (first,) = on_ranks(1, lambda communicator: speeds(0.0, communicator))
+    assert 0.0 < np.ptp(first[:, 0]) < 1e-3
+    for last in (0.0, 1e-40, -1e-40):
+        found = on_ranks(ranks, lambda communicator, last=last: speeds(last, communicator))  # type: ignore[misc]
+        assert np.array_equal(np.concatenate(found), first)
 
 
 @pytest.mark.parametrize("damping", [0.1, 10.0, 1000.0])
