@@ -10,10 +10,11 @@ resistances C. The normal film is nonlinear: its resistance is the mean over its
 form gives for the motion that all other films leave to the pair. J_d is what a film that begins has missed on its way
 from its cut-off gap.
 
-Preconditioned conjugate gradients start from the impulses of the last step. Each iterate consists of impulses of pairs,
-so momentum stays to round-off, and energy falls with every iterate, however early the iteration ends. Where spheres pass
-each other, the rate at which they part in the step adds a term of second order in the step, which can raise the energy
-of a row of spheres by that order. Films with a damping number X = c dt (1/m1 + 1/m2) below `WEAK` stay outside: their impulses are explicit and come first.
+Preconditioned conjugate gradients start from the impulses of the last step. Each iterate consists of impulses of
+pairs, so momentum stays to round-off, and energy falls with every iterate, however early the iteration ends. Where
+spheres pass each other, the rate at which they part in the step adds a term of second order in the step, which can
+raise the energy of a row of spheres by that order. Films with a damping number X = c dt (1/m1 + 1/m2) below `WEAK`
+stay outside: their impulses are explicit and come first.
 
 A loop over particles sums what the films of each do to it, in a fixed order, and a loop over films finds the rates.
 Sums over all films are sums of integers (`scale_of`): they have the same bits in any order, on any number of threads.
