@@ -21,7 +21,15 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
 from cfddem.particles.energy_of_bridges import RESISTANCE, BridgeEnergies
-from cfddem.particles.energy_of_contacts import BY_IMPULSES, CHANNELS, WALLS, count_motion, count_work, room_for_count
+from cfddem.particles.energy_of_contacts import (
+    BY_IMPULSES,
+    BY_SHEAR,
+    CHANNELS,
+    WALLS,
+    count_motion,
+    count_work,
+    room_for_count,
+)
 from cfddem.particles.energy_of_shear import CHANNELS as OF_SHEAR
 from cfddem.particles.energy_of_shear import ShearEnergies
 from cfddem.particles.impulse_motion import keep_motion
@@ -149,7 +157,7 @@ class Energies:
             self.totals[WALLS] += by_walls
         if self._shear is not None:
             lost, by_walls = self._shear.count(solver, step)
-            self.totals[-1] += lost
+            self.totals[-1] += lost + counted[BY_SHEAR]
             self.totals[WALLS] += by_walls
         if before + after > 0.0:
             solver.particles.work_displacement += self._count.moved

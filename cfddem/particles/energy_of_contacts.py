@@ -12,13 +12,16 @@ from cfddem.particles.energy_of_bridges import note_bridge_loss
 from cfddem.particles.impulse_motion import taken_by_impulses
 from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
+from cfddem.particles.interactions.film import push_alone
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
+from cfddem.particles.interactions.shear_film import impulses_of
 from cfddem.particles.interactions.slots import (
     BRIDGE,
     FILM,
     RECORD,
     RESCALED,
     ROLLING,
+    SHEAR,
     ContactState,
     contact_overlap,
     derive,
@@ -42,8 +45,9 @@ CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffeni
 """Energy lost to films, dashpots, sliding and rolling; energy gained from moving walls, from tangential springs whose
 stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
-BY_IMPULSES = len(CHANNELS)
-"""Place after the channels: work of springs at speeds that the impulses of bridges have taken again."""
+BY_IMPULSES, BY_SHEAR = len(CHANNELS), len(CHANNELS) + 1
+"""Places after the channels: work of springs at speeds that the impulses of bridges have taken again, and energy lost
+to weak films that resist sliding."""
 
 ALMOST = 1.0 - 1e-9
 """A contact slides if its tangential force is this share of Coulomb's limit or more."""
@@ -64,7 +68,7 @@ class Count(NamedTuple):
     yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
     push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with bridges [N]
     twist: np.ndarray  # (n, 3) its moment over the radius, the same on both bodies [N]
-    totals: np.ndarray  # (2, CHUNKS, channels + 1); the second half is of pairs that another rank adds [J]
+    totals: np.ndarray  # (2, CHUNKS, channels + 2); the second half is of pairs that another rank adds [J]
 
 
 def room_for_count(solver: ParticleSolver) -> Count:
@@ -73,7 +77,7 @@ def room_for_count(solver: ParticleSolver) -> Count:
     ahead, spin_ahead, moved, turned, drifted = np.zeros((5, count, 3))
     spring, stiffness, power, held, yielded = np.zeros((5, number))
     push, twist = np.zeros((2, number, 3))
-    totals = np.zeros((2, CHUNKS, len(CHANNELS) + 1))
+    totals = np.zeros((2, CHUNKS, len(CHANNELS) + 2))
     return Count(
         ahead, spin_ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, push, twist, totals
     )
@@ -132,6 +136,31 @@ def _film_works(k, system, count, step):
         other = touched(edges, k, SURFACE)
         by_wall = dot(impulse, other)
     return -dot(impulse, minus(speed, other)), by_wall
+
+
+@inline
+def _film_force_works(k, system, count, duration, totals):
+    """Count what the film of edge k, as a force, has taken in the half kicks around this instant."""
+    memory, edges = system.memory, system.edges
+    i, j = edges.first[k], edges.second[k]
+    moved, _, _, _, _, _, by_wall = _moved(k, system, count, duration)
+    force = push_alone(k, memory)
+    lost = -dot(force, moved)
+    totals[FILMS] += lost
+    totals[WALLS] += dot(force, by_wall)
+    if SHEAR:
+        push, first, second = impulses_of(k, memory.shear_push)
+        gained, put_in = dot(push, moved) + dot(first, at(count.turned, i)), dot(push, by_wall)
+        if k < edges.between_particles:
+            gained += dot(second, at(count.turned, j))
+        else:
+            about = times(duration, at(system.walls.spin, system.walls.wall[j]))
+            gained += dot(second, about)
+            put_in -= dot(second, about)
+        totals[BY_SHEAR] -= gained
+        totals[WALLS] += put_in
+        lost -= gained
+    note_loss(k, memory, FILMS, lost)
 
 
 @inline
@@ -271,5 +300,7 @@ def count_work(system, count, step, before, after):
                 totals[FILMS] += lost
                 note_loss(k, memory, FILMS, lost)
                 totals[WALLS] += by_wall
+            if FILM:
+                _film_force_works(k, system, count, before + after, totals)
             if not near <= k < pairs:
                 _contact_works(k, system, count, step, before + after, totals)

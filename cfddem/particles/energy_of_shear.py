@@ -67,7 +67,7 @@ def _shear_works(k, system, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
     particles, edges, memory, walls = system.particles, system.edges, system.memory, system.walls
     i, j = edges.first[k], edges.second[k]
-    impulse, first, second = impulses_of(k, memory)
+    impulse, first, second = impulses_of(k, memory.shear_impulse)
     velocity, spin = mean_motion(i, particles, count, step)
     gained = dot(impulse, velocity) + dot(first, spin)
     if k < edges.between_particles:

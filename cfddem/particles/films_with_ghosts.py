@@ -52,7 +52,6 @@ class FilmsWithGhosts:
         number = int(self.communicator.sum([owned]))
         if number == 0:
             return
-        self.ghosts.refresh("joint_film")
         tolerance = system.parameters.film_tolerance
         self.begin(system, count, step)
         self.ghosts.refresh("film_change")

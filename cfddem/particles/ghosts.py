@@ -267,8 +267,7 @@ class StepsWithGhosts:
     ) -> tuple[int, float, int]:
         """Arguments and results of `integrate`."""
         self.ghosts.refresh("start")
-        if self.bridges:
-            self.begin(system.particles)
+        self.begin(system, step if steps > 0 else 0.0)
         largest, done, noted, full = 0.0, 0, 0, False
         if steps == 0:
             self.finish(self._changes(system), system, 0.0, time, log, noted)

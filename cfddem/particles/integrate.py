@@ -4,8 +4,7 @@ A step consists of these phases:
 
     kick                 half a step by the forces of the last step
     [halo: velocity, spin]
-    film impulses        of weak films, of every pair and then of every particle; then of all others together,
-                         see `joint_solution`
+    film impulses        of all films together that are not weak, see `joint_solution`
     [halo: velocity, spin, rates of bridges]
     bridge impulses      of every pair, then of every particle
     drift                new positions; walls move
@@ -32,7 +31,8 @@ from cfddem.particles.collision_events import record_event
 from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
-from cfddem.particles.interactions.film import film_force, update_edge_film
+from cfddem.particles.interactions.film import film_force, push_alone, update_edge_film
+from cfddem.particles.interactions.joint_films import find_due
 from cfddem.particles.interactions.joint_solution import film_kick
 from cfddem.particles.interactions.kinematics import wall_kinematics
 from cfddem.particles.interactions.pair_loops import edge_contact
@@ -116,13 +116,16 @@ def find_forces(system, step):
     edges = system.edges
     pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
     if FILM:
-        update_films(near, pairs, system)
+        update_films(near, pairs, system, step)
         for k in range(pairs, number):
-            update_edge_film(k, system)
+            update_edge_film(k, system, step)
     pair_forces(0, near, system, step)
     if WALLS:
         for k in range(pairs, number):
             wall_contact(np.uint64(k), system, step)
+            if DRIFTING:
+                acting = plus(at(system.memory.force, k), push_alone(k, system.memory))
+                put(system.memory.acting_force, k, acting)
     if FILM and not DRIFTING:
         add_film_forces(system)
 
@@ -193,6 +196,15 @@ def record(system, time, log, noted):
 
 
 @serial
+def start_steps(system, step):
+    """What steps need before the first: liquid that has come from outside, and which films are solved together."""
+    if BRIDGE:
+        renew_thickness(system.particles)
+    if DRIFTING and step > 0.0:
+        find_due(system, step)
+
+
+@serial
 def integrate(system, step, steps, origin, reach, time, log):
     """Find the forces at the present positions, then advance by up to `steps` steps.
 
@@ -204,8 +216,7 @@ def integrate(system, step, steps, origin, reach, time, log):
     particles, edges = system.particles, system.edges
     largest, done, noted, full = 0.0, 0, 0, False
     half = step if steps > 0 else 0.0
-    if BRIDGE:
-        renew_thickness(particles)
+    start_steps(system, half)
     while True:
         if steps > 0:
             kick_particles(particles, step)
@@ -227,13 +238,6 @@ def integrate(system, step, steps, origin, reach, time, log):
 
 
 # ---------------------------------------------------------------- one phase after the other
-
-
-@serial
-def start_steps(particles):
-    """What particles need before the first step, of liquid that has come from outside."""
-    if BRIDGE:
-        renew_thickness(particles)
 
 
 @serial

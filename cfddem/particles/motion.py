@@ -5,36 +5,48 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
-from cfddem.particles.interactions.slots import BRIDGE, FILM, ROLLING
+from cfddem.particles.interactions.joint_films import list_due
+from cfddem.particles.interactions.shear_film import impulses_of
+from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FILM, ROLLING, SHEAR
 from cfddem.particles.pair_graph import edge_role, places_of
-from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, at, dot, either, minus, plus, put, times
 
 
 @inline
 def gather_forces(i, system, near):
-    """Sum what the edges of particle i do to it, with weight and outside force.
+    """Sum what the edges of particle i do to it, with weight and outside force, and list its films that are not weak.
 
     near  number of leading pairs that may touch
     """
     particles, edges, memory = system.particles, system.edges, system.memory
-    force, couple, moment, load = at(particles.applied, i), NOTHING, NOTHING, 0.0
+    force, couple, moment, turn, load = at(particles.applied, i), NOTHING, NOTHING, NOTHING, 0.0
+    end = edges.start[i]
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
+        if DRIFTING:
+            end = list_due(place, end, system)
+            force = plus(force, times(sign, at(memory.acting_force, k)))
+        if SHEAR:
+            push, first, second = impulses_of(k, memory.shear_push)
+            force, turn = plus(force, times(sign, push)), plus(turn, either(sign > 0.0, first, second))
         if BRIDGE:  # zero without a bridge, which costs less than to look
             load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))
         if (FILM or BRIDGE) and near <= k < edges.between_particles:
-            if BRIDGE:
+            if BRIDGE or DRIFTING:
                 continue
             break  # pairs that cannot touch come last
-        force = plus(force, times(sign, at(memory.force, k)))
+        if not DRIFTING:
+            force = plus(force, times(sign, at(memory.force, k)))
         couple = plus(couple, at(memory.couple, k))
         if ROLLING:
             moment = plus(moment, times(sign, at(memory.moment, k)))
     if particles.inverse_mass[i] > 0.0:
         force = plus(force, times(1.0 / particles.inverse_mass[i], system.parameters.gravity))
     put(particles.force, i, force)
-    put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
+    put(particles.torque, i, plus(plus(times(particles.radius[i], couple), moment), turn))
+    if DRIFTING:
+        particles.joint_end[i] = end
     if BRIDGE:
         particles.bridge_rate[i] = particles.inverse_mass[i] * load
         particles.bridge_turn_rate[i] = particles.radius[i] * particles.radius[i] * particles.inverse_inertia[i] * load

@@ -1,7 +1,9 @@
-"""Lubrication film between two bodies: its resistance, and what it remembers.
+"""Lubrication film between two bodies: its resistance, what it remembers, and what it does if it is weak.
 
-A film remembers its approach, from when the pair comes within reach until it leaves it. Functions of numbers without
-branches work on several pairs at once; the others work on one edge.
+A film remembers its approach, from when the pair comes within reach until it leaves it. A weak film acts by itself, as
+a force: its resistance times the mean rate of the gap since the last positions. All others are solved together
+(`cfddem.particles.interactions.joint_solution`). Functions of numbers without branches work on several pairs at once;
+the others work on one edge.
 """
 
 from __future__ import annotations
@@ -10,17 +12,18 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.film_law import at_least
+from cfddem.particles.interactions.film_law import at_gap, at_least
 from cfddem.particles.interactions.kinematics import (
     pair_mass_and_radius,
     pair_row,
     pair_viscosity,
     relative_velocity,
 )
-from cfddem.particles.interactions.shear_film import edge_asymmetry, renew_shear
+from cfddem.particles.interactions.shear_film import motion_at_wall, renew_shear
 from cfddem.particles.interactions.slots import (
     COUNT_FILM,
     COUNT_GAP,
+    DRIFTING,
     SHEAR,
     USER_GAP,
     FilmState,
@@ -32,19 +35,28 @@ from cfddem.particles.interactions.slots import (
     user_minimum_gap,
 )
 from cfddem.particles.pair_graph import THICKEST, geometry
-from cfddem.particles.vectors import dot, times
+from cfddem.particles.vectors import LEAST, at, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
 
 FIELDS = (
     Field("resistance", "kg/s", role="memory", meaning="resistance of the film without lever; 0 out of its reach"),
     Field("approach_speed", "m/s", role="memory", meaning="largest approach speed since the film began"),
-    Field("accounted_gap", "m", role="memory", initial=np.inf, meaning="gap from which the film acts in this step"),
-    Field("film_gap", "m", role="memory", meaning="gap of two particles at the present positions"),
-    Field("film_normal", "1", 3, "memory", meaning="direction from the second particle to the first"),
-    Field("impulse", "N s", 3, "memory", meaning="impulse of the film in the last step, on the first body"),
-    Field("faster", role="scratch", dtype=bool, meaning="the bodies approach faster than before in this film"),
+    Field("film_gap", "m", role="memory", initial=np.inf, meaning="gap at the present positions"),
+    Field("film_normal", "1", 3, "memory", meaning="direction from the second body to the first"),
 )
+
+WEAK = 1e-3
+"""Damping number X below which a film acts by itself. Ten times as much costs 2 % of the viscosity of a suspension."""
+
+WEAK_FIELDS = (
+    Field("film_push", "N", role="memory", meaning="mean force of a film by itself since the last positions"),
+    Field("acting_force", "N", 3, "scratch", meaning="of the contact and of a film by itself, on the first body"),
+    Field("film_rate", "1/s", role="memory", meaning="damping number of the film over the step"),
+    Field("film_due", role="memory", dtype=bool, meaning="the film is solved with the others in the next step"),
+    Field("faster", role="memory", dtype=bool, meaning="the bodies approach faster than before in this film"),
+)
+"""What pairs remember of the films that act by themselves, and of which do."""
 
 OUTSIDE = Field("outside", role="scratch", dtype=int, meaning="uses of a law outside of its range")
 """Of pairs with a user's law of the film or the minimum gap."""
@@ -61,50 +73,97 @@ def minimum_gap_of(approach_speed, viscosity, reduced_radius, row):
 def update_film(gap, viscosity, reduced_radius, memory, row, cutoff_ratio):
     """Resistance of a film, and its memory; the memory begins anew where the pair comes within reach.
 
-    memory   resistance, approach speed, minimum gap and accounted gap of the step before
+    memory   gap, resistance, approach speed and minimum gap of the step before
     row      of the pair table
-    returns  the same four as they are now
+    returns  the last three as they are now
     """
-    resistance, approach_speed, minimum_gap, accounted_gap = memory
+    before, resistance, approach_speed, minimum_gap = memory
     roughness = row.roughness_gap
     within = gap <= cutoff_ratio * reduced_radius
     begins = within and resistance == 0.0
-    unknown = accounted_gap == np.inf
+    unknown = before == np.inf
     approach_speed = 0.0 if begins else approach_speed
     minimum_gap = roughness if begins or (unknown and not within) else minimum_gap
     if USER_GAP:
         minimum_gap = minimum_gap_of(0.0, viscosity, reduced_radius, row) if begins else minimum_gap
-    accounted_gap = accounted_gap if begins and not unknown else gap  # a film begins where it was in the last step
     state = FilmState(max(gap, minimum_gap), viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
-    return film_resistance(state) if within else 0.0, approach_speed, minimum_gap, accounted_gap
+    return film_resistance(state) if within else 0.0, approach_speed, minimum_gap
 
 
 @inline
-def renew_film(k, gap, viscosity, reduced_radius, share, memory, row, cutoff_ratio):
-    """Update resistance and memory of the film of edge k.
+def act_alone(k, film, resistance, weight, share, memory, step):
+    """What the film of edge k has done by itself since the last positions, and whether it is weak.
 
-    share  part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    The push of a film that is not weak any more is given with the others (`film_due`).
+
+    resistance  [kg/s]
+    weight      sum of the inverse masses [1/kg]
+    share       part of the film that belongs to this edge
+    step        since the last positions; 0 if these are the same [s]
     """
-    then = (memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k], memory.accounted_gap[k])
-    resistance, approach_speed, minimum_gap, accounted_gap = update_film(
-        gap, viscosity, reduced_radius, then, row, cutoff_ratio
-    )
-    memory.resistance[k], memory.approach_speed[k] = share * resistance, approach_speed
-    memory.minimum_gap[k], memory.accounted_gap[k] = minimum_gap, accounted_gap
+    gap, before, minimum_gap = film.gap, memory.film_gap[k], film.minimum_gap
+    moved = step > 0.0 and before < np.inf
+    begin, end = min(before, film.cutoff_gap), min(gap, film.cutoff_gap)
+    middle = 0.5 * (begin + end)
+    rate = (end - begin) / max(step, LEAST)
+    lever = min(max(middle, 0.0) / minimum_gap, 1.0)
+    push = -share * lever * film_resistance(at_gap(film, max(middle, minimum_gap))) * rate
+    alone = weight > 0.0 and memory.joint_row[k] == 0
+    memory.film_push[k] = (push if alone else 0.0) if moved else memory.film_push[k]
+    # the lever is 0 for solids that overlap, and 1 above the minimum gap
+    change = gap - before if moved else 0.0
+    lever = min(max(gap, gap + change, 0.0) / minimum_gap, 1.0)
+    leaps = gap > minimum_gap and abs(change) > 0.5 * gap
+    within = resistance > 0.0 and weight > 0.0
+    film_rate = (np.inf if leaps else resistance * weight * lever) if within else 0.0
+    memory.film_rate[k] = film_rate
+    memory.film_due[k] = step * film_rate >= WEAK if moved else memory.film_due[k]
+    faster = within and gap > minimum_gap and -rate > memory.approach_speed[k]
+    memory.faster[k] = faster if moved else memory.faster[k]
+    if COUNT_FILM:
+        memory.outside[k] += film_outside(at_least(film)) if within and moved else 0
 
 
 @inline
-def update_edge_film(k, system):
+def push_alone(k, memory):
+    """Force of the film of edge k on the first body, if it acts by itself."""
+    return times(0.0 if memory.film_due[k] else memory.film_push[k], at(memory.film_normal, k))
+
+
+@inline
+def renew_film(k, between, viscosity, reduced_radius, weight, share, system, row, step):
+    """Update the film of edge k: its resistance, and what it does if it acts by itself.
+
+    between  separation from the second body to the first, distance and gap
+    weight   sum of the inverse masses [1/kg]
+    share    part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    row      of the pair table
+    step     since the last positions; 0 if these are the same [s]
+    """
+    memory, cutoff_ratio = system.memory, system.parameters.cutoff_ratio
+    separation, distance, gap = between
+    then = (memory.film_gap[k], memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k])
+    resistance, approach_speed, minimum_gap = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
+    memory.resistance[k], memory.approach_speed[k] = share * resistance, approach_speed
+    memory.minimum_gap[k] = minimum_gap
+    if DRIFTING:
+        film = FilmState(gap, viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
+        act_alone(k, film, share * resistance, weight, share, memory, step)
+    memory.film_gap[k] = gap
+    put(memory.film_normal, k, times(1.0 / distance, separation))
+
+
+@inline
+def update_edge_film(k, system, step):
     """Update the film of edge k."""
-    edges, memory = system.edges, system.memory
-    _, _, gap = geometry(k, system)
-    reduced_radius, _ = pair_mass_and_radius(k, system)
-    viscosity = pair_viscosity(k, system)
-    row = pair_row(k, system)
-    renew_film(k, gap, viscosity, reduced_radius, portion(edges, k), memory, row, system.parameters.cutoff_ratio)
+    between = geometry(k, system)
+    reduced_radius, weight = pair_mass_and_radius(k, system)
+    viscosity, share, row = pair_viscosity(k, system), portion(system.edges, k), pair_row(k, system)
+    renew_film(k, between, viscosity, reduced_radius, weight, share, system, row, step)
     if SHEAR:
-        asymmetry = edge_asymmetry(k, system)
-        renew_shear(k, gap, viscosity, reduced_radius, asymmetry, portion(edges, k), memory)
+        motion = motion_at_wall(k, at(system.memory.film_normal, k), system)
+        arms = (system.particles.radius[system.edges.first[k]], 0.0)
+        renew_shear(k, viscosity, reduced_radius, -1.0, share, arms, motion, system.memory, step)
 
 
 @inline

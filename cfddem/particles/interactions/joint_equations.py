@@ -8,22 +8,18 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import inline, part, prange
+from cfddem.particles.interactions.film import record_approach
 from cfddem.particles.interactions.film_law import at_gap, at_least
-from cfddem.particles.interactions.joint_films import (
+from cfddem.particles.interactions.joint_films import film_at, passing_rate
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row, relative_velocity
+from cfddem.particles.interactions.shear_film import (
     by_blocks,
     couples,
-    film_at,
-    normal_and_gap,
-    note_approach,
-    pair_arms,
-    passing_rate,
-    slip_and_roll,
-)
-from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
-from cfddem.particles.interactions.shear_film import (
     edge_asymmetry,
     impulses_of,
+    pair_arms,
     sliding_ratios,
+    slip_and_roll,
     twist_strength,
 )
 from cfddem.particles.interactions.slots import (
@@ -59,21 +55,19 @@ def prepare_film(e, system, step):
     """What the equations need of film e, and its impulse of the last step."""
     edges, memory, radius = system.edges, system.memory, system.particles.radius
     k = memory.joint_edge[e]
-    normal, gap = normal_and_gap(k, system)
+    normal, gap, velocity = at(memory.film_normal, k), memory.film_gap[k], relative_velocity(k, system)
     passing = 0.0
     if k < edges.between_particles:
         distance = radius[edges.first[k]] + radius[edges.second[k]] + gap
-        passing = passing_rate(normal, distance, relative_velocity(k, system), system.parameters.free, step)
+        passing = passing_rate(normal, distance, velocity, system.parameters.free, step)
     memory.joint_passing[e] = passing
     _, weight = pair_mass_and_radius(k, system)
     share = portion(edges, k)
     memory.joint_least[e] = _NONE / (step * weight)
-    if memory.faster[k]:
-        note_approach(k, system)
     film = film_at(k, gap, system)
-    missed = min(memory.accounted_gap[k], film.cutoff_gap) - gap
-    middle = at_gap(film, max(gap + 0.5 * missed, film.minimum_gap))
-    memory.joint_debt[e] = share * film_resistance(middle) * missed if missed > 0.0 else 0.0
+    speed = dot(velocity, normal)
+    record_approach(k, memory, speed, gap, film.viscosity, film.reduced_radius, pair_row(k, system))
+    memory.joint_debt[e] = step * memory.film_push[k]
     memory.joint_gap[e], memory.joint_weight[e] = gap, weight
     put(memory.joint_normal, e, normal)
     memory.joint_impulse[e] = dot(at(memory.impulse, k), normal)
@@ -119,7 +113,7 @@ def prepare_sliding(e, k, film, weight, share, normal, system, step):
     four[row], four[row + _1], four[row + _2] = inverse * roll, -inverse * crossed, inverse * own
     four[row + _2 + _1] = 1.0 / (twist + turn_i + turn_j)
     memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1] = arms
-    push, first, _ = impulses_of(k, memory)
+    push, first, _ = impulses_of(k, memory.shear_impulse)
     push = across(push, normal)
     moment = minus(first, times(arms[0], cross(push, normal)))
     put_two(memory.joint_shear_impulse, e, push, cross(normal, moment))
@@ -187,7 +181,8 @@ def spread(system, direction):
     for i in prange(particles.owned):
         total, couple = NOTHING, NOTHING
         for place in range(edges.start[i], particles.joint_end[i]):
-            e, sign = edge_role(memory.joint_incident[place])
+            k, sign = edge_role(memory.joint_incident[place])
+            e = memory.joint_row[k] - 1
             normal = at(memory.joint_normal, e)
             total = plus(total, times(sign * impulse[e], normal))
             if SHEAR:

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from cfddem.backend.compile import inline, part, prange
 from cfddem.particles.interactions.joint_equations import four_of, own, put_two, rates_of, two
-from cfddem.particles.interactions.joint_films import by_blocks, couples
-from cfddem.particles.interactions.shear_film import write_impulse
+from cfddem.particles.interactions.shear_film import by_blocks, couples, put_impulses
 from cfddem.particles.interactions.slots import SHEAR
 from cfddem.particles.vectors import at, dot, minus, plus, put, times
 
@@ -119,7 +118,7 @@ def keep_film(e, system):
     if SHEAR:
         push, roll = two(memory.joint_shear_impulse, e)
         first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
-        write_impulse(k, memory, push, first, second)
+        put_impulses(k, memory.shear_impulse, push, first, second)
 
 
 @part

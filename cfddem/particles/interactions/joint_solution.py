@@ -14,7 +14,7 @@ Preconditioned conjugate gradients start from the impulses of the last step. Eac
 pairs, so momentum stays to round-off, and energy falls with every iterate, however early the iteration ends. Where
 spheres pass each other, the rate at which they part in the step adds a term of second order in the step, which can
 raise the energy of a row of spheres by that order. Films with a damping number X = c dt (1/m1 + 1/m2) below `WEAK`
-stay outside: their impulses are explicit and come first.
+stay outside: they act by themselves, as forces.
 
 A loop over particles sums what the films of each do to it, in a fixed order, and a loop over films finds the rates.
 Sums over all films are sums of integers (`scale_of`): they have the same bits in any order, on any number of threads.
@@ -28,7 +28,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
 from cfddem.particles.interactions.joint_equations import SLIGHT, find_residual, own, prepare, spread
-from cfddem.particles.interactions.joint_films import collect, give_weak
+from cfddem.particles.interactions.joint_films import collect
 from cfddem.particles.interactions.joint_iteration import (
     find_direction,
     find_product,
@@ -36,7 +36,6 @@ from cfddem.particles.interactions.joint_iteration import (
     give_joint,
     scale_impulses,
 )
-from cfddem.particles.interactions.slots import film_impulses
 
 PASSES = 3
 """Most times that the resistances of a step are found anew."""
@@ -120,10 +119,8 @@ def sum_of_terms(system, count, column, power):
 
 @serial
 def start_films(system, step):
-    """Weak films act, and all others are listed; returns their number, and that of those that are counted here."""
-    film_impulses(0, system.edges.between_particles, system, step)
+    """List the films that are solved; returns their number, and that of those that are counted here."""
     count = collect(system, step)
-    give_weak(system)
     owned = 0
     for e in range(count):
         owned += 1 if own(e, system) else 0

@@ -18,14 +18,14 @@ from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
-from cfddem.particles.interactions.film import renew_film
-from cfddem.particles.interactions.joint_films import weak_pair
+from cfddem.particles.interactions.film import push_alone, renew_film
 from cfddem.particles.interactions.kinematics import sphere_kinematics
 from cfddem.particles.interactions.rolling import resist_rolling
-from cfddem.particles.interactions.shear_film import renew_shear
+from cfddem.particles.interactions.shear_film import pair_arms, renew_shear, slip_and_roll
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
+    DRIFTING,
     FILM,
     ROLLING,
     SHEAR,
@@ -35,7 +35,7 @@ from cfddem.particles.interactions.slots import (
 )
 from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.system import PairSystem, Parameters
-from cfddem.particles.vectors import NOTHING, at, put, times
+from cfddem.particles.vectors import NOTHING, at, minus, plus, put, times
 
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity")
 """Arrays of the particles that loops over pairs read."""
@@ -78,39 +78,44 @@ def pair_force(n, system, step):
     kinematics = sphere_kinematics(k, apart, system)
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     if FILM:
-        viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-        renew_film(k, kinematics.gap, viscosity, kinematics.reduced_radius, 1.0, memory, row, p.cutoff_ratio)
-        keep_geometry(k, kinematics.separation, kinematics.distance, kinematics.gap, memory)
-        if SHEAR:
-            asymmetry = (particles.radius[i] - particles.radius[j]) * kinematics.inverse_sum
-            renew_shear(k, kinematics.gap, viscosity, kinematics.reduced_radius, asymmetry, 1.0, memory)
+        between = (kinematics.separation, kinematics.distance, kinematics.gap)
+        pair_film(k, between, kinematics.reduced_radius, row, system, step)
     edge_contact(k, kinematics, row, 1.0, memory, p, step)
+    if DRIFTING:
+        put(memory.acting_force, k, plus(at(memory.force, k), push_alone(k, memory)))
 
 
 @inline
-def pair_film(n, system):
+def far_film(n, system, step):
     """Film of one pair of particles that cannot touch."""
-    memory, p = system.memory, system.parameters
     k = np.uint64(n)
     particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
     separation, distance, radii = of_two_spheres(k, particles, edges, system.shift)
-    gap = distance - radii
     reduced_radius = particles.radius[i] * particles.radius[j] / radii
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
-    viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-    renew_film(k, gap, viscosity, reduced_radius, 1.0, memory, row, p.cutoff_ratio)
-    keep_geometry(k, separation, distance, gap, memory)
-    if SHEAR:
-        asymmetry = (particles.radius[i] - particles.radius[j]) / radii
-        renew_shear(k, gap, viscosity, reduced_radius, asymmetry, 1.0, memory)
+    pair_film(k, (separation, distance, distance - radii), reduced_radius, row, system, step)
+    if DRIFTING:
+        put(system.memory.acting_force, k, push_alone(k, system.memory))
 
 
 @inline
-def keep_geometry(k, separation, distance, gap, memory):
-    """Keep gap and direction of a pair for the impulse of its film, which acts at the same positions."""
-    memory.film_gap[k] = gap
-    put(memory.film_normal, k, times(1.0 / distance, separation))
+def pair_film(k, between, reduced_radius, row, system, step):
+    """Film of one pair of particles.
+
+    between  separation from the second to the first, its length, and the gap
+    """
+    particles, edges = system.particles, system.edges
+    i, j = edges.first[k], edges.second[k]
+    viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
+    weight = particles.inverse_mass[i] + particles.inverse_mass[j]
+    renew_film(k, between, viscosity, reduced_radius, weight, 1.0, system, row, step)
+    if SHEAR:
+        radius, normal = particles.radius, at(system.memory.film_normal, k)
+        asymmetry, arms = (radius[i] - radius[j]) / (radius[i] + radius[j]), pair_arms(i, j, radius, between[2])
+        velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
+        motion = slip_and_roll(velocity, at(particles.spin, i), at(particles.spin, j), normal, arms)
+        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, arms, motion, system.memory, step)
 
 
 class PairLoop(NamedTuple):
@@ -124,8 +129,7 @@ class PairLoop(NamedTuple):
 
 LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force),
-    "update_films": PairLoop(pair_film, rest="", needed_by="FILM"),
-    "film_impulses": PairLoop(weak_pair, needed_by="DRIFTING"),
+    "update_films": PairLoop(far_film, needed_by="FILM"),
     "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
     "bridge_impulses": PairLoop(pair_bridge_impulse, particles=WetParticles, needed_by="BRIDGE"),
 }

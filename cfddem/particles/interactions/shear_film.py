@@ -10,7 +10,9 @@ import numpy as np
 
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
-from cfddem.particles.vectors import LEAST, at, put
+from cfddem.particles.interactions.kinematics import relative_velocity
+from cfddem.particles.interactions.slots import TWIST
+from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times
 from closures.tangential_lubrication import (
     roll_resistance,
     shear_resistance,
@@ -20,14 +22,7 @@ from closures.tangential_lubrication import (
 
 FIELDS = (
     Field("shear_resistance", "kg/s", role="memory", meaning="resistance of the film to sliding; 0 out of its reach"),
-    Field(
-        "shear_impulse",
-        "1",
-        9,
-        "memory",
-        meaning="impulse of the film against sliding, on the first body [N s]; its angular impulses on the first and "
-        "on the second body [N m s]",
-    ),
+    Field("shear_push", "1", 9, "memory", meaning="of a film by itself against sliding, see `put_impulses` [N, N m]"),
 )
 """What pairs remember of the films between them that resist sliding."""
 
@@ -63,18 +58,86 @@ def edge_asymmetry(k, system):
 
 
 @inline
-def renew_shear(k, gap, viscosity, reduced_radius, asymmetry, share, memory):
-    """Resistance to sliding of the film of edge k, whose normal resistance is known.
+def slip_and_roll(velocity, spin, other, normal, arms):
+    """Slip of the surfaces, and difference of the spins times the normal with the rate of twist along the normal.
 
-    share  part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    velocity     of the first centre relative to the second, or to the surface of a wall
+    spin, other  of the first and the second body
+    arms         lever arms of both
+    """
+    turning = plus(times(arms[0], spin), times(arms[1], other))
+    slip, about = minus(across(velocity, normal), cross(turning, normal)), minus(spin, other)
+    roll = cross(normal, about)
+    return slip, plus(roll, times(dot(about, normal), normal)) if TWIST else roll
+
+
+@inline
+def by_blocks(blocks, slip, roll, normal):
+    """Product of the symmetric matrix of an edge (of slip, of both, of roll, of twist) with slip and roll."""
+    first = plus(times(blocks[0], slip), times(blocks[1], roll))
+    second = plus(times(blocks[1], slip), times(blocks[2], roll))
+    if TWIST:
+        twist = dot(roll, normal)
+        first = minus(first, times(blocks[1] * twist, normal))
+        second = plus(second, times((blocks[3] - blocks[2]) * twist, normal))
+    return first, second
+
+
+@inline
+def couples(push, roll, normal, arms):
+    """Angular impulses on the first and the second body, from impulses against slip and against roll and twist."""
+    turn = cross(push, normal)
+    moment = cross(roll, normal)
+    if TWIST:
+        moment = plus(moment, times(dot(roll, normal), normal))
+    return plus(times(arms[0], turn), moment), minus(times(arms[1], turn), moment)
+
+
+@inline
+def pair_arms(i, j, radius, gap):
+    """Lever arms of slip of two spheres: they add up to the distance of the centres."""
+    lever = (radius[i] + radius[j] + gap) / (radius[i] + radius[j])
+    return lever * radius[i], lever * radius[j]
+
+
+@inline
+def motion_at_wall(k, normal, system):
+    """Slip and roll of particle-wall edge k."""
+    particles, edges, walls = system.particles, system.edges, system.walls
+    i, arms = edges.first[k], (particles.radius[edges.first[k]], 0.0)
+    slip, _ = slip_and_roll(relative_velocity(k, system), at(particles.spin, i), NOTHING, normal, arms)
+    about = minus(at(particles.spin, i), at(walls.spin, walls.wall[edges.second[k]]))
+    _, roll = slip_and_roll(NOTHING, about, NOTHING, normal, arms)
+    return slip, roll
+
+
+@inline
+def renew_shear(k, viscosity, reduced_radius, asymmetry, share, arms, motion, memory, step):
+    """Resistance to sliding of the film of edge k, whose normal resistance is known, and what it does by itself.
+
+    share   part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    arms    lever arms of slip
+    motion  slip and roll, see `slip_and_roll`
+    step    since the last positions; 0 if these are the same [s]
     """
     # the smaller radius; at a wall, where the asymmetry is -1, that of the sphere
     smaller = 2.0 * reduced_radius / (1.0 + abs(asymmetry))
-    minimum_gap = memory.minimum_gap[k]
+    gap, minimum_gap, normal = memory.film_gap[k], memory.minimum_gap[k], at(memory.film_normal, k)
     lever = min(max(gap, 0.0) / minimum_gap, 1.0)
     size = max(logarithm(smaller / max(gap, minimum_gap)), 0.0)
+    before = memory.shear_resistance[k]
     resistance = share * lever * size * shear_resistance(viscosity, reduced_radius, asymmetry)
-    memory.shear_resistance[k] = resistance if memory.resistance[k] > 0.0 else 0.0
+    resistance = resistance if memory.resistance[k] > 0.0 else 0.0
+    memory.shear_resistance[k] = resistance
+    # one that begins, or has been solved with the others, does nothing by itself
+    resistance = resistance if before > 0.0 and memory.joint_row[k] == 0 else 0.0
+    both, rolling = sliding_ratios(reduced_radius, asymmetry)
+    twist = twist_strength(gap, minimum_gap, resistance, viscosity, reduced_radius, asymmetry, share)
+    blocks = (-resistance, -resistance * both, -resistance * rolling, -twist)
+    push, roll = by_blocks(blocks, motion[0], motion[1], normal)
+    first, second = couples(push, roll, normal, arms)
+    if step > 0.0:
+        put_impulses(k, memory.shear_push, push, first, second)
 
 
 @inline
@@ -99,16 +162,19 @@ def twist_strength(gap, minimum_gap, resistance, viscosity, reduced_radius, asym
 
 
 @inline
-def write_impulse(k, memory, impulse, first, second):
-    """Write what the film of edge k does in this step: impulse, and angular impulses on the first and second body."""
+def put_impulses(k, array, impulse, first, second):
+    """Write what the film of edge k does: impulse on the first body, angular impulses on the first and the second.
+
+    Or forces and torques.
+    """
     row = _3 * np.uint64(k)
-    put(memory.shear_impulse, row, impulse)
-    put(memory.shear_impulse, row + _1, first)
-    put(memory.shear_impulse, row + _2, second)
+    put(array, row, impulse)
+    put(array, row + _1, first)
+    put(array, row + _2, second)
 
 
 @inline
-def impulses_of(k, memory):
-    """What `write_impulse` has written."""
+def impulses_of(k, array):
+    """What `put_impulses` has written."""
     row = _3 * np.uint64(k)
-    return at(memory.shear_impulse, row), at(memory.shear_impulse, row + _1), at(memory.shear_impulse, row + _2)
+    return at(array, row), at(array, row + _1), at(array, row + _2)

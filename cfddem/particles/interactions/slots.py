@@ -134,7 +134,6 @@ TRIANGLES = Slot("TRIANGLES")  # some of them are surfaces of triangles
 RECORD = Slot("RECORD")  # collisions are recorded
 pair_forces = Slot("pair_forces")
 update_films = Slot("update_films")
-film_impulses = Slot("film_impulses")
 pair_bridges = Slot("pair_bridges")
 bridge_impulses = Slot("bridge_impulses")
 copy_memory = Slot("copy_memory")  # (memory arrays, from, to)
