@@ -25,11 +25,11 @@ Role = Literal["state", "memory", "scratch"]
 """`state` describes the row itself, `memory` is what a law stores from step to step, `scratch` is valid within a step.
 Checkpoints hold state and memory, not scratch."""
 
-Phase = Literal["start", "film", "film_change", "bridge", "motion", "liquid", "work"]
+Phase = Literal["start", "film", "film_change", "film_direction", "bridge", "motion", "liquid", "work"]
 """When ghost rows receive values.
 
-In order: at the start of an advance, before and within the solution of films, before the impulses of bridges, after
-the drift, before new bridges fill, and before work is counted.
+In order: at the start of an advance, before the solution of films and twice within, before the impulses of bridges,
+after the drift, before new bridges fill, and before work is counted.
 """
 
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]

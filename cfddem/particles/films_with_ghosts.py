@@ -8,10 +8,8 @@ from typing import Any
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.law_set import specialise
-from cfddem.particles.interactions.joint_equations import SLIGHT
 from cfddem.particles.interactions.joint_solution import (
     MOST_ITERATIONS,
-    NEAR,
     PASSES,
     SETTLED,
     along_direction,
@@ -23,7 +21,6 @@ from cfddem.particles.interactions.joint_solution import (
     new_product,
     new_residual,
     new_scale,
-    renew_change,
     scale_of,
     start_films,
     units_of,
@@ -39,10 +36,10 @@ class FilmsWithGhosts:
 
     def __init__(self, choices: Mapping[str, Any], threads: bool, ghosts: Any, communicator: Communicator) -> None:
         self.ghosts, self.communicator = ghosts, communicator
-        loops = (start_films, begin_solution, finish_solution, renew_change, new_residual, new_scale)
+        loops = (start_films, begin_solution, finish_solution, new_residual, new_scale)
         more = (new_direction, new_product, along_direction, largest_of, units_of)
         made = [specialise(loop, choices, threads) for loop in (*loops, *more)]
-        self.start, self.begin, self.finish, self.renew_change, self.new_residual, self.new_scale = made[: len(loops)]
+        self.start, self.begin, self.finish, self.new_residual, self.new_scale = made[: len(loops)]
         self.new_direction, self.new_product, self.along, self.largest_of, self.units_of = made[len(loops) :]
 
     def __call__(self, system: System, step: float) -> None:
@@ -66,23 +63,19 @@ class FilmsWithGhosts:
             limit = tolerance * tolerance * whole
             if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
                 break
-            change = self.communicator.largest([self.largest_of(system, count, 4)])
-            last = passes == 0 and left < NEAR * whole and change < SLIGHT
             passes += 1
             share = 0.0
             for _ in range(MOST_ITERATIONS):
                 self.new_direction(system, count, share)
-                self.ghosts.refresh("film_change")
+                self.ghosts.refresh("film_direction")
                 self.new_product(system, count)
-                self.along(system, count, left / self._total(system, count, number, 0))
+                self.along(system, count, left / self._total(system, count, number, 0), step)
                 before, left = left, self._total(system, count, number, 0)
                 iterations += 1
                 share = left / before
                 if not left > limit:
                     break
-            self.renew_change(system)
-            self.ghosts.refresh("film_change")
-            if last:
+            if not self._total(system, count, number, 1) > limit:
                 break
         self.finish(system, count)
         system.film_counts[:] += (1.0, iterations, passes, owned)

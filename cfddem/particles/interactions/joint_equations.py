@@ -25,13 +25,14 @@ from cfddem.particles.interactions.shear_film import (
 from cfddem.particles.interactions.slots import (
     SHEAR,
     TWIST,
+    FilmState,
     explicit_resistance,
     film_resistance,
     speed_after_film,
     speed_after_short_film,
 )
 from cfddem.particles.pair_graph import edge_role
-from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, either, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
 
 SLIGHT = 1e-3
@@ -67,6 +68,10 @@ def prepare_film(e, system, step):
     film = film_at(k, gap, system)
     speed = dot(velocity, normal)
     record_approach(k, memory, speed, gap, film.viscosity, film.reduced_radius, pair_row(k, system))
+    memory.joint_first[e] = edges.first[k]
+    memory.joint_second[e] = edges.second[k] if k < edges.between_particles else -1
+    memory.joint_share[e], memory.joint_viscosity[e] = share, film.viscosity
+    memory.joint_reduced_radius[e], memory.joint_minimum_gap[e] = film.reduced_radius, memory.minimum_gap[k]
     memory.joint_debt[e] = step * memory.film_push[k]
     memory.joint_gap[e], memory.joint_weight[e] = gap, weight
     put(memory.joint_normal, e, normal)
@@ -150,14 +155,13 @@ def rates_of(e, velocity, spin, with_walls, system):
     with_walls  walls move, too; else they are at rest
     """
     edges, memory = system.edges, system.memory
-    k = np.uint64(memory.joint_edge[e])
-    i, j = edges.first[k], edges.second[k]
+    i, j = memory.joint_first[e], memory.joint_second[e]
     normal, difference = at(memory.joint_normal, e), at(velocity, i)
-    between = k < edges.between_particles
+    between = j >= 0
     if between:
         difference = minus(difference, at(velocity, j))
     elif with_walls:
-        difference = minus(difference, touched(edges, k, SURFACE))
+        difference = minus(difference, touched(edges, memory.joint_edge[e], SURFACE))
     slip, roll = NOTHING, NOTHING
     if SHEAR:
         arms = (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1])
@@ -166,7 +170,8 @@ def rates_of(e, velocity, spin, with_walls, system):
             second = at(spin, j)
         slip, roll = slip_and_roll(difference, first, second, normal, arms)
         if with_walls and not between:
-            about = minus(first, at(system.walls.spin, system.walls.wall[j]))
+            wall = system.walls.wall[edges.second[memory.joint_edge[e]]]
+            about = minus(first, at(system.walls.spin, wall))
             _, roll = slip_and_roll(NOTHING, about, NOTHING, normal, arms)
     return dot(difference, normal), slip, roll
 
@@ -176,8 +181,10 @@ def spread(system, direction):
     """What the impulses of the films solved together do to every particle; or what their `direction` does."""
     particles, edges, memory = system.particles, system.edges, system.memory
     impulse = memory.joint_direction if direction else memory.joint_impulse
+    change = particles.film_along if direction else particles.film_change
     if SHEAR:
         shear_impulse = memory.joint_shear_direction if direction else memory.joint_shear_impulse
+        turn = particles.film_turn_along if direction else particles.film_turn
     for i in prange(particles.owned):
         total, couple = NOTHING, NOTHING
         for place in range(edges.start[i], particles.joint_end[i]):
@@ -190,9 +197,9 @@ def spread(system, direction):
                 first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
                 total = plus(total, times(sign, push))
                 couple = plus(couple, either(sign > 0.0, first, second))
-        put(particles.film_change, i, times(particles.inverse_mass[i], total))
+        put(change, i, times(particles.inverse_mass[i], total))
         if SHEAR:
-            put(particles.film_turn, i, times(particles.inverse_inertia[i], couple))
+            put(turn, i, times(particles.inverse_inertia[i], couple))
 
 
 @inline
@@ -202,8 +209,10 @@ def mean_resistance(speed, e, system, step):
     speed  of the pair with all films, as found so far [m/s]
     """
     memory = system.memory
-    k, gap, weight = memory.joint_edge[e], memory.joint_gap[e], memory.joint_weight[e]
-    film, share = film_at(k, gap, system), portion(system.edges, k)
+    gap, weight, share = memory.joint_gap[e], memory.joint_weight[e], memory.joint_share[e]
+    radius = memory.joint_reduced_radius[e]
+    cutoff_gap = system.parameters.cutoff_ratio * radius
+    film = FilmState(gap, memory.joint_viscosity[e], radius, memory.joint_minimum_gap[e], cutoff_gap)
     if abs(step * speed) < SLIGHT * gap:
         return share * explicit_resistance(at_gap(film, gap + 0.5 * step * speed))
     free = speed - weight * (memory.joint_impulse[e] - memory.joint_debt[e])
@@ -220,7 +229,7 @@ def mean_resistance(speed, e, system, step):
 @inline
 def own(e, system):
     """Whether film e is counted here: its first body is not a ghost."""
-    return system.edges.first[system.memory.joint_edge[e]] < system.particles.owned
+    return system.memory.joint_first[e] < system.particles.owned
 
 
 @inline
@@ -231,6 +240,7 @@ def film_residual(e, system, step, renew):
     before += memory.joint_passing[e]
     given, slipped, rolled = rates_of(e, particles.film_change, particles.film_turn, False, system)
     if renew:
+        memory.joint_speed[e], memory.joint_shift[e] = before + given, 0.0
         resistance = mean_resistance(before + given, e, system, step)
         memory.joint_compliance[e] = 1.0 / (step * max(resistance, memory.joint_least[e]))
     compliance, impulse = memory.joint_compliance[e], memory.joint_impulse[e]
@@ -253,8 +263,9 @@ def film_residual(e, system, step, renew):
         by_wanted -= dot(push, slip) + dot(couple, roll)
         by_residual += dot(push, s) + dot(couple, q)
     mine = 1.0 if own(e, system) else 0.0
-    change = step * (before + given) / max(memory.joint_gap[e], LEAST)
-    write_terms(e, system, mine * left, mine * whole, mine * by_wanted, mine * by_residual, change)
+    terms, rows = memory.joint_terms, len(system.edges.first)
+    terms[e], terms[rows + e] = mine * left, mine * whole
+    terms[2 * rows + e], terms[3 * rows + e] = mine * by_wanted, mine * by_residual
 
 
 @part
@@ -266,11 +277,3 @@ def find_residual(system, count, step, renew):
     """
     for e in prange(count):
         film_residual(e, system, step, renew)
-
-
-@inline
-def write_terms(e, system, a, b, c, d, change):
-    """Write the terms of film e in four sums, and the change of its gap over its gap."""
-    terms, rows = system.memory.joint_terms, len(system.edges.first)
-    terms[e], terms[rows + e], terms[2 * rows + e], terms[3 * rows + e] = a, b, c, d
-    terms[4 * rows + e] = change

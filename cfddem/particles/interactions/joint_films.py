@@ -27,6 +27,12 @@ FIELDS = (
     Field("impulse", "N s", 3, "memory", meaning="impulse of a film solved with others in the last step, on the first"),
     Field("joint_row", role="memory", dtype=np.int32, meaning="its place among those solved together, from 1; else 0"),
     Field("joint_edge", role="scratch", dtype=np.int32, meaning="pair of each film solved together"),
+    Field("joint_first", role="scratch", dtype=np.int32, meaning="its first body"),
+    Field("joint_second", role="scratch", dtype=np.int32, meaning="its second body; below 0 at a wall"),
+    Field("joint_share", role="scratch", meaning="part of the film that belongs to the edge"),
+    Field("joint_viscosity", "Pa s", role="scratch", meaning="of the film"),
+    Field("joint_reduced_radius", "m", role="scratch", meaning="R*"),
+    Field("joint_minimum_gap", "m", role="scratch", meaning="h_min"),
     Field(
         "joint_incident",
         "1",
@@ -39,6 +45,8 @@ FIELDS = (
     Field("joint_weight", "1/kg", role="scratch", meaning="sum of the inverse masses"),
     Field("joint_passing", "m/s", role="scratch", meaning="rate at which bodies that pass each other part"),
     Field("joint_gap", "m", role="scratch", meaning="gap at the beginning of the step"),
+    Field("joint_speed", "m/s", role="scratch", meaning="rate of the gap for which the resistance holds"),
+    Field("joint_shift", "m/s", role="scratch", meaning="change of that rate since"),
     Field("joint_least", "kg/s", role="scratch", meaning="least resistance of the film"),
     Field("joint_compliance", "1/kg", role="scratch", meaning="1/(resistance times step)"),
     Field(
@@ -51,7 +59,7 @@ FIELDS = (
     Field("joint_residual", "m/s", role="scratch", meaning="of the equation of the normal impulse"),
     Field("joint_direction", "N s", role="scratch", meaning="of conjugate gradients"),
     Field("joint_product", "m/s", role="scratch", meaning="matrix times direction"),
-    Field("joint_terms", "1", 5, "scratch", meaning="terms of sums over all films"),
+    Field("joint_terms", "1", 4, "scratch", meaning="terms of sums over all films"),
 )
 """Of pairs whose films act by impulses. Those named joint_, but `joint_row`, hold one row for each film solved."""
 
@@ -70,6 +78,8 @@ SHEAR_FIELDS = (
 PARTICLE_FIELDS = (
     Field("film_change", "m/s", 3, "scratch", halo=("film_change",), meaning="change of velocity by films"),
     Field("film_turn", "rad/s", 3, "scratch", halo=("film_change",), meaning="change of spin by films"),
+    Field("film_along", "m/s", 3, "scratch", halo=("film_direction",), meaning="the same along the direction"),
+    Field("film_turn_along", "rad/s", 3, "scratch", halo=("film_direction",), meaning="the same along the direction"),
     Field("joint_end", role="scratch", dtype=np.int64, meaning="end of the films of the particle in joint_incident"),
 )
 """Fields of particles whose films act by impulses."""

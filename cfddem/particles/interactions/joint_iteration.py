@@ -9,7 +9,7 @@ from cfddem.backend.compile import inline, part, prange
 from cfddem.particles.interactions.joint_equations import four_of, own, put_two, rates_of, two
 from cfddem.particles.interactions.shear_film import by_blocks, couples, put_impulses
 from cfddem.particles.interactions.slots import SHEAR
-from cfddem.particles.vectors import at, dot, minus, plus, put, times
+from cfddem.particles.vectors import LEAST, at, dot, minus, plus, put, times
 
 
 @inline
@@ -38,7 +38,7 @@ def find_direction(system, count, share):
 def film_product(e, system):
     """Matrix times direction of film e."""
     particles, memory = system.particles, system.memory
-    product, slip, roll = rates_of(e, particles.film_change, particles.film_turn, False, system)
+    product, slip, roll = rates_of(e, particles.film_along, particles.film_turn_along, False, system)
     direction = memory.joint_direction[e]
     product += memory.joint_compliance[e] * direction
     memory.joint_product[e] = product
@@ -60,13 +60,22 @@ def find_product(system, count):
 
 
 @inline
-def film_follows(e, system, length):
+def film_follows(e, system, length, step):
     """New impulse and residual of film e."""
     memory = system.memory
-    memory.joint_impulse[e] += length * memory.joint_direction[e]
+    direction, compliance = memory.joint_direction[e], memory.joint_compliance[e]
+    memory.joint_impulse[e] += length * direction
     residual = memory.joint_residual[e] - length * memory.joint_product[e]
     memory.joint_residual[e] = residual
-    term = residual * residual / (memory.joint_compliance[e] + memory.joint_weight[e])
+    inverse = 1.0 / (compliance + memory.joint_weight[e])
+    term = inverse * residual * residual
+    # the resistance holds for the rate of the gap before; it changes as the gap at the middle of the way
+    shift = memory.joint_shift[e] + length * (memory.joint_product[e] - compliance * direction)
+    memory.joint_shift[e] = shift
+    gap = memory.joint_gap[e]
+    farther = max(gap, gap + step * memory.joint_speed[e], LEAST)
+    stale = compliance * memory.joint_impulse[e] * 0.5 * step * shift / farther
+    outdated = inverse * stale * stale
     if SHEAR:
         push, couple = two(memory.joint_shear_impulse, e)
         s, q = two(memory.joint_shear_direction, e)
@@ -77,14 +86,26 @@ def film_follows(e, system, length):
         put_two(memory.joint_shear_residual, e, s, q)
         a, b = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
         term += dot(a, s) + dot(b, q)
-    memory.joint_terms[e] = term if own(e, system) else 0.0
+    mine = 1.0 if own(e, system) else 0.0
+    memory.joint_terms[e] = mine * term
+    memory.joint_terms[len(system.edges.first) + e] = mine * outdated
 
 
 @part
-def follow_direction(system, count, length):
-    """New impulses and residuals at a length along the direction, and the terms of the square of the residual."""
+def follow_direction(system, count, length, step):
+    """New impulses at a length along the direction, and what they do to the particles; terms of two sums.
+
+    The sums are the squares of the residual, and of its part due to resistances that should be found anew.
+    """
+    particles = system.particles
     for e in prange(count):
-        film_follows(e, system, length)
+        film_follows(e, system, length, step)
+    for i in prange(len(particles.radius)):
+        change, along = at(particles.film_change, i), at(particles.film_along, i)
+        put(particles.film_change, i, plus(change, times(length, along)))
+        if SHEAR:
+            turn, along = at(particles.film_turn, i), at(particles.film_turn_along, i)
+            put(particles.film_turn, i, plus(turn, times(length, along)))
 
 
 @inline

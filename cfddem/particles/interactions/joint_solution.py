@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
-from cfddem.particles.interactions.joint_equations import SLIGHT, find_residual, own, prepare, spread
+from cfddem.particles.interactions.joint_equations import find_residual, own, prepare, spread
 from cfddem.particles.interactions.joint_films import collect
 from cfddem.particles.interactions.joint_iteration import (
     find_direction,
@@ -42,10 +42,6 @@ PASSES = 3
 
 MOST_ITERATIONS = 400
 """Of one pass; energy falls also where the iteration ends here."""
-
-NEAR = 1e-2
-"""Square of the first residual over that without impulses below which the impulses of the last step are close: where
-all gaps change by less than `SLIGHT`, too, resistances need not be found anew."""
 
 SETTLED = 1e-14
 """Square of the first residual over that without impulses below which the impulses of the last step stay. It is small
@@ -160,15 +156,9 @@ def new_product(system, count):
 
 
 @serial
-def along_direction(system, count, length):
+def along_direction(system, count, length, step):
     """See `follow_direction`."""
-    follow_direction(system, count, length)
-
-
-@serial
-def renew_change(system):
-    """What the impulses do to the particles."""
-    spread(system, False)
+    follow_direction(system, count, length, step)
 
 
 @serial
@@ -218,20 +208,18 @@ def film_kick(system, step):
         limit = tolerance * tolerance * whole
         if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
             break
-        last = passes == 0 and left < NEAR * whole and largest_of(system, count, 4) < SLIGHT
         passes += 1
         share = 0.0
         for _ in range(MOST_ITERATIONS):
             new_direction(system, count, share)
             new_product(system, count)
-            along_direction(system, count, left / total_of(system, count, 0))
+            along_direction(system, count, left / total_of(system, count, 0), step)
             before, left = left, total_of(system, count, 0)
             iterations += 1
             share = left / before
             if not left > limit:
                 break
-        renew_change(system)
-        if last:
+        if not total_of(system, count, 1) > limit:
             break
     finish_solution(system, count)
     counts = system.film_counts
