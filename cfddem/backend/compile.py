@@ -45,6 +45,8 @@ from numba import get_num_threads, njit, prange, set_num_threads
 from numba.core import event
 from numba.core.cpu import CPUTargetOptions
 from numba.core.options import TargetOptions
+from numba.core.types import none as none_type
+from numba.extending import intrinsic
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.backend.errors import InputError
@@ -56,6 +58,7 @@ __all__ = [
     "either",
     "fused",
     "inline",
+    "kept_whole",
     "part",
     "prange",
     "seconds_of_compilation",
@@ -133,12 +136,23 @@ def part(function: Callable[..., Any]) -> Any:
     return _marked(njit(error_model="numpy")(function), part)
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def kept_whole(context):  # type: ignore[no-untyped-def]
+    """Within a loop: keep it out of its caller, where the compiler can no longer tell its arrays apart."""
+
+    def code(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        builder.function.attributes.add("noinline")
+        return context.get_dummy_value()
+
+    return none_type(), code
+
+
 def vector_part(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` as `part` does, where no two array arguments share memory and rows do not meet.
 
     The compiler may then work on several rows at once, as it does by itself in loops for all threads.
     """
-    compiled = njit(error_model="numpy", noalias=True)(function)  # type: ignore[call-overload]
+    compiled = njit(error_model="numpy", noalias=True, forceinline=False)(function)  # type: ignore[call-overload]
     return _marked(compiled, vector_part)
 
 

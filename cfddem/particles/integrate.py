@@ -116,7 +116,7 @@ def find_forces(system, step):
     edges = system.edges
     pairs, number, near = edges.between_particles, len(edges.first), may_touch(edges)
     if FILM:
-        update_films(near, pairs, system, step)
+        update_films(0, pairs, system, step)
         for k in range(pairs, number):
             update_edge_film(k, system, step)
     pair_forces(0, near, system, step)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.compile import inline, prange, vector_part
+from cfddem.backend.compile import inline, kept_whole, prange, vector_part
 from cfddem.backend.law_set import specialise, written
 from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
@@ -26,7 +26,6 @@ from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
     DRIFTING,
-    FILM,
     ROLLING,
     SHEAR,
     adhesive_reach,
@@ -69,7 +68,7 @@ def edge_contact(k, kinematics, row, share, memory, p, step):
 
 @inline
 def pair_force(n, system, step):
-    """Film and contact of one pair of particles."""
+    """Contact of one pair of particles."""
     memory, p = system.memory, system.parameters
     k = np.uint64(n)
     particles, edges = system.particles, system.edges
@@ -77,45 +76,34 @@ def pair_force(n, system, step):
     apart = kept_separation(k, system) if BRIDGE else of_two_spheres(k, particles, edges, system.shift)
     kinematics = sphere_kinematics(k, apart, system)
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
-    if FILM:
-        between = (kinematics.separation, kinematics.distance, kinematics.gap)
-        pair_film(k, between, kinematics.reduced_radius, row, system, step)
     edge_contact(k, kinematics, row, 1.0, memory, p, step)
     if DRIFTING:
-        put(memory.acting_force, k, plus(at(memory.force, k), push_alone(k, memory)))
+        put(memory.acting_force, k, plus(at(memory.acting_force, k), at(memory.force, k)))
 
 
 @inline
-def far_film(n, system, step):
-    """Film of one pair of particles that cannot touch."""
-    k = np.uint64(n)
+def pair_film(n, system, step):
+    """Film of one pair of particles."""
+    memory, k = system.memory, np.uint64(n)
     particles, edges = system.particles, system.edges
-    i, j = edges.first[k], edges.second[k]
+    i, j, radius = edges.first[k], edges.second[k], particles.radius
     separation, distance, radii = of_two_spheres(k, particles, edges, system.shift)
-    reduced_radius = particles.radius[i] * particles.radius[j] / radii
+    gap, reduced_radius = distance - radii, radius[i] * radius[j] / radii
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
-    pair_film(k, (separation, distance, distance - radii), reduced_radius, row, system, step)
-    if DRIFTING:
-        put(system.memory.acting_force, k, push_alone(k, system.memory))
-
-
-@inline
-def pair_film(k, between, reduced_radius, row, system, step):
-    """Film of one pair of particles.
-
-    between  separation from the second to the first, its length, and the gap
-    """
-    particles, edges = system.particles, system.edges
-    i, j = edges.first[k], edges.second[k]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     weight = particles.inverse_mass[i] + particles.inverse_mass[j]
-    renew_film(k, between, viscosity, reduced_radius, weight, 1.0, system, row, step)
+    renew_film(k, (separation, distance, gap), viscosity, reduced_radius, weight, 1.0, system, row, step)
+    if DRIFTING:
+        put(memory.acting_force, k, push_alone(k, memory))
     if SHEAR:
-        radius, normal = particles.radius, at(system.memory.film_normal, k)
-        asymmetry, arms = (radius[i] - radius[j]) / (radius[i] + radius[j]), pair_arms(i, j, radius, between[2])
+        asymmetry, arms, normal = (
+            (radius[i] - radius[j]) / radii,
+            pair_arms(i, j, radius, gap),
+            at(memory.film_normal, k),
+        )
         velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
         motion = slip_and_roll(velocity, at(particles.spin, i), at(particles.spin, j), normal, arms)
-        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, arms, motion, system.memory, step)
+        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, arms, motion, memory, step)
 
 
 class PairLoop(NamedTuple):
@@ -129,7 +117,7 @@ class PairLoop(NamedTuple):
 
 LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force),
-    "update_films": PairLoop(far_film, needed_by="FILM"),
+    "update_films": PairLoop(pair_film, needed_by="FILM"),
     "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
     "bridge_impulses": PairLoop(pair_bridge_impulse, particles=WetParticles, needed_by="BRIDGE"),
 }
@@ -188,6 +176,7 @@ def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Pa
     more = f", {rest}" if rest else ""
     loop = (
         f"def over_pairs(begin, end, {names}{more}):\n"
+        f"    kept_whole()\n"
         f"    for n in prange(begin, end):\n"
         f"        body(n, {rebuilt}{more})\n"
     )
@@ -197,7 +186,7 @@ def over_pairs(body: Any, rest: str, particles: Any, memory: Any, parameters: Pa
         f"    kinds, rows = uint64(len(system.table)), system.table.reshape(-1)\n"
         f"    over_pairs(begin, end, {given}{more})\n"
     )
-    made_loop = written(loop, vector_part, body=body, prange=prange, **structures)
+    made_loop = written(loop, vector_part, body=body, prange=prange, kept_whole=kept_whole, **structures)
     return written(call, over_pairs=made_loop, uint64=np.uint64)
 
 
