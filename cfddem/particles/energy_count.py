@@ -62,7 +62,7 @@ class Energies:
             raise InputError("energies", None, "a contact law that gives its energy", f"the law {name!r} does not")
         if laws.film and laws.integrator != "drift":
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
-        self._work = specialise(count_work, solver.choices)
+        self._work, self._motion = specialise(count_work, solver.choices), specialise(count_motion, solver.choices)
         self._bridges = None if laws.bridge is None else BridgeEnergies(solver)
         self._shear = ShearEnergies(solver) if laws.shears else None
         self.channels = CHANNELS if self._bridges is None else (*CHANNELS, *self._bridges.channels)
@@ -146,7 +146,7 @@ class Energies:
         count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
         count.totals[:] = 0.0
         gravity, free = np.array(solver.gravity, float), np.array(solver.free, float)
-        count_motion(solver.system.particles, count, gravity, free, step, before, after)
+        self._motion(solver.system.particles, count, gravity, free, step, before, after)
         self._work(solver.system, count, step, before, after)
         counted = solver.communicator.sum(count.totals[0], axis=0)
         self.totals[: len(CHANNELS)] += counted[: len(CHANNELS)]

@@ -9,12 +9,11 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.particles.energy_of_bridges import note_bridge_loss
-from cfddem.particles.impulse_motion import taken_by_impulses
+from cfddem.particles.impulse_motion import drifted, mean_motion, motion_of_weak, taken_by_impulses
 from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
-from cfddem.particles.interactions.film import push_alone
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
-from cfddem.particles.interactions.shear_film import impulses_of
+from cfddem.particles.interactions.shear_film import two
 from cfddem.particles.interactions.slots import (
     BRIDGE,
     FILM,
@@ -101,11 +100,11 @@ def count_motion(particles, count, gravity, free, step, before, after):
             )
             put(count.turned, i, turned)
             if step > 0.0 and particles.inverse_mass[i] > 0.0:
-                drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], force))
-                drifted = (free[0] * drifted[0], free[1] * drifted[1], free[2] * drifted[2])
-                put(count.drifted, i, times(step, drifted))
+                velocity, _ = drifted(i, particles, step)
+                velocity = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
+                put(count.drifted, i, times(step, velocity))
                 if i < particles.owned:
-                    totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, drifted)
+                    totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, velocity)
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
 
@@ -122,45 +121,35 @@ def note_loss(k, memory, channel, lost):
 @inline
 def _film_works(k, system, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
-    particles, edges, memory = system.particles, system.edges, system.memory
+    edges, memory, particles = system.edges, system.memory, system.particles
     i, j = edges.first[k], edges.second[k]
-    impulse = at(memory.impulse, k)
-    drifted = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
-    speed = times(0.5, plus(at(count.ahead, i), drifted))
+    normal, solved = at(memory.film_normal, k), at(memory.impulse, k)
+    weak = times(dot(at(memory.film_push, k), normal), normal)
+    velocity, _ = mean_motion(i, particles, count, step)
+    later, _ = motion_of_weak(i, particles, step)
+    gained = dot(solved, velocity) + dot(weak, later)
     if k < edges.between_particles:
-        drifted = minus(
-            at(particles.velocity, j), times(0.5 * step * particles.inverse_mass[j], at(particles.force, j))
-        )
-        other, by_wall = times(0.5, plus(at(count.ahead, j), drifted)), 0.0
-    else:
-        other = touched(edges, k, SURFACE)
-        by_wall = dot(impulse, other)
-    return -dot(impulse, minus(speed, other)), by_wall
+        velocity, _ = mean_motion(j, particles, count, step)
+        later, _ = motion_of_weak(j, particles, step)
+        return dot(solved, velocity) + dot(weak, later) - gained, 0.0
+    by_wall = dot(plus(solved, weak), touched(edges, k, SURFACE))
+    return by_wall - gained, by_wall
 
 
 @inline
-def _film_force_works(k, system, count, duration, totals):
-    """Count what the film of edge k, as a force, has taken in the half kicks around this instant."""
-    memory, edges = system.memory, system.edges
+def _weak_shear_works(k, system, step):
+    """The same of the resistance to sliding of a weak film."""
+    edges, memory, particles, walls = system.edges, system.memory, system.particles, system.walls
     i, j = edges.first[k], edges.second[k]
-    moved, _, _, _, _, _, by_wall = _moved(k, system, count, duration)
-    force = push_alone(k, memory)
-    lost = -dot(force, moved)
-    totals[FILMS] += lost
-    totals[WALLS] += dot(force, by_wall)
-    if SHEAR:
-        push, first, second = impulses_of(k, memory.shear_push)
-        gained, put_in = dot(push, moved) + dot(first, at(count.turned, i)), dot(push, by_wall)
-        if k < edges.between_particles:
-            gained += dot(second, at(count.turned, j))
-        else:
-            about = times(duration, at(system.walls.spin, system.walls.wall[j]))
-            gained += dot(second, about)
-            put_in -= dot(second, about)
-        totals[BY_SHEAR] -= gained
-        totals[WALLS] += put_in
-        lost -= gained
-    note_loss(k, memory, FILMS, lost)
+    push = across(at(memory.film_push, k), at(memory.film_normal, k))
+    first, second = two(memory.shear_couples, k)
+    velocity, spin = motion_of_weak(i, particles, step)
+    gained = dot(push, velocity) + dot(first, spin)
+    if k < edges.between_particles:
+        velocity, spin = motion_of_weak(j, particles, step)
+        return dot(push, velocity) - gained - dot(second, spin), 0.0
+    by_wall = dot(push, touched(edges, k, SURFACE)) - dot(second, at(walls.spin, walls.wall[j]))
+    return by_wall - gained, by_wall
 
 
 @inline
@@ -300,7 +289,10 @@ def count_work(system, count, step, before, after):
                 totals[FILMS] += lost
                 note_loss(k, memory, FILMS, lost)
                 totals[WALLS] += by_wall
-            if FILM:
-                _film_force_works(k, system, count, before + after, totals)
+            if SHEAR and step > 0.0:
+                lost, by_wall = _weak_shear_works(k, system, step)
+                totals[BY_SHEAR] += lost
+                note_loss(k, memory, FILMS, lost)
+                totals[WALLS] += by_wall
             if not near <= k < pairs:
                 _contact_works(k, system, count, step, before + after, totals)

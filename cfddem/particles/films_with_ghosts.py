@@ -45,7 +45,7 @@ class FilmsWithGhosts:
     def __call__(self, system: System, step: float) -> None:
         """Arguments of `film_kick`."""
         self.ghosts.refresh("film")
-        count, owned = self.start(system, step)
+        count, owned = self.start(system)
         number = int(self.communicator.sum([owned]))
         if number == 0:
             return

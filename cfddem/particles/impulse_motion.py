@@ -1,6 +1,7 @@
 """Motion of the particles while impulses act: between the two half kicks of a step.
 
-The product of an impulse with this mean motion is its work, to round-off.
+The product of an impulse with the mean motion while it acts is its work, to round-off. Weak films act last, at the
+positions after the drift.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.compile import inline
+from cfddem.particles.interactions.slots import DRIFTING
 from cfddem.particles.state import Particles
 from cfddem.particles.vectors import at, minus, plus, times
 
@@ -25,16 +27,32 @@ def keep_motion(count: Any, particles: Particles, step: float, ahead: np.ndarray
 
 
 @inline
-def mean_motion(i, particles, count, step):
-    """Mean velocity and spin of particle i while impulses act: between the two half kicks of the step."""
+def drifted(i, particles, step):
+    """Velocity and spin with which particle i has drifted in the step."""
     velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
     spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
+    if DRIFTING:
+        velocity, spin = minus(velocity, at(particles.film_gain, i)), minus(spin, at(particles.film_spin_gain, i))
+    return velocity, spin
+
+
+@inline
+def mean_motion(i, particles, count, step):
+    """Mean velocity and spin of particle i while impulses act that are solved, and those of bridges."""
+    velocity, spin = drifted(i, particles, step)
     return times(0.5, plus(at(count.ahead, i), velocity)), times(0.5, plus(at(count.spin_ahead, i), spin))
 
 
 @inline
+def motion_of_weak(i, particles, step):
+    """Mean velocity and spin of particle i while weak films act."""
+    velocity, spin = drifted(i, particles, step)
+    gain, turn = times(0.5, at(particles.film_gain, i)), times(0.5, at(particles.film_spin_gain, i))
+    return plus(velocity, gain), plus(spin, turn)
+
+
+@inline
 def taken_by_impulses(i, particles, count, step):
-    """Velocity and spin that all impulses of the step have taken from particle i."""
-    velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))
-    spin = minus(at(particles.spin, i), times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i)))
+    """Velocity and spin that the impulses before the drift have taken from particle i."""
+    velocity, spin = drifted(i, particles, step)
     return minus(at(count.ahead, i), velocity), minus(at(count.spin_ahead, i), spin)

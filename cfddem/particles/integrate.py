@@ -13,7 +13,7 @@ A step consists of these phases:
     [halo: liquid for new bridges]
     bridges              those that form and break, and the pull of all
     pairs                films, contacts and rolling of every edge
-    sum                  force and torque of every particle over its own edges, in a fixed order
+    sum                  force, torque and impulses of weak films of every particle over its own edges, in a fixed order
     kick                 the other half
 
 A loop over edges writes what each pair does, a loop over particles sums its edges: no two threads write the same
@@ -31,7 +31,7 @@ from cfddem.particles.collision_events import record_event
 from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
-from cfddem.particles.interactions.film import film_force, push_alone, update_edge_film
+from cfddem.particles.interactions.film import film_force, update_edge_film
 from cfddem.particles.interactions.joint_films import find_due
 from cfddem.particles.interactions.joint_solution import film_kick
 from cfddem.particles.interactions.kinematics import wall_kinematics
@@ -123,22 +123,19 @@ def find_forces(system, step):
     if WALLS:
         for k in range(pairs, number):
             wall_contact(np.uint64(k), system, step)
-            if DRIFTING:
-                acting = plus(at(system.memory.force, k), push_alone(k, system.memory))
-                put(system.memory.acting_force, k, acting)
     if FILM and not DRIFTING:
         add_film_forces(system)
 
 
 @part
 def sum_forces(system, step):
-    """Sum the forces on the particles, and kick them by half a step."""
+    """Sum the forces on the particles, and let weak films and half a kick act on them."""
     particles, edges = system.particles, system.edges
     near = may_touch(edges)
     for i in prange(particles.owned):
         gather_forces(i, system, near)
         if step > 0.0:
-            kick(i, particles, step)
+            kick(i, particles, step, True)
 
 
 # ---------------------------------------------------------------- between the halos

@@ -6,7 +6,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.joint_films import list_due
-from cfddem.particles.interactions.shear_film import impulses_of
+from cfddem.particles.interactions.shear_film import two
 from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FILM, ROLLING, SHEAR
 from cfddem.particles.pair_graph import edge_role, places_of
 from cfddem.particles.vectors import NOTHING, at, dot, either, minus, plus, put, times
@@ -19,16 +19,16 @@ def gather_forces(i, system, near):
     near  number of leading pairs that may touch
     """
     particles, edges, memory = system.particles, system.edges, system.memory
-    force, couple, moment, turn, load = at(particles.applied, i), NOTHING, NOTHING, NOTHING, 0.0
-    end = edges.start[i]
+    force, couple, moment, load = at(particles.applied, i), NOTHING, NOTHING, 0.0
+    impulse, turn, end = NOTHING, NOTHING, edges.start[i]
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
         if DRIFTING:
             end = list_due(place, end, system)
-            force = plus(force, times(sign, at(memory.acting_force, k)))
+            impulse = plus(impulse, times(sign, at(memory.film_push, k)))
         if SHEAR:
-            push, first, second = impulses_of(k, memory.shear_push)
-            force, turn = plus(force, times(sign, push)), plus(turn, either(sign > 0.0, first, second))
+            first, second = two(memory.shear_couples, k)
+            turn = plus(turn, either(sign > 0.0, first, second))
         if BRIDGE:  # zero without a bridge, which costs less than to look
             load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))
@@ -36,25 +36,31 @@ def gather_forces(i, system, near):
             if BRIDGE or DRIFTING:
                 continue
             break  # pairs that cannot touch come last
-        if not DRIFTING:
-            force = plus(force, times(sign, at(memory.force, k)))
+        force = plus(force, times(sign, at(memory.force, k)))
         couple = plus(couple, at(memory.couple, k))
         if ROLLING:
             moment = plus(moment, times(sign, at(memory.moment, k)))
     if particles.inverse_mass[i] > 0.0:
         force = plus(force, times(1.0 / particles.inverse_mass[i], system.parameters.gravity))
     put(particles.force, i, force)
-    put(particles.torque, i, plus(plus(times(particles.radius[i], couple), moment), turn))
+    put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
     if DRIFTING:
         particles.joint_end[i] = end
+        put(particles.film_gain, i, times(particles.inverse_mass[i], impulse))
+        if SHEAR:
+            put(particles.film_spin_gain, i, times(particles.inverse_inertia[i], turn))
     if BRIDGE:
         particles.bridge_rate[i] = particles.inverse_mass[i] * load
         particles.bridge_turn_rate[i] = particles.radius[i] * particles.radius[i] * particles.inverse_inertia[i] * load
 
 
 @inline
-def kick(i, particles, step):
-    """Half a kick by the forces of the last step."""
+def kick(i, particles, step, with_films):
+    """Half a kick by the forces of the last step, after what weak films have given in it."""
+    if DRIFTING and with_films:
+        put(particles.velocity, i, plus(at(particles.velocity, i), at(particles.film_gain, i)))
+        if SHEAR:
+            put(particles.spin, i, plus(at(particles.spin, i), at(particles.film_spin_gain, i)))
     gain = times(0.5 * step * particles.inverse_mass[i], at(particles.force, i))
     put(particles.velocity, i, plus(at(particles.velocity, i), gain))
     gain = times(0.5 * step * particles.inverse_inertia[i], at(particles.torque, i))
@@ -84,7 +90,7 @@ def drift(i, particles, free, step, origin):
 def kick_particles(particles, step):
     """Half a kick of all particles."""
     for i in prange(particles.owned):
-        kick(i, particles, step)
+        kick(i, particles, step, False)
 
 
 @part

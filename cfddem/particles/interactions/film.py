@@ -1,9 +1,9 @@
 """Lubrication film between two bodies: its resistance, what it remembers, and what it does if it is weak.
 
-A film remembers its approach, from when the pair comes within reach until it leaves it. A weak film acts by itself, as
-a force: its resistance times the mean rate of the gap since the last positions. All others are solved together
-(`cfddem.particles.interactions.joint_solution`). Functions of numbers without branches work on several pairs at once;
-the others work on one edge.
+A film remembers its approach, from when the pair comes within reach until it leaves it. A weak film acts by itself at
+the end of each step: its impulse is its resistance times the change of the gap in the step. All others are solved
+together (`cfddem.particles.interactions.joint_solution`). Functions of numbers without branches work on several pairs
+at once; the others work on one edge.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from cfddem.particles.interactions.slots import (
     user_minimum_gap,
 )
 from cfddem.particles.pair_graph import THICKEST, geometry
-from cfddem.particles.vectors import LEAST, at, dot, put, times
+from cfddem.particles.vectors import at, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
 
@@ -50,9 +50,18 @@ WEAK = 1e-2
 """Damping number X below which a film acts by itself. The viscosity of a suspension at a solid fraction of 0.5 is the
 same to 1e-5 with a tenth of it, and to 1e-4 with three times as much."""
 
+STIFF = 0.1
+"""Damping number above which a film that has begun or was weak gives the impulse for its way so far with the others."""
+
+LEAP = 0.1
+"""Change of the gap in a step, over the gap, above which a film is not weak: the resistance at the middle of the way is
+the mean to a thousandth."""
+
 WEAK_FIELDS = (
-    Field("film_push", "N", role="memory", meaning="mean force of a film by itself since the last positions"),
-    Field("acting_force", "N", 3, "scratch", meaning="of the contact and of a film by itself, on the first body"),
+    Field("film_push", "N s", 3, "scratch", meaning="impulse of a film by itself in the last step, on the first body"),
+    Field(
+        "film_owed", "N s", role="memory", meaning="of a stiff one that begins: impulse that it gives with the others"
+    ),
     Field("film_rate", "1/s", role="memory", meaning="damping number of the film over the step"),
     Field("film_due", role="memory", dtype=bool, meaning="the film is solved with the others in the next step"),
     Field("faster", role="memory", dtype=bool, meaning="the bodies approach faster than before in this film"),
@@ -92,11 +101,12 @@ def update_film(gap, viscosity, reduced_radius, memory, row, cutoff_ratio):
 
 
 @inline
-def act_alone(k, film, resistance, weight, share, memory, step):
-    """What the film of edge k has done by itself since the last positions, and whether it is weak.
+def act_alone(k, film, normal, resistance, weight, share, memory, step):
+    """What the film of edge k does by itself for the change of its gap, and whether it is weak.
 
-    The push of a film that is not weak any more is given with the others (`film_due`).
+    A film that has begun and is stiff owes this impulse: it gives it with the others.
 
+    normal      direction from the second body to the first
     resistance  [kg/s]
     weight      sum of the inverse masses [1/kg]
     share       part of the film that belongs to this edge
@@ -104,31 +114,29 @@ def act_alone(k, film, resistance, weight, share, memory, step):
     """
     gap, before, minimum_gap = film.gap, memory.film_gap[k], film.minimum_gap
     moved = step > 0.0 and before < np.inf
-    begin, end = min(before, film.cutoff_gap), min(gap, film.cutoff_gap)
-    middle = 0.5 * (begin + end)
-    rate = (end - begin) / max(step, LEAST)
-    lever = min(max(middle, 0.0) / minimum_gap, 1.0)
-    push = -share * lever * film_resistance(at_gap(film, max(middle, minimum_gap))) * rate
-    alone = weight > 0.0 and memory.joint_row[k] == 0
-    memory.film_push[k] = (push if alone else 0.0) if moved else memory.film_push[k]
+    # the film acts down to gap 0; below the minimum gap its resistance is linear in the gap
+    begin, end = min(max(before, 0.0), film.cutoff_gap), min(max(gap, 0.0), film.cutoff_gap)
+    low, high = min(begin, minimum_gap), min(end, minimum_gap)
+    below = film_resistance(at_gap(film, minimum_gap)) * 0.5 * (low + high) / minimum_gap
+    middle = 0.5 * (max(begin, minimum_gap) + max(end, minimum_gap))
+    above = film_resistance(at_gap(film, middle))
+    taken = below * (high - low) + above * ((end - high) - (begin - low))
+    impulse = -share * taken if moved and weight > 0.0 and memory.joint_row[k] == 0 else 0.0
     # the lever is 0 for solids that overlap, and 1 above the minimum gap
     change = gap - before if moved else 0.0
     lever = min(max(gap, gap + change, 0.0) / minimum_gap, 1.0)
-    leaps = gap > minimum_gap and abs(change) > 0.5 * gap
+    leaps = gap > minimum_gap and abs(change) > LEAP * gap
     within = resistance > 0.0 and weight > 0.0
-    film_rate = (np.inf if leaps else resistance * weight * lever) if within else 0.0
-    memory.film_rate[k] = film_rate
-    memory.film_due[k] = step * film_rate >= WEAK if moved else memory.film_due[k]
-    faster = within and gap > minimum_gap and -rate > memory.approach_speed[k]
+    rate = (np.inf if leaps else resistance * weight * lever) if within else 0.0
+    due = step * rate >= WEAK if moved else memory.film_due[k]
+    owes = due and step * above * weight > STIFF
+    faster = within and gap > minimum_gap and begin - end > step * memory.approach_speed[k]
+    memory.film_rate[k], memory.film_due[k] = rate, due
     memory.faster[k] = faster if moved else memory.faster[k]
+    memory.film_owed[k] = (impulse if owes else 0.0) if moved else memory.film_owed[k]
+    put(memory.film_push, k, times(0.0 if owes else impulse, normal))
     if COUNT_FILM:
         memory.outside[k] += film_outside(at_least(film)) if within and moved else 0
-
-
-@inline
-def push_alone(k, memory):
-    """Force of the film of edge k on the first body, if it acts by itself."""
-    return times(0.0 if memory.film_due[k] else memory.film_push[k], at(memory.film_normal, k))
 
 
 @inline
@@ -147,11 +155,12 @@ def renew_film(k, between, viscosity, reduced_radius, weight, share, system, row
     resistance, approach_speed, minimum_gap = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
     memory.resistance[k], memory.approach_speed[k] = share * resistance, approach_speed
     memory.minimum_gap[k] = minimum_gap
+    normal = times(1.0 / distance, separation)
     if DRIFTING:
         film = FilmState(gap, viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
-        act_alone(k, film, share * resistance, weight, share, memory, step)
+        act_alone(k, film, normal, share * resistance, weight, share, memory, step)
     memory.film_gap[k] = gap
-    put(memory.film_normal, k, times(1.0 / distance, separation))
+    put(memory.film_normal, k, normal)
 
 
 @inline

@@ -18,9 +18,11 @@ from cfddem.particles.interactions.shear_film import (
     edge_asymmetry,
     impulses_of,
     pair_arms,
+    put_two,
     sliding_ratios,
     slip_and_roll,
     twist_strength,
+    two,
 )
 from cfddem.particles.interactions.slots import (
     SHEAR,
@@ -72,7 +74,7 @@ def prepare_film(e, system, step):
     memory.joint_second[e] = edges.second[k] if k < edges.between_particles else -1
     memory.joint_share[e], memory.joint_viscosity[e] = share, film.viscosity
     memory.joint_reduced_radius[e], memory.joint_minimum_gap[e] = film.reduced_radius, memory.minimum_gap[k]
-    memory.joint_debt[e] = step * memory.film_push[k]
+    memory.joint_debt[e] = memory.film_owed[k]
     memory.joint_gap[e], memory.joint_weight[e] = gap, weight
     put(memory.joint_normal, e, normal)
     memory.joint_impulse[e] = dot(at(memory.impulse, k), normal)
@@ -124,21 +126,6 @@ def prepare_sliding(e, k, film, weight, share, normal, system, step):
     put_two(memory.joint_shear_impulse, e, push, cross(normal, moment))
     if TWIST:
         put_two(memory.joint_shear_impulse, e, push, plus(cross(normal, moment), times(dot(moment, normal), normal)))
-
-
-@inline
-def two(array, e):
-    """The two vectors of a row."""
-    row = _2 * np.uint64(e)
-    return at(array, row), at(array, row + _1)
-
-
-@inline
-def put_two(array, e, a, b):
-    """Write the two vectors of a row."""
-    row = _2 * np.uint64(e)
-    put(array, row, a)
-    put(array, row + _1, b)
 
 
 @inline

@@ -17,7 +17,7 @@ from cfddem.particles.interactions.kinematics import (
     pair_viscosity,
     relative_velocity,
 )
-from cfddem.particles.interactions.shear_film import impulses_of, put_impulses
+from cfddem.particles.interactions.shear_film import put_impulses
 from cfddem.particles.interactions.slots import SHEAR, FilmState
 from cfddem.particles.pair_graph import places_of
 from cfddem.particles.vectors import NOTHING, across, at, dot, put, times
@@ -76,6 +76,8 @@ SHEAR_FIELDS = (
 """The same of films that resist sliding."""
 
 PARTICLE_FIELDS = (
+    Field("film_gain", "m/s", 3, "scratch", halo=("work",), meaning="velocity given by weak films in the last step"),
+    Field("film_spin_gain", "rad/s", 3, "scratch", halo=("work",), meaning="spin given by weak films in the last step"),
     Field("film_change", "m/s", 3, "scratch", halo=("film_change",), meaning="change of velocity by films"),
     Field("film_turn", "rad/s", 3, "scratch", halo=("film_change",), meaning="change of spin by films"),
     Field("film_along", "m/s", 3, "scratch", halo=("film_direction",), meaning="the same along the direction"),
@@ -118,13 +120,10 @@ def note_approach(k, system):
 
 
 @inline
-def enter(k, row, memory, step):
-    """List the film of edge k at a row; one that has acted by itself so far goes on with the same impulse."""
+def enter(k, row, memory):
+    """List the film of edge k at a row; one that has acted by itself so far begins with the impulse that it owes."""
     if memory.joint_row[k] == 0:
-        put(memory.impulse, k, times(step * memory.film_push[k], at(memory.film_normal, k)))
-        if SHEAR:
-            push, first, second = impulses_of(k, memory.shear_push)
-            put_impulses(k, memory.shear_impulse, times(step, push), times(step, first), times(step, second))
+        put(memory.impulse, k, times(memory.film_owed[k], at(memory.film_normal, k)))
     memory.joint_edge[row] = k
     memory.joint_row[k] = row + 1
 
@@ -143,7 +142,7 @@ def stay_apart(k, system):
 
 
 @part
-def collect(system, step):
+def collect(system):
     """List the films that are solved together, and note fast approaches of all others; returns their number."""
     memory = system.memory
     number, counts = len(system.edges.first), np.zeros(CHUNKS + 1, np.int64)
@@ -158,7 +157,7 @@ def collect(system, step):
         row = counts[chunk]
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
             if memory.film_due[k]:
-                enter(k, row, memory, step)
+                enter(k, row, memory)
                 row += 1
             elif memory.joint_row[k] > 0 or memory.faster[k]:
                 stay_apart(k, system)
@@ -178,10 +177,7 @@ def find_due(system, step):
     """Find the films that are solved together at a step that may differ from the last one."""
     particles, edges, memory = system.particles, system.edges, system.memory
     for k in prange(len(edges.first)):
-        due = memory.film_due[k] or step * memory.film_rate[k] >= WEAK
-        # the push of a film that was weak so far has been given
-        memory.film_push[k] = memory.film_push[k] if due == memory.film_due[k] else 0.0
-        memory.film_due[k] = due
+        memory.film_due[k] = memory.film_due[k] or step * memory.film_rate[k] >= WEAK
     for i in prange(particles.owned):
         end = edges.start[i]
         for place in places_of(i, edges):

@@ -6,8 +6,8 @@ See `cfddem.particles.interactions.joint_solution`.
 from __future__ import annotations
 
 from cfddem.backend.compile import inline, part, prange
-from cfddem.particles.interactions.joint_equations import four_of, own, put_two, rates_of, two
-from cfddem.particles.interactions.shear_film import by_blocks, couples, put_impulses
+from cfddem.particles.interactions.joint_equations import four_of, own, rates_of
+from cfddem.particles.interactions.shear_film import by_blocks, couples, put_impulses, put_two, two
 from cfddem.particles.interactions.slots import SHEAR
 from cfddem.particles.vectors import LEAST, at, dot, minus, plus, put, times
 

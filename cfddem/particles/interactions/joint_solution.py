@@ -14,7 +14,7 @@ Preconditioned conjugate gradients start from the impulses of the last step. Eac
 pairs, so momentum stays to round-off, and energy falls with every iterate, however early the iteration ends. Where
 spheres pass each other, the rate at which they part in the step adds a term of second order in the step, which can
 raise the energy of a row of spheres by that order. Films with a damping number X = c dt (1/m1 + 1/m2) below `WEAK`
-stay outside: they act by themselves, as forces.
+stay outside: they act by themselves, at the end of the step.
 
 A loop over particles sums what the films of each do to it, in a fixed order, and a loop over films finds the rates.
 Sums over all films are sums of integers (`scale_of`): they have the same bits in any order, on any number of threads.
@@ -114,9 +114,9 @@ def sum_of_terms(system, count, column, power):
 
 
 @serial
-def start_films(system, step):
+def start_films(system):
     """List the films that are solved; returns their number, and that of those that are counted here."""
-    count = collect(system, step)
+    count = collect(system)
     owned = 0
     for e in range(count):
         owned += 1 if own(e, system) else 0
@@ -192,7 +192,7 @@ def total_of(system, count, column):
 @serial
 def film_kick(system, step):
     """Give the particles the impulses of all films over the coming step."""
-    count, _ = start_films(system, step)
+    count, _ = start_films(system)
     if count == 0:
         return
     tolerance = system.parameters.film_tolerance

@@ -18,14 +18,13 @@ from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
 from cfddem.particles.interactions.contact import contact, contact_state
-from cfddem.particles.interactions.film import push_alone, renew_film
+from cfddem.particles.interactions.film import renew_film
 from cfddem.particles.interactions.kinematics import sphere_kinematics
 from cfddem.particles.interactions.rolling import resist_rolling
 from cfddem.particles.interactions.shear_film import pair_arms, renew_shear, slip_and_roll
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
-    DRIFTING,
     ROLLING,
     SHEAR,
     adhesive_reach,
@@ -34,7 +33,7 @@ from cfddem.particles.interactions.slots import (
 )
 from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.system import PairSystem, Parameters
-from cfddem.particles.vectors import NOTHING, at, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, at, minus, put, times
 
 PairParticles = namedtuple("PairParticles", "position velocity spin radius inverse_mass material viscosity")
 """Arrays of the particles that loops over pairs read."""
@@ -77,8 +76,6 @@ def pair_force(n, system, step):
     kinematics = sphere_kinematics(k, apart, system)
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     edge_contact(k, kinematics, row, 1.0, memory, p, step)
-    if DRIFTING:
-        put(memory.acting_force, k, plus(at(memory.acting_force, k), at(memory.force, k)))
 
 
 @inline
@@ -93,8 +90,6 @@ def pair_film(n, system, step):
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     weight = particles.inverse_mass[i] + particles.inverse_mass[j]
     renew_film(k, (separation, distance, gap), viscosity, reduced_radius, weight, 1.0, system, row, step)
-    if DRIFTING:
-        put(memory.acting_force, k, push_alone(k, memory))
     if SHEAR:
         asymmetry, arms, normal = (
             (radius[i] - radius[j]) / radii,

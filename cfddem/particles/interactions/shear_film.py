@@ -22,7 +22,7 @@ from closures.tangential_lubrication import (
 
 FIELDS = (
     Field("shear_resistance", "kg/s", role="memory", meaning="resistance of the film to sliding; 0 out of its reach"),
-    Field("shear_push", "1", 9, "memory", meaning="of a film by itself against sliding, see `put_impulses` [N, N m]"),
+    Field("shear_couples", "N m s", 6, "scratch", meaning="angular impulses of a film by itself on both bodies"),
 )
 """What pairs remember of the films between them that resist sliding."""
 
@@ -133,11 +133,12 @@ def renew_shear(k, viscosity, reduced_radius, asymmetry, share, arms, motion, me
     resistance = resistance if before > 0.0 and memory.joint_row[k] == 0 else 0.0
     both, rolling = sliding_ratios(reduced_radius, asymmetry)
     twist = twist_strength(gap, minimum_gap, resistance, viscosity, reduced_radius, asymmetry, share)
-    blocks = (-resistance, -resistance * both, -resistance * rolling, -twist)
+    factor = -step
+    blocks = (factor * resistance, factor * resistance * both, factor * resistance * rolling, factor * twist)
     push, roll = by_blocks(blocks, motion[0], motion[1], normal)
     first, second = couples(push, roll, normal, arms)
-    if step > 0.0:
-        put_impulses(k, memory.shear_push, push, first, second)
+    put(memory.film_push, k, plus(at(memory.film_push, k), push))
+    put_two(memory.shear_couples, k, first, second)
 
 
 @inline
@@ -162,11 +163,23 @@ def twist_strength(gap, minimum_gap, resistance, viscosity, reduced_radius, asym
 
 
 @inline
-def put_impulses(k, array, impulse, first, second):
-    """Write what the film of edge k does: impulse on the first body, angular impulses on the first and the second.
+def two(array, e):
+    """The two vectors of a row."""
+    row = _2 * np.uint64(e)
+    return at(array, row), at(array, row + _1)
 
-    Or forces and torques.
-    """
+
+@inline
+def put_two(array, e, a, b):
+    """Write the two vectors of a row."""
+    row = _2 * np.uint64(e)
+    put(array, row, a)
+    put(array, row + _1, b)
+
+
+@inline
+def put_impulses(k, array, impulse, first, second):
+    """Write what the film of edge k does: impulse on the first body, angular impulses on the first and the second."""
     row = _3 * np.uint64(k)
     put(array, row, impulse)
     put(array, row + _1, first)
