@@ -141,7 +141,8 @@ def kept_whole(context):  # type: ignore[no-untyped-def]
     """Within a loop: keep it out of its caller, where the compiler can no longer tell its arrays apart."""
 
     def code(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        builder.function.attributes.add("noinline")
+        if "alwaysinline" not in builder.function.attributes:  # as in loops for all threads
+            builder.function.attributes.add("noinline")
         return context.get_dummy_value()
 
     return none_type(), code

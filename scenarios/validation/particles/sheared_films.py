@@ -118,6 +118,7 @@ def _force_on(run: ParticleSolver, lid: np.ndarray) -> float:
 def _impulse_on(run: ParticleSolver, lid: np.ndarray) -> float:
     """Impulse of all films on the upper layer in the last step, along the shear [N s]."""
     upper, edges = np.isin(run.particles.id, lid), run.edges
-    impulse = edges.impulse[:, 0] + (edges.shear_impulse[:, 0] if "shear_impulse" in edges else 0.0)
+    impulse = edges.impulse[:, 0] + edges.film_push[:, 0]
+    impulse += edges.shear_impulse[:, 0] if "shear_impulse" in edges else 0.0
     sign = upper[edges.first].astype(float) - upper[edges.second]
     return float(sign @ impulse)
