@@ -25,6 +25,7 @@ from cfddem.particles.interactions.slots import (
     COUNT_GAP,
     DRIFTING,
     SHEAR,
+    TRIANGLES,
     USER_GAP,
     FilmState,
     GapState,
@@ -35,7 +36,7 @@ from cfddem.particles.interactions.slots import (
     user_minimum_gap,
 )
 from cfddem.particles.pair_graph import THICKEST, geometry
-from cfddem.particles.vectors import at, dot, put, times
+from cfddem.particles.vectors import NOTHING, at, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
 
@@ -140,17 +141,18 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
 
 
 @inline
-def renew_film(k, between, viscosity, reduced_radius, weight, share, system, row, step):
+def renew_film(k, between, viscosity, size, share, system, row, step):
     """Update the film of edge k: its resistance, and what it does if it acts by itself.
 
     between  separation from the second body to the first, distance and gap
-    weight   sum of the inverse masses [1/kg]
+    size     reduced radius [m], and sum of the inverse masses [1/kg]
     share    part of the film that belongs to this edge: below 1 where triangles of a mesh share one
     row      of the pair table
     step     since the last positions; 0 if these are the same [s]
     """
     memory, cutoff_ratio = system.memory, system.parameters.cutoff_ratio
     separation, distance, gap = between
+    reduced_radius, weight = size
     then = (memory.film_gap[k], memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k])
     resistance, approach_speed, minimum_gap = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
     memory.resistance[k], memory.approach_speed[k] = share * resistance, approach_speed
@@ -167,13 +169,14 @@ def renew_film(k, between, viscosity, reduced_radius, weight, share, system, row
 def update_edge_film(k, system, step):
     """Update the film of edge k."""
     between = geometry(k, system)
-    reduced_radius, weight = pair_mass_and_radius(k, system)
-    viscosity, share, row = pair_viscosity(k, system), portion(system.edges, k), pair_row(k, system)
-    renew_film(k, between, viscosity, reduced_radius, weight, share, system, row, step)
+    size, viscosity = pair_mass_and_radius(k, system), pair_viscosity(k, system)
+    share, row, memory = portion(system.edges, k), pair_row(k, system), system.memory
+    renew_film(k, between, viscosity, size, share, system, row, step)
+    if TRIANGLES and DRIFTING and memory.resistance[k] == 0.0:  # its last gap may be that of the triangle beside it
+        put(memory.film_push, k, NOTHING)
     if SHEAR:
-        motion = motion_at_wall(k, at(system.memory.film_normal, k), system)
-        arms = (system.particles.radius[system.edges.first[k]], 0.0)
-        renew_shear(k, viscosity, reduced_radius, -1.0, share, arms, motion, system.memory, step)
+        motion = motion_at_wall(k, at(memory.film_normal, k), system)
+        renew_shear(k, viscosity, size[0], -1.0, share, motion, memory, step)
 
 
 @inline

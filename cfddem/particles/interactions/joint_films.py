@@ -172,14 +172,25 @@ def list_due(place, end, system):
     return end + (1 if memory.film_due[np.int64(incident) ^ (np.int64(incident) >> 63)] else 0)
 
 
+@inline
+def mark_due(k, memory, step):
+    """Solve the film of edge k with the others if it is not weak at this step."""
+    memory.film_due[k] = memory.film_due[k] or step * memory.film_rate[k] >= WEAK
+
+
+@inline
+def list_all_due(i, system):
+    """List the edges of particle i whose films are solved with the others."""
+    end = system.edges.start[i]
+    for place in places_of(i, system.edges):
+        end = list_due(place, end, system)
+    system.particles.joint_end[i] = end
+
+
 @part
 def find_due(system, step):
     """Find the films that are solved together at a step that may differ from the last one."""
-    particles, edges, memory = system.particles, system.edges, system.memory
-    for k in prange(len(edges.first)):
-        memory.film_due[k] = memory.film_due[k] or step * memory.film_rate[k] >= WEAK
-    for i in prange(particles.owned):
-        end = edges.start[i]
-        for place in places_of(i, edges):
-            end = list_due(place, end, system)
-        particles.joint_end[i] = end
+    for k in prange(len(system.edges.first)):
+        mark_due(k, system.memory, step)
+    for i in prange(system.particles.owned):
+        list_all_due(i, system)

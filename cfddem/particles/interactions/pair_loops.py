@@ -88,8 +88,8 @@ def pair_film(n, system, step):
     gap, reduced_radius = distance - radii, radius[i] * radius[j] / radii
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
-    weight = particles.inverse_mass[i] + particles.inverse_mass[j]
-    renew_film(k, (separation, distance, gap), viscosity, reduced_radius, weight, 1.0, system, row, step)
+    size = (reduced_radius, particles.inverse_mass[i] + particles.inverse_mass[j])
+    renew_film(k, (separation, distance, gap), viscosity, size, 1.0, system, row, step)
     if SHEAR:
         asymmetry, arms, normal = (
             (radius[i] - radius[j]) / radii,
@@ -97,8 +97,8 @@ def pair_film(n, system, step):
             at(memory.film_normal, k),
         )
         velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
-        motion = slip_and_roll(velocity, at(particles.spin, i), at(particles.spin, j), normal, arms)
-        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, arms, motion, memory, step)
+        slip, roll = slip_and_roll(velocity, at(particles.spin, i), at(particles.spin, j), normal, arms)
+        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, (slip, roll, arms), memory, step)
 
 
 class PairLoop(NamedTuple):

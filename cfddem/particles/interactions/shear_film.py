@@ -102,22 +102,21 @@ def pair_arms(i, j, radius, gap):
 
 @inline
 def motion_at_wall(k, normal, system):
-    """Slip and roll of particle-wall edge k."""
+    """Slip and roll of particle-wall edge k, and the lever arms of slip."""
     particles, edges, walls = system.particles, system.edges, system.walls
     i, arms = edges.first[k], (particles.radius[edges.first[k]], 0.0)
     slip, _ = slip_and_roll(relative_velocity(k, system), at(particles.spin, i), NOTHING, normal, arms)
     about = minus(at(particles.spin, i), at(walls.spin, walls.wall[edges.second[k]]))
     _, roll = slip_and_roll(NOTHING, about, NOTHING, normal, arms)
-    return slip, roll
+    return slip, roll, arms
 
 
 @inline
-def renew_shear(k, viscosity, reduced_radius, asymmetry, share, arms, motion, memory, step):
+def renew_shear(k, viscosity, reduced_radius, asymmetry, share, motion, memory, step):
     """Resistance to sliding of the film of edge k, whose normal resistance is known, and what it does by itself.
 
     share   part of the film that belongs to this edge: below 1 where triangles of a mesh share one
-    arms    lever arms of slip
-    motion  slip and roll, see `slip_and_roll`
+    motion  slip and roll, see `slip_and_roll`, and the lever arms of slip
     step    since the last positions; 0 if these are the same [s]
     """
     # the smaller radius; at a wall, where the asymmetry is -1, that of the sphere
@@ -136,7 +135,7 @@ def renew_shear(k, viscosity, reduced_radius, asymmetry, share, arms, motion, me
     factor = -step
     blocks = (factor * resistance, factor * resistance * both, factor * resistance * rolling, factor * twist)
     push, roll = by_blocks(blocks, motion[0], motion[1], normal)
-    first, second = couples(push, roll, normal, arms)
+    first, second = couples(push, roll, normal, motion[2])
     put(memory.film_push, k, plus(at(memory.film_push, k), push))
     put_two(memory.shear_couples, k, first, second)
 
