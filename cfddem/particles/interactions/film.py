@@ -65,6 +65,7 @@ WEAK_FIELDS = (
     ),
     Field("film_rate", "1/s", role="memory", meaning="damping number of the film over the step"),
     Field("film_due", role="memory", dtype=bool, meaning="the film is solved with the others in the next step"),
+    Field("film_unmoved", role="memory", dtype=bool, meaning="of a film whose change of the gap is not known yet"),
     Field("faster", role="memory", dtype=bool, meaning="the bodies approach faster than before in this film"),
 )
 """What pairs remember of the films that act by themselves, and of which do."""
@@ -132,7 +133,7 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
     due = step * rate >= WEAK if moved else memory.film_due[k]
     owes = due and step * above * weight > STIFF
     faster = within and gap > minimum_gap and begin - end > step * memory.approach_speed[k]
-    memory.film_rate[k], memory.film_due[k] = rate, due
+    memory.film_rate[k], memory.film_due[k], memory.film_unmoved[k] = rate, due, not moved
     memory.faster[k] = faster if moved else memory.faster[k]
     memory.film_owed[k] = (impulse if owes else 0.0) if moved else memory.film_owed[k]
     put(memory.film_push, k, times(0.0 if owes else impulse, normal))

@@ -10,7 +10,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.film import WEAK, WEAK_FIELDS, record_approach
+from cfddem.particles.interactions.film import LEAP, WEAK, WEAK_FIELDS, record_approach
 from cfddem.particles.interactions.kinematics import (
     pair_mass_and_radius,
     pair_row,
@@ -173,9 +173,14 @@ def list_due(place, end, system):
 
 
 @inline
-def mark_due(k, memory, step):
+def mark_due(k, system, step):
     """Solve the film of edge k with the others if it is not weak at this step."""
-    memory.film_due[k] = memory.film_due[k] or step * memory.film_rate[k] >= WEAK
+    memory = system.memory
+    leaps, gap = False, memory.film_gap[k]
+    if memory.film_unmoved[k] and memory.film_rate[k] > 0.0:
+        speed = dot(relative_velocity(k, system), at(memory.film_normal, k))
+        leaps = gap > memory.minimum_gap[k] and abs(step * speed) > LEAP * gap
+    memory.film_due[k] = memory.film_due[k] or leaps or step * memory.film_rate[k] >= WEAK
 
 
 @inline
@@ -191,6 +196,6 @@ def list_all_due(i, system):
 def find_due(system, step):
     """Find the films that are solved together at a step that may differ from the last one."""
     for k in prange(len(system.edges.first)):
-        mark_due(k, system.memory, step)
+        mark_due(k, system, step)
     for i in prange(system.particles.owned):
         list_all_due(i, system)
