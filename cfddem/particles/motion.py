@@ -6,10 +6,11 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.joint_films import list_due
-from cfddem.particles.interactions.shear_film import two
 from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FILM, ROLLING, SHEAR
 from cfddem.particles.pair_graph import edge_role, places_of
-from cfddem.particles.vectors import NOTHING, at, dot, either, minus, plus, put, times
+from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
+
+_0, _1, _2 = np.uint64(0), np.uint64(1), np.uint64(2)
 
 
 @inline
@@ -27,8 +28,7 @@ def gather_forces(i, system, near):
             end = list_due(place, end, system)
             impulse = plus(impulse, times(sign, at(memory.film_push, k)))
         if SHEAR:
-            first, second = two(memory.shear_couples, k)
-            turn = plus(turn, either(sign > 0.0, first, second))
+            turn = plus(turn, at(memory.shear_couples, _2 * k + (_0 if sign > 0.0 else _1)))
         if BRIDGE:  # zero without a bridge, which costs less than to look
             load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))

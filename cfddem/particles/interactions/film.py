@@ -135,7 +135,8 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
     faster = within and gap > minimum_gap and begin - end > step * memory.approach_speed[k]
     memory.film_rate[k], memory.film_due[k], memory.film_unmoved[k] = rate, due, not moved
     memory.faster[k] = faster if moved else memory.faster[k]
-    memory.film_owed[k] = (impulse if owes else 0.0) if moved else memory.film_owed[k]
+    if due and moved:
+        memory.film_owed[k] = impulse if owes else 0.0
     put(memory.film_push, k, times(0.0 if owes else impulse, normal))
     if COUNT_FILM:
         memory.outside[k] += film_outside(at_least(film)) if within and moved else 0
@@ -156,8 +157,9 @@ def renew_film(k, between, viscosity, size, share, system, row, step):
     reduced_radius, weight = size
     then = (memory.film_gap[k], memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k])
     resistance, approach_speed, minimum_gap = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
-    memory.resistance[k], memory.approach_speed[k] = share * resistance, approach_speed
-    memory.minimum_gap[k] = minimum_gap
+    memory.resistance[k] = share * resistance
+    if minimum_gap != then[3] or approach_speed != then[2]:
+        memory.approach_speed[k], memory.minimum_gap[k] = approach_speed, minimum_gap
     normal = times(1.0 / distance, separation)
     if DRIFTING:
         film = FilmState(gap, viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)

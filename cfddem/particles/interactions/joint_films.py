@@ -180,7 +180,8 @@ def mark_due(k, system, step):
     if memory.film_unmoved[k] and memory.film_rate[k] > 0.0:
         speed = dot(relative_velocity(k, system), at(memory.film_normal, k))
         leaps = gap > memory.minimum_gap[k] and abs(step * speed) > LEAP * gap
-    memory.film_due[k] = memory.film_due[k] or leaps or step * memory.film_rate[k] >= WEAK
+    if not memory.film_due[k] and (leaps or step * memory.film_rate[k] >= WEAK):
+        memory.film_due[k], memory.film_owed[k] = True, 0.0
 
 
 @inline
