@@ -65,6 +65,7 @@ WEAK_FIELDS = (
     ),
     Field("film_rate", "1/s", role="memory", meaning="damping number of the film over the step"),
     Field("film_due", role="memory", dtype=bool, meaning="the film is solved with the others in the next step"),
+    Field("film_solved", role="memory", dtype=bool, meaning="the film was solved with the others in the last step"),
     Field("film_unmoved", role="memory", dtype=bool, meaning="of a film whose change of the gap is not known yet"),
     Field("faster", role="memory", dtype=bool, meaning="the bodies approach faster than before in this film"),
 )
@@ -123,7 +124,7 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
     middle = 0.5 * (max(begin, minimum_gap) + max(end, minimum_gap))
     above = film_resistance(at_gap(film, middle))
     taken = below * (high - low) + above * ((end - high) - (begin - low))
-    impulse = -share * taken if moved and weight > 0.0 and memory.joint_row[k] == 0 else 0.0
+    impulse = -share * taken if moved and weight > 0.0 and not memory.film_solved[k] else 0.0
     # the lever is 0 for solids that overlap, and 1 above the minimum gap
     change = gap - before if moved else 0.0
     lever = min(max(gap, gap + change, 0.0) / minimum_gap, 1.0)

@@ -176,7 +176,7 @@ def spread(system, direction):
         total, couple = NOTHING, NOTHING
         for place in range(edges.start[i], particles.joint_end[i]):
             k, sign = edge_role(memory.joint_incident[place])
-            e = memory.joint_row[k] - 1
+            e = memory.joint_row[k]
             normal = at(memory.joint_normal, e)
             total = plus(total, times(sign * impulse[e], normal))
             if SHEAR:

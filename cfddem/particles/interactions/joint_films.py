@@ -25,7 +25,7 @@ from cfddem.particles.vectors import NOTHING, across, at, dot, put, times
 FIELDS = (
     *WEAK_FIELDS,
     Field("impulse", "N s", 3, "memory", meaning="impulse of a film solved with others in the last step, on the first"),
-    Field("joint_row", role="memory", dtype=np.int32, meaning="its place among those solved together, from 1; else 0"),
+    Field("joint_row", role="scratch", dtype=np.int32, meaning="place of the film among those solved together"),
     Field("joint_edge", role="scratch", dtype=np.int32, meaning="pair of each film solved together"),
     Field("joint_first", role="scratch", dtype=np.int32, meaning="its first body"),
     Field("joint_second", role="scratch", dtype=np.int32, meaning="its second body; below 0 at a wall"),
@@ -122,18 +122,19 @@ def note_approach(k, system):
 @inline
 def enter(k, row, memory):
     """List the film of edge k at a row; one that has acted by itself so far begins with the impulse that it owes."""
-    if memory.joint_row[k] == 0:
+    if not memory.film_solved[k]:
+        memory.film_solved[k] = True
         put(memory.impulse, k, times(memory.film_owed[k], at(memory.film_normal, k)))
     memory.joint_edge[row] = k
-    memory.joint_row[k] = row + 1
+    memory.joint_row[k] = row
 
 
 @inline
 def stay_apart(k, system):
     """The film of edge k is not solved with the others, perhaps not any more, and may approach faster than ever."""
     memory = system.memory
-    if memory.joint_row[k] > 0:
-        memory.joint_row[k] = 0
+    if memory.film_solved[k]:
+        memory.film_solved[k] = False
         put(memory.impulse, k, NOTHING)
         if SHEAR:
             put_impulses(k, memory.shear_impulse, NOTHING, NOTHING, NOTHING)
@@ -159,7 +160,7 @@ def collect(system):
             if memory.film_due[k]:
                 enter(k, row, memory)
                 row += 1
-            elif memory.joint_row[k] > 0 or memory.faster[k]:
+            elif memory.film_solved[k] or memory.faster[k]:
                 stay_apart(k, system)
     return counts[CHUNKS]
 

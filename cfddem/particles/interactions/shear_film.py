@@ -129,7 +129,7 @@ def renew_shear(k, viscosity, reduced_radius, asymmetry, share, motion, memory, 
     resistance = resistance if memory.resistance[k] > 0.0 else 0.0
     memory.shear_resistance[k] = resistance
     # one that begins, or has been solved with the others, does nothing by itself
-    resistance = resistance if before > 0.0 and memory.joint_row[k] == 0 else 0.0
+    resistance = resistance if before > 0.0 and not memory.film_solved[k] else 0.0
     both, rolling = sliding_ratios(reduced_radius, asymmetry)
     twist = twist_strength(gap, minimum_gap, resistance, viscosity, reduced_radius, asymmetry, share)
     factor = -step
