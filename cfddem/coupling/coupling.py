@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.coupling.fluid_step_limits import COURANT, crossing_rate
 from cfddem.coupling.force_list import ForceList
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler
@@ -27,12 +26,6 @@ from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
-
-SAME_STEP = 1e-6
-"""Fluid steps that differ by less than this part are equal."""
-
-STEP_RELAXATION = 0.01
-"""Weight of the present step in the running mean of the fluid step."""
 
 
 class Coupling:
@@ -57,7 +50,6 @@ class Coupling:
         self.momentum = Transfer(
             kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
         )
-        self._mean_step = 0.0
         declared = self.momentum.declare(particles)
         self.forces = ForceList(particles, forces)
         self._stored = (*declared, *(field.name for force in self.forces for field in force.fields))
@@ -111,11 +103,11 @@ class Coupling:
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next step depends on beside fluid, particles and forces."""
-        return {"last_step": self.momentum.last_step, "mean_step": self._mean_step}
+        return {"last_step": self.momentum.last_step}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
-        self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
+        self.momentum.last_step = float(state["last_step"])
 
     # ------------------------------------------------------------ terms
 
@@ -123,25 +115,20 @@ class Coupling:
         """Terms of a step with the flow around every particle, before any force has acted."""
         solid = self.kernel.solid_fraction(cell_map)
         terms = CouplingTerms(particles, step, self.momentum.last_step, cell_map, solid)
-        terms.flow = self.flow.sample(particles, cell_map, solid)
+        # forces act over the step: they see the mean of the solid fractions at its beginning and its end
+        first = self.momentum.last_step == 0.0
+        mean = solid if first else 0.5 * (solid + (1.0 - self.fluid.voidage))
+        terms.flow = self.flow.sample(particles, cell_map, mean)
         return terms
 
     def _mapped_position(self, particles: Particles, step: float) -> Array:
-        r"""Positions from which the voidage is computed, :math:`x + (h - \bar h)\,v` (N, 3) [m].
+        """Positions from which the voidage at the end of the step is computed, x + h v (N, 3) [m].
 
-        h is the length of this step and :math:`\bar h` a running mean of it, which follows h slowly. Over a step the
-        voidage moves from where the particles were mapped in the step before to where they are mapped now. The
-        particles took the last step, h_l, between the two; the fluid takes h. The shift makes both intervals h. Without
-        it particles would displace the fluid at h_l/h of their rate, a pressure shock in a liquid.
+        Over a step the voidage moves from where the particles were mapped in the step before, which is near where they
+        are now, to where they are mapped now. So they displace the fluid at the rate at which they move, in this step
+        and also where the length of the step changes. With x the fluid would follow a step later, and feed waves.
         """
-        fluid, mean = self.fluid, self._mean_step or step
-        self._mean_step = mean
-        if abs(step - mean) < SAME_STEP * step:
-            return particles.position
-        crossing = crossing_rate(particles.velocity, fluid.grid.spacing, fluid.communicator)
-        mean = min(mean, step + COURANT / max(crossing, 1e-300))  # particles are not moved by more than a cell
-        self._mean_step = mean + STEP_RELAXATION * (step - mean)
-        return self.kernel.wrapped(particles.position + (step - mean) * particles.velocity)
+        return self.kernel.wrapped(particles.position + step * particles.velocity)
 
     def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
