@@ -251,6 +251,25 @@ def test_rounding_of_the_time_does_not_change_the_step(late: float) -> None:
     assert [step for step, _ in lengths] == pytest.approx([1e-3] * 5, rel=2e-6)
 
 
+def test_the_voidage_is_that_of_the_particles_at_the_end_of_the_step_to_second_order() -> None:
+    """Spheres that begin to sink: half the fluid step, a quarter of the error."""
+    errors = []
+    for step in (4e-4, 2e-4):
+        run = Simulation(
+            suspension(**{"laws.gravity": (0.0, 0.0, -9.81), "laws.lubrication": "none", "run.fluid_step": step})
+        )
+        kernel, fluid = run.coupling.kernel, run.fluid
+        while run.time < 3.9e-3:
+            begun = fluid.voidage.copy()
+            run.step()
+        spheres = run.particle_solver.particles
+        there = kernel.solid_fraction(kernel.map_particles(spheres.position, spheres.radius))
+        moved = np.abs(1.0 - begun - there).max()
+        errors.append(np.abs(1.0 - fluid.voidage - there).max())
+        assert errors[-1] < 0.1 * moved
+    assert errors[1] < 0.3 * errors[0]
+
+
 def test_a_change_of_the_step_is_no_shock_of_pressure() -> None:
     """Particles that sink displace the liquid at their own rate, however the length of the fluid's step changes."""
     case = suspension(

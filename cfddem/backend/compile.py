@@ -46,7 +46,7 @@ from numba.core import event
 from numba.core.cpu import CPUTargetOptions
 from numba.core.options import TargetOptions
 from numba.core.types import none as none_type
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.backend.errors import InputError
@@ -137,8 +137,8 @@ def part(function: Callable[..., Any]) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def kept_whole(context):  # type: ignore[no-untyped-def]
-    """Within a loop: keep it out of its caller, where the compiler can no longer tell its arrays apart."""
+def _not_inlined(context):  # type: ignore[no-untyped-def]
+    """See `kept_whole`."""
 
     def code(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         if "alwaysinline" not in builder.function.attributes:  # as in loops for all threads
@@ -146,6 +146,15 @@ def kept_whole(context):  # type: ignore[no-untyped-def]
         return context.get_dummy_value()
 
     return none_type(), code
+
+
+def kept_whole() -> None:
+    """Within a loop: keep it out of its caller, where the compiler can no longer tell its arrays apart."""
+
+
+@overload(kept_whole)
+def _kept_whole() -> Any:
+    return lambda: _not_inlined()
 
 
 def vector_part(function: Callable[..., Any]) -> Any:

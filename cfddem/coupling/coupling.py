@@ -22,10 +22,24 @@ from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler
 from cfddem.coupling.terms import CouplingTerms, inertia, total
 from cfddem.coupling.transfer import Transfer
+from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
+
+SAME_STEP = 1e-6
+"""Fluid steps that differ by less than this part are equal."""
+
+STEP_RELAXATION = 0.01
+"""Weight of the present step in the running mean of the fluid step."""
+
+MAPPED = Field(
+    "mapped_position", "m", 3, "memory", lambda table, rows: table.position[rows],
+    meaning="position from which the voidage was computed in the last fluid step",
+)  # fmt: skip
+
+RESPONSE = Field("response_rate", "1/s", role="memory", meaning="rate at which a particle took up the fluid's velocity")
 
 
 class Coupling:
@@ -50,7 +64,10 @@ class Coupling:
         self.momentum = Transfer(
             kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
         )
-        declared = self.momentum.declare(particles)
+        self._mean_step = 0.0
+        for field in (MAPPED, RESPONSE):
+            particles.declare(field)
+        declared = [MAPPED.name, RESPONSE.name, *self.momentum.declare(particles)]
         self.forces = ForceList(particles, forces)
         self._stored = (*declared, *(field.name for force in self.forces for field in force.fields))
         if self.sets_inertia:
@@ -90,11 +107,12 @@ class Coupling:
         """
         terms.receive(self.momentum.apply(particles, terms.cell_map, terms.implicit, *self.fluid.drag_response()))
         self.forces.finish(terms)
+        particles.mapped_position = terms.cell_map.position
+        particles.response_rate = terms.resistance / terms.inertia
 
     def solid_fraction(self, particles: Particles) -> Array:
         """Solid fraction of the cells by the places from which the last voidage was computed (nz, ny, nx) [-]."""
-        place = particles.mapped_position if "mapped_position" in particles else particles.position
-        return self.kernel.solid_fraction(self.kernel.map_particles(place, particles.radius))
+        return self.kernel.solid_fraction(self.kernel.map_particles(particles.mapped_position, particles.radius))
 
     @property
     def outside(self) -> dict[str, int]:
@@ -103,11 +121,11 @@ class Coupling:
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next step depends on beside fluid, particles and forces."""
-        return {"last_step": self.momentum.last_step}
+        return {"last_step": self.momentum.last_step, "mean_step": self._mean_step}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
-        self.momentum.last_step = float(state["last_step"])
+        self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
 
     # ------------------------------------------------------------ terms
 
@@ -118,17 +136,31 @@ class Coupling:
         # forces act over the step: they see the mean of the solid fractions at its beginning and its end
         first = self.momentum.last_step == 0.0
         mean = solid if first else 0.5 * (solid + (1.0 - self.fluid.voidage))
-        terms.flow = self.flow.sample(particles, cell_map, mean)
+        terms.flow = self.flow.sample(particles, cell_map, solid, mean)
         return terms
 
     def _mapped_position(self, particles: Particles, step: float) -> Array:
-        """Positions from which the voidage at the end of the step is computed, x + h v (N, 3) [m].
+        r"""Positions from which the voidage at the end of the step is computed (N, 3) [m].
 
-        Over a step the voidage moves from where the particles were mapped in the step before, which is near where they
-        are now, to where they are mapped now. So they displace the fluid at the rate at which they move, in this step
-        and also where the length of the step changes. With x the fluid would follow a step later, and feed waves.
+        .. math:: x + \left(h - (1-w)\,\bar h\right) v,\qquad w = 1/(1 + \bar h/\tau)
+
+        with the time :math:`\tau` in which the fluid takes a particle along, and a running mean :math:`\bar h` of the
+        step, which follows h slowly. Over a step the voidage moves from where the particles were mapped in the step
+        before to where they are mapped now. Heavy particles (w = 1) keep their velocity: they displace the fluid while
+        they move. With x the fluid would follow a step later, and feed waves. Light particles follow the fluid within
+        the step. To predict their motion from their velocity would be unstable above a solid fraction of 1/3; they are
+        mapped where they are, and shifted where h changes, so that they displace the fluid at their rate. Each step
+        makes up for what the last one has missed by the acceleration of a particle; a shorter one for a part of it, as
+        its square, or this would be a shock of pressure.
         """
-        return self.kernel.wrapped(particles.position + step * particles.velocity)
+        mean, last = self._mean_step or step, self.momentum.last_step
+        light = (1.0 - 1.0 / (1.0 + mean * particles.response_rate))[:, None]
+        ahead = (step - light * mean) * particles.velocity
+        if last > step * (1.0 + SAME_STEP):
+            missed = self.kernel.nearest(particles.mapped_position - particles.position)
+            ahead += (1.0 - (step / last) ** 2) * (missed + light * mean * particles.velocity)
+        self._mean_step = mean + STEP_RELAXATION * (step - mean)
+        return self.kernel.wrapped(particles.position + ahead)
 
     def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""

@@ -128,6 +128,12 @@ class FilterKernel:
         inside: Array = position - self._periodic * size * np.floor((position - origin) / size)
         return inside
 
+    def nearest(self, way: Array) -> Array:
+        """The shortest of the ways that are equal along periodic directions (N, 3) [m]."""
+        size = np.array(self.grid.whole.size)
+        shortest: Array = way - self._periodic * size * np.round(way / size)
+        return shortest
+
     def stencil(self, position: Array, radius: Array) -> Stencil:
         """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
         shape = len(position), len(self._offsets)

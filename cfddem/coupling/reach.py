@@ -17,7 +17,7 @@ from cfddem.fluid.grid import Array, Grid
 
 LAYERS = THINNEST
 """Layers of ghosts beyond a border. A particle may lie half a cell less beyond its rank's cells: it moves until the
-next neighbour list, and is mapped where it was two fluid steps ago."""
+next neighbour list, and is mapped where it was two fluid steps ago, or where it will be after the next one."""
 
 
 class Homes(NamedTuple):

@@ -47,12 +47,18 @@ class FlowSampler:
     def __init__(self, fluid: FluidSolver, kernel: FilterKernel, own: Own = nothing_of_its_own, sizes: bool = False):
         self.fluid, self.kernel, self.own, self.sizes = fluid, kernel, own, sizes
 
-    def sample(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> SampledFlow:
+    def sample(
+        self, particles: Particles, cell_map: ParticleCellMap, solid: Array, mean: Array | None = None
+    ) -> SampledFlow:
         """The flow around every particle now.
 
-        solid  solid fraction of the cells (nz, ny, nx)
+        solid  solid fraction of the cells, of the positions in `cell_map` (nz, ny, nx)
+        mean   the same in the middle of the step, which particles see; `solid` if None
         """
-        gathered, (modes, own) = self._gathered(cell_map, solid), self.own(particles, cell_map)
+        gathered, (modes, own) = (
+            self._gathered(cell_map, solid if mean is None else mean),
+            self.own(particles, cell_map),
+        )
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
         _sample(

@@ -12,12 +12,9 @@ from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 
-MAPPED, MAPPED_EARLIER = (
-    Field(
-        name, "m", 3, "memory", lambda table, rows: table.position[rows],
-        meaning=f"position from which the voidage was computed {when}",
-    )
-    for name, when in (("mapped_position", "in the last fluid step"), ("earlier_mapped_position", "in the step before"))
+MAPPED_EARLIER = Field(
+    "earlier_mapped_position", "m", 3, "memory", lambda table, rows: table.position[rows],
+    meaning="position from which the voidage was computed in the step before the last",
 )  # fmt: skip
 """The voidage that the fluid sees is a mean over three steps; so is the pressure gradient that a particle sees."""
 
@@ -29,7 +26,7 @@ class PressureForce(FluidForce):
     kernel  gathers the pressure gradient
     """
 
-    name, lines, fields = "pressure", ("pressure",), (MAPPED, MAPPED_EARLIER)
+    name, lines, fields = "pressure", ("pressure",), (MAPPED_EARLIER,)
 
     def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
         self.fluid, self.kernel = fluid, kernel
@@ -49,7 +46,9 @@ class PressureForce(FluidForce):
         gradient = self.kernel.smooth(self.fluid.cell_pressure_gradient())
         if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
             self._known = []  # rows have changed
-        last, earlier = (self._stencil(particles, n, field.name) for n, field in enumerate((MAPPED, MAPPED_EARLIER)))
+        last, earlier = (
+            self._stencil(particles, n, name) for n, name in enumerate(("mapped_position", MAPPED_EARLIER.name))
+        )
         force: Array = self.kernel.gather_over_steps(earlier, last, cell_map.stencil, gradient)
         for along in force.T:
             along *= -cell_map.volume
@@ -62,8 +61,7 @@ class PressureForce(FluidForce):
         return self.kernel.stencil(particles[name], particles.radius)
 
     def end(self, terms: CouplingTerms) -> None:
-        """Store the places of this step for the next two."""
+        """Store the places of the last step for the next one; the coupling stores those of this step."""
         particles, cell_map = terms.particles, terms.cell_map
         particles.earlier_mapped_position = particles.mapped_position
-        particles.mapped_position = cell_map.position
         self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()

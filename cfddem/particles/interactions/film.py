@@ -156,10 +156,11 @@ def renew_film(k, between, viscosity, size, share, system, row, step):
     memory, cutoff_ratio = system.memory, system.parameters.cutoff_ratio
     separation, distance, gap = between
     reduced_radius, weight = size
-    then = (memory.film_gap[k], memory.resistance[k], memory.approach_speed[k], memory.minimum_gap[k])
+    fastest, least = memory.approach_speed[k], memory.minimum_gap[k]
+    then = (memory.film_gap[k], memory.resistance[k], fastest, least)
     resistance, approach_speed, minimum_gap = update_film(gap, viscosity, reduced_radius, then, row, cutoff_ratio)
     memory.resistance[k] = share * resistance
-    if minimum_gap != then[3] or approach_speed != then[2]:
+    if minimum_gap != least or approach_speed != fastest:
         memory.approach_speed[k], memory.minimum_gap[k] = approach_speed, minimum_gap
     normal = times(1.0 / distance, separation)
     if DRIFTING:
