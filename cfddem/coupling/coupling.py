@@ -142,7 +142,7 @@ class Coupling:
     def _mapped_position(self, particles: Particles, step: float) -> Array:
         r"""Positions from which the voidage at the end of the step is computed (N, 3) [m].
 
-        .. math:: x + \left(h - (1-w)\,\bar h\right) v,\qquad w = 1/(1 + \bar h/\tau)
+        .. math:: x + \left(h - (1-w)\,\bar h\right) v,\qquad w = 1/(1 + \bar h^2/\tau^2)
 
         with the time :math:`\tau` in which the fluid takes a particle along, and a running mean :math:`\bar h` of the
         step, which follows h slowly. Over a step the voidage moves from where the particles were mapped in the step
@@ -154,7 +154,7 @@ class Coupling:
         its square, or this would be a shock of pressure.
         """
         mean, last = self._mean_step or step, self.momentum.last_step
-        light = (1.0 - 1.0 / (1.0 + mean * particles.response_rate))[:, None]
+        light = (1.0 - 1.0 / (1.0 + (mean * particles.response_rate) ** 2))[:, None]
         ahead = (step - light * mean) * particles.velocity
         if last > step * (1.0 + SAME_STEP):
             missed = self.kernel.nearest(particles.mapped_position - particles.position)
