@@ -30,8 +30,8 @@ class AgitationFactors(NamedTuple):
 class CaseLaws(Checked):
     """Physical models and numerical schemes."""
 
-    drag: str | Callable[..., float] | None = Field(
-        "di_felice", description="drag law: none, a name from `cfddem explain`, or a function"
+    drag: str | Callable[..., float] = Field(
+        "di_felice", description="drag law: none (no drag), a name from `cfddem explain`, or a function"
     )
     model: Literal["A", "B"] = Field(
         "A", description="model A: pressure gradient on both phases; model B: on the fluid alone"
@@ -105,6 +105,12 @@ class CaseLaws(Checked):
     )
     convection: Literal["limited", "central"] = Field("limited", description="convection scheme of the fluid")
     gravity: Point = Field((0.0, 0.0, -9.81), description="gravitational acceleration g [m/s2]")
+
+    @field_validator("drag", mode="before")
+    @classmethod
+    def _none_is_a_word(cls, value: Any) -> Any:
+        """None means no drag, too: as a word, because a case file has no null and would fall back to the default."""
+        return "none" if value is None else value
 
     @field_validator("drag", "minimum_gap", "lubrication", "agitation")
     @classmethod
@@ -187,7 +193,7 @@ class CaseLaws(Checked):
     def drag_law(self) -> Law | None:
         """Drag law with its range and reference; None without drag."""
         drag = self.drag
-        return None if drag is None or drag in (*BUILT_IN["drag"], *self.missing.values()) else chosen("drag", drag)
+        return None if drag in (*BUILT_IN["drag"], *self.missing.values()) else chosen("drag", drag)
 
     @property
     def pair_laws(self) -> dict[str, Law]:
