@@ -161,7 +161,7 @@ def test_functions_named_on_pages_exist(page: Path) -> None:
 
 @pytest.mark.parametrize(
     "page",
-    [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "scenarios").rglob("README.md"))],
+    [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "scenarios").rglob("README.md"))],
     ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_links_in_the_repository_exist(page: Path) -> None:
