@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 HOME = Path(__file__).parents[1]
-PACKAGES = tomllib.loads((HOME / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
+PACKAGES = tomllib.loads((HOME / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]["wheel"]
 
 SCRIPT = """from pathlib import Path
 from cfddem import Case, open_run
@@ -31,13 +31,13 @@ def test_every_package_of_the_wheel_is_marked_as_typed() -> None:
     assert set(PACKAGES) == {"packages"}, "no rule leaves files out"
     for name in PACKAGES["packages"]:
         assert (HOME / name / "py.typed").read_bytes() == b""
-    assert not {"py.typed", "*.typed"} & set((HOME / ".gitignore").read_text().split())
+    assert not {"py.typed", "*.typed"} & set((HOME / ".gitignore").read_text(encoding="utf-8").split())
 
 
 def test_mypy_accepts_a_script_of_a_user_and_finds_a_wrong_argument_in_it(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
-    (tmp_path / "script.py").write_text(SCRIPT)
-    (tmp_path / "wrong.py").write_text(SCRIPT.replace("10.0", '"ten"'))
+    (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
+    (tmp_path / "wrong.py").write_text(SCRIPT.replace("10.0", '"ten"'), encoding="utf-8")
     mypy = [sys.executable, "-P", "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache")]
     checked = subprocess.run(
         [*mypy, "script.py", "wrong.py"],
