@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.optional import library
 from cfddem.io.files import require_no_links
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData, open_run
@@ -41,12 +41,12 @@ def export(
         if not -count <= each < count:
             raise InputError("snapshot", each, f"from 0 to {count - 1}, or -1 for the last")
     places = [each % count for each in places]
-    library = _library({"vtu": "meshio", "csv": "pandas", "netcdf": "xarray"}[kind])
+    package = library({"vtu": "meshio", "csv": "pandas", "netcdf": "xarray"}[kind], "export", "export")
     if output is None:
         require_no_links(Path(), [home.name])
     home.mkdir(parents=True, exist_ok=True)
     require_no_links(home)
-    return {"vtu": _vtu, "csv": _csv, "netcdf": _netcdf}[kind](run, home, places, library)
+    return {"vtu": _vtu, "csv": _csv, "netcdf": _netcdf}[kind](run, home, places, package)
 
 
 def _vtu(run: RunData, home: Path, places: list[int], meshio: Any) -> list[Path]:
@@ -79,7 +79,7 @@ def _csv(run: RunData, home: Path, places: list[int], pandas: Any) -> list[Path]
 
 
 def _netcdf(run: RunData, home: Path, places: list[int], xarray: Any) -> list[Path]:
-    _library("h5netcdf")
+    library("h5netcdf", "export", "export")
     files = []
 
     def write(name: str, variables: dict[str, Any], coordinates: dict[str, Any]) -> None:
@@ -88,18 +88,9 @@ def _netcdf(run: RunData, home: Path, places: list[int], xarray: Any) -> list[Pa
             files[-1], engine="h5netcdf"
         )
 
-    times = ("time", run.times[places], {"units": "s"})
     if run.grid is not None:
-        names = ("time", "z", "y", "x", "component")
-        centres: dict[str, Any] = {
-            axis: (axis, x0 + h * (np.arange(n) + 0.5), {"units": "m"})
-            for axis, x0, h, n in zip("xyz", run.grid.origin, run.grid.spacing, run.grid.cells)
-        }
-        fields: dict[str, Any] = {}
-        for name in run.fluid_fields:
-            series = np.stack([run.fluid(name, place) for place in places])
-            fields[name] = (names[: series.ndim], series, {"units": run.unit(name)})
-        write("fluid.nc", fields, centres | {"time": times, "component": ["x", "y", "z"]})
+        files.append(home / "fluid.nc")
+        run.dataset()[run.fluid_fields].isel(time=places).to_netcdf(files[-1], engine="h5netcdf")
     for place in places:
         particles = {
             name: (("particle", "component")[: each.ndim], each, {"units": run.unit(name)})
@@ -149,10 +140,3 @@ _AROUND = tuple(
     (slice(None), *each) for each in ((_FIRST, _FIRST), (_FIRST, _SECOND), (_SECOND, _SECOND), (_SECOND, _FIRST))
 )
 """Corners of a cell in a layer, counter-clockwise, as (y, x) slices."""
-
-
-def _library(name: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError:
-        raise InputError("export", None, f"used with {name} installed", "`pip install 'cfddem[export]'`") from None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +18,16 @@ import numpy as np
 
 from cfddem.backend import html
 from cfddem.backend.errors import InputError, RunFailed, nearest
+from cfddem.backend.optional import library
 from cfddem.case.toml_text import read_text
 from cfddem.io.damage import ArrayFile, opened, require_cells, require_columns, require_particles
 from cfddem.io.folder import AVERAGES_FROM, NUMBERED, read_about, read_columns, read_snapshot_header
-from cfddem.io.index import GridBox, Snapshot, field_name, listed
-from cfddem.io.quantities import Quantity, from_json, shown_unit
+from cfddem.io.index import POINTS, GridBox, Snapshot, field_name, listed
+from cfddem.io.quantities import Quantity, declared, from_json, shown_unit
 
 if TYPE_CHECKING:
     import pyvista
+    import xarray
 
 _log = logging.getLogger("cfddem")
 
@@ -241,7 +243,73 @@ class RunData:
             blocks["particles"] = points
         return blocks
 
+    def dataset(self) -> xarray.Dataset:
+        """The run as an xarray Dataset with units; field values are read when they are asked for.
+
+        Fluid fields have the dimensions time, z, y, x, with the centres of the cells [m] as coordinates, and vectors
+        a last one, component. A column of the history is `history_NAME`, with its own times `history_time`. A
+        particle field is `particle_NAME`, with the dimensions time and particle and the coordinate `id`. Particles
+        are left out unless all snapshots hold the same ones.
+
+        errors  InputError if xarray is not installed
+        """
+        xarray = library("xarray", "dataset", "data")
+        coordinates: dict[str, Any] = {"time": ("time", self.times, {"units": "s"})}
+        fields: dict[str, Any] = {}
+        if self.grid is not None and self.fluid_fields:
+            fields |= self._series("fluid", "", ("z", "y", "x"))
+            for axis, x0, h, n in zip("xyz", self.grid.origin, self.grid.spacing, self.grid.cells):
+                coordinates[axis] = axis, x0 + h * (np.arange(n) + 0.5), {"units": "m"}
+        ids = self._common_ids()
+        if ids is not None:
+            fields |= self._series("particles", "particle_", ("particle",))
+            fields.pop("particle_id")
+            coordinates["id"] = "particle", ids, {"units": "1"}
+        if any("component" in dimensions for dimensions, *_ in fields.values()):
+            coordinates["component"] = ["x", "y", "z"]
+        for name, column in self.history.items():
+            block = coordinates if name == "time" else fields
+            block[f"history_{name}"] = "history_time", column, self._labels("history", name)
+        return xarray.Dataset(fields, coordinates, {"run": self.folder.resolve().name})
+
     # ------------------------------------------------------------ details
+
+    def _series(self, block: str, prefix: str, axes: tuple[str, ...]) -> dict[str, Any]:
+        """Variables for xarray of the fields of a block: prefix and name -> dimensions, lazy values, attributes."""
+        from cfddem.io.lazy import blank, series
+
+        read = {"fluid": self.fluid, "particles": self._particle_field}[block]
+        variables: dict[str, Any] = {}
+        with self._opened(-1) as data:
+            for key, each in data.file[block].items():
+                name = field_name(key)
+                data.require_own(each)
+                form = blank(each.dtype, each.shape[1:] if block == "fluid" else each.shape)
+                if self.grid is not None and block == "fluid":
+                    require_cells(form, name, self.grid.shape)
+                last = () if form.ndim == len(axes) else ("component",)
+                values = series(partial(read, name), len(self.snapshots), form)
+                variables[prefix + name] = ("time", *axes, *last), values, self._labels(block, name)
+        return variables
+
+    def _labels(self, block: str, name: str) -> dict[str, str]:
+        quantity = declared(self.quantities, block, name)
+        return {"units": quantity.unit, "long_name": quantity.meaning}
+
+    def _particle_field(self, name: str, snapshot: int) -> np.ndarray:
+        """One particle field of one snapshot."""
+        with self._opened(snapshot) as data:
+            values = data.read(data.file["particles"][POINTS if name == "position" else name])
+            require_particles({name: values})
+            return values
+
+    def _common_ids(self) -> np.ndarray | None:
+        """The ids of the particles if all snapshots hold the same ones, else None."""
+        if "id" not in self.particle_fields or len({each.particles for each in self.snapshots}) != 1:
+            return None
+        ids = self._particle_field("id", -1)
+        same = (np.array_equal(ids, self._particle_field("id", place)) for place in range(len(self.snapshots) - 1))
+        return ids if all(same) else None
 
     def _find(self) -> tuple[list[Snapshot], list[str]]:
         """The snapshots in the folder, indexed or not, and the names of missing ones.
