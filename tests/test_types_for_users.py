@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 HOME = Path(__file__).parents[1]
-PACKAGES = tomllib.loads((HOME / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]["wheel"]
+PROJECT = tomllib.loads((HOME / "pyproject.toml").read_text(encoding="utf-8"))
+PACKAGES = PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]
 
 SCRIPT = """from pathlib import Path
 from cfddem import Case, open_run
