@@ -55,10 +55,8 @@ class FlowSampler:
         solid  solid fraction of the cells, of the positions in `cell_map` (nz, ny, nx)
         mean   the same in the middle of the step, which particles see; `solid` if None
         """
-        gathered, (modes, own) = (
-            self._gathered(cell_map, solid if mean is None else mean),
-            self.own(particles, cell_map),
-        )
+        gathered = self._gathered(cell_map, solid if mean is None else mean)
+        modes, own = self.own(particles, cell_map)
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
         _sample(
