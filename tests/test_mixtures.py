@@ -21,6 +21,7 @@ from cfddem.preflight.mixture import net_downward_forces
 from cfddem.preflight.summary import preflight
 from cfddem.run.build import parts_of
 from cfddem.run.runner import Run
+from cfddem.run.simulation import Simulation
 from closures.drag_resolved import beetstra, beetstra_polydisperse
 
 
@@ -185,6 +186,18 @@ def test_drag_uses_the_diameter_over_the_local_sauter_mean() -> None:
         stokes = 3.0 * math.pi * 1e-3 * 2.0 * particles.radius[row]
         assert resistance[row] == pytest.approx(stokes * 0.7 * factor, rel=1e-12)
         assert not math.isclose(factor, beetstra(20.0, 0.7), rel_tol=0.05)
+
+
+def test_spheres_of_one_size_see_their_own_diameter_while_they_move() -> None:
+    """Both sums of the Sauter mean are of the same positions, though the voidage is the mean over the fluid step."""
+    run = Simulation(mixture(bed__species__pellets__diameter=1e-3, bed__species__pellets__spread=0.0))
+    assert run.coupling is not None and run.fluid is not None
+    run.step()
+    run.particles.velocity[:, 2] = 0.2
+    terms = run.coupling.prepare(run.particles, 1e-3)
+    assert np.abs(1.0 - run.fluid.voidage - terms.solid).max() > 1e-3  # they have moved
+    assert run.coupling.flow.sizes
+    assert np.abs(terms.flow.diameter_ratio - 1.0).max() < 1e-12
 
 
 def test_a_run_records_species_and_resumes_to_the_same_bits(tmp_path: Path) -> None:
