@@ -60,9 +60,7 @@ the mean to a thousandth."""
 
 WEAK_FIELDS = (
     Field("film_push", "N s", 3, "scratch", meaning="impulse of a film by itself in the last step, on the first body"),
-    Field(
-        "film_owed", "N s", role="memory", meaning="of a stiff one that begins: impulse that it gives with the others"
-    ),
+    Field("film_owed", "N s", role="memory", meaning="impulse that a stiff film gives with the others"),
     Field("film_rate", "1/s", role="memory", meaning="damping number of the film over the step"),
     Field("film_due", role="memory", dtype=bool, meaning="the film is solved with the others in the next step"),
     Field("film_solved", role="memory", dtype=bool, meaning="the film was solved with the others in the last step"),

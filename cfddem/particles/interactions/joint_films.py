@@ -34,12 +34,7 @@ FIELDS = (
     Field("joint_reduced_radius", "m", role="scratch", meaning="R*"),
     Field("joint_minimum_gap", "m", role="scratch", meaning="h_min"),
     Field(
-        "joint_incident",
-        "1",
-        2,
-        "scratch",
-        dtype=np.int32,
-        meaning="pairs of each particle whose films are solved together",
+        "joint_incident", "1", 2, "scratch", dtype=np.int32, meaning="of each particle, edges whose films are solved"
     ),
     Field("joint_normal", "1", 3, "scratch", meaning="direction from the second body to the first"),
     Field("joint_weight", "1/kg", role="scratch", meaning="sum of the inverse masses"),
@@ -49,12 +44,7 @@ FIELDS = (
     Field("joint_shift", "m/s", role="scratch", meaning="change of that rate since"),
     Field("joint_least", "kg/s", role="scratch", meaning="least resistance of the film"),
     Field("joint_compliance", "1/kg", role="scratch", meaning="1/(resistance times step)"),
-    Field(
-        "joint_debt",
-        "N s",
-        role="scratch",
-        meaning="impulse that a film has missed which was not solved in the last step",
-    ),
+    Field("joint_debt", "N s", role="scratch", meaning="impulse that a film owes for its way before the step"),
     Field("joint_impulse", "N s", role="scratch", meaning="normal impulse"),
     Field("joint_residual", "m/s", role="scratch", meaning="of the equation of the normal impulse"),
     Field("joint_direction", "N s", role="scratch", meaning="of conjugate gradients"),
