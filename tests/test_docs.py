@@ -264,7 +264,7 @@ def test_all_pages_are_in_the_navigation() -> None:
 def test_every_key_of_a_case_is_in_the_reference(monkeypatch: pytest.MonkeyPatch) -> None:
     from cfddem.case.bed import Bed, MixtureSpecies
     from cfddem.case.case_laws import CaseLaws
-    from cfddem.case.schema import CaseRun, Column
+    from cfddem.case.tables import CaseRun, Column
 
     monkeypatch.syspath_prepend(str(DOCS / "tools"))
     pytest.importorskip("griffe")

@@ -18,7 +18,6 @@ from cfddem.analysis.run_warnings import NOTE, STATE, last_value, warnings_of
 from cfddem.analysis.series import block_average, drift_of, stationarity
 from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import with_files_of
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
 from cfddem.preflight.summary import preflight
@@ -85,7 +84,8 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
 
 def case_of(run: RunData) -> Case:
     """The case of a run."""
-    return with_files_of(Case.from_text(run.case_text, str(run.folder / "case.toml"), finished=True), run.folder)
+    case = Case.from_text(run.case_text, str(run.folder / "case.toml"), finished=True)
+    return case.with_files_of(run.folder)
 
 
 def window_of(run: RunData, case: Case) -> tuple[float, float]:

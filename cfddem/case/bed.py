@@ -14,6 +14,7 @@ Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Point = tuple[float, float, float]
 Sizes = tuple[tuple[Positive, Annotated[float, Field(ge=0)]], ...]
+Size = tuple[NonNegative, NonNegative, NonNegative]
 Name = Annotated[str, Field(pattern=r"^\w[\w-]*$", max_length=24)]
 
 POURED_SOLID_FRACTION = 0.58
@@ -246,3 +247,32 @@ class Bed(Species):
     def fastest_inflow(self) -> float:
         """Highest superficial velocity over time through the floor or the jet, whichever is higher [m/s]."""
         return max(self.highest_inlet_velocity, 0.0 if self.jet is None else self.jet.velocity)
+
+
+class CaseFeed(Checked):
+    """A box in which particles appear at a constant rate."""
+
+    corner: Point = Field(description="lower corner of the box in which centres appear [m]")
+    size: Size = Field(description="edges of the box; an edge may be 0 [m]")
+    rate: Positive | None = Field(None, description="particles per second [1/s]")
+    mass_rate: Positive | None = Field(None, description="mass per second, instead of a rate [kg/s]")
+    species: str | None = Field(None, description="species of the bed that is fed; needed for a mixture")
+    velocity: Point = Field((0.0, 0.0, 0.0), description="velocity of particles that enter [m/s]")
+    begin: NonNegative = Field(0.0, description="time at which the feed begins [s]")
+    end: Positive | None = Field(None, description="time at which it ends; default: the end of the run [s]")
+
+    @model_validator(mode="after")
+    def _one_rate_and_a_span(self) -> CaseFeed:
+        if (self.rate is None) == (self.mass_rate is None):
+            found = "found none" if self.rate is None else "found both"
+            raise InputError("rate", self.rate, "given, or mass_rate, and only one of them", found)
+        if self.end is not None and self.end <= self.begin:
+            raise InputError("end", self.end, f"after the beginning, {self.begin:g} s")
+        return self
+
+
+class CaseOutlet(Checked):
+    """A box in which particles are removed and counted."""
+
+    corner: Point = Field(description="lower corner of the box; a particle leaves when its centre is inside [m]")
+    size: tuple[Positive, Positive, Positive] = Field(description="edges of the box [m]")

@@ -7,7 +7,8 @@ from functools import lru_cache, reduce
 
 import numpy as np
 
-from cfddem.case.schema import Case, Column
+from cfddem.case.schema import Case
+from cfddem.case.tables import Column
 from cfddem.case.wall_geometry import solid_part, stamp
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -17,10 +16,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import Positive
 from cfddem.case.data_table import Array, Column, read_table
 from cfddem.case.materials import Checked
-from cfddem.case.walls import kept, with_surfaces_of
-
-if TYPE_CHECKING:
-    from cfddem.case.schema import Case
+from cfddem.case.walls import kept
 
 COPIES = "measured"
 """Folder inside a run folder with copies of the measured data."""
@@ -133,14 +129,17 @@ def _value_columns(columns: Mapping[str, Column]) -> list[str]:
     return [each for each in columns if each not in ABSCISSAE and each != ERROR and not each.endswith(f"_{ERROR}")]
 
 
-def held(case: Case, velocities: Array) -> np.ndarray:
-    """Whether a case holds each of some inlet velocities, all the time or during a step of its table (n,) bool."""
-    inlet = case.bed.inlet_velocity
+def held(inlet: float | Sequence[tuple[float, float]], until: float, velocities: Array) -> np.ndarray:
+    """Whether a case holds each of some inlet velocities, all the time or during a step of its table (n,) bool.
+
+    inlet  velocity of the case [m/s]
+    until  end of the run [s]
+    """
     if isinstance(inlet, float):
         steps = [inlet]
     else:
         steps = [low for (_, low), (_, high) in pairwise(inlet) if math.isclose(low, high, rel_tol=HELD)]
-        steps += [velocity for time, velocity in inlet[-1:] if time < case.run.until]
+        steps += [velocity for time, velocity in inlet[-1:] if time < until]
     return np.array([any(math.isclose(each, step, rel_tol=HELD) for step in steps) for each in velocities])
 
 
@@ -178,13 +177,13 @@ def _errors(path: Path, data: CaseData, chosen: Column, column: Column | None) -
     return np.full(len(chosen.values), np.nan if data.error is None else data.error)
 
 
-def require_measured_units(case: Case, units: Mapping[str, str]) -> None:
-    """Refuse measured data that a run of the case will not have, or will have in another unit, before it runs.
+def require_measured_units(measured: Mapping[str, CaseData], units: Mapping[str, str]) -> None:
+    """Refuse measured data that a run will not have, or will have in another unit, before it runs.
 
     units   of the columns of the history, by their names
     errors  InputError
     """
-    for name, data in case.compare.items():
+    for name, data in measured.items():
         require_measured_unit(points_of(name, data), units)
 
 
@@ -222,30 +221,27 @@ def require_unit(points: Points, unit: str) -> None:
 # ---------------------------------------------------------------- places of files
 
 
-def with_files_of(case: Case, folder: Path) -> Case:
-    """The case with the places of its surface files and measured data; a run folder has copies of both.
+def data_in(measured: Mapping[str, CaseData], folder: Path) -> dict[str, CaseData]:
+    """Measured data with the places of their files; a run folder has copies, other paths are relative to it.
 
-    folder  of the case file; other paths are relative to it
-    errors  InputError for measured data outside of the folder, unless their whole path is given
+    folder  of the case file
+    errors  InputError for a file outside of the folder, unless its whole path is given
     """
-    case = with_surfaces_of(case, folder)
     is_run = (folder / "run.json").is_file()
-    files = {}
-    for name, data in case.compare.items():
-        key, copy = f"compare.{name}.file", copy_of(folder, name)
+
+    def place(name: str, file: str) -> str:
+        copy = copy_of(folder, name)
         copied = is_run and copy.is_file()
-        files[name] = os.path.abspath(
-            kept(folder, copy, key, data.file) if copied else _inside(folder, name, data.file)
+        return os.path.abspath(
+            kept(folder, copy, f"compare.{name}.file", file) if copied else _inside(folder, name, file)
         )
-    return with_data(case, files)
+
+    return with_data(measured, place)
 
 
-def with_data(case: Case, files: dict[str, str]) -> Case:
-    """The case with other files of measured data, by their names."""
-    if not files:
-        return case
-    data = {name: each.model_copy(update={"file": files[name]}) for name, each in case.compare.items()}
-    return case.model_copy(update={"compare": data})
+def with_data(measured: Mapping[str, CaseData], place: Callable[[str, str], str]) -> dict[str, CaseData]:
+    """Measured data with other files, each from the name of the data and the file that they have now."""
+    return {name: each.model_copy(update={"file": place(name, each.file)}) for name, each in measured.items()}
 
 
 def copy_of(folder: Path, name: str) -> Path:

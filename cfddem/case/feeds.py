@@ -1,58 +1,21 @@
-"""Particles that enter and leave during a run: feeds and outlets of a case."""
+"""What feeds bring during a run, and the walls, feeds and outlets that do not go with the rest of a case."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
-
-from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, nearest, shown
-from cfddem.case.bed import AT_RANDOM, NonNegative, Point, Positive, Species
-from cfddem.case.materials import Checked
-
-if TYPE_CHECKING:
-    from cfddem.case.schema import Case
-
-Size = tuple[NonNegative, NonNegative, NonNegative]
+from cfddem.case.bed import AT_RANDOM, CaseFeed, Species
+from cfddem.case.tables import CaseTables
 
 
-class CaseFeed(Checked):
-    """A box in which particles appear at a constant rate."""
-
-    corner: Point = Field(description="lower corner of the box in which centres appear [m]")
-    size: Size = Field(description="edges of the box; an edge may be 0 [m]")
-    rate: Positive | None = Field(None, description="particles per second [1/s]")
-    mass_rate: Positive | None = Field(None, description="mass per second, instead of a rate [kg/s]")
-    species: str | None = Field(None, description="species of the bed that is fed; needed for a mixture")
-    velocity: Point = Field((0.0, 0.0, 0.0), description="velocity of particles that enter [m/s]")
-    begin: NonNegative = Field(0.0, description="time at which the feed begins [s]")
-    end: Positive | None = Field(None, description="time at which it ends; default: the end of the run [s]")
-
-    @model_validator(mode="after")
-    def _one_rate_and_a_span(self) -> CaseFeed:
-        if (self.rate is None) == (self.mass_rate is None):
-            found = "found none" if self.rate is None else "found both"
-            raise InputError("rate", self.rate, "given, or mass_rate, and only one of them", found)
-        if self.end is not None and self.end <= self.begin:
-            raise InputError("end", self.end, f"after the beginning, {self.begin:g} s")
-        return self
-
-
-class CaseOutlet(Checked):
-    """A box in which particles are removed and counted."""
-
-    corner: Point = Field(description="lower corner of the box; a particle leaves when its centre is inside [m]")
-    size: tuple[Positive, Positive, Positive] = Field(description="edges of the box [m]")
-
-
-def refuse_wrong_equipment(case: Case) -> None:
+def refuse_wrong_equipment(case: CaseTables) -> None:
     """Refuse walls, feeds and outlets that do not go with the rest of the case."""
     for error in (*_wrong_walls(case), *_wrong_feeds(case)):
         raise error
 
 
-def feed_rate(case: Case, feed: CaseFeed) -> float:
+def feed_rate(case: CaseTables, feed: CaseFeed) -> float:
     """Particles per second that a feed brings [1/s]."""
     species = fed_species(case, feed)
     if feed.rate is not None:
@@ -60,18 +23,18 @@ def feed_rate(case: Case, feed: CaseFeed) -> float:
     return (feed.mass_rate or 0.0) / (species.mean_volume * case.material_of(species).density)
 
 
-def fed_count(case: Case) -> float:
+def fed_count(case: CaseTables) -> float:
     """Particles that all feeds bring until the end of the run."""
     ends = (case.run.until if each.end is None else min(each.end, case.run.until) for each in case.feed)
     return sum(feed_rate(case, each) * max(end - each.begin, 0.0) for each, end in zip(case.feed, ends))
 
 
-def fed_species(case: Case, feed: CaseFeed) -> Species:
+def fed_species(case: CaseTables, feed: CaseFeed) -> Species:
     """The species that a feed brings."""
     return case.species[feed.species or next(iter(case.species))]
 
 
-def _wrong_walls(case: Case) -> Iterator[InputError]:
+def _wrong_walls(case: CaseTables) -> Iterator[InputError]:
     for number, wall in enumerate(case.wall):
         key = f"wall.{number}"
         if wall.material is not None and wall.material not in case.material:
@@ -93,7 +56,7 @@ def _wrong_walls(case: Case) -> Iterator[InputError]:
         yield InputError("bed.start", case.bed.start, '"poured", "suspended" or "placed" where walls are given')
 
 
-def _wrong_feeds(case: Case) -> Iterator[InputError]:
+def _wrong_feeds(case: CaseTables) -> Iterator[InputError]:
     boxes = [(f"feed.{n}", each.corner, each.size) for n, each in enumerate(case.feed)]
     boxes += [(f"outlet.{n}", each.corner, each.size) for n, each in enumerate(case.outlet)]
     if case.bed.start_size is not None and case.bed.start_corner is not None:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import NonNegative, Point, Positive
-from cfddem.case.materials import Checked
+from cfddem.case.materials import Checked, Fluid
 from closures.liquid_film import film_volume
-
-if TYPE_CHECKING:
-    from cfddem.case.schema import Case
 
 Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -163,9 +160,12 @@ class Spray(Checked):
         return np.array([corner, corner + np.array(self.size)])
 
 
-def check_wet(case: Case) -> None:
-    """Refuse a liquid, or a spray, that does not go with the rest of the case."""
-    liquid, spray, fluid = case.liquid, case.spray, case.fluid
+def check_wet(liquid: Liquid | None, spray: Spray | None, fluid: Fluid | None, size: Point, round_column: bool) -> None:
+    """Refuse a liquid, or a spray, that does not go with the rest of the case.
+
+    size          of the column [m]
+    round_column  whether it is a cylinder
+    """
     if liquid is None:
         if spray is not None:
             raise InputError("spray", None, "left out where there is no liquid", "give the table [liquid]")
@@ -179,7 +179,7 @@ def check_wet(case: Case) -> None:
             "particles in a liquid have no bridges of the same liquid; leave out [liquid]",
         )  # fmt: skip
     if spray is not None:
-        _check_zone(spray, case.column.size, case.column.shape == "cylinder")
+        _check_zone(spray, size, round_column)
 
 
 def _alike(one: float, other: float) -> bool:

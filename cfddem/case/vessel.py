@@ -6,11 +6,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.case.bed import Point
+from cfddem.case.tables import CaseTables, Column
 from cfddem.case.wall_geometry import (
     Array,
     distance,
@@ -22,10 +24,6 @@ from cfddem.case.wall_geometry import (
     triangles,
 )
 from cfddem.case.walls import CaseWall
-
-if TYPE_CHECKING:
-    from cfddem.case.bed import Point
-    from cfddem.case.schema import Case, Column
 
 Side = Literal["inside", "outside", "behind"]
 
@@ -46,7 +44,7 @@ SET_START = "set bed.start_corner and bed.start_size"
 # ---------------------------------------------------------------- where particles start
 
 
-def start_box(case: Case) -> tuple[Point, Point]:
+def start_box(case: CaseTables) -> tuple[Point, Point]:
     """Corner and size of the box in which particles start [m]: as given, or the column, or a box in a round one."""
     if case.bed.start_corner is not None and case.bed.start_size is not None:
         return case.bed.start_corner, case.bed.start_size
@@ -58,7 +56,7 @@ def start_box(case: Case) -> tuple[Point, Point]:
     return (corner, corner, 0.0), (side, side, height)
 
 
-def start_places(case: Case) -> Array:
+def start_places(case: CaseTables) -> Array:
     """Places where particles start: as given, or a lattice in their box, half a diameter from its faces (N, 3) [m]."""
     if case.bed.positions:
         return np.array(case.bed.positions, float)
@@ -68,7 +66,7 @@ def start_places(case: Case) -> Array:
     return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def belongs_inside(case: Case, wall: CaseWall, corners: Array, places: Array) -> bool:
+def belongs_inside(case: CaseTables, wall: CaseWall, corners: Array, places: Array) -> bool:
     """Whether particles belong inside a closed surface.
 
     They do if its outside is solid to the fluid; without solid cells if it encloses most of the column, or most of the
@@ -85,7 +83,7 @@ def belongs_inside(case: Case, wall: CaseWall, corners: Array, places: Array) ->
     return bool(2 * np.count_nonzero(inside) > len(inside))
 
 
-def on_the_wrong_side(case: Case, number: int, positions: Array) -> tuple[int, str, str] | None:
+def on_the_wrong_side(case: CaseTables, number: int, positions: Array) -> tuple[int, str, str] | None:
     """The first particle on the wrong side of a closed surface, what is wrong, and the remedy; None if there is none.
 
     number     of the wall
@@ -105,11 +103,13 @@ def on_the_wrong_side(case: Case, number: int, positions: Array) -> tuple[int, s
     return int(wrong[0]), why, _remedy(case, number, wanted)
 
 
-def start_behind_a_surface(case: Case) -> tuple[str, str, str] | None:
+def start_behind_a_surface(case: CaseTables, count: int) -> tuple[str, str, str] | None:
     """Key, reason and remedy where particles start on the wrong side of a closed surface; None if none does.
 
     It holds before particles have places. A poured bed fills the larger part of its box, so that most of the box
     decides; particles that are spread evenly go everywhere.
+
+    count  of the particles
     """
     if case.bed.positions:
         return None
@@ -125,7 +125,7 @@ def start_behind_a_surface(case: Case) -> tuple[str, str, str] | None:
                 shift = step * case.bed.largest_diameter * np.eye(3)[axis]
                 wrong &= inside_surface(corners, places + shift) != wanted
         share = float(wrong.mean())
-        spread = case.bed.start == "suspended" and share * case.particle_count >= SEVERAL
+        spread = case.bed.start == "suspended" and share * count >= SEVERAL
         if share <= 0.5 and not spread:
             continue
         side = "outside of" if wanted else "inside"
@@ -135,12 +135,12 @@ def start_behind_a_surface(case: Case) -> tuple[str, str, str] | None:
     return None
 
 
-def _remedy(case: Case, number: int, wanted: bool) -> str:
+def _remedy(case: CaseTables, number: int, wanted: bool) -> str:
     """What puts particles on the right side of a closed surface."""
     return SET_OUTSIDE.format(number) if _solid_inside(case, number, wanted) else SET_START
 
 
-def _solid_inside(case: Case, number: int, wanted: bool) -> bool:
+def _solid_inside(case: CaseTables, number: int, wanted: bool) -> bool:
     """Whether particles are on the wrong side of a surface because its inside is solid to the fluid."""
     return case.fluid is not None and case.wall[number].solid != "none" and not wanted
 
@@ -193,7 +193,7 @@ class Vessel:
         return thickness[used], self.areas[used]
 
 
-def vessel_of(case: Case) -> Vessel | None:
+def vessel_of(case: CaseTables) -> Vessel | None:
     """The vessel that walls at rest form in the column of a case; None if none does, or a surface cannot be read.
 
     An open cone or tube without a fluid has no side: particles may be on both.
@@ -208,7 +208,7 @@ def vessel_of(case: Case) -> Vessel | None:
     return vessel if vessel.areas.any() else None
 
 
-def closed_side(case: Case, wall: CaseWall) -> Side | None:
+def closed_side(case: CaseTables, wall: CaseWall) -> Side | None:
     """The side of a wall that is closed to particles at the start; None if there is none."""
     if wall.leaves_its_place:
         return None

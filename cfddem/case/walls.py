@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -14,10 +14,6 @@ from pydantic import Field, model_validator
 from cfddem.backend.errors import InputError, shown
 from cfddem.case.bed import NonNegative, Point, Positive
 from cfddem.case.materials import Checked
-
-if TYPE_CHECKING:
-    from cfddem.case.schema import Case
-
 
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {
     "plane": ("normal",),
@@ -204,8 +200,8 @@ def copy_of(folder: Path, number: int) -> Path:
     return folder / COPIES / f"wall_{number}.stl"
 
 
-def with_surfaces_of(case: Case, folder: Path) -> Case:
-    """The case with the places of its surface files; a run folder has copies, other paths are relative to it.
+def walls_in(walls: Sequence[CaseWall], folder: Path) -> tuple[CaseWall, ...]:
+    """Walls with the places of their surface files; a run folder has copies, other paths are relative to it.
 
     folder  of the case file
     """
@@ -215,7 +211,7 @@ def with_surfaces_of(case: Case, folder: Path) -> Case:
         copy = copy_of(folder, number)
         return str(kept(folder, copy, f"wall.{number}.file", file)) if is_run else os.path.abspath(folder / file)
 
-    return with_surfaces(case, {n: place(n, wall.file) for n, wall in enumerate(case.wall) if wall.file is not None})
+    return with_surfaces(walls, place)
 
 
 def kept(folder: Path, copy: Path, key: str, file: str) -> Path:
@@ -229,9 +225,9 @@ def kept(folder: Path, copy: Path, key: str, file: str) -> Path:
     raise InputError(key, file, f"a file in the run folder, {copy}", "files outside of it are not read; copy it there")
 
 
-def with_surfaces(case: Case, files: Mapping[int, str]) -> Case:
-    """The case with other surface files, by the number of the wall."""
-    if not files:
-        return case
-    walls = [wall.model_copy(update={"file": files[n]}) if n in files else wall for n, wall in enumerate(case.wall)]
-    return case.model_copy(update={"wall": tuple(walls)})
+def with_surfaces(walls: Sequence[CaseWall], place: Callable[[int, str], str]) -> tuple[CaseWall, ...]:
+    """Walls with other surface files, each from the number of the wall and the file that it has now."""
+    return tuple(
+        wall if wall.file is None else wall.model_copy(update={"file": place(n, wall.file)})
+        for n, wall in enumerate(walls)
+    )

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import RunFailed
-from cfddem.case.bed import Species
-from cfddem.case.feeds import CaseFeed, fed_species, feed_rate
+from cfddem.case.bed import CaseFeed, Species
+from cfddem.case.feeds import fed_species, feed_rate
 from cfddem.case.particle_properties import SPECIES, diameters_of
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field

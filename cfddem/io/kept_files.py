@@ -26,10 +26,13 @@ def keep_files(case: Case, folder: Path) -> None:
 
 def with_kept_files(case: Case, folder: Path) -> Case:
     """The case with the copies of its files in a run folder."""
-    folder = folder.absolute()
-    surfaces = {n: str(copy_of(folder, n)) for n, wall in enumerate(case.wall) if wall.file is not None}
-    data = {name: str(compare.copy_of(folder, name)) for name in case.compare}
-    return compare.with_data(with_surfaces(case, surfaces), data)
+    return _at_copies(case, folder.absolute())
+
+
+def _at_copies(case: Case, folder: Path) -> Case:
+    walls = with_surfaces(case.wall, lambda number, _: copy_of(folder, number).as_posix())
+    data = compare.with_data(case.compare, lambda name, _: compare.copy_of(folder, name).as_posix())
+    return case.model_copy(update={"wall": walls, "compare": data})
 
 
 def holds_surfaces_of(case: Case, folder: Path) -> bool:
@@ -40,10 +43,7 @@ def holds_surfaces_of(case: Case, folder: Path) -> bool:
 
 def text_with_kept_files(case: Case) -> str:
     """The case as TOML text with the places of the copies in its run folder, which may move."""
-    here = Path()
-    surfaces = {n: copy_of(here, n).as_posix() for n, wall in enumerate(case.wall) if wall.file is not None}
-    data = {name: compare.copy_of(here, name).as_posix() for name in case.compare}
-    return compare.with_data(with_surfaces(case, surfaces), data).to_toml()
+    return _at_copies(case, Path()).to_toml()
 
 
 def _copy(key: str, file: str, path: Path, kind: str) -> None:

@@ -52,7 +52,7 @@ def _error(key: str, failure: InputError) -> Issue:
 
 def _check_velocities(case: Case, key: str, points: Points) -> Iterator[Issue]:
     """Check that the case holds the velocities of measured points."""
-    found = held(case, points.place)
+    found = held(case.bed.inlet_velocity, case.run.until, points.place)
     if not found.all():
         some = f"only {found.sum()} of" if found.any() else "none of"
         missing = [f"{each:.3g}" for each in points.place[~found]]

@@ -79,7 +79,7 @@ def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 def check_positions(case: Case) -> Iterator[Issue]:
     """Check that particles start on the right side of surfaces, given positions in the column and apart."""
     with suppress(InputError, OSError, ValueError):  # a surface that cannot be read is reported elsewhere
-        if (wrong := start_behind_a_surface(case)) is not None:
+        if (wrong := start_behind_a_surface(case, case.particle_count)) is not None:
             yield Issue("error", *wrong)
     positions = np.array(case.bed.positions, float).reshape(-1, 3)
     if not len(positions):

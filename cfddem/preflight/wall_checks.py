@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from cfddem.backend.errors import InputError
-from cfddem.case.bed import POURED_SOLID_FRACTION, Point
-from cfddem.case.feeds import CaseFeed, fed_species, feed_rate
+from cfddem.case.bed import POURED_SOLID_FRACTION, CaseFeed, Point
+from cfddem.case.feeds import fed_species, feed_rate
 from cfddem.case.schema import Case
 from cfddem.case.wall_geometry import (
     corners_of,

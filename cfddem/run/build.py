@@ -15,7 +15,8 @@ from cfddem.case.bed import Jet
 from cfddem.case.column_grid import grid_of, open_floor
 from cfddem.case.materials import pair_overrides
 from cfddem.case.particle_properties import SPECIES
-from cfddem.case.schema import Case, Column
+from cfddem.case.schema import Case
+from cfddem.case.tables import Column
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.features.moving_walls import case_walls

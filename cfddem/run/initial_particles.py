@@ -39,7 +39,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     """The particles of a case at the start."""
     bed, properties = case.bed, particle_properties(case)
     diameters = properties.diameter
-    if (wrong := start_behind_a_surface(case)) is not None:
+    if (wrong := start_behind_a_surface(case, case.particle_count)) is not None:
         key, reason, remedy = wrong
         raise InputError(key, None, f"changed: {reason}", remedy)
     if bed.start == "poured":

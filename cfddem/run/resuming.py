@@ -9,7 +9,6 @@ from typing import Any
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
-from cfddem.case.compare import with_files_of
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import read_text
 from cfddem.io.writer import RunFolder
@@ -58,7 +57,7 @@ def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float
             f"package; or import it in Python and call cfddem.Run.resume{''.join(lost)}"
         )
         raise InputError(f"laws.{key}", name, "a law that is known here", remedy)
-    return with_files_of(case, folder)
+    return case.with_files_of(folder)
 
 
 def restored(

@@ -111,7 +111,7 @@ class Run:
         folder, text = Path(folder), text_with_kept_files(case) if text is None else text
         history.require_shared(case, communicator.size)
         require_measures_of(case)
-        require_measured_units(case, history.units_of(case))
+        require_measured_units(case.compare, history.units_of(case))
         require_compiled(case)
         communicator.by_first(lambda: prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)

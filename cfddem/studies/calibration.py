@@ -151,7 +151,7 @@ def calibrate(
         raise InputError("--trials" if trials < 1 else "--jobs", min(trials, jobs), "at least 1")
     case = with_files(Case.from_toml(path, overrides), match)
     data = _data(case)
-    require_measured_units(case, history.units_of(case))
+    require_measured_units(case.compare, history.units_of(case))
     for low_or_high in (0.0, 1.0):  # both ends of all ranges are valid values
         case.with_(**{each.key: each.value(low_or_high) for each in varied})
     sweep.make_output(output)
@@ -185,8 +185,11 @@ def _data(case: Case) -> list[Points]:
         if not np.isfinite(each.error).all():  # local: of measured points
             remedy = "add a column error, or relative_error in [compare] of the case"
             raise InputError(f"data {each.name}", None, "given with standard errors", remedy)
-        if each.against == "inlet_velocity" and not held(case, each.place).all():  # local: measured points
-            missing = float(each.place[~held(case, each.place)][0])
+        if each.against != "inlet_velocity":
+            continue
+        in_run = held(case.bed.inlet_velocity, case.run.until, each.place)
+        if not in_run.all():  # local: measured points
+            missing = float(each.place[~in_run][0])
             remedy = f"for all points: {steps_of(each.place, case.run.until)}"
             raise InputError(f"data {each.name} inlet_velocity", missing, "a velocity that the case holds", remedy)
     return data

@@ -1,0 +1,132 @@
+"""The tables of a case, as they are written. :class:`cfddem.case.schema.Case` compares them with each other."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from cfddem.backend.errors import InputError
+from cfddem.case.bed import Bed, CaseFeed, CaseOutlet, Name, Point, Positive, Species
+from cfddem.case.case_laws import CaseLaws
+from cfddem.case.compare import CaseData
+from cfddem.case.liquid import Liquid, Spray
+from cfddem.case.materials import Checked, Fluid, Material, Materials, Pairs
+from cfddem.case.walls import CaseWall
+
+
+class Column(Checked):
+    """The vessel and its grid: a box, or an upright cylinder inside a box of cells."""
+
+    shape: Literal["box", "cylinder"] = Field("box", description="shape of the vessel; a cylinder is upright")
+    width: Positive = Field(description="width along x, or diameter of a cylinder [m]")
+    depth: Positive | None = Field(None, description="depth along y; default: width [m]")
+    height: Positive = Field(description="height along z [m]")
+    cell: Positive | tuple[Positive, Positive, Positive] = Field(
+        description="edge of a cubic cell, or edges along x, y, z; at least 2 diameters [m]"
+    )
+    sides: Literal["no_slip", "free_slip", "periodic"] = Field(
+        "no_slip", description="boundary condition of the fluid on the sides"
+    )
+    front: Literal["no_slip", "free_slip", "periodic"] | None = Field(
+        None, description="boundary condition on the two sides normal to y; default: sides"
+    )
+    ends: Literal["flow", "closed", "periodic"] = Field(
+        "flow", description="floor and lid: inlet and outlet, closed walls, or periodic"
+    )
+    material: str | None = Field(None, description="material of the walls; default: that of the bed")
+
+    @property
+    def size(self) -> Point:
+        """Edges of the box (x, y, z) [m]."""
+        return self.width, self.width if self.depth is None else self.depth, self.height
+
+    @property
+    def floor_area(self) -> float:
+        """Area of the floor [m2]."""
+        width, depth, _ = self.size
+        return 0.25 * math.pi * width**2 if self.shape == "cylinder" else width * depth
+
+    @model_validator(mode="after")
+    def _check_cylinder(self) -> Column:
+        if self.shape == "cylinder":
+            if self.depth not in (None, self.width):
+                raise InputError(
+                    "depth", self.depth, "left out, or equal to width", "the width of a cylinder is its diameter"
+                )
+            if self.sides == "periodic":
+                raise InputError("sides", self.sides, "no_slip or free_slip", "the side of a cylinder is a wall")
+            if self.front is not None:
+                raise InputError("front", self.front, "left out", "a cylinder has only one side")
+        return self
+
+
+class CaseRun(Checked):
+    """Duration, output and time steps."""
+
+    until: Positive = Field(description="end time [s]")
+    every: Positive | None = Field(None, description="interval between snapshots; default: until / 50 [s]")
+    history_every: Positive | None = Field(None, description="interval between history rows; default: every / 10 [s]")
+    average_from: float | None = Field(
+        None, ge=0, description="start of time averages; default: middle of the run, or of its last inlet step [s]"
+    )
+    until_error: dict[str, Positive] = Field(
+        {},
+        description="end early, once the standard error of the mean of each named measure is below this fraction of "
+        "the mean; averages then begin where the start-up ends [-]",
+    )
+    particle_step: Positive | None = Field(None, description="particle time step; default: 2 % of the Hertz time [s]")
+    fluid_step: Positive | None = Field(None, description="longest fluid time step; default: set by stability [s]")
+    reference_speed: Positive | None = Field(
+        None, description="expected highest collision speed, which sets the time step; default: estimated [m/s]"
+    )
+    film_tolerance: float = Field(
+        1e-3, gt=0, le=1, description="to which the films of a step are solved together; energy falls at any value [-]"
+    )
+    energy_budget: bool = Field(
+        False, description="record the energy budget, force by force; takes up to 50 % more time"
+    )
+    record_collisions: bool = Field(
+        False, description="record every collision of two particles, from first to last contact"
+    )
+
+
+class CaseTables(Checked):
+    """Every table of a case but those that features own."""
+
+    title: str = Field("", description="title, one line")
+    fluid: Fluid | None = Field(None, description="the fluid; without this table, dry particles only")
+    material: Materials = Field(min_length=1, description="solids by name")
+    pair: Pairs = Field({}, description="contact of two unlike materials, by their names")
+    column: Column
+    bed: Bed
+    wall: tuple[CaseWall, ...] = Field((), description="walls beside those of the column")
+    feed: tuple[CaseFeed, ...] = Field((), description="boxes in which particles enter during the run")
+    outlet: tuple[CaseOutlet, ...] = Field((), description="boxes in which particles are removed during the run")
+    liquid: Liquid | None = Field(None, description="liquid on the particles, which forms bridges between them")
+    spray: Spray | None = Field(None, description="zone where drops of the liquid land on the particles")
+    laws: CaseLaws = CaseLaws.model_validate({})
+    run: CaseRun
+    compare: dict[Name, CaseData] = Field({}, description="measured data that the report draws beside the run")
+
+    @field_validator("title")
+    @classmethod
+    def _title_is_one_line(cls, value: str) -> str:
+        if not value.isprintable() or len(value) > 200:
+            raise InputError("title", value, "one line of at most 200 printable characters")
+        return value
+
+    @property
+    def species(self) -> dict[str, Species]:
+        """Species by name; a bed of one kind is one species, named after its material."""
+        only = next(iter(self.material))
+        return dict(self.bed.species) or {self.bed.material or only: self.bed}
+
+    def material_of(self, species: Species) -> Material:
+        """Material of the particles of a species."""
+        return self.material[self.material_name_of(species)]
+
+    def material_name_of(self, species: Species) -> str:
+        """Name of the material of a species."""
+        return species.material or next(iter(self.material))
