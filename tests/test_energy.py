@@ -123,7 +123,7 @@ def test_the_count_changes_no_bit_and_is_the_same_on_any_number_of_threads() -> 
         found.append((run.energies.totals.copy(), run.particles.velocity.copy()))
     assert np.array_equal(found[0][0], found[1][0])
     plain = box(viscosity=1e-3, count=100)
-    plain.energies = None
+    plain.features.clear()
     plain.advance(2e-5, 300)
     assert np.array_equal(plain.particles.velocity, found[0][1])
 

@@ -211,7 +211,7 @@ def test_ranks_count_the_energies_of_one_process(film: bool, walls: bool, liquid
         lost = np.stack([mine[name] for name in mine.dtype.names if name.startswith("lost_to_")], axis=1)
         names = np.stack([mine["first"], mine["second"], mine["end"]], axis=1)
         rows = communicator.joined(np.concatenate([names, lost], axis=1))
-        stored = [*run.energies.springs(run), run.energies.bridges(run)]
+        stored = [*run.energies.springs(run), run.energies.stored(run).get("bridges", 0.0)]
         return np.append(run.energies.totals, stored), rows[np.lexsort(rows[:, 2::-1].T)]
 
     expected, collisions = program(SERIAL)

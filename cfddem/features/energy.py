@@ -15,7 +15,7 @@ from cfddem.coupling.work_on_particles import CouplingWork
 from cfddem.features.case_feature import CaseFeature
 from cfddem.fluid import budgets
 from cfddem.io.quantities import Quantity
-from cfddem.particles.energy_of_contacts import CHANNELS
+from cfddem.particles.energy_count import EVERY_CHANNEL, Energies
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 
 STORED = {
@@ -106,6 +106,7 @@ class EnergyLedger(CaseFeature):
         self.particle_solver, self.fluid, self.coupling = (
             simulation.particle_solver, simulation.fluid, simulation.coupling,
         )  # fmt: skip
+        self._count: Energies = self.particle_solver.feature(Energies)
         self._acted_on = simulation.is_acted_on  # whether the line of forces from outside is shown
         self._work = None if self.coupling is None else CouplingWork(self.particle_solver.particles, self.coupling)
         self._recent = (0.0, 0.0)  # work of the pressure on the displaced volume in the last two fluid steps [J]
@@ -187,11 +188,8 @@ class EnergyLedger(CaseFeature):
             absent.add("external")
         if self.particle_solver.laws.contact_law.lost is None:
             absent.add("hysteresis")
-        if not self.particle_solver.laws.shears:
-            absent.add("film_shear")
+        absent |= {*EVERY_CHANNEL} - {*self._count.channels}
         absent |= {"history"} - {*(self.coupling.forces.lines if self.coupling else ())}
-        if self.particle_solver.laws.bridge is None:
-            absent |= {"bridge", "bridges_formed", "bridges_broken"}
         names = [name for name in [*GAINED, *LOST, *PASSED] if name not in absent]
         lines |= {name: sums[name] for name in names}
         put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
@@ -220,9 +218,7 @@ class EnergyLedger(CaseFeature):
 
     def _totals(self) -> dict[str, float]:
         """All sums, those of the particle solver included."""
-        count = self.particle_solver.energies
-        assert count is not None
-        sums = dict(self.sums)
+        count, sums = self._count, dict(self.sums)
         for name, total in zip(count.channels, count.totals):
             if name in sums:
                 sums[name] += float(total)
@@ -231,19 +227,15 @@ class EnergyLedger(CaseFeature):
 
     def _stored(self) -> dict[str, float]:
         """Stored energy now [J]; the potential energy is relative to the start."""
-        particle_solver, count = self.particle_solver, self.particle_solver.energies
-        assert count is not None
+        particle_solver, count = self.particle_solver, self._count
         particles = particle_solver.particles
-        normal, tangential = count.springs(particle_solver)
-        fallen = self.sums["fallen"] + float(count.totals[CHANNELS.index("fall")])
+        forms = count.stored(particle_solver)
+        fallen = self.sums["fallen"] + float(count.totals[count.channels.index("fall")])
         stored = {
             "kinetic": kinetic_energy(particles, particle_solver.communicator),
             "potential": -fallen,
-            "normal_springs": normal,
-            "tangential_springs": tangential,
+            **forms,
         }
-        if particle_solver.bridges is not None:
-            stored["bridges"] = count.bridges(particle_solver)
         if self.fluid is None:
             return stored
         return stored | {

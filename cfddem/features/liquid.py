@@ -11,6 +11,7 @@ from cfddem.backend.communicator import SERIAL
 from cfddem.case.schema import Case
 from cfddem.features import wet_state
 from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.particles.interactions.bridge_view import Bridges
 
 
 class LiquidOnParticles(CaseFeature):
@@ -24,6 +25,7 @@ class LiquidOnParticles(CaseFeature):
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.particle_solver, self.brought = simulation.particle_solver, 0.0
+        self.bridges: Bridges = self.particle_solver.feature(Bridges)
         self.start = self.total
 
     @classmethod
@@ -49,14 +51,12 @@ class LiquidOnParticles(CaseFeature):
     @property
     def in_bridges(self) -> float:
         """Volume in bridges [m3]."""
-        bridges = self.particle_solver.bridges
-        return 0.0 if bridges is None else float(self.particle_solver.communicator.sum(bridges.volume))
+        return float(self.particle_solver.communicator.sum(self.bridges.volume))
 
     @property
     def gained_by_walls(self) -> float:
         """Volume on the walls less that at the start [m3]."""
-        bridges = self.particle_solver.bridges
-        return 0.0 if bridges is None else bridges.gained_by_walls
+        return self.bridges.gained_by_walls
 
     @property
     def total(self) -> float:
@@ -66,8 +66,7 @@ class LiquidOnParticles(CaseFeature):
     @property
     def imbalance(self) -> float:
         """Change of the total that sprays and inserted particles did not bring, over all liquid there was [-]."""
-        bridges = self.particle_solver.bridges
-        came = self.start + self.brought + (0.0 if bridges is None else bridges.fed)
+        came = self.start + self.brought + self.bridges.fed
         return abs(self.total - came) / max(came, -self.gained_by_walls, self.on_particles, 1e-300)
 
     def checkpoint(self) -> dict[str, Any]:
@@ -122,8 +121,7 @@ def coating_variation(simulation: Any) -> float:
 
 def bridge_count(simulation: Any) -> float:
     """Number of liquid bridges."""
-    bridges = simulation.particle_solver.bridges
-    return 0.0 if bridges is None else float(bridges.count)
+    return float(_budget(simulation).bridges.count)
 
 
 def bridges_per_particle(simulation: Any) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 from cfddem.analysis.agglomerates import carried_liquid, sizes
 from cfddem.data.fields import Field
 from cfddem.particles.agglomerates import agglomerates
+from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
 
 CARRIED = Field(
@@ -29,8 +30,7 @@ def ids(solver: ParticleSolver) -> np.ndarray:
 
 def joined(solver: ParticleSolver) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places among `ids` of the particles that each bridge between particles joins (n,), (n,), and its liquid [m3]."""
-    bridges, all_ids = solver.bridges, ids(solver)
-    assert bridges is not None
+    bridges, all_ids = solver.feature(Bridges), ids(solver)
     bodies, volume = bridges.bodies.reshape(-1, 2), bridges.volume
     pairs = bodies[:, 1] >= 0
     bodies, volume = solver.communicator.joined(bodies[pairs]), solver.communicator.joined(volume[pairs])
@@ -39,8 +39,7 @@ def joined(solver: ParticleSolver) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def carried(solver: ParticleSolver) -> np.ndarray:
     """Liquid of every particle by id, with half of its bridges to others and all at walls (N,) [m3]."""
-    bridges, collect, particles = solver.bridges, solver.communicator.joined, solver.particles
-    assert bridges is not None
+    bridges, collect, particles = solver.feature(Bridges), solver.communicator.joined, solver.particles
     names = collect(particles.id[: particles.owned])
     order = np.argsort(names)
     liquid = carried_liquid(collect(particles.liquid[: particles.owned])[order], *joined(solver))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cfddem.backend.compile import inline
@@ -43,7 +45,13 @@ COLLISION_FIELDS = (
 )
 """Columns of the record."""
 
-COLLISION = np.dtype([(field.name, field.dtype, field.shape) for field in COLLISION_FIELDS], align=True)
+
+def collision_row(fields: Sequence[Field]) -> np.dtype:
+    """One row of a record with these columns."""
+    return np.dtype([(field.name, field.dtype, field.shape) for field in fields], align=True)
+
+
+COLLISION = collision_row(COLLISION_FIELDS)
 """One row of the record."""
 
 WET_COLLISION_FIELDS = (
@@ -52,9 +60,6 @@ WET_COLLISION_FIELDS = (
     Field("lost_to_bridge", "J", meaning="energy dissipated by the bridge; NaN without an energy budget"),
 )
 """Columns of the record where particles carry liquid; a collision lasts as long as a bridge."""
-
-WET_COLLISION = np.dtype([(field.name, field.dtype, field.shape) for field in WET_COLLISION_FIELDS], align=True)
-"""One row of the record where particles carry liquid."""
 
 FIELDS = (
     Field("begin", "s", role="memory", initial=np.nan, meaning="time at which the collision began; NaN outside one"),

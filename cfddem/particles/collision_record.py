@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.particles.collision_events import COLLISION
+from cfddem.particles.particle_feature import Engine, ParticleFeature
 
 MOST = 500_000
 """Rows kept between two snapshots; where there are more, every second row is dropped, repeatedly if needed."""
@@ -12,19 +17,22 @@ MOST = 500_000
 _FIRST, _SECOND, _SPREAD = (np.uint64(odd) for odd in (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0xBF58476D1CE4E5B9))
 
 
-class CollisionRecord:
+class CollisionRecord(ParticleFeature):
     """A growing table of collisions, filled by the particle loop.
 
-    `table` is a structured array of dtype :data:`cfddem.particles.collision_events.COLLISION`, with liquid of
-    `WET_COLLISION`. Above `most` rows the table is thinned out evenly; the weight of a row is the number of collisions
+    `table` is a structured array of dtype :data:`cfddem.particles.collision_events.COLLISION`, with liquid of more
+    columns. Above `most` rows the table is thinned out evenly; the weight of a row is the number of collisions
     that it represents.
 
-    most   rows to keep until they are taken
-    dtype  of a row
+    most          rows to keep until they are taken
+    dtype         of a row
+    communicator  of the run
     """
 
-    def __init__(self, most: int = MOST, dtype: np.dtype = COLLISION) -> None:
-        self.most, self.dtype = most, dtype
+    name = "collisions"
+
+    def __init__(self, most: int = MOST, dtype: np.dtype = COLLISION, communicator: Communicator = SERIAL) -> None:
+        self.most, self.dtype, self._communicator = most, dtype, communicator
         self._kept: list[np.ndarray] = []
         self._count, self._share = 0, 1  # rows kept; one of how many collisions is
         self._rows = np.zeros(0, self.dtype)
@@ -40,6 +48,10 @@ class CollisionRecord:
             self._rows = np.zeros(2 * edges + 64, self.dtype)
         return self._rows
 
+    def after(self, engine: Engine, step: float, last: bool, ended: int) -> None:
+        """Keep the rows that the loop has written."""
+        self.keep(ended)
+
     def keep(self, count: int) -> None:
         """Keep the first `count` rows that the loop has written."""
         if not count:
@@ -53,10 +65,23 @@ class CollisionRecord:
             self._count = len(self._kept[0])
 
     def take(self) -> np.ndarray:
-        """All rows; the table is empty afterwards."""
-        table = self.table
+        """All rows of all ranks, on rank 0, in the order of their ends; the table is empty afterwards."""
+        table = self._gathered()
         self._kept, self._count, self._share = [], 0, 1
         return table
+
+    def _gathered(self) -> np.ndarray:
+        rows = self._communicator.gathered(self.table)
+        return rows if self._communicator.size == 1 else np.sort(rows, order=["end", "first", "second"])
+
+    def checkpoint(self) -> dict[str, Any]:
+        """All rows of all ranks, on rank 0."""
+        return {"rows": self._gathered()}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        if self._communicator.rank == 0:
+            self.put_back(state["rows"])
 
     def put_back(self, rows: np.ndarray) -> None:
         """Put earlier rows back, as after a restart."""

@@ -13,31 +13,28 @@ and runs that count no energy pay nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
-from cfddem.particles.energy_of_bridges import RESISTANCE, BridgeEnergies
+from cfddem.particles.energy_of_bridges import BridgeEnergies
 from cfddem.particles.energy_of_contacts import (
-    BY_IMPULSES,
-    BY_SHEAR,
     CHANNELS,
     WALLS,
+    EnergyAccount,
+    allocate_tally,
     count_motion,
     count_work,
-    room_for_count,
 )
-from cfddem.particles.energy_of_shear import CHANNELS as OF_SHEAR
 from cfddem.particles.energy_of_shear import ShearEnergies
 from cfddem.particles.impulse_motion import keep_motion
+from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 from cfddem.particles.vectors import flat
-
-if TYPE_CHECKING:
-    from cfddem.particles.solver import ParticleSolver
 
 DISPLACEMENT = Field("displacement", "m", 3, "scratch", meaning="displacement in the last advance")
 WORK_DISPLACEMENT = Field(
@@ -45,8 +42,12 @@ WORK_DISPLACEMENT = Field(
 )
 
 
-class Energies:
-    """The energy account of a particle solver.
+EVERY_CHANNEL = (*CHANNELS, *BridgeEnergies.channels, *ShearEnergies.channels)
+"""Channels of a run that has everything."""
+
+
+class Energies(ParticleFeature):
+    """The energy account of a particle engine.
 
     channels  names of the channels: `CHANNELS`, and those of bridges and of films that resist sliding, if any
     totals    energy of each channel since the count began [J]
@@ -55,111 +56,116 @@ class Energies:
     with a constant force is its work; they differ by the impulses of films.
     """
 
-    def __init__(self, solver: ParticleSolver) -> None:
-        laws = solver.laws
+    name, every_step = "energies", True
+
+    def __init__(self, engine: Engine) -> None:
+        laws = engine.laws
         if laws.contact_law.energy is None:
             name = laws.contact_law.name
             raise InputError("energies", None, "a contact law that gives its energy", f"the law {name!r} does not")
         if laws.film and laws.integrator != "drift":
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
-        self._work, self._motion = specialise(count_work, solver.choices), specialise(count_motion, solver.choices)
-        self._bridges = None if laws.bridge is None else BridgeEnergies(solver)
-        self._shear = ShearEnergies(solver) if laws.shears else None
-        self.channels = CHANNELS if self._bridges is None else (*CHANNELS, *self._bridges.channels)
-        self.channels = (*self.channels, *OF_SHEAR) if laws.shears else self.channels
+        self._work, self._motion = specialise(count_work, engine.choices), specialise(count_motion, engine.choices)
+        present = {BridgeEnergies: engine.choices["BRIDGE"], ShearEnergies: laws.shears}
+        self._accounts: list[EnergyAccount] = [each(engine) for each, counted in present.items() if counted]
+        self.channels = (*CHANNELS, *(name for each in self._accounts for name in each.channels))
         self.totals = np.zeros(len(self.channels))
-        self.fed = 0.0  # energy of inserted particles less that of removed ones [J]
+        self.fed, self._had = 0.0, 0.0  # energy of inserted particles less that of removed ones; before an exchange [J]
         for field in (DISPLACEMENT, WORK_DISPLACEMENT):
-            solver.particles.declare(field)
+            engine.particles.declare(field)
         self._edges: Any = None
         self._count: Any = None
 
-    def before(self, solver: ParticleSolver, step: float, first: bool) -> None:
+    def before(self, engine: Engine, step: float, first: bool) -> None:
         """Count before a step [s]; `first` of an advance, in which the present forces begin to act."""
         if first:
-            solver.particles.reset(DISPLACEMENT.name, WORK_DISPLACEMENT.name)
-        if first or self._edges is not solver.edges:
-            if self._edges is not solver.edges:
-                self._make_room(solver)
-            self._pass(solver, 0.0, 0.0, 0.5 * step if first else 0.0)
-            if self._bridges is not None and not first:
-                self._bridges.count(solver, 0.0, 0.0, 0.5 * step)  # a new list forgets the half kick that follows
-        particles = solver.particles
+            engine.particles.reset(DISPLACEMENT.name, WORK_DISPLACEMENT.name)
+        if first or self._edges is not engine.edges:
+            if self._edges is not engine.edges:
+                self._make_room(engine)
+            self._pass(engine, 0.0, 0.0, 0.5 * step if first else 0.0)
+            for account in () if first else self._accounts:
+                account.renewed(engine, 0.5 * step)
+        particles = engine.particles
         ahead = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
         keep_motion(self._count, particles, step, ahead)
-        if self._bridges is not None:
-            self._bridges.before(solver, step, ahead)
-        if self._shear is not None:
-            self._shear.before(solver, step, ahead)
+        for account in self._accounts:
+            account.before(engine, step, ahead)
 
-    def after(self, solver: ParticleSolver, step: float, last: bool) -> None:
+    def after(self, engine: Engine, step: float, last: bool, ended: int) -> None:
         """Count after a step [s]; `last` of an advance."""
-        self._pass(solver, step, 0.5 * step, 0.0 if last else 0.5 * step)
+        self._pass(engine, step, 0.5 * step, 0.0 if last else 0.5 * step)
 
-    def springs(self, solver: ParticleSolver) -> tuple[float, float]:
+    def before_exchange(self, engine: Engine) -> None:
+        """Note the energy of the particles that are there."""
+        self._had = self.of_all(engine)
+
+    def after_exchange(self, engine: Engine) -> None:
+        """Count what others have brought or taken along."""
+        self.fed += self.of_all(engine) - self._had
+
+    def stored(self, engine: Engine) -> dict[str, float]:
+        """Energy of normal and tangential springs, and what else stores energy, such as `bridges`, by its form [J]."""
+        self._renew(engine)
+        count, total, mine = self._count, engine.communicator.sum, engine.edges.first < engine.particles.owned
+        forms = {
+            "normal_springs": total(count.held[mine]),
+            "tangential_springs": 0.5 * total((count.stiffness * count.spring)[mine]),
+        }
+        for account in self._accounts:
+            forms |= account.stored(engine)
+        return forms
+
+    def springs(self, engine: Engine) -> tuple[float, float]:
         """Energy of the normal and of the tangential springs [J]."""
-        self._renew(solver)
-        count, total, mine = self._count, solver.communicator.sum, solver.edges.first < solver.particles.owned
-        return total(count.held[mine]), 0.5 * total((count.stiffness * count.spring)[mine])
+        forms = self.stored(engine)
+        return forms["normal_springs"], forms["tangential_springs"]
 
-    def bridges(self, solver: ParticleSolver) -> float:
-        """Energy of the pull of liquid bridges, from contact [J]."""
-        if self._bridges is None:
-            return 0.0
-        self._renew(solver)
-        return self._bridges.held(solver)
-
-    def mechanical(self, solver: ParticleSolver) -> float:
+    def mechanical(self, engine: Engine) -> float:
         """Kinetic energy, and that of springs and bridges [J]."""
-        stored = sum(self.springs(solver)) + self.bridges(solver)
-        return kinetic_energy(solver.particles, solver.communicator) + stored
+        return kinetic_energy(engine.particles, engine.communicator) + sum(self.stored(engine).values())
 
-    def of_all(self, solver: ParticleSolver) -> float:
+    def of_all(self, engine: Engine) -> float:
         """Energy that particles bring and take along: mechanical energy, and that of their added mass [J]."""
-        return self.mechanical(solver) + added_mass_energy(solver.particles, solver.communicator)
+        return self.mechanical(engine) + added_mass_energy(engine.particles, engine.communicator)
 
     def checkpoint(self) -> dict[str, Any]:
         """What has been counted."""
         return {"totals": self.totals.copy(), "fed": self.fed}
 
-    def restore(self, state: dict[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.totals, self.fed = np.array(state["totals"]), float(state["fed"])
         self._edges = None
 
-    def _renew(self, solver: ParticleSolver) -> None:
+    def _renew(self, engine: Engine) -> None:
         """Evaluate stored energy where the neighbour list is new."""
-        if self._edges is not solver.edges:
-            self._make_room(solver)
-            self._pass(solver, 0.0, 0.0, 0.0)
+        if self._edges is not engine.edges:
+            self._make_room(engine)
+            self._pass(engine, 0.0, 0.0, 0.0)
 
-    def _make_room(self, solver: ParticleSolver) -> None:
+    def _make_room(self, engine: Engine) -> None:
         """Begin with another neighbour list."""
-        self._edges, self._count = solver.edges, room_for_count(solver)
-        if self._bridges is not None:
-            self._bridges.make_room(solver)
-        if self._shear is not None:
-            self._shear.make_room(solver)
+        self._edges, self._count = engine.edges, allocate_tally(engine)
+        for account in self._accounts:
+            account.make_room(engine)
 
-    def _pass(self, solver: ParticleSolver, step: float, before: float, after: float) -> None:
-        solver.lists.ghosts.refresh("work")
+    def _pass(self, engine: Engine, step: float, before: float, after: float) -> None:
+        engine.lists.ghosts.refresh("work")
         count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
         count.totals[:] = 0.0
-        gravity, free = np.array(solver.gravity, float), np.array(solver.free, float)
-        self._motion(solver.system.particles, count, gravity, free, step, before, after)
-        self._work(solver.system, count, step, before, after)
-        counted = solver.communicator.sum(count.totals[0], axis=0)
+        gravity, free = np.array(engine.gravity, float), np.array(engine.free, float)
+        self._motion(engine.system.particles, count, gravity, free, step, before, after)
+        self._work(engine.system, count, step, before, after)
+        counted = engine.communicator.sum(count.totals[0], axis=0)
         self.totals[: len(CHANNELS)] += counted[: len(CHANNELS)]
-        if self._bridges is not None:
-            done, by_walls = self._bridges.count(solver, step, before, after)
-            done[RESISTANCE] -= counted[BY_IMPULSES]
-            self.totals[len(CHANNELS) :][: len(done)] += done
+        place = len(CHANNELS)
+        for account in self._accounts:
+            done, by_walls = account.count(engine, step, before, after, counted)
+            self.totals[place : place + len(done)] += done
             self.totals[WALLS] += by_walls
-        if self._shear is not None:
-            lost, by_walls = self._shear.count(solver, step)
-            self.totals[-1] += lost + counted[BY_SHEAR]
-            self.totals[WALLS] += by_walls
+            place += len(done)
         if before + after > 0.0:
-            solver.particles.work_displacement += self._count.moved
+            engine.particles.work_displacement += self._count.moved
         if step > 0.0:
-            solver.particles.displacement += self._count.drifted
+            engine.particles.displacement += self._count.drifted

@@ -11,24 +11,23 @@ what the pull stores. The same holds for the springs of contacts (`energy_of_con
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, serial, threaded
 from cfddem.backend.law_set import specialise
+from cfddem.particles.energy_of_contacts import BY_IMPULSES, EnergyAccount, note_bridge_loss
 from cfddem.particles.impulse_motion import keep_motion, mean_motion
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_changes import of_same_wall
 from cfddem.particles.interactions.bridge_solution import pull_energy
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
-from cfddem.particles.interactions.slots import BRIDGE_PULL, RECORD
+from cfddem.particles.interactions.slots import BRIDGE_PULL
 from cfddem.particles.pair_graph import geometry
+from cfddem.particles.particle_feature import Engine
 from cfddem.particles.vectors import at, dot, flat, minus, plus, times
 from cfddem.particles.walls.nearest_point import SURFACE, touched
-
-if TYPE_CHECKING:
-    from cfddem.particles.solver import ParticleSolver
 
 CHANNELS = ("bridge", "bridges_formed", "bridges_broken")
 """Energy lost to the resistance of bridges; energy gained where bridges form and lost where they break."""
@@ -46,46 +45,52 @@ class BridgeCount(NamedTuple):
     totals: np.ndarray  # (2, CHUNKS, 4); the second half is of pairs that another rank adds [J]
 
 
-class BridgeEnergies:
-    """The energy account of the bridges of a particle solver.
+class BridgeEnergies(EnergyAccount):
+    """The energy account of the bridges of a particle engine.
 
     channels  `CHANNELS`
     """
 
     channels = CHANNELS
 
-    def __init__(self, solver: ParticleSolver) -> None:
-        self._loop = specialise(_count_bridges, solver.choices)
-        self.make_room(solver)
+    def __init__(self, engine: Engine) -> None:
+        self._loop = specialise(_count_bridges, engine.choices)
+        self.make_room(engine)
 
-    def make_room(self, solver: ParticleSolver) -> None:
+    def make_room(self, engine: Engine) -> None:
         """Begin with another neighbour list."""
-        ahead, spin_ahead = np.zeros((2, solver.particles.count, 3))
-        held, pulled = np.zeros((2, len(solver.edges.first)))
+        ahead, spin_ahead = np.zeros((2, engine.particles.count, 3))
+        held, pulled = np.zeros((2, len(engine.edges.first)))
         self._state = BridgeCount(ahead, spin_ahead, held, pulled, np.zeros((2, CHUNKS, 4)))
 
-    def before(self, solver: ParticleSolver, step: float, ahead: np.ndarray) -> None:
+    def before(self, engine: Engine, step: float, ahead: np.ndarray) -> None:
         """Before a step [s]; `ahead`, the velocity after the first half kick (N, 3) [m/s]."""
-        keep_motion(self._state, solver.particles, step, ahead)
+        keep_motion(self._state, engine.particles, step, ahead)
 
-    def count(self, solver: ParticleSolver, step: float, before: float, after: float) -> tuple[np.ndarray, float]:
-        """Count at this instant.
+    def renewed(self, engine: Engine, kick: float) -> None:
+        """Note the work of pulls in the half kick that follows; it is counted already."""
+        self._sums(engine, 0.0, 0.0, kick)
 
-        step           0 where no time has passed since the last count [s]
-        before, after  half kicks before and after this instant [s]
-        returns        energy of each channel (3,) and what moving walls have put in [J]
-        """
-        state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
-        state.totals[:] = 0.0
-        if step > 0.0 and len(solver.walls.kind) > 0:
-            _follow_bridges(solver.system, state)
-        self._loop(solver.system, state, step, before, after)
-        done = solver.communicator.sum(state.totals[0], axis=0)
+    def count(
+        self, engine: Engine, step: float, before: float, after: float, contacts: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Count at this instant."""
+        done = self._sums(engine, step, before, after)
+        done[RESISTANCE] -= contacts[BY_IMPULSES]
         return done[[RESISTANCE, FORMED, BROKEN]], float(done[BY_WALLS])
 
-    def held(self, solver: ParticleSolver) -> float:
+    def _sums(self, engine: Engine, step: float, before: float, after: float) -> np.ndarray:
+        state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
+        state.totals[:] = 0.0
+        if step > 0.0 and len(engine.walls.kind) > 0:
+            _follow_bridges(engine.system, state)
+        self._loop(engine.system, state, step, before, after)
+        return engine.communicator.sum(state.totals[0], axis=0)  # type: ignore[no-any-return]
+
+    def stored(self, engine: Engine) -> dict[str, float]:
         """Energy of the pull of all bridges, from contact [J]."""
-        return float(solver.communicator.sum(self._state.held[solver.edges.first < solver.particles.owned]))
+        held = self._state.held[engine.edges.first < engine.particles.owned]
+        return {"bridges": float(engine.communicator.sum(held))}
 
 
 @serial
@@ -140,14 +145,6 @@ def _resisted(k, system, count, step):
         return -dot(impulse, minus(velocity, other)) - turned, 0.0
     surface = touched(edges, k, SURFACE)
     return -dot(impulse, minus(velocity, surface)) - turned, dot(impulse, surface)
-
-
-@inline
-def note_bridge_loss(k, memory, lost):
-    """Add what the bridge of edge k has lost to its collision, where one is recorded."""
-    if RECORD and not np.isnan(memory.begin[k]):
-        before = memory.lost_to_bridge[k]
-        memory.lost_to_bridge[k] = lost + (0.0 if np.isnan(before) else before)
 
 
 @inline

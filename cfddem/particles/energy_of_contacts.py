@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, threaded
-from cfddem.particles.energy_of_bridges import note_bridge_loss
 from cfddem.particles.impulse_motion import drifted, mean_motion, motion_of_weak, taken_by_impulses
 from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
@@ -31,13 +30,11 @@ from cfddem.particles.interactions.slots import (
     tangential_stiffness,
 )
 from cfddem.particles.pair_graph import geometry
+from cfddem.particles.particle_feature import Engine
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
 from closures.blend import contact_share
 from closures.friction import coulomb_limit
-
-if TYPE_CHECKING:
-    from cfddem.particles.solver import ParticleSolver
 
 FILMS, DAMPING, SLIDING, TURNING, WALLS, STIFFENING, FALL, HYSTERESIS = range(8)
 CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffening", "fall", "hysteresis")
@@ -70,9 +67,9 @@ class Count(NamedTuple):
     totals: np.ndarray  # (2, CHUNKS, channels + 2); the second half is of pairs that another rank adds [J]
 
 
-def room_for_count(solver: ParticleSolver) -> Count:
+def allocate_tally(engine: Engine) -> Count:
     """A count with all values 0, for the present particles and pairs."""
-    number, count = len(solver.edges.first), solver.particles.count
+    number, count = len(engine.edges.first), engine.particles.count
     ahead, spin_ahead, moved, turned, drifted = np.zeros((5, count, 3))
     spring, stiffness, power, held, yielded = np.zeros((5, number))
     push, twist = np.zeros((2, number, 3))
@@ -80,6 +77,40 @@ def room_for_count(solver: ParticleSolver) -> Count:
     return Count(
         ahead, spin_ahead, moved, turned, drifted, spring, stiffness, power, held, yielded, push, twist, totals
     )
+
+
+class EnergyAccount:
+    """Energy of one kind of interaction, counted beside that of contacts and films.
+
+    channels  names of its channels
+    """
+
+    channels: tuple[str, ...] = ()
+
+    def make_room(self, engine: Engine) -> None:
+        """Begin with another neighbour list."""
+
+    def before(self, engine: Engine, step: float, ahead: np.ndarray) -> None:
+        """Before a step [s]; `ahead`, the velocity after the first half kick (N, 3) [m/s]."""
+
+    def renewed(self, engine: Engine, kick: float) -> None:
+        """A new list was made amid an advance; it has forgotten the half kick [s] that follows."""
+
+    def count(
+        self, engine: Engine, step: float, before: float, after: float, contacts: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Count at this instant.
+
+        step           0 where no time has passed since the last count [s]
+        before, after  half kicks before and after this instant [s]
+        contacts       `Count.totals` of contacts, summed [J]
+        returns        energy of each channel and what moving walls have put in [J]
+        """
+        return np.zeros(len(self.channels)), 0.0
+
+    def stored(self, engine: Engine) -> dict[str, float]:
+        """Energy that it stores, by its form [J]."""
+        return {}
 
 
 @threaded
@@ -107,6 +138,14 @@ def count_motion(particles, count, gravity, free, step, before, after):
                     totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, velocity)
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
+
+
+@inline
+def note_bridge_loss(k, memory, lost):
+    """Add what the bridge of edge k has lost to its collision, where one is recorded."""
+    if RECORD and not np.isnan(memory.begin[k]):
+        before = memory.lost_to_bridge[k]
+        memory.lost_to_bridge[k] = lost + (0.0 if np.isnan(before) else before)
 
 
 @inline

@@ -6,20 +6,18 @@ of all impulses adds up to the change of the kinetic energy to round-off.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.backend.law_set import specialise
-from cfddem.particles.energy_of_contacts import FILMS, note_loss
+from cfddem.particles.energy_of_contacts import BY_SHEAR, FILMS, EnergyAccount, note_loss
 from cfddem.particles.impulse_motion import keep_motion, mean_motion
 from cfddem.particles.interactions.shear_film import impulses_of
+from cfddem.particles.particle_feature import Engine
 from cfddem.particles.vectors import at, dot, flat
 from cfddem.particles.walls.nearest_point import SURFACE, touched
-
-if TYPE_CHECKING:
-    from cfddem.particles.solver import ParticleSolver
 
 CHANNELS = ("film_shear",)
 """Energy lost to films that resist sliding, rolling and twisting."""
@@ -33,33 +31,35 @@ class ShearCount(NamedTuple):
     totals: np.ndarray  # (2, CHUNKS, 2) lost, and put in by moving walls; second half: another rank adds it [J]
 
 
-class ShearEnergies:
+class ShearEnergies(EnergyAccount):
     """The energy account of films that resist sliding."""
 
-    def __init__(self, solver: ParticleSolver) -> None:
-        self._loop = specialise(_count_shear, solver.choices)
-        self.make_room(solver)
+    channels = CHANNELS
 
-    def make_room(self, solver: ParticleSolver) -> None:
+    def __init__(self, engine: Engine) -> None:
+        self._loop = specialise(_count_shear, engine.choices)
+        self.make_room(engine)
+
+    def make_room(self, engine: Engine) -> None:
         """Begin with another neighbour list."""
-        ahead, spin_ahead = np.zeros((2, solver.particles.count, 3))
+        ahead, spin_ahead = np.zeros((2, engine.particles.count, 3))
         self._state = ShearCount(ahead, spin_ahead, np.zeros((2, CHUNKS, 2)))
 
-    def before(self, solver: ParticleSolver, step: float, ahead: np.ndarray) -> None:
+    def before(self, engine: Engine, step: float, ahead: np.ndarray) -> None:
         """Before a step [s]; `ahead`, the velocity after the first half kick (N, 3) [m/s]."""
-        keep_motion(self._state, solver.particles, step, ahead)
+        keep_motion(self._state, engine.particles, step, ahead)
 
-    def count(self, solver: ParticleSolver, step: float) -> np.ndarray:
-        """Energy lost in the step, and put in by moving walls (2,) [J].
-
-        step  0 where no time has passed since the last count [s]
-        """
-        if step == 0.0:
-            return np.zeros(2)
-        state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
-        state.totals[:] = 0.0
-        self._loop(solver.system, state, step)
-        return solver.communicator.sum(state.totals[0], axis=0)
+    def count(
+        self, engine: Engine, step: float, before: float, after: float, contacts: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Count at this instant."""
+        lost, by_walls = np.zeros(2)
+        if step > 0.0:
+            state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]
+            state.totals[:] = 0.0
+            self._loop(engine.system, state, step)
+            lost, by_walls = engine.communicator.sum(state.totals[0], axis=0)
+        return np.array([lost + contacts[BY_SHEAR]]), float(by_walls)
 
 
 @inline

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,21 +12,20 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.stopwatch import Stopwatch
-from cfddem.particles.collision_events import COLLISION, WET_COLLISION, WET_FIELDS
+from cfddem.particles.collision_events import COLLISION, collision_row
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.energy_count import Energies
 from cfddem.particles.ghosts import Slabs, StepsWithGhosts
 from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
-from cfddem.particles.interactions.bridge_reach import bridge_reach_ratio, films_outgrow, release_bridges
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.pair_loops import loop_choices
-from cfddem.particles.interactions.wall_liquid import with_room
 from cfddem.particles.listing import NeighbourLists, rows_before
 from cfddem.particles.named_state import named_state, restored_list
 from cfddem.particles.pair_graph import Edges, gaps, shifts
+from cfddem.particles.particle_feature import ParticleFeature
 from cfddem.particles.state import Particles
 from cfddem.particles.system import System
 from cfddem.particles.time_scales import TimeScales, check_step, refusing, time_scales
@@ -41,6 +40,13 @@ CHECK_EVERY = 20
 
 _NO_ROWS = np.zeros(0, COLLISION)
 _NO_LOOP: Any = None
+
+Kind = TypeVar("Kind", bound=ParticleFeature)
+
+
+def _no_rows(pairs: int) -> np.ndarray:
+    """No room for collisions: none is recorded."""
+    return _NO_ROWS
 
 
 class ParticleSolver:
@@ -90,18 +96,16 @@ class ParticleSolver:
         self.walls = wall_arrays(walls)
         self.laws = laws or Laws()
         self.laws.check()
-        wall_share = self.laws.bridge.wall_share if self.laws.bridge is not None else 0.0
-        for name, each in (("after", after), ("wall_share", wall_share or None)):
+        for name, each in (("after", after), ("wall_share", self.laws.bridges.wall_share or None)):
             if communicator.size > 1 and each is not None:
                 raise InputError(name, None, "absent in a run of several processes")
-        wet = self.laws.bridge is not None
-        recorded = (*RECORD_FIELDS, *(WET_FIELDS if wet else ())) if record else ()
+        recorded = (*RECORD_FIELDS, *self.laws.bridges.collision_memory) if record else ()
         self.pair_fields = [*self.laws.fields(), *recorded]
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
         choices = self.laws.choices() | {"WALLS": bool(walls), "RECORD": record}
         choices["TRIANGLES"] = len(self.walls.cell_member) > 0
         self.parameters = self.laws.parameters(gravity, free)
-        self.choices = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
+        self.choices: Mapping[str, Any] = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
         self._loop, self._threads, self.film_counts = _NO_LOOP, False, np.zeros(4)
         self._touch_walls = specialise(wall_contacts, self.choices)
         self.gravity, self.free = gravity, free
@@ -111,8 +115,12 @@ class ParticleSolver:
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
         self.time, self.steps = 0.0, 0
-        self.collisions = CollisionRecord(dtype=WET_COLLISION if wet else COLLISION) if record else None
-        self.bridges = None if self.laws.bridge is None else Bridges(self)
+        self.features: list[ParticleFeature] = [Bridges(self, self.laws.bridge)] if self.laws.bridge else []
+        self._rows_for: Callable[[int], np.ndarray] = _no_rows
+        if record:
+            kept = CollisionRecord(dtype=collision_row(self.laws.bridges.collision_fields), communicator=communicator)
+            self._rows_for = kept.room
+            self.features.append(kept)
         self.wall = Stopwatch()
         self.lists = NeighbourLists(
             self.pair_fields, table, self.box, communicator=communicator, division=division, balance=balance,
@@ -127,12 +135,37 @@ class ParticleSolver:
         )
         self._outside = 0
         self.refresh()
-        self.energies = Energies(self) if energies else None
+        self.features += [Energies(self)] if energies else []
+
+    def find(self, kind: type[Kind]) -> Kind | None:
+        """The feature of a kind; None if this run has none."""
+        return next((each for each in self.features if isinstance(each, kind)), None)
+
+    def feature(self, kind: type[Kind]) -> Kind:
+        """The feature of a kind, such as `Bridges`; InputError if this run has none."""
+        if found := self.find(kind):
+            return found
+        raise InputError(kind.name, None, "a particle solver that has them", "see the options of ParticleSolver")
+
+    @property
+    def bridges(self) -> Bridges | None:
+        """The liquid bridges; None where particles carry no liquid."""
+        return self.find(Bridges)
+
+    @property
+    def collisions(self) -> CollisionRecord | None:
+        """The record of collisions, with `record`."""
+        return self.find(CollisionRecord)
+
+    @property
+    def energies(self) -> Energies | None:
+        """The energy account, with `energies`."""
+        return self.find(Energies)
 
     def _find_reach(self, after: Particles | None = None) -> float:
         """Reach that the next list must have; `after` a change to these particles."""
         reach = self.laws.cutoff_ratio if self.laws.film else 0.0
-        return reach if self.bridges is None else max(reach, bridge_reach_ratio(self, after))
+        return max(reach, *(each.reach_ratio(self, after) for each in self.features), 0.0)
 
     @property
     def gap(self) -> np.ndarray:
@@ -179,24 +212,23 @@ class ParticleSolver:
         a position is NaN, or a particle has left the domain or was pressed through another body.
         """
         self.wall.start()
-        if self.bridges is not None and films_outgrow(self, self._reach):
+        if any(each.outgrows(self, self._reach) for each in self.features):  # local: the same on all ranks
             self._relist()
-        counting, first = self.energies, True
+        first, at_once = True, 1 if any(each.every_step for each in self.features) else steps  # local: a choice
         while steps > 0:
             if self._checking and step > self._accepted:
                 check_step(step, refusing(self.time_scales(), self.laws.film))
                 self._accepted = step
-            if counting is not None:
-                counting.before(self, step, first)
-            done, farthest, noted = self._integrate(step, steps if counting is None else 1)
+            for each in self.features:
+                each.before(self, step, first)
+            done, farthest, noted = self._integrate(step, min(steps, at_once))
             self.wall.lap("pairs and motion")
             steps -= done
-            if counting is not None:
-                counting.after(self, step, steps == 0)
-                self.wall.lap("energies")
+            for each in self.features:
+                each.after(self, step, steps == 0, noted)
+                if each.every_step:
+                    self.wall.lap(each.name)
             first = False
-            if self.collisions is not None:
-                self.collisions.keep(noted)
             self.steps += done
             self.time += done * step
             moved_far = not farthest < (0.5 * self.lists.skin) ** 2
@@ -218,11 +250,11 @@ class ParticleSolver:
         return state | {
             "walls": checkpoint_walls(self.walls),
             "listed_walls": self._listed_walls,
-            **({} if self.energies is None else {"energies": self.energies.checkpoint()}),
+            "features": {each.name: each.checkpoint() for each in self.features},
             "lists": self.lists.checkpoint(),
             "counters": {
                 "time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": outside,
-                **({} if self.bridges is None else self.bridges.counters(self._reach)),
+                "reach": self._reach,
             },
         }  # fmt: skip
 
@@ -234,8 +266,7 @@ class ParticleSolver:
         walls, listed_walls = state["walls"], state.get("listed_walls", state["walls"])
         self.lists.restore(state["lists"])
         counters = state["counters"]
-        if self.bridges is not None:
-            self._reach = self.bridges.restore(counters)
+        self._reach = float(counters["reach"])
         found = restored_list(state, self.particles, self.edges, self.lists, listed_walls, self._reach)
         self.particles, edges, origin = found
         self.lists.count(self.particles)
@@ -247,8 +278,8 @@ class ParticleSolver:
         self._take_list(edges)
         self._origin[:], self._listed_walls = origin, listed_walls
         self.walls.travel[:], self.edges.touch[:] = walls["travel"], touch
-        if self.energies is not None:
-            self.energies.restore(state["energies"])
+        for each in self.features:
+            each.restore(state["features"][each.name])
 
     def _integrate(self, step: float, steps: int) -> tuple[int, float, int]:
         threads = self.lists.many and use_threads(None) > 1  # one thread gains nothing from loops for all
@@ -256,17 +287,18 @@ class ParticleSolver:
             self._threads, self._loop = threads, specialise(integrate, self.choices, threads)
             if self.communicator.size > 1:
                 self._loop = StepsWithGhosts(self.choices, self._threads, self.lists.ghosts, self.communicator)
-        log = _NO_ROWS if self.collisions is None else self.collisions.room(len(self.edges.first))
         return self._loop(  # type: ignore[no-any-return]
-            self.system, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time, log
-        )
+            self.system, step, steps, self._origin.reshape(-1), 0.5 * self.lists.skin, self.time,
+            self._rows_for(len(self.edges.first)),
+        )  # fmt: skip
 
     def _take_list(self, edges: Edges) -> None:
         """Use a new neighbour list: note the positions it was made at, and make the arrays that loops take."""
         self.edges, self._owned = edges, self.particles.owned
-        if self.laws.bridge is not None and self.laws.bridge.wall_share > 0.0:
-            self.walls = with_room(self.walls, len(edges.first) - edges.between_particles)
-        self._origin, self._listed_walls = self.particles.position.copy(), checkpoint_walls(self.walls)
+        for each in self.features:
+            self.walls = each.with_room(self.walls, edges)
+        self._origin: np.ndarray = self.particles.position.copy()
+        self._listed_walls = checkpoint_walls(self.walls)
         self.system = System(
             self.particles.view_with(self.laws.particle_fields()), edges.flat_graph, edges.memory, flat(self.walls),
             shifts(self.box).reshape(-1), self.table, self.parameters, self.film_counts,
@@ -301,8 +333,8 @@ class ParticleSolver:
         fresh.id[:] = ids
         joined = self.particles.copy(slice(count))
         added = joined.append(self.lists.own(fresh))
-        if self.bridges is not None:
-            self.bridges.feed(joined.liquid[added])
+        for each in self.features:
+            each.inserted(self, joined, added)
         self._exchange(joined, np.append(np.arange(count), np.full(len(added), -1)))
         return ids
 
@@ -316,12 +348,9 @@ class ParticleSolver:
         number = self.communicator.count(gone)
         if self.communicator.all(gone):
             raise InputError("gone", number, f"fewer than all {number} particles")
-        if self.bridges is not None:
-            release_bridges(self, gone)
-            self.bridges.forget(gone)
+        for each in self.features:
+            each.removing(self, gone)
         taken: Particles = self.particles.copy(np.flatnonzero(gone))
-        if self.bridges is not None:
-            self.bridges.feed(-taken.liquid)
         if number:
             stay = np.flatnonzero(~gone)
             self._exchange(self.particles.copy(stay), stay)
@@ -332,8 +361,8 @@ class ParticleSolver:
 
         old_row  row of each before; -1 for an inserted particle
         """
-        counting = self.energies
-        had = 0.0 if counting is None else counting.of_all(self)
+        for each in self.features:
+            each.before_exchange(self)
         self._reach = self._find_reach(made)
         self.particles = made
         self.lists.count(made)
@@ -342,5 +371,5 @@ class ParticleSolver:
         springs = self.edges.spring.copy()
         self.refresh()
         self.edges.spring[:] = springs  # no time has passed in which contacts could slide
-        if counting is not None:
-            counting.fed += counting.of_all(self) - had
+        for each in self.features:
+            each.after_exchange(self)

@@ -62,8 +62,7 @@ def time_scales(
             strongest = _film_strength(laws, viscosity, radius, float(row["roughness_gap"]))
             film = min(film, 2.0 * timescales.film_time(mass, strongest, float(row["roughness_gap"])))
     largest_rate = specialise(_largest_rate, laws.choices())
-    of_bridges = ("bridge_film", "bridge_volume", "bridge_gap") if laws.bridge is not None else ()
-    remembered = ("minimum_gap", *of_bridges, *(field.name for field in laws.contact_law.memory))
+    remembered = ("minimum_gap", *laws.bridges.pulling, *(field.name for field in laws.contact_law.memory))
     memory = named_arrays("Memory", remembered)(*(edges[name] for name in remembered))
     nowhere = np.zeros(0)  # gaps are known
     system = System(particles.view, edges.flat_graph, memory, walls, nowhere, table, laws.parameters(), np.zeros(4))

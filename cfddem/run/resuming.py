@@ -73,8 +73,6 @@ def restored(
     """
     try:
         simulation = Simulation.restored(case, state["simulation"], communicator=communicator, **given)
-        if simulation.particle_solver.collisions is not None and communicator.rank == 0:
-            simulation.particle_solver.collisions.put_back(state["collisions"])
     except (KeyError, IndexError, TypeError) as failure:
         remedy = f"its checkpoint does not fit; run {folder}/case.toml again in another folder"
         raise InputError("folder", str(folder), "a run of this version of cfddem", remedy) from failure

@@ -27,7 +27,6 @@ from cfddem.io.provenance import provenance
 from cfddem.io.quantities import Quantities, Quantity, of_fields
 from cfddem.io.writer import RunFolder, folder_of_ranks
 from cfddem.model.feature import Feature, Function
-from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS
 from cfddem.particles.guard import guard
 from cfddem.run import history
 from cfddem.run.own_laws import record_of, require_compiled, warn_of_changes
@@ -313,16 +312,11 @@ class Run:
                 fluid = {name: simulation.fluid.whole(name) for name in RECORDED}
                 if SOLID in self.folder.quantities["fluid"]:
                     fluid[SOLID] = ~simulation.fluid.grid.whole.open
-            collisions = None if solver.collisions is None else self._gathered(solver.collisions.take())
+            collisions = solver.collisions.take() if solver.collisions else None
             self.folder.write_snapshot(simulation.time, solver.steps, fluid, simulation.snapshot(), collisions)
         due = clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE
         if simulation.communicator.broadcast(due):
             self._write_checkpoint()
-
-    def _gathered(self, collisions: np.ndarray) -> np.ndarray:
-        """The collisions of all ranks, on rank 0, in the order of their ends."""
-        rows = self.simulation.communicator.gathered(collisions)
-        return rows if self.simulation.communicator.size == 1 else np.sort(rows, order=["end", "first", "second"])
 
     def _write_checkpoint(self) -> None:
         """Write the full state, with the intervals, which would otherwise follow from a new end."""
@@ -333,8 +327,6 @@ class Run:
                 "run.until_error": simulation.case.run.until_error,
             }  # fmt: skip
             state: dict[str, Any] = {"time": simulation.time, "overrides": plan, "simulation": simulation.checkpoint()}
-            if simulation.particle_solver.collisions is not None:
-                state["collisions"] = self._gathered(simulation.particle_solver.collisions.table)
             self.folder.write_checkpoint(state)
         self.folder.note("wall_time", dict(simulation.wall.seconds))
         self._checkpoint_at = clock.monotonic()
@@ -359,11 +351,12 @@ def _no_empty_folder(folder: Path) -> Iterator[None]:
 def quantities_of(simulation: Simulation) -> Quantities:
     """Unit and meaning of everything that a run of a simulation writes."""
     case = simulation.case
-    recorded = COLLISION_FIELDS if simulation.particle_solver.bridges is None else WET_COLLISION_FIELDS
     return {
         "history": history.all_columns(case),
         "particles": of_fields(field for field in simulation.particles.fields.values() if field.snapshot),
         "fluid": of_fields(field for field in FLUID_FIELDS if field.name in RECORDED)
         | ({SOLID: Quantity("1", "1 in solid cells, 0 in the fluid")} if grid_of(case).solid is not None else {}),
-        "collisions": of_fields(recorded) if case.run.record_collisions else {},
+        "collisions": of_fields(simulation.particle_solver.laws.bridges.collision_fields)
+        if case.run.record_collisions
+        else {},
     }

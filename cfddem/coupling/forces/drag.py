@@ -71,13 +71,16 @@ class Drag(FluidForce):
 def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, model_b, conductance):
     """Drag over slip of every particle; returns how many flows are outside the range of the law, and how many numbers
     are negative or not finite."""
+    slowest, fastest = numbers
+    densest, loosest = voidages
+    smallest, largest = ratios
     outside = wrong = 0
     for n in prange(len(reynolds)):
         factor = drag_factor(reynolds[n], voidage[n], ratio[n])
         conductance[n] = factor
-        beyond = reynolds[n] < numbers[0] or reynolds[n] > numbers[1]
-        beyond = beyond or voidage[n] < voidages[0] or voidage[n] > voidages[1]
-        outside += 1 if beyond or ratio[n] < ratios[0] or ratio[n] > ratios[1] else 0
+        beyond = reynolds[n] < slowest or reynolds[n] > fastest
+        beyond = beyond or voidage[n] < densest or voidage[n] > loosest
+        outside += 1 if beyond or ratio[n] < smallest or ratio[n] > largest else 0
         wrong += 0 if factor >= 0.0 and factor < math.inf else 1
     # In the same loop the compiler would evaluate all branches of a law.
     for n in prange(len(reynolds)):

@@ -88,6 +88,13 @@ class Scales(NamedTuple):
     growth: Array  # B, force per change of the slip in the step (n,) [kg/s]
 
 
+class Place(NamedTuple):
+    """Place in the table of a step over t_c."""
+
+    row: int
+    part: float  # of the way to the next row
+
+
 @inline
 def implicit_part(drag, growth, time):
     r"""Conductance of the newest part of the history force, and the factor of its impulse.
@@ -137,22 +144,24 @@ def _between(table, row, part):
 
 
 @fused
-def _advance(kernel, modes, gain, last, now, steady):
+def _advance(kernel, modes, before, until, gain, last, now, steady):
     """Advance the modes of a particle over the last step; returns their sum in the coming one.
 
+    modes      their components, and those of a mode not kept
+    before     number of modes so far
+    until      number of modes from now on
     gain       change of the slip in a time t_c, as in the last step
-    last, now  row of the table and part of the way to the next, of the last and of the coming step
+    last, now  `Place` of the last and of the coming step
     steady     whether both are equal
     """
-    before, until = int(modes[0]), max(kernel.kept[last[0]], kernel.kept[now[0]])
     for k in range(before, until):  # the particle slows down or the step is shorter: more modes than before
         for d in range(3):
-            modes[4 + 3 * k + d] = modes[1 + 3 * before + d]
-    low, high, part, share = kernel.fading[now[0]], kernel.fading[now[0] + 1], now[1], kernel.share
-    low_last, high_last, part_last = kernel.fading[last[0]], kernel.fading[last[0] + 1], last[1]
+            modes[3 + 3 * k + d] = modes[3 * before + d]
+    low, high, part, share = kernel.fading[now.row], kernel.fading[now.row + 1], now.part, kernel.share
+    low_last, high_last, part_last = kernel.fading[last.row], kernel.fading[last.row + 1], last.part
     x, y, z = NOTHING
     for k in range(until):
-        fading, here = low[k] + part * (high[k] - low[k]), 1 + 3 * k
+        fading, here = low[k] + part * (high[k] - low[k]), 3 * k
         faded = fading if steady else low_last[k] + part_last * (high_last[k] - low_last[k])
         along = modes[here] + faded * (gain[0] - modes[here])
         across = modes[here + 1] + faded * (gain[1] - modes[here + 1])
@@ -160,8 +169,7 @@ def _advance(kernel, modes, gain, last, now, steady):
         modes[here], modes[here + 1], modes[here + 2] = along, across, up
         left = fading * share[k]
         x, y, z = x + left * along, y + left * across, z + left * up
-    modes[0] = until
-    modes[1 + 3 * until], modes[2 + 3 * until], modes[3 + 3 * until] = gain
+    modes[3 * until], modes[1 + 3 * until], modes[2 + 3 * until] = gain
     return plus(times(kernel.rest[until], gain), (x, y, z))
 
 
@@ -229,13 +237,16 @@ def _remember_one(memory, slips, found, kernel, step, last_step, n, place):
     past, missing = NOTHING, NOTHING
     if last_step > 0.0 and not math.isnan(before[0]):
         time, stokes, growth_last = found.time[place], found.stokes[place], found.growth[place]
-        change, now = minus(slip, before), (found.row[place], found.part[place])
+        change, now = minus(slip, before), Place(found.row[place], found.part[place])
         last = now
         if last_step != step:
-            last = _row(last_step / time)
-            growth_last = stokes * _between(kernel.second, last[0], last[1])
-        gain = times(time / last_step, change)
-        past = times(stokes * time / step, _advance(kernel, memory.modes[n], gain, last, now, last_step == step))
+            row, part = _row(last_step / time)
+            last, growth_last = Place(row, part), stokes * _between(kernel.second, row, part)
+        gain, until = times(time / last_step, change), max(kernel.kept[last.row], kernel.kept[now.row])
+        modes, steady = memory.modes[n, 1:], last_step == step
+        modes_sum = _advance(kernel, modes, int(memory.modes[n, 0]), until, gain, last, now, steady)
+        memory.modes[n, 0] = until
+        past = times(stokes * time / step, modes_sum)
         missing = minus(times(last_step * growth_last, change), of_row(memory.newest, n))
     for d in range(3):
         memory.force[n, d] = past[d] + missing[d] / step - memory.conductance[n] * slip[d]

@@ -14,7 +14,11 @@ from typing import Any, NamedTuple
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_set import adapted, check_compiles
 from cfddem.backend.named import can_be_named
+from cfddem.data.fields import Field
+from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS, WET_FIELDS
+from cfddem.particles.interactions.bridge import FIELDS, INERTIA_FIELDS, PARTICLE_FIELDS
 from cfddem.particles.interactions.slots import BridgeState
+from cfddem.particles.system import numbers
 from closures import bridge, capillary, capillary_pull, rupture
 from closures.lubrication import film_strength
 
@@ -237,6 +241,16 @@ class BridgeLaws:
         for name, function in self._functions().items():
             check_compiles(f"laws.bridge.{name}", function)
 
+    particle_fields = PARTICLE_FIELDS
+    collision_memory, collision_fields = WET_FIELDS, WET_COLLISION_FIELDS
+    kept_apart = frozenset(each.name for each in (*FIELDS, *INERTIA_FIELDS))
+    pulling = ("bridge_film", "bridge_volume", "bridge_gap")
+
+    @property
+    def fields(self) -> tuple[Field, ...]:
+        """What pairs remember of their bridges."""
+        return (*FIELDS, *(INERTIA_FIELDS if self.film_density > 0.0 else ()))
+
     @property
     def numbers(self) -> BridgeNumbers:
         """The numbers of all laws."""
@@ -293,7 +307,35 @@ class BridgeLaws:
         return _WORDS[name][law] if isinstance(law, str) else law
 
 
-NO_BRIDGE: dict[str, Any] = {"BRIDGE": False}
-"""What a run without liquid puts into the slots."""
+class NoBridges:
+    """Laws of a run whose particles carry no liquid, with what the machine asks of :class:`BridgeLaws`.
+
+    particle_fields   what particles remember
+    fields            what pairs remember
+    kept_apart        those fields that inactive triangles of a mesh do not take over
+    pulling           fields of pairs on which the pull depends
+    collision_memory  what pairs remember of a recorded collision, beyond the memory without liquid
+    collision_fields  columns of the record of collisions
+    """
+
+    particle_fields: tuple[Field, ...] = ()
+    fields: tuple[Field, ...] = ()
+    kept_apart: frozenset[str] = frozenset()
+    pulling: tuple[str, ...] = ()
+    collision_memory: tuple[Field, ...] = ()
+    collision_fields = COLLISION_FIELDS
+    wall_share = 0.0
+    parameters: Mapping[str, float] = {}
+    numbers = numbers({})
+
+    def check(self) -> None:
+        """Nothing can be wrong."""
+
+    def choices(self) -> dict[str, Any]:
+        """What a run without liquid puts into the slots of the loops."""
+        return {"BRIDGE": False}
+
+
+NO_BRIDGES = NoBridges()
 
 assert {*BridgeNumbers._fields} <= {each.name for each in fields(BridgeLaws)}

@@ -1,28 +1,45 @@
-"""The liquid bridges of a run, as a user sees them."""
+"""The liquid bridges of a run: as a user sees them, how far neighbour lists must reach for them, and what becomes of
+those of removed particles."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from cfddem.backend.compile import serial
+from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.particles.agglomerates import agglomerates
 from cfddem.particles.interactions.bridge import thickness_of_films
-from cfddem.particles.interactions.bridge_changes import longest_gap
-from cfddem.particles.interactions.wall_liquid import gained_by_walls
+from cfddem.particles.interactions.bridge_changes import clear_bridges, longest_gap, mark_bodies, transfer_liquid
+from cfddem.particles.interactions.bridge_law import BridgeLaws
+from cfddem.particles.interactions.slots import WALL_LIQUID, WALLS
+from cfddem.particles.interactions.wall_liquid import gained_by_walls, transfer_wall_liquid, with_room
+from cfddem.particles.pair_graph import Edges
+from cfddem.particles.particle_feature import Engine, ParticleFeature
+from cfddem.particles.state import Particles
+from cfddem.particles.walls.nearest_point import Walls
 
-if TYPE_CHECKING:
-    from cfddem.particles.solver import ParticleSolver
+GROWTH = 1.25
+"""Factor by which films may grow before a new list is made."""
+
+ROUNDING = 1.0 + 1e-9
+"""Factor by which a list reaches beyond the longest bridge."""
 
 
-class Bridges:
-    """A view of the bridges of a particle solver; those whose first body this process owns."""
+class Bridges(ParticleFeature):
+    """A view of the bridges of a particle solver; those whose first body this process owns.
 
-    def __init__(self, solver: ParticleSolver) -> None:
-        self._solver = solver
+    solver  with the laws of bridges `laws`
+    """
+
+    name = "bridges"
+
+    def __init__(self, solver: Engine, laws: BridgeLaws) -> None:
+        self._solver, self._laws = solver, laws
         self._formed, self._broken = 0, 0  # counted by particles that have been removed
         self._fed = 0.0  # of this rank [m3]
 
@@ -69,16 +86,10 @@ class Bridges:
         """Liquid that inserted particles have brought, less what removed ones have taken along [m3]."""
         return float(self._solver.communicator.sum([self._fed]))
 
-    def feed(self, liquid: np.ndarray) -> None:
-        """Count the liquid on inserted particles, or less than none on removed ones (n,) [m3]."""
-        self._fed += float(liquid.sum())  # local: of this rank
-
     @property
     def gained_by_walls(self) -> float:
         """Liquid on the walls less that at the start [m3]."""
-        laws = self._solver.laws.bridge
-        assert laws is not None
-        return gained_by_walls(self._solver.walls, laws.wall_film, laws.wall_patch)
+        return gained_by_walls(self._solver.walls, self._laws.wall_film, self._laws.wall_patch)
 
     @property
     def thickness(self) -> np.ndarray:
@@ -100,20 +111,72 @@ class Bridges:
         gap = solver.gap[rows]
         return gap, longest - gap
 
-    def forget(self, gone: np.ndarray) -> None:
-        """Keep the counts of particles that will be removed (N,) bool."""
+    def checkpoint(self) -> dict[str, Any]:
+        """What the fields of particles do not tell."""
+        return {"formed": self._formed, "broken": self._broken, "fed": self.fed}
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self._formed, self._broken = int(state["formed"]), int(state["broken"])
+        self._fed = float(state["fed"]) if self._solver.communicator.rank == 0 else 0.0
+
+    def inserted(self, engine: Engine, joined: Particles, rows: np.ndarray) -> None:
+        """Count the liquid that particles bring."""
+        self._fed += float(joined.liquid[rows].sum())  # local: of this rank
+
+    def removing(self, engine: Engine, gone: np.ndarray) -> None:
+        """Break the bridges of particles that will be removed; each keeps its part of the liquid and takes it along."""
+        if engine.communicator.size > 1:
+            raise InputError("remove", None, "absent in a run of several processes with liquid bridges")
+        edges, pairs = engine.edges, engine.edges.between_particles
+        leaves = gone[edges.first]
+        leaves[:pairs] |= gone[edges.second[:pairs]]
+        edges.bridge_change[:] = np.where(leaves & (edges.bridge_film > 0.0), -1, 0)
+        specialise(_break, engine.choices)(engine.system)
         self._formed += self._sum("bridges_formed", gone)
         self._broken += self._sum("bridges_broken", gone)
+        self._fed += float(-engine.particles.liquid[: len(gone)][gone].sum())  # local: of this rank
 
-    def counters(self, reach: float) -> dict[str, Any]:
-        """What a checkpoint contains beside the fields; `reach` of the neighbour list over R* [-]."""
-        return {"reach": reach, "formed": self._formed, "broken": self._broken, "fed": self.fed}
+    def reach_ratio(self, engine: Engine, after: Particles | None) -> float:
+        """Largest gap at which two films can touch before the next list, or that a bridge has now, over R* [-].
 
-    def restore(self, counters: Mapping[str, Any]) -> float:
-        """Continue from a checkpoint; returns the reach of its neighbour list."""
-        self._formed, self._broken = int(counters["formed"]), int(counters["broken"])
-        self._fed = float(counters["fed"]) if self._solver.communicator.rank == 0 else 0.0
-        return float(counters["reach"])
+        A listed pair stays in its list however far its bridge is stretched. The bound assumes that every bridge of a
+        particle breaks and returns all its liquid.
+        """
+        particles, largest = engine.particles, engine.communicator.largest
+        radius, most = particles.radius, particles.liquid.copy()
+        edges: Edges | None = getattr(engine, "edges", None)
+        longest = np.zeros(0)
+        if edges is not None and len(edges.first):
+            rows = np.flatnonzero(edges.bridge_film > 0.0)
+            at_wall = rows >= edges.between_particles
+            first, second = edges.first[rows], edges.second[rows]
+            np.add.at(most, first, edges.bridge_volume[rows])
+            np.add.at(most, second[~at_wall], edges.bridge_volume[rows[~at_wall]])
+            other = np.where(at_wall, np.inf, radius[np.where(at_wall, 0, second)])
+            longest = engine.gap[rows] * (1.0 / radius[first] + 1.0 / other)
+        films, radii = thickness_of_films(radius, most), radius
+        if after is not None:
+            films = np.append(films, thickness_of_films(after.radius, after.liquid))
+            radii = np.append(radius, after.radius)
+        on_walls = max(self._laws.wall_film, float(engine.walls.patch_thickest[0]))
+        reach = (4.0 * GROWTH * largest(films, default=0.0) + on_walls) / engine.communicator.smallest(
+            radii, default=np.inf
+        )
+        return max(reach, ROUNDING * largest(longest, default=0.0))  # type: ignore[no-any-return]
+
+    def outgrows(self, engine: Engine, reach: float) -> bool:
+        """Whether liquid from outside, such as a spray, has made films thicker than the neighbour list allows."""
+        particles, communicator = engine.particles, engine.communicator
+        square = particles.radius**2
+        spread = particles.liquid / (4.0 * np.pi * square)  # thickness of a thin layer; a thicker one has less
+        thickest = communicator.largest(spread, default=0.0)
+        smallest = communicator.smallest(square, default=np.inf)
+        return bool(4.0 * thickest > reach * math.sqrt(smallest))
+
+    def with_room(self, walls: Walls, edges: Edges) -> Walls:
+        """The walls with room for the patches of liquid that may be made until the next list."""
+        return with_room(walls, len(edges.first) - edges.between_particles) if self._laws.wall_share > 0.0 else walls
 
     def _sum(self, name: str, rows: Any = slice(None)) -> int:
         """Sum of a count over the owned particles, or some of them."""
@@ -125,3 +188,13 @@ class Bridges:
 def _longest(rows, system, longest):
     for n in range(len(rows)):
         longest[n] = longest_gap(rows[n], system)
+
+
+@serial
+def _break(system):
+    edges, memory = system.edges, system.memory
+    mark_bodies(system)
+    if WALLS and WALL_LIQUID:
+        transfer_wall_liquid(system)
+    transfer_liquid(system)
+    clear_bridges(edges, memory)

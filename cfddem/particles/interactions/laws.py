@@ -10,8 +10,8 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
-from cfddem.particles.interactions import bridge, contact, film, joint_films, rolling, shear_film
-from cfddem.particles.interactions.bridge_law import NO_BRIDGE, BridgeLaws
+from cfddem.particles.interactions import contact, film, joint_films, rolling, shear_film
+from cfddem.particles.interactions.bridge_law import NO_BRIDGES, BridgeLaws, NoBridges
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
 from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
@@ -81,8 +81,7 @@ class Laws(NamedTuple):
             )
         if not 0.0 < self.film_tolerance <= 1.0:
             raise InputError("film_tolerance", self.film_tolerance, "above 0 and at most 1")
-        if self.bridge is not None:
-            self.bridge.check()
+        self.bridges.check()
         for kind in OF_THE_PAIR_LOOP:
             if (law := getattr(self, kind)) is None:
                 continue
@@ -98,6 +97,11 @@ class Laws(NamedTuple):
     def contact_law(self) -> ContactLaw:
         """The law of the normal contact."""
         return self.contact if isinstance(self.contact, ContactLaw) else contact_named(str(self.contact))
+
+    @property
+    def bridges(self) -> BridgeLaws | NoBridges:
+        """The laws of liquid bridges, also where particles carry no liquid."""
+        return NO_BRIDGES if self.bridge is None else self.bridge
 
     @property
     def shears(self) -> bool:
@@ -131,8 +135,8 @@ class Laws(NamedTuple):
             film_tolerance=float(self.film_tolerance),
             rolling_damping=float(self.rolling_damping),
             contact=numbers(self.contact_law.parameters),
-            bridge=numbers({}) if self.bridge is None else self.bridge.numbers,
-            bridge_functions=numbers({} if self.bridge is None else self.bridge.parameters),
+            bridge=self.bridges.numbers,
+            bridge_functions=numbers(self.bridges.parameters),
         )
 
     def fields(self) -> list[Field]:
@@ -146,24 +150,19 @@ class Laws(NamedTuple):
             fields += [*shear_film.FIELDS, *joint_films.SHEAR_FIELDS]
         if self.rolling != "none":
             fields += rolling.FIELDS
-        if self.bridge is not None:
-            fields += bridge.FIELDS
-            if self.bridge.film_density > 0.0:
-                fields += bridge.INERTIA_FIELDS
+        fields += self.bridges.fields
         if self.minimum_gap is not None or self.lubrication is not None:
             fields.append(film.OUTSIDE)
         return fields
 
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
-        of_bridges = () if self.bridge is None else bridge.PARTICLE_FIELDS
-        return (*of_bridges, *(joint_films.PARTICLE_FIELDS if self.drifting else ()))
+        return (*self.bridges.particle_fields, *(joint_films.PARTICLE_FIELDS if self.drifting else ()))
 
     @property
     def kept_apart(self) -> set[str]:
         """Fields that inactive triangles do not take over: one film and one bridge act, at the nearest of them."""
-        of_bridges = () if self.bridge is None else (*bridge.FIELDS, *bridge.INERTIA_FIELDS)
-        return {"impulse", "shear_impulse", *(field.name for field in of_bridges)}
+        return {"impulse", "shear_impulse", *self.bridges.kept_apart}
 
     def choices(self) -> dict[str, Any]:
         """What these laws put into the slots of the loops."""
@@ -192,7 +191,7 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "USER_GAP": laws.minimum_gap is not None,
         "COUNT_GAP": False,
         "COUNT_FILM": False,
-        **(NO_BRIDGE if laws.bridge is None else laws.bridge.choices()),
+        **laws.bridges.choices(),
     }
     if laws.minimum_gap is not None:
         entry = chosen("minimum_gap", laws.minimum_gap)

@@ -22,6 +22,7 @@ from cfddem.backend.errors import InputError, UnstableStep, nearest
 from cfddem.backend.html import table
 from cfddem.backend.law_choice import called_by_name, chosen
 from cfddem.case.materials import Material
+from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -350,8 +351,7 @@ def _frozen_gap(simulation: ParticleSolver, setting: Setting) -> float:
     """Minimum gap of the collision, from its record or, where it has not ended, from the pair."""
     if not simulation.laws.film:
         return 0.0
-    assert simulation.collisions is not None
-    ended = simulation.collisions.table
+    ended = simulation.feature(CollisionRecord).table
     return float(ended["minimum_gap"][-1] if len(ended) else simulation.edges.minimum_gap[0])
 
 

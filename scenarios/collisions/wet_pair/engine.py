@@ -10,6 +10,7 @@ from cfddem.backend.errors import RunFailed
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
+from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -45,11 +46,11 @@ def integrate(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, dur
     coat(two, 0.5 * pair.film)
     # the steps are chosen here: they follow the film, whose resistance changes as it opens and closes
     run = ParticleSolver(two, pair_table([solid]), laws=Laws(bridge=liquid), check_steps=False)
-    assert run.bridges is not None
+    bridges = run.feature(Bridges)
     stiffness = hertz_stiffness(pair.modulus, 0.5 * pair.radius)
     short = IMPACT_STEP * timescales.hertz_time(0.5 * pair.mass, stiffness, pair.speed)
     times, rows = [0.0], [_look(run)]
-    while run.bridges.count and run.time < duration:
+    while bridges.count and run.time < duration:
         gap, _, approach, *_ = rows[-1]
         long = FILM_STEP * pair.film / max(abs(approach), SLOWEST * pair.speed)
         run.advance(short if gap < 2.0 * long * abs(approach) else long)
@@ -57,7 +58,7 @@ def integrate(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, dur
         rows.append(_look(run))
         if run.steps > MOST_STEPS:
             raise RunFailed(f"the pair is still in its film after {MOST_STEPS} steps, at t = {run.time:.6g} s")
-    return Motion(run.bridges.count == 0, np.array(times), *np.array(rows).T)
+    return Motion(bridges.count == 0, np.array(times), *np.array(rows).T)
 
 
 def _look(run: ParticleSolver) -> tuple[float, float, float, float, float]:

@@ -202,8 +202,7 @@ def _spheres(
     coat(spheres, thickness)
     laws = Laws(film=True, cutoff_ratio=2.0 * film / (0.25 * diameter), bridge=liquid)
     run = ParticleSolver(spheres, pair_table([GRAIN]), laws=laws, box=(box[0], box[1], box[2]))
-    assert run.bridges is not None
-    return run, run.bridges
+    return run, run.feature(Bridges)
 
 
 def _momentum(run: ParticleSolver) -> np.ndarray:
