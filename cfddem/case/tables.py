@@ -130,3 +130,10 @@ class CaseTables(Checked):
     def material_name_of(self, species: Species) -> str:
         """Name of the material of a species."""
         return species.material or next(iter(self.material))
+
+    @property
+    def required_fluid(self) -> Fluid:
+        """The fluid; InputError for a case without one."""
+        if self.fluid is None:
+            raise InputError("fluid", None, "given", "without this table the case has dry particles only")
+        return self.fluid

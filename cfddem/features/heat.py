@@ -39,8 +39,8 @@ class HeatExchange(CaseFeature):
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Heat.of(case)
-        assert keys is not None and case.fluid is not None
-        self.keys, self.fluid, self.capacities = keys, case.fluid, keys.capacities(case)
+        assert keys is not None
+        self.keys, self.fluid, self.capacities = keys, case.required_fluid, keys.capacities(case)
         self.fluid_temperature, self.given = keys.fluid_temperature, 0.0
         self.communicator = simulation.communicator
         self.start = self.stored(simulation.owned)

@@ -181,13 +181,13 @@ def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:
 
 def uniform_bed(case: Case, voidage: float) -> UniformBed:
     """The uniform bed of a case at a voidage, for linear theory, without granular temperature."""
-    assert case.fluid is not None
+    fluid = case.required_fluid
     return UniformBed(
         voidage,
         case.bed.diameter,
         case.solid_density,
-        case.fluid.density,
-        case.fluid.viscosity,
+        fluid.density,
+        fluid.viscosity,
         bed_drag(case),
         gravity=math.hypot(*case.laws.gravity),
         kernel=case.laws.kernel_width * case.bed.largest_diameter,

@@ -178,13 +178,12 @@ def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 
 def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check the inlet velocity against minimum fluidisation and terminal velocity."""
-    assert case.fluid is not None
     inlet = case.bed.inlet_velocity
-    if case.laws.gravity[2] * (case.solid_density - case.fluid.density) > 0.0:
+    if case.laws.gravity[2] * (case.solid_density - case.required_fluid.density) > 0.0:
         names = {case.material_name_of(each) for each in case.species.values()}
         yield Issue(
             "warning", f"material.{names.pop() if len(names) == 1 else 'NAME'}.density",
-            f"particles float (mean {case.solid_density:.4g} kg/m3, fluid {case.fluid.density:.4g} kg/m3), "
+            f"particles float (mean {case.solid_density:.4g} kg/m3, fluid {case.required_fluid.density:.4g} kg/m3), "
             "and the flow carries them to the lid",
             "reverse laws.gravity",
         )  # fmt: skip

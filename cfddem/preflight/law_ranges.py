@@ -69,13 +69,12 @@ def by_default(case: Case) -> list[str]:
 
 def state_of(case: Case, bed: BedEstimate) -> dict[str, float]:
     """Arguments of laws in the estimated bed, by name."""
-    assert case.fluid is not None
     voidage = bed.voidage if bed.inlet > 0.0 or case.bed.start == "poured" else 1.0
     return {
         "reynolds": bed.reynolds,
         "voidage": voidage,
         "solid_fraction": 1.0 - voidage,
-        "density_ratio": case.solid_density / case.fluid.density,
+        "density_ratio": case.solid_density / case.required_fluid.density,
     }
 
 
@@ -161,10 +160,9 @@ def _fitted_here(law: Law, state: Mapping[str, float]) -> list[Law]:
 
 def _result(case: Case, bed: BedEstimate, law: Law, state: Mapping[str, float]) -> tuple[str, float]:
     """The number of interest that follows from a law of drag: its name and value; NaN if there is none."""
-    assert case.fluid is not None
     if case.bed.fixed:
         return "pressure drop", law.function(bed.reynolds, state["voidage"])
-    if bed.inlet > bed.onset and case.fluid.is_liquid:
+    if bed.inlet > bed.onset and case.required_fluid.is_liquid:
         packed = 1.0 - POURED_SOLID_FRACTION
         voidage = balance.voidage_in_balance(bed.archimedes, bed.reynolds, drag_by_name(law), packed)
         return "bed height", 1.0 / max(1.0 - voidage, 1e-9)

@@ -43,9 +43,9 @@ def check_length(case: Case, refused: bool) -> list[Issue]:
 
 def unit_of_velocity(case: Case, bed: BedEstimate) -> str:
     """The unit that an inlet velocity above the terminal velocity suggests, as a question; empty if none."""
-    assert case.fluid is not None
-    viscosity = case.fluid.viscosity
-    if case.fluid.is_liquid and viscosity >= VISCOUS_LIQUID:
+    fluid = case.required_fluid
+    viscosity = fluid.viscosity
+    if fluid.is_liquid and viscosity >= VISCOUS_LIQUID:
         return f"viscosity {viscosity:g} Pa s is {viscosity / 1e-3:.0f} times that of water; is it in mPa s?"
     if bed.onset < 1e-3 * bed.inlet < bed.terminal:
         return f"is it in mm/s? {1e-3 * bed.inlet:.3g} m/s fluidises the bed"

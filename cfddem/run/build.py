@@ -116,15 +116,14 @@ def flow_of(
     spheres  particles of this rank
     cells    division of the cells among the ranks; None in one process
     """
-    assert case.fluid is not None
     grid = grid_of(case)
     if cells is not None:
         grid = Block(grid, cells, communicator)
     fluid = FluidSolver(
         grid,
         boundaries_of(case),
-        density=case.fluid.density,
-        viscosity=case.fluid.viscosity_at(grid.centres()[2]),
+        density=case.required_fluid.density,
+        viscosity=case.required_fluid.viscosity_at(grid.centres()[2]),
         gravity=case.laws.gravity,
         model=case.laws.model,
         convection=case.laws.convection,

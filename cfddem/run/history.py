@@ -176,8 +176,7 @@ def bed_voidage(simulation: Simulation) -> float:
 @measure("1", when=_is_fluid_bed)
 def bed_voidage_from_pressure(simulation: Simulation) -> float:
     """Mean voidage of the bed, from the pressure gradient within it."""
-    particles, fluid, grid = simulation.owned, simulation.fluid, grid_of(simulation.case)
-    assert fluid is not None
+    particles, fluid, grid = simulation.owned, simulation.required_fluid, grid_of(simulation.case)
     carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
     total, volume = simulation.communicator.sum, particles.volume
     weight = (total(particles.density * volume) / total(volume) - fluid.density) * carried
@@ -189,8 +188,7 @@ def bed_voidage_from_pressure(simulation: Simulation) -> float:
 @measure("Pa", when=_is_fluid_bed)
 def pressure_drop(simulation: Simulation) -> float:
     """Pressure drop from below the floor to the top, without the hydrostatic part."""
-    fluid, column = simulation.fluid, simulation.case.column
-    assert fluid is not None
+    fluid, column = simulation.required_fluid, simulation.case.column
     grid = grid_of(simulation.case)
     drop = measures.pressure_drop(fluid.whole("pressure"), grid.spacing, 0.0, column.height, open_cells=grid.open)
     inflow, voidage = fluid.grid.joined(fluid.volume_flux(2)[:-1])[0], fluid.whole("mean_voidage")[0]
@@ -241,16 +239,14 @@ def particle_count(simulation: Simulation) -> float:
 @measure("1", group="recorded", when=_has_fluid)
 def out_of_range_count(simulation: Simulation) -> float:
     """How often drag and film laws were evaluated outside of their ranges so far."""
-    assert simulation.coupling is not None
-    of_fluid = simulation.coupling.outside
+    of_fluid = simulation.required_coupling.outside
     return of_fluid.get("drag", 0) + simulation.communicator.sum([simulation.particle_solver.outside])
 
 
 @measure("1", group="recorded", when=_is_agitated)
 def agitation_out_of_range_count(simulation: Simulation) -> float:
     """How often the law of agitation was evaluated outside of its range so far."""
-    assert simulation.coupling is not None
-    return simulation.coupling.outside["agitation"]
+    return simulation.required_coupling.outside["agitation"]
 
 
 # ---------------------------------------------------------------- mixtures
@@ -296,15 +292,13 @@ _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
 @measure("1", group="imbalance", when=_has_fluid)
 def momentum_imbalance(simulation: Simulation) -> float:
     """Momentum that the fluid gave and particles did not receive, over that given."""
-    assert simulation.fluid is not None
-    return conservation.momentum_imbalance(simulation.fluid, simulation.owned)
+    return conservation.momentum_imbalance(simulation.required_fluid, simulation.owned)
 
 
 @measure("1", group="imbalance", when=_has_fluid)
 def volume_imbalance(simulation: Simulation) -> float:
     """Volume gained by a cell against the flux through its faces, over the largest flux."""
-    assert simulation.fluid is not None
-    return conservation.volume_imbalance(simulation.fluid)
+    return conservation.volume_imbalance(simulation.required_fluid)
 
 
 # ---------------------------------------------------------------- features

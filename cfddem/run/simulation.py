@@ -13,16 +13,20 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.backend.memory import keep_freed_memory
 from cfddem.case.schema import Case
+from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.force_list import ForceList, require_features
 from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
+from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import Equipment, Feature, FluidForce, Function, On, OwnForce
 from cfddem.particles.state import Particles, particles_in
 from cfddem.run.build import parts_of
 from cfddem.run.time_steps import TimeSteps
 
 Kind = TypeVar("Kind", bound=Equipment)
+
+Part = TypeVar("Part")
 
 Callback = Callable[["Simulation"], None]
 """Function that is called after every fluid step, with the simulation."""
@@ -121,6 +125,21 @@ class Simulation:
     def particles(self) -> Particles:
         """The particles."""
         return self.particle_solver.particles
+
+    @property
+    def required_fluid(self) -> FluidSolver:
+        """The solver of the fluid; InputError where there are dry particles only."""
+        return self._required(self.fluid)
+
+    @property
+    def required_coupling(self) -> Coupling:
+        """The coupling of particles and fluid; InputError where there are dry particles only."""
+        return self._required(self.coupling)
+
+    def _required(self, part: Part | None) -> Part:
+        if part is None:
+            raise InputError("fluid", None, "given in the case of this simulation", "its particles are dry")
+        return part
 
     @property
     def time(self) -> float:

@@ -142,11 +142,10 @@ def turning(steps: int) -> Motion:
 def from_rest(steps: int = 3000) -> Motion:
     """The bead of the gallery case, glass of 0.5 mm in water, from rest until it has reached its terminal velocity."""
     case = settling.mordant()
-    assert case.fluid is not None
     times = np.linspace(0.0, case.run.until, steps + 1)
     slips = np.zeros((steps + 1, 3))
     slips[:, 2] = settling.equation_of_motion(case, times)
-    return Motion(slips, float(times[1]), case.bed.diameter, case.fluid.density, case.fluid.viscosity)
+    return Motion(slips, float(times[1]), case.bed.diameter, case.required_fluid.density, case.required_fluid.viscosity)
 
 
 def rebounding(steps: int = 3000) -> Motion:

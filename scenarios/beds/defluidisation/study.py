@@ -91,10 +91,10 @@ def _onset(case: Case, velocity: np.ndarray, share: np.ndarray, voidage: np.ndar
     powers = np.stack([velocity, velocity**2], axis=1)
     (viscous, inertial), *_ = np.linalg.lstsq(powers, share, rcond=None)
     found = 2.0 / (viscous + np.sqrt(viscous**2 + 4.0 * inertial))
-    assert case.fluid is not None and case.laws.drag_law is not None
+    assert case.laws.drag_law is not None
     own = float(np.average(voidage, weights=1.0 - voidage))
     balance = fluidising_velocity(
-        case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, own,
+        case.bed.diameter, case.solid.density, case.required_fluid.density, case.required_fluid.viscosity, own,
         in_layers(case.laws.drag_law.function, voidage), abs(case.laws.gravity[2]),
     )  # fmt: skip
     return Onset(float(found), own, balance)

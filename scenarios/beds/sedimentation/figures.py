@@ -19,10 +19,9 @@ from scenarios.beds.sedimentation.study import SOLID_FRACTIONS, Settling, expone
 def figure(found: Sequence[Settling], path: Path) -> None:
     """Velocities of suspensions over that of one sphere, on logarithmic axes, and two power laws."""
     case = vessel()
-    assert case.fluid is not None
     terminal = found[0].terminal
     power, alone = exponent(found)
-    reynolds = case.fluid.density * terminal * case.bed.diameter / case.fluid.viscosity
+    reynolds = case.required_fluid.density * terminal * case.bed.diameter / case.required_fluid.viscosity
     published = exponent_richardson_zaki(reynolds, 0.0)
     drawn, axes = panels(width=6.5, height=4.2)
     voidage = np.linspace(0.55, 1.0, 50)

@@ -46,8 +46,8 @@ def vessel() -> Case:
 
 def alone(case: Case) -> float:
     """Terminal velocity of one sphere by the case's drag law [m/s]."""
-    assert case.fluid is not None and case.laws.drag_law is not None
-    fluid = case.fluid
+    assert case.laws.drag_law is not None
+    fluid = case.required_fluid
     drag, gravity = case.laws.drag_law.function, abs(case.laws.gravity[2])
     return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, drag, gravity)
 
@@ -60,12 +60,11 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, di
     distance        approximate settling distance in diameters; the first half is not averaged
     """
     case = vessel()
-    assert case.fluid is not None
     diameter = case.bed.diameter
     count = round(solid_fraction * EDGE**2 * HEIGHT * 6.0 / math.pi)
     case = case.with_(
         **{
-            "fluid.viscosity": viscosity or case.fluid.viscosity,
+            "fluid.viscosity": viscosity or case.required_fluid.viscosity,
             "column": {
                 "width": EDGE * diameter, "height": HEIGHT * diameter, "cell": 2.0 * diameter,
                 "sides": "periodic", "ends": "periodic",
@@ -75,7 +74,6 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, di
     )  # fmt: skip
     speed = alone(case)
     case = case.with_(**{"run.reference_speed": 0.5 * speed})
-    assert case.fluid is not None
     simulation = Simulation(case)
     fluid, particles = simulation.fluid, simulation.particles
     assert fluid is not None

@@ -34,14 +34,13 @@ def mixture(velocity: float = VELOCITIES[0]) -> Case:
 
 def thresholds(case: Case) -> dict[str, float]:
     """Velocity at which the layers of the two species are equally dense, by each published law of expansion [m/s]."""
-    assert case.fluid is not None
     alone = [expansion_exponents(_alone(case, name)) for name in case.species]
     densities = [case.material_of(each).density for each in case.species.values()]
     first, second = densities
     return {
         law: inversion_velocity(
             (alone[0][law][1], alone[1][law][1]), (alone[0][law][0], alone[1][law][0]), (first, second),
-            case.fluid.density,
+            case.required_fluid.density,
         )
         for law in alone[0]
     }  # fmt: skip

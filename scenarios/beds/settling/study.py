@@ -81,10 +81,9 @@ def fall(
         },
     )
     simulation = Simulation(case)
-    assert simulation.fluid is not None
     while simulation.time < end * (1.0 - 1e-12):
         simulation.step(end)
-    fluid = float(simulation.fluid.velocity[..., 2].mean())
+    fluid = float(simulation.required_fluid.velocity[..., 2].mean())
     velocity = (fluid - float(simulation.particles.velocity[0, 2])) / speed
     return Fall(reynolds, cell, self_disturbance, velocity)
 
@@ -105,9 +104,10 @@ def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
     """Speed of the same sphere from rest by its equation of motion, alone in an endless fluid (n,) [m/s]."""
     if case.laws.history != "none":
         return _with_memory(case, times, case.run.until / 600.0)
-    assert case.fluid is not None and isinstance(case.laws.drag, str)
+    assert isinstance(case.laws.drag, str)
     law, gravity = REGISTRY["drag"][case.laws.drag].function, abs(case.laws.gravity[2])
-    sphere = (case.bed.diameter, case.solid.density, case.fluid.density, case.fluid.viscosity, law, gravity)
+    fluid = case.required_fluid
+    sphere = (case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
     speeds = [0.0]
     for begin, end in pairwise(times):
         speeds.append(speed_after(end - begin, speeds[-1], *sphere, added_mass=case.laws.added_mass_at(1.0)))
@@ -119,8 +119,8 @@ def _with_memory(case: Case, times: np.ndarray, step: float) -> np.ndarray:
 
     step  of the integration, much shorter than the memory [s]
     """
-    assert case.fluid is not None and isinstance(case.laws.drag, str)
-    fluid, diameter, gravity = case.fluid, case.bed.diameter, abs(case.laws.gravity[2])
+    assert isinstance(case.laws.drag, str)
+    fluid, diameter, gravity = case.required_fluid, case.bed.diameter, abs(case.laws.gravity[2])
     drag, law = REGISTRY["drag"][case.laws.drag].function, REGISTRY["history"][case.laws.history].function
     kinematic, volume = fluid.viscosity / fluid.density, math.pi / 6.0 * diameter**3
     weight = (case.solid.density - fluid.density) * volume * gravity
@@ -153,8 +153,7 @@ def mordant() -> Case:
 
 def unbounded(case: Case, drag: str) -> float:
     """Terminal velocity of the sphere of a case by a drag law, alone in an endless fluid [m/s]."""
-    assert case.fluid is not None
-    law, fluid, gravity = REGISTRY["drag"][drag].function, case.fluid, abs(case.laws.gravity[2])
+    law, fluid, gravity = REGISTRY["drag"][drag].function, case.required_fluid, abs(case.laws.gravity[2])
     return terminal_velocity(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
 
 
@@ -194,11 +193,10 @@ def in_held_gas() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         run={"until": float(times[-1]), "fluid_step": 2e-4, "reference_speed": 0.06},
     )
     simulation = Simulation(case)
-    assert simulation.fluid is not None
     velocity = [0.0]
     for instant in times[1:]:
         while simulation.time < instant * (1.0 - 1e-12):
-            simulation.fluid.set_velocity((0.0, 0.0, 0.4))
+            simulation.required_fluid.set_velocity((0.0, 0.0, 0.4))
             simulation.step(float(instant))
         velocity.append(float(simulation.particles.velocity[0, 2]))
     return times, np.array(velocity), exact

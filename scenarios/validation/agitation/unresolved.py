@@ -101,7 +101,6 @@ def run(row: dict[str, Any], *, settle: float = 10.0, until: float = 60.0, **cha
 
 def _hold_drag(simulation: Simulation, ratio: float) -> None:
     """Multiply the drag law, so that the mean drag is that of the resolved run."""
-    assert simulation.coupling is not None
     drag = simulation.forces["drag"]
     law = drag.conductance
     drag.conductance = lambda particles, flow: ratio * law(particles, flow)

@@ -66,13 +66,17 @@ def sedimentation(progress: Progress) -> list[Row]:
     """Exponents in water and in syrup, in a periodic box and between walls."""
     rows = []
     case = vessel()
-    assert case.fluid is not None
-    for place, viscosity in (("water", case.fluid.viscosity), ("syrup", SYRUP), ("water, between walls", None)):
+    fluid = case.required_fluid
+    for place, viscosity in (
+        ("water", fluid.viscosity),
+        ("syrup", SYRUP),
+        ("water, between walls", None),
+    ):
         found: list[Settling] = []
         for share in SOLID_FRACTIONS:
             progress(f"sedimentation in {place} at a solid fraction of {share:g}")
             found.append(between_walls(share) if viscosity is None else in_periodic_box(share, viscosity=viscosity))
-        reynolds = case.fluid.density * found[0].terminal * case.bed.diameter / (viscosity or case.fluid.viscosity)
+        reynolds = fluid.density * found[0].terminal * case.bed.diameter / (viscosity or fluid.viscosity)
         law = exponent_richardson_zaki(reynolds, 0.0)
         own, start = exponent(found)
         points = [{"at": each.solid_fraction, "value": each.velocity, "reference": each.terminal} for each in found]
