@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfddem.backend.communicator import SERIAL
-from cfddem.features.zone_times import FIELDS, mean_round, mean_visit, note_visits
+from cfddem.features.spray import FIELDS, mean_round, mean_visit, note_visits
 from cfddem.particles.state import Particles, make_particles
 
 HISTORY = {  # time -> which of three particles are in the zone

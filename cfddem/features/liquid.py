@@ -5,13 +5,27 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cfddem.analysis import agglomerates
-from cfddem.analysis.agglomerates import AgglomerateSizes
+import numpy as np
+
+from cfddem.analysis.agglomerates import AgglomerateSizes, carried_liquid, sizes, summary
 from cfddem.backend.communicator import SERIAL
 from cfddem.case.schema import Case
-from cfddem.features import wet_state
+from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.particles.agglomerates import agglomerates
 from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.solver import ParticleSolver
+
+CARRIED = Field(
+    "liquid_carried", "m3", role="scratch", snapshot=True,
+    meaning="liquid of the particle, half of its bridges to others and all at walls included",
+)  # fmt: skip
+AGGLOMERATE = Field(
+    "agglomerate", role="scratch", dtype=np.int64, snapshot=True, meaning="lowest id in the agglomerate of the particle"
+)
+SIZE = Field("agglomerate_size", role="scratch", dtype=np.int64, snapshot=True, meaning="particles in the agglomerate")
+SNAPSHOT_FIELDS = (CARRIED, AGGLOMERATE, SIZE)
+"""What snapshots of wet particles contain beside the fields of the solver."""
 
 
 class LiquidOnParticles(CaseFeature):
@@ -21,7 +35,7 @@ class LiquidOnParticles(CaseFeature):
     """
 
     name = "liquid"
-    fields = wet_state.SNAPSHOT_FIELDS
+    fields = SNAPSHOT_FIELDS
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.particle_solver, self.brought = simulation.particle_solver, 0.0
@@ -40,7 +54,7 @@ class LiquidOnParticles(CaseFeature):
 
     def before_snapshot(self, simulation: Any) -> None:
         """Find the liquid that each particle carries, and its agglomerate."""
-        wet_state.fill_snapshot_fields(self.particle_solver)
+        _fill_snapshot_fields(self.particle_solver)
 
     @property
     def on_particles(self) -> float:
@@ -78,6 +92,50 @@ class LiquidOnParticles(CaseFeature):
         self.start, self.brought = float(state["start"]), float(state["brought"])
 
 
+# ---------------------------------------------------------------- of all ranks
+
+
+def _ids(solver: ParticleSolver) -> np.ndarray:
+    """Ids of the particles of all ranks, in ascending order (N,)."""
+    particles = solver.particles
+    return np.sort(solver.communicator.joined(particles.id[: particles.owned]))
+
+
+def _joined(solver: ParticleSolver) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places among `_ids` of the particles that each bridge between particles joins (n,), (n,), and its liquid [m3]."""
+    bridges, all_ids = solver.feature(Bridges), _ids(solver)
+    bodies, volume = bridges.bodies.reshape(-1, 2), bridges.volume
+    pairs = bodies[:, 1] >= 0
+    bodies, volume = solver.communicator.joined(bodies[pairs]), solver.communicator.joined(volume[pairs])
+    return np.searchsorted(all_ids, bodies[:, 0]), np.searchsorted(all_ids, bodies[:, 1]), volume
+
+
+def _carried(solver: ParticleSolver) -> np.ndarray:
+    """Liquid of every particle by id, with half of its bridges to others and all at walls (N,) [m3]."""
+    bridges, collect, particles = solver.feature(Bridges), solver.communicator.joined, solver.particles
+    names = collect(particles.id[: particles.owned])
+    order = np.argsort(names)
+    liquid = carried_liquid(collect(particles.liquid[: particles.owned])[order], *_joined(solver))
+    bodies = bridges.bodies.reshape(-1, 2)
+    at_wall = bodies[:, 1] < 0
+    places = np.searchsorted(names[order], collect(bodies[at_wall, 0]))
+    np.add.at(liquid, places, collect(bridges.volume[at_wall]))
+    return liquid
+
+
+def _fill_snapshot_fields(solver: ParticleSolver) -> None:
+    """Find the `SNAPSHOT_FIELDS` of the particles of this rank."""
+    particles, all_ids = solver.particles, _ids(solver)
+    first, second, _ = _joined(solver)
+    belongs = agglomerates(first, second, len(all_ids))
+    lowest = np.full(len(all_ids), np.iinfo(np.int64).max)
+    np.minimum.at(lowest, belongs, all_ids)
+    places = np.searchsorted(all_ids, particles.id[: particles.owned])
+    particles.liquid_carried[: particles.owned] = _carried(solver)[places]
+    particles.agglomerate[: particles.owned] = lowest[belongs][places]
+    particles.agglomerate_size[: particles.owned] = sizes(belongs)[belongs][places]
+
+
 # ---------------------------------------------------------------- measures
 
 
@@ -109,12 +167,12 @@ def bridge_liquid_share(simulation: Any) -> float:
 
 def wet_share(simulation: Any) -> float:
     """Share of the particles that carry liquid, on themselves or in a bridge."""
-    return SERIAL.count(wet_state.carried(simulation.particle_solver) > 0.0) / max(len(simulation.whole("id")), 1)
+    return SERIAL.count(_carried(simulation.particle_solver) > 0.0) / max(len(simulation.whole("id")), 1)
 
 
 def coating_variation(simulation: Any) -> float:
     """Standard deviation of the liquid on a particle over its mean, with its part of the liquid of its bridges."""
-    carried = wet_state.carried(simulation.particle_solver)
+    carried = _carried(simulation.particle_solver)
     mean = carried.mean()  # local: of all ranks
     return float(carried.std() / mean) if mean > 0.0 else math.nan  # local: of all ranks
 
@@ -126,7 +184,7 @@ def bridge_count(simulation: Any) -> float:
 
 def bridges_per_particle(simulation: Any) -> float:
     """Mean number of bridges of a particle to other particles."""
-    first, _, _ = wet_state.joined(simulation.particle_solver)
+    first, _, _ = _joined(simulation.particle_solver)
     return 2.0 * len(first) / max(len(simulation.whole("id")), 1)
 
 
@@ -151,8 +209,8 @@ def _budget(simulation: Any) -> LiquidOnParticles:
 
 
 def _sizes(simulation: Any) -> AgglomerateSizes:
-    first, second, _ = wet_state.joined(simulation.particle_solver)
-    return agglomerates.summary(first, second, len(wet_state.ids(simulation.particle_solver)))
+    first, second, _ = _joined(simulation.particle_solver)
+    return summary(first, second, len(_ids(simulation.particle_solver)))
 
 
 MEASURES = tuple(

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from typing import Any, Literal
 
 import numpy as np
@@ -25,9 +26,10 @@ from cfddem.preflight.flow_checks import suggested_cell
 from cfddem.preflight.geometry_checks import fits
 from cfddem.preflight.issue import ORDER, WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
-from cfddem.preflight.own_laws import check_own_laws
 from cfddem.preflight.step_estimate import estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
+from closures import registry
+from closures.check import check as check_law
 
 LARGEST, SMALLEST = 1e20, 1e-30
 """Magnitudes of values of a case beyond which estimates overflow, or say nothing; 0 and seeds are free."""
@@ -199,3 +201,27 @@ def refuse_errors(case: Case) -> Preflight:
     if result.status == "error":
         raise PreflightError("\n".join(str(each) for each in result.issues if each.severity == "error"))
     return result
+
+
+# ---------------------------------------------------------------- laws of a user
+
+
+FATAL = ("fails", "cannot be compiled", "takes", "does not take", "is nan", "is inf", "is -inf", "is not")
+"""How problems begin with which a law cannot be used in a run."""
+
+
+def check_own_laws(case: Case) -> Iterator[Issue]:
+    """Check the laws of a case that are not built in against the requirements of their kinds."""
+    for kind, law in case.laws.own_laws.items():
+        for problem in _problems(law.function):
+            fatal = problem.startswith(FATAL) or "must be positive" in problem
+            remedy = "correct it, or state the range for which it holds" if fatal else "see closures.check"
+            yield Issue("error" if fatal else "warning", f"laws.{kind}", f"{law.name} {problem}", remedy)
+    for name, reason in registry.load_package_laws().items():
+        yield Issue("warning", "laws", f"the package {name} could not be loaded: {reason}", "correct or remove it")
+
+
+@lru_cache(maxsize=64)
+def _problems(law: Callable[..., float]) -> tuple[str, ...]:
+    """What the check finds; a law is compiled once for it."""
+    return tuple(check_law(law))
