@@ -143,18 +143,18 @@ class Case(CaseTables):
         name = law.name if isinstance(law, Law) else law
         along, across = SHARES.get(name, (1.0, 1.0))
         return AgitationFactors(
-            along if laws.agitation_drag_along is None else laws.agitation_drag_along,
-            across if laws.agitation_drag_across is None else laws.agitation_drag_across,
+            _given(laws.agitation_drag_along, along),
+            _given(laws.agitation_drag_across, across),
             laws.agitation_inertia,
-            TIMES.get(name, 1.0) if laws.agitation_time is None else laws.agitation_time,
+            _given(laws.agitation_time, TIMES.get(name, 1.0)),
         )
 
     @property
     def _agitation_is_measured(self) -> bool:
         """Whether the law of free spheres was measured for all species at the highest inlet velocity."""
-        fluid, ranges = self.fluid, law_of(free_spheres).ranges
-        if fluid is None or fluid.viscosity <= 0.0 or self.laws.drag_law is None:
+        if not self.resists:
             return False
+        fluid, ranges = self.required_fluid, law_of(free_spheres).ranges
         numbers = [
             {
                 "density_ratio": self.material_of(each).density / fluid.density,
@@ -248,6 +248,10 @@ class Case(CaseTables):
         for key, value in changes.items():
             set_value(values, key.split("."), value, key)
         return Case(**values)
+
+
+def _given(value: float | None, default: float) -> float:
+    return default if value is None else value
 
 
 def _unknown_materials_in(failure: ValidationError, values: Mapping[str, Any]) -> list[InputError]:

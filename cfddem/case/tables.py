@@ -137,3 +137,12 @@ class CaseTables(Checked):
         if self.fluid is None:
             raise InputError("fluid", None, "given", "without this table the case has dry particles only")
         return self.fluid
+
+    @property
+    def resists(self) -> bool:
+        """Whether the fluid resists the particles: it has a viscosity and a law of drag."""
+        return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.drag_law is not None
+
+    def closes_cells(self, wall: CaseWall) -> bool:
+        """Whether a wall closes cells to the fluid."""
+        return self.fluid is not None and wall.solid != "none"

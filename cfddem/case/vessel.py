@@ -75,7 +75,7 @@ def belongs_inside(case: CaseTables, wall: CaseWall, corners: Array, places: Arr
     corners  of its triangles (T, 3, 3) [m]
     places   of the particles (N, 3) [m]
     """
-    if case.fluid is not None and wall.solid != "none":
+    if case.closes_cells(wall):
         return wall.solid == "outside"
     if enclosed_volume(corners) > VESSEL * math.prod(case.column.size):
         return True
@@ -142,7 +142,7 @@ def _remedy(case: CaseTables, number: int, wanted: bool) -> str:
 
 def _solid_inside(case: CaseTables, number: int, wanted: bool) -> bool:
     """Whether particles are on the wrong side of a surface because its inside is solid to the fluid."""
-    return case.fluid is not None and case.wall[number].solid != "none" and not wanted
+    return case.closes_cells(case.wall[number]) and not wanted
 
 
 # ---------------------------------------------------------------- the open cross-section

@@ -151,15 +151,15 @@ def _inflow(axes: Axes, case: Case) -> None:
     bed, (width, _, height) = case.bed, case.column.size
     if case.column.ends != "flow" or bed.fastest_inflow <= 0.0:
         return
-    jet = bed.jet
-    half = 0.5 * jet.width if jet is not None else 0.0
+    half, fastest, words = 0.0, bed.highest_inlet_velocity, f"{bed.highest_inlet_velocity:.3g} m/s"
+    if bed.jet is not None:
+        half, fastest = 0.5 * bed.jet.width, bed.jet.velocity
+        words += f", jet {fastest:.3g} m/s"
     for x in (np.arange(7) + 0.5) * width / 7.0:
-        within = jet is not None and abs(x - 0.5 * width) <= half
-        speed = jet.velocity if within and jet is not None else bed.highest_inlet_velocity
+        speed = fastest if abs(x - 0.5 * width) <= half else bed.highest_inlet_velocity
         length = 0.09 * height * speed / bed.fastest_inflow
         if length > 0.0:
             axes.annotate("", (x, 0.0), (x, -length), arrowprops={"arrowstyle": "-|>", "color": SKY, "linewidth": 1.4})
-    words = f"{bed.highest_inlet_velocity:.3g} m/s" + ("" if jet is None else f", jet {jet.velocity:.3g} m/s")
     axes.text(0.5 * width, -0.105 * height, words, ha="center", va="top", fontsize=9.5, color=BLUE)
 
 

@@ -157,8 +157,7 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
 
 def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check that drag has a viscosity, and that `viscosity` represents the profile inside the bed."""
-    fluid = case.fluid
-    assert fluid is not None
+    fluid = case.required_fluid
     if fluid.viscosity == 0.0 and case.laws.drag_law is not None:
         yield Issue(
             "error", "fluid.viscosity", "0 Pa s, but drag laws need a viscosity above 0",
@@ -206,7 +205,7 @@ def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 def check_drag(case: Case) -> Iterator[Issue]:
     """Check that the drag law suits unequal particles."""
     law = case.laws.drag_law
-    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+    if law is None or not case.resists:
         return
     ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]
     if max(ratios) > UNEQUAL * min(ratios) and "diameter_ratio" not in law.arguments:

@@ -43,7 +43,7 @@ NOT_FITTED_WITH = (
 def check_ranges(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check that the laws of the fluid's forces are used inside of their ranges."""
     law = case.laws.drag_law
-    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+    if law is None or not case.resists:
         return
     state = state_of(case, bed)
     ratios = [each.sauter_diameter / case.bed.diameter for each in case.species.values()]

@@ -88,7 +88,7 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "warning", "run.reference_speed", f"the speed of {key}, a surface file that spins, is not part of it",
             "set it to the speed of the tip, if that is the fastest",
         )  # fmt: skip
-    if wall.moves and case.fluid is not None and wall.solid != "none":
+    if wall.moves and case.closes_cells(wall):
         yield Issue(
             "warning", f"{key}.velocity" if any(wall.velocity) else f"{key}.spin",
             "the fluid does not feel the motion of a wall: at its cells the velocity is 0",
@@ -126,7 +126,7 @@ def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "simplify the surface, or check scale: the unit of the file in m", False,
         )  # fmt: skip
     yield from _check_vessel(case, wall, key, corners)
-    if case.fluid is not None and wall.solid != "none" and not is_closed(corners):
+    if case.closes_cells(wall) and not is_closed(corners):
         yield Issue(
             "error", f"{key}.solid", "the surface is not closed, so that no cells lie inside",
             'close the surface, or set solid = "none"',
@@ -140,7 +140,7 @@ def _check_vessel(case: Case, wall: CaseWall, key: str, corners: np.ndarray) -> 
     if bed.start_corner is not None and bed.start_size is not None:
         places = np.array(bed.start_corner) + _GRID * np.array(bed.start_size)
     room = sum(case.volumes.values()) / POURED_SOLID_FRACTION
-    if not len(places) or not is_closed(corners) or (case.fluid is not None and wall.solid != "none"):
+    if not len(places) or not is_closed(corners) or case.closes_cells(wall):
         return
     if enclosed_volume(corners) > room and not inside_surface(corners, places).any():
         yield Issue(

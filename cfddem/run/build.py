@@ -64,24 +64,24 @@ def parts_of(
         spheres = communicator.by_first(lambda: particles_of(case, table, walls, laws))
     if case.bed.species:
         spheres.declare(SPECIES)
-    cells = None
-    if case.fluid is not None and communicator.size > 1:
+    cells, dry = None, case.fluid is None
+    if communicator.size > 1 and not dry:
         cells = divide(grid_of(case), communicator.size, spheres.position)
     solver = ParticleSolver(
         spheres,
         table,
         walls=walls,
         laws=laws,
-        gravity=case.laws.gravity if case.fluid is None else (0.0, 0.0, 0.0),
+        gravity=case.laws.gravity if dry else (0.0, 0.0, 0.0),
         box=periodic_box(case),
         domain=_domain(case),
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
         communicator=communicator,
         division=division_of(case, spheres, communicator.size, cells),
-        balance=case.fluid is None,
+        balance=dry,
     )
-    if case.fluid is None:
+    if dry:
         return Parts(solver, None, None)
     fluid, coupling = flow_of(case, solver.particles, communicator, cells)
     if coupling.sets_inertia:
