@@ -139,6 +139,11 @@ class CaseTables(Checked):
         return self.fluid
 
     @property
+    def in_liquid(self) -> bool:
+        """Whether a liquid is around the particles."""
+        return self.fluid is not None and self.fluid.is_liquid
+
+    @property
     def resists(self) -> bool:
         """Whether the fluid resists the particles: it has a viscosity and a law of drag."""
         return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.drag_law is not None

@@ -112,8 +112,7 @@ def _pressure_drop(
 
     In a vessel, each level that is wider than the floor has less drag, and carries no more than its weight.
     """
-    fluid, drag = case.fluid, bed_drag(case)
-    assert fluid is not None
+    fluid, drag = case.required_fluid, bed_drag(case)
 
     def gradient(velocity: float) -> float:
         flow = case.bed.diameter, fluid.density, fluid.viscosity, min(voidage, 0.999)
@@ -130,7 +129,7 @@ def _pressure_drop(
 
 def bubbles(case: Case, bed: BedEstimate) -> bool:
     """Whether the bed bubbles: a gas bed above minimum fluidisation. Correlations for homogeneous beds then fail."""
-    return case.fluid is not None and not case.fluid.is_liquid and not case.bed.fixed and bed.inlet > bed.onset
+    return not case.in_liquid and not case.bed.fixed and bed.inlet > bed.onset
 
 
 def _terminal_by_law(case: Case, gravity: float) -> float:

@@ -149,8 +149,7 @@ def grid_damping(speed: float, wavelength: float, cell: float) -> float:
 
 def is_liquid_bed(case: Case) -> bool:
     """Whether a case is a bed of free particles in a liquid."""
-    liquid = case.fluid is not None and case.fluid.is_liquid
-    return liquid and case.particle_count > 1 and not case.bed.fixed
+    return case.in_liquid and case.particle_count > 1 and not case.bed.fixed
 
 
 def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:

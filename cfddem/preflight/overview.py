@@ -204,7 +204,7 @@ def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[
 
 def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
     group = "expected result"
-    if case.fluid is not None and not math.isnan(bed.archimedes) and (case.bed.start == "poured" or bed.inlet):
+    if not math.isnan(bed.archimedes) and (case.bed.start == "poured" or bed.inlet):
         note = ""
         if case.bed.fixed:
             note = "fixed bed"
@@ -218,8 +218,9 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
             packed, law = case.bed.fixed or bed.inlet < bed.onset, bed_drag(case).__name__
             area = "the floor area" if vessel_of(case) is None else "the mean cross-section of the bed"
             yield Row(group, "pressure drop", bed.pressure_drop, "Pa", law if packed else f"buoyant weight over {area}")
-            if packed and vessel_of(case) is None and law != "ergun" and case.fluid is not None:
-                flow = bed.inlet, case.bed.diameter, case.fluid.density, case.fluid.viscosity, bed.voidage
+            if packed and vessel_of(case) is None and law != "ergun":
+                fluid = case.required_fluid
+                flow = bed.inlet, case.bed.diameter, fluid.density, fluid.viscosity, bed.voidage
                 yield Row(group, "pressure drop, Ergun", ergun_gradient(*flow) * bed.height, "Pa")
     elif case.bed.start == "poured" and (not case.wall or vessel_of(case) is not None):
         yield Row(group, "bed height", bed.height, "m", "poured")

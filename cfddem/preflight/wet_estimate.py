@@ -121,9 +121,9 @@ def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
             "warning", "liquid.contact_angle", f"{liquid.contact_angle:g} degrees: bridges push instead of pulling",
             "angles are in degrees; below 90 the liquid wets the solids",
         )  # fmt: skip
-    if case.fluid is not None and case.fluid.is_liquid:
+    if case.in_liquid:
         yield Issue(
-            "warning", "liquid", f"bridges in a fluid of {case.fluid.density:g} kg/m3, a liquid",
+            "warning", "liquid", f"bridges in a fluid of {case.required_fluid.density:g} kg/m3, a liquid",
             "give the interfacial tension of the two liquids, which do not mix, or use a gas",
         )  # fmt: skip
     if wet.volume > 0.0 and wet.minimum_gap >= 2.0 * wet.film:

@@ -39,8 +39,7 @@ def flow_through(described: Case, velocity: float, slab: tuple[float, float] = (
     velocity  superficial [m/s]
     slab      part of the height over which the drop is measured
     """
-    fluid_of, diameter = described.fluid, described.bed.diameter
-    assert fluid_of is not None
+    fluid_of, diameter = described.required_fluid, described.bed.diameter
     law = described.laws.drag_law
     assert law is not None
     cell = described.column.cell
@@ -48,8 +47,7 @@ def flow_through(described: Case, velocity: float, slab: tuple[float, float] = (
     simulation = Simulation(
         described.with_(**{"bed.inlet_velocity": velocity, "run.fluid_step": 0.2 * edge / velocity})
     )
-    fluid = simulation.fluid
-    assert fluid is not None
+    fluid = simulation.required_fluid
     height = described.column.height
     low, high = slab[0] * height, slab[1] * height
     before = np.inf

@@ -75,8 +75,7 @@ def in_periodic_box(solid_fraction: float, *, viscosity: float | None = None, di
     speed = alone(case)
     case = case.with_(**{"run.reference_speed": 0.5 * speed})
     simulation = Simulation(case)
-    fluid, particles = simulation.fluid, simulation.particles
-    assert fluid is not None
+    fluid, particles = simulation.required_fluid, simulation.particles
     solids = count * math.pi / 6.0 * diameter**3 / math.prod(fluid.grid.size)
     fluid.boundaries.driving[2] = solids * (case.solid.density - fluid.density) * abs(case.laws.gravity[2])
     end, rows = distance * diameter / (speed * (1.0 - solids) ** 3), 100

@@ -121,9 +121,8 @@ def single_wave(case: Case, wavelength: float, *, duration: float = 0.3) -> Meas
     wave, slip, smoothed = bed.wave(wavelength), bed.slip(), math.exp(-0.5 * (number * bed.kernel) ** 2)
     rate = complex(wave.growth, -number * wave.speed)
     simulation = Simulation(case)
-    fluid, particles = simulation.fluid, simulation.particles
-    coupling = simulation.coupling
-    assert fluid is not None and coupling is not None
+    fluid, particles = simulation.required_fluid, simulation.particles
+    coupling = simulation.required_coupling
     height = particles.position[:, 2]
     by_particles = START * -rate / (1j * number)  # complex amplitudes of the velocities
     by_fluid = START * smoothed * (1.0 - bed.voidage) * (rate + 1j * number * slip) / (1j * number * bed.voidage)
