@@ -33,6 +33,14 @@ CLASS_RATIO = 2.0
 """Radii within this factor are in one size class."""
 
 
+class FoundPairs(NamedTuple):
+    """Pairs that a search finds, with an equal part of the arrays for every piece of the particles."""
+
+    first: np.ndarray  # row of the particle
+    second: np.ndarray  # row of its neighbour
+    image: np.ndarray  # of the periodic box in which the neighbour is
+
+
 class Cells(NamedTuple):
     """Particles sorted into the cells of their size class."""
 
@@ -154,7 +162,7 @@ def _among_many(particles: Particles, cutoff_ratio: float, skin: float, box: np.
     found = np.zeros(CHUNKS, np.int64)
     while True:
         first, second, image = (np.empty(CHUNKS * room, kind) for kind in (np.uint32, np.uint32, np.uint8))
-        _search(particles.view, cells, cutoff_ratio, skin, box, found, first, second, image)
+        _search(particles.view, cells, cutoff_ratio, skin, box, found, FoundPairs(first, second, image))
         needed = int(found.max())  # local: pairs found by this rank
         if needed <= room:
             begins = room * np.arange(CHUNKS)
@@ -213,9 +221,9 @@ def _sort_into_cells(position, size_class, low, width, number, offset, start, me
 
 
 @threaded
-def _search(particles, cells, cutoff_ratio, skin, box, found, first, second, image):
+def _search(particles, cells, cutoff_ratio, skin, box, found, pairs):
     """Write the neighbours of each owned particle in later rows, ascending; count all, store what fits."""
-    count, room = particles.owned, len(first) // CHUNKS
+    count, room = particles.owned, len(pairs.first) // CHUNKS
     for chunk in prange(CHUNKS):
         base = chunk * room
         end, total = base + room, base
@@ -254,7 +262,7 @@ def _search(particles, cells, cutoff_ratio, skin, box, found, first, second, ima
                                 if square < near * near and particles.inverse_mass[i] + particles.inverse_mass[j] > 0.0:
                                     if total < end:
                                         code = HOME - 9 * shift_x - 3 * shift_y - shift_z
-                                        _insert(first, second, image, begin, total - begin, i, j, code)
+                                        _insert(pairs, begin, total - begin, i, j, code)
                                     total += 1
         found[chunk] = total - base
 
@@ -282,14 +290,14 @@ def _wrap(cell, number):
 
 
 @inline
-def _insert(first, second, image, base, found, i, j, code):
+def _insert(pairs, base, found, i, j, code):
     """Keep the neighbours of i in ascending order."""
-    place = base + found
+    second, image, place = pairs.second, pairs.image, base + found
     while place > base and second[place - 1] > j:
         second[place], image[place] = second[place - 1], image[place - 1]
         place -= 1
     second[place], image[place] = j, code
-    first[base + found] = i
+    pairs.first[base + found] = i
 
 
 def wrap(position: np.ndarray, box: np.ndarray) -> None:

@@ -31,7 +31,6 @@ from cfddem.particles.system import System
 from cfddem.particles.time_scales import TimeScales, check_step, refusing, time_scales
 from cfddem.particles.vectors import flat
 from cfddem.particles.walls.arrays import check_walls, checkpoint_walls, restored_walls, wall_arrays
-from cfddem.particles.walls.load import wall_forces
 from cfddem.particles.walls.mesh_contacts import wall_contacts
 from cfddem.particles.walls.shapes import Wall
 
@@ -183,8 +182,13 @@ class ParticleSolver:
 
     @property
     def wall_force(self) -> np.ndarray:
-        """Contact force of all particles on each wall (walls, 3) [N]; without the impulses of films."""
-        return wall_forces(self.edges, self.walls)
+        """Force of contacts and of the pull of bridges on each wall, without the impulses of films (walls, 3) [N]."""
+        edges, result = self.edges, np.zeros((len(self.walls.sweep), 3))
+        at_walls = slice(edges.between_particles, None)
+        for name in ("force", "bridge_force"):
+            if name in edges:
+                np.subtract.at(result, self.walls.wall[edges.second[at_walls]], edges[name][at_walls])
+        return result
 
     def time_scales(self, reference_speed: float = 0.0) -> TimeScales:
         """Largest time steps that the particles allow now.

@@ -156,9 +156,10 @@ def needed_modulus(case: Case, collision: CollisionEstimate) -> float:
 def check_surface_laws(case: Case) -> Iterator[Issue]:
     """Check that contact law and rolling resistance have material properties, and that no property is unused."""
     laws, contact = case.laws, case.laws.contact_law
-    if contact.adhesive and (case.has_films or case.liquid is not None):
-        liquid = "bridges" if case.liquid is not None else "films"
-        remedy = "leave out [liquid]" if case.liquid is not None else 'set laws.lubrication = "none"'
+    wetting = {"bridges": case.liquid is not None, "films": case.has_films}
+    liquid = next((name for name, form in wetting.items() if form), "")
+    if contact.adhesive and liquid:
+        remedy = {"bridges": "leave out [liquid]", "films": 'set laws.lubrication = "none"'}[liquid]
         yield Issue(
             "error", "laws.contact", f"{contact.name} holds for dry solids, but {liquid} form between particles",
             f"{remedy}, or another contact law",

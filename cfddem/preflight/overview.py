@@ -187,7 +187,7 @@ def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[
         yield Row(group, "2 % of the Hertz time", scales.hertz, "s")
         for name, limit in (("impact", scales.impact), ("crossing", scales.crossing)):
             yield Row(group, f"{name} criterion", limit, "s", "stability limit" * (name == scales.limiting))
-    if case.fluid is None or math.isinf(steps.fluid):
+    if steps.cells is None or math.isinf(steps.fluid):
         return
     yield Row(group, "fluid step", steps.fluid, "s", f"set by the {steps.limiting} criterion")
     for name, limit in sorted(steps.limits.items(), key=lambda each: each[1]):
@@ -195,7 +195,7 @@ def _time_scales(case: Case, bed: BedEstimate, steps: StepEstimate) -> Iterator[
     if not case.bed.fixed:
         yield Row(group, "particle steps per fluid step", steps.substeps)
     if not math.isnan(bed.drag_factor) and 0.0 < bed.voidage < 1.0:
-        fluid, density = case.fluid, case.solid_density
+        fluid, density = case.required_fluid, case.solid_density
         relaxation = timescales.drag_time(case.bed.diameter, density, fluid.viscosity, bed.voidage, bed.drag_factor)
         load = (1.0 - bed.voidage) * density / (bed.voidage * fluid.density)
         stiffness = load * steps.fluid / relaxation

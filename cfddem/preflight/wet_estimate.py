@@ -33,7 +33,8 @@ DROPS = 1e9
 class WetEstimate:
     """Bridge between two wet particles of mean size of one species, and their collision at the reference speed."""
 
-    film: float  # thickness of the liquid on each particle [m]
+    liquid: Liquid  # of the case
+    film: float  # its thickness on each particle [m]
     volume: float  # of liquid in the bridge, V [m3]
     volume_ratio: float  # V/R^3
     content: float  # volume of liquid at the start over that of the particles
@@ -77,6 +78,7 @@ def estimate_wet(case: Case, collision: CollisionEstimate) -> WetEstimate | None
     weight = 2.0 * mass * math.hypot(*case.laws.gravity)
     drag = 6.0 * math.pi * liquid.viscosity * radius**2
     return WetEstimate(
+        liquid=liquid,
         film=film,
         volume=volume,
         volume_ratio=volume / (2.0 * radius) ** 3,
@@ -96,9 +98,9 @@ def estimate_wet(case: Case, collision: CollisionEstimate) -> WetEstimate | None
 
 def check_wet(case: Case, wet: WetEstimate | None) -> Iterator[Issue]:
     """Check that the laws of bridges hold for this liquid, and that the spray wets without flooding."""
-    liquid = case.liquid
-    if wet is None or liquid is None:
+    if wet is None:
         return
+    liquid = wet.liquid
     key = "liquid." + next((name for name in ("volume_per_particle", "liquid_fraction") if getattr(liquid, name)),
                            "thickness")  # fmt: skip
     if wet.content > 1.0:

@@ -54,7 +54,8 @@ def loose_places(
     while True:
         sites, missing = _sites(walls, corner, size, pitch, sum(wanted)), []
         for those, share in zip(layers, np.split(sites, np.cumsum(wanted)[:-1])):
-            missing.append(_fill(share, those, edge, diameters, blocks, pitch, walls, generator, places))
+            sharing = {k: those[edge[those] == k] for k in blocks}
+            missing.append(_fill(share, sharing, diameters, blocks, pitch, walls, generator, places))
         if not any(missing):
             return places
         wanted = [number + more for number, more in zip(wanted, missing)]
@@ -62,8 +63,7 @@ def loose_places(
 
 def _fill(
     sites: np.ndarray,
-    those: np.ndarray,
-    edge: np.ndarray,
+    sharing: dict[int, np.ndarray],
     diameters: np.ndarray,
     blocks: dict[int, np.ndarray],
     pitch: float,
@@ -71,10 +71,13 @@ def _fill(
     generator: np.random.Generator,
     places: np.ndarray,
 ) -> int:
-    """Place some of the spheres at random on sites; returns the number of missing sites."""
+    """Place some of the spheres at random on sites; returns the number of missing sites.
+
+    sharing  rows of the spheres that share a site with as many in each direction
+    """
     order, begin, missing = generator.permutation(len(sites)), 0, 0
     for k, block in blocks.items():
-        members = generator.permutation(those[edge[those] == k])
+        members = generator.permutation(sharing[k])
         if not len(members):
             continue
         free = 0.5 * (pitch / k - float(diameters[members].max()))

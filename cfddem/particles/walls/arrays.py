@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -123,6 +123,14 @@ def check_walls(walls: Sequence[Wall], box: np.ndarray, materials: int) -> None:
             raise InputError(f"walls[{number}]", type(wall).__name__, "the same all along the periodic axes of the box")
 
 
+class NearPieces(NamedTuple):
+    """Pieces of walls near particles, as loops write them."""
+
+    number: np.ndarray  # (N,) how many are near each particle, or where the next of its pieces is written
+    first: np.ndarray  # (n,) row of the particle
+    second: np.ndarray  # (n,) piece
+
+
 def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: float) -> tuple[np.ndarray, np.ndarray]:
     """Particles and pieces of walls that are closer than the reach of the film plus a skin (n,), (n,) uint32.
 
@@ -132,11 +140,11 @@ def near_walls(particles: Particles, walls: Walls, cutoff_ratio: float, skin: fl
     if len(walls.kind) == 0:
         return nothing, nothing
     count = np.zeros(particles.count, np.int64)
-    _list_pieces(particles, walls, cutoff_ratio, skin, count, nothing, nothing, False)
+    _list_pieces(particles, walls, cutoff_ratio, skin, NearPieces(count, nothing, nothing), False)
     begin = np.cumsum(count) - count
     end = begin.copy()
     first, second = (np.empty(int(count.sum()), np.uint32) for _ in range(2))
-    _list_pieces(particles, walls, cutoff_ratio, skin, end, first, second, True)
+    _list_pieces(particles, walls, cutoff_ratio, skin, NearPieces(end, first, second), True)
     if len(walls.cell_member):
         _sort_rows(second, begin, end)
     return first, second
@@ -147,36 +155,34 @@ def _list_pieces(
     walls: Walls,
     cutoff_ratio: float,
     skin: float,
-    count: np.ndarray,
-    first: np.ndarray,
-    second: np.ndarray,
+    found: NearPieces,
     fill: bool,
 ) -> None:
-    """Count the pieces near each particle, or write them from `count` on."""
-    _list_single(particles.view, flat(walls), cutoff_ratio, skin, count, first, second, fill)
+    """Count the pieces near each particle, or write them from `found.number` on."""
+    _list_single(particles.view, flat(walls), cutoff_ratio, skin, found, fill)
     if len(walls.cell_member):  # the search in cells is compiled only where there are meshes
-        _list_meshes(particles.view, flat(walls), cutoff_ratio, skin, count, first, second, fill)
+        _list_meshes(particles.view, flat(walls), cutoff_ratio, skin, found, fill)
 
 
 @serial
-def _list_single(particles, walls, cutoff_ratio, skin, count, first, second, fill):
+def _list_single(particles, walls, cutoff_ratio, skin, found, fill):
     """Count or write the pieces near each particle that are no triangles."""
     for i in range(particles.owned):
         if particles.inverse_mass[i] > 0.0:
             reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
             for w in walls.single:
-                _list(i, w, walls.wall[w], particles, walls, reach, count, first, second, fill)
+                _list(i, w, walls.wall[w], particles, walls, reach, found, fill)
 
 
 @serial
-def _list_meshes(particles, walls, cutoff_ratio, skin, count, first, second, fill):
+def _list_meshes(particles, walls, cutoff_ratio, skin, found, fill):
     """Count or write the triangles near each particle."""
     for i in range(particles.owned):
         if particles.inverse_mass[i] > 0.0:
             reach = (1.0 + cutoff_ratio) * particles.radius[i] + skin
             for m in range(len(walls.sweep)):
                 if walls.cell_number[3 * m] > 0:
-                    _list_triangles(i, m, particles, walls, reach, count, first, second, fill)
+                    _list_triangles(i, m, particles, walls, reach, found, fill)
 
 
 @serial
@@ -192,16 +198,16 @@ def _sort_rows(values, begins, ends):
 
 
 @inline
-def _list(i, w, m, particles, walls, reach, count, first, second, fill):
+def _list(i, w, m, particles, walls, reach, found, fill):
     """List piece w of wall m if it is within reach of particle i."""
     if nearest(walls.kind, walls.shape, w, in_frame(walls, m, at(particles.position, i)))[1] < reach:
         if fill:
-            first[count[i]], second[count[i]] = i, w
-        count[i] += 1
+            found.first[found.number[i]], found.second[found.number[i]] = i, w
+        found.number[i] += 1
 
 
 @serial
-def _list_triangles(i, m, particles, walls, reach, count, first, second, fill):
+def _list_triangles(i, m, particles, walls, reach, found, fill):
     """List the triangles of mesh m within reach of particle i, each once: in the first cell within reach."""
     place = in_frame(walls, m, at(particles.position, i))
     low, high = _span(walls, m, place, place, reach)
@@ -217,7 +223,7 @@ def _list_triangles(i, m, particles, walls, reach, count, first, second, fill):
                         and y == max(low[1], begin[1], 0)
                         and z == max(low[2], begin[2], 0)
                     ):
-                        _list(i, w, m, particles, walls, reach, count, first, second, fill)
+                        _list(i, w, m, particles, walls, reach, found, fill)
 
 
 @inline
