@@ -283,12 +283,6 @@ def _gaps(edges, particles, walls, shift, result):
 
 
 @inline
-def is_far(k, edges):
-    """Whether edge k joins two particles that cannot touch before the next list."""
-    return edges.near <= k < edges.between_particles
-
-
-@inline
 def places_of(i, edges):
     """Places in `incident` of the edges of particle i; unsigned, so that loops need not check for negative rows."""
     return range(np.uint64(edges.start[i]), np.uint64(edges.start[i + 1]))
