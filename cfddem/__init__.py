@@ -21,7 +21,17 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.case.materials import Fluid as Fluid
     from cfddem.case.materials import Material as Material
     from cfddem.case.schema import Case as Case
+    from cfddem.coupling.coupling import Coupling as Coupling
+    from cfddem.coupling.forces.drag import Drag as Drag
+    from cfddem.coupling.forces.pressure import PressureForce as PressureForce
+    from cfddem.coupling.forces.weight import Weight as Weight
+    from cfddem.coupling.kernel import FilterKernel as FilterKernel
     from cfddem.data.fields import Field as Field
+    from cfddem.fluid.conditions import FreeSlip as FreeSlip
+    from cfddem.fluid.conditions import Inlet as Inlet
+    from cfddem.fluid.conditions import NoSlip as NoSlip
+    from cfddem.fluid.conditions import Outlet as Outlet
+    from cfddem.fluid.conditions import Periodic as Periodic
     from cfddem.fluid.grid import Grid as Grid
     from cfddem.fluid.solver import FluidSolver as FluidSolver
     from cfddem.io.reading import open_run as open_run
@@ -46,42 +56,54 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.run.history import measure as measure
     from cfddem.run.runner import Run as Run
     from cfddem.run.simulation import Simulation as Simulation
+    from cfddem.run.time_steps import StepSettings as StepSettings
     from cfddem.studies.notebook import run_case as run_case
 
 _MODULES = {
     "Box": "cfddem.particles.walls.shapes",
     "BridgeLaws": "cfddem.particles.interactions.bridge_law",
-    "coat": "cfddem.particles.interactions.bridge",
     "Case": "cfddem.case.schema",
-    "check": "cfddem.run.check",
     "CfddemError": "cfddem.backend.errors",
+    "check": "cfddem.run.check",
+    "coat": "cfddem.particles.interactions.bridge",
     "Cone": "cfddem.particles.walls.shapes",
+    "Coupling": "cfddem.coupling.coupling",
     "Cylinder": "cfddem.particles.walls.shapes",
-    "Field": "cfddem.data.fields",
-    "Fluid": "cfddem.case.materials",
+    "Drag": "cfddem.coupling.forces.drag",
     "Equipment": "cfddem.model.feature",
     "Feature": "cfddem.model.feature",
+    "Field": "cfddem.data.fields",
+    "FilterKernel": "cfddem.coupling.kernel",
+    "Fluid": "cfddem.case.materials",
     "FluidForce": "cfddem.model.feature",
     "FluidSolver": "cfddem.fluid.solver",
+    "FreeSlip": "cfddem.fluid.conditions",
     "gallery": "cfddem.case.gallery",
     "Grid": "cfddem.fluid.grid",
+    "Inlet": "cfddem.fluid.conditions",
     "Laws": "cfddem.particles.interactions.laws",
+    "make_particles": "cfddem.particles.state",
     "Material": "cfddem.case.materials",
+    "measure": "cfddem.run.history",
     "Mesh": "cfddem.particles.walls.shapes",
+    "NoSlip": "cfddem.fluid.conditions",
+    "open_run": "cfddem.io.reading",
+    "Outlet": "cfddem.fluid.conditions",
     "OwnForce": "cfddem.model.feature",
+    "pair_table": "cfddem.particles.material_pairs",
     "ParticleSolver": "cfddem.particles.solver",
+    "Periodic": "cfddem.fluid.conditions",
     "Plane": "cfddem.particles.walls.shapes",
+    "pour": "cfddem.particles.initial.pouring",
     "Preflight": "cfddem.preflight.summary",
+    "PressureForce": "cfddem.coupling.forces.pressure",
     "Report": "cfddem.analysis.report_text",
     "report": "cfddem.analysis.report",
     "Run": "cfddem.run.runner",
-    "Simulation": "cfddem.run.simulation",
-    "make_particles": "cfddem.particles.state",
-    "measure": "cfddem.run.history",
-    "open_run": "cfddem.io.reading",
-    "pair_table": "cfddem.particles.material_pairs",
     "run_case": "cfddem.studies.notebook",
-    "pour": "cfddem.particles.initial.pouring",
+    "Simulation": "cfddem.run.simulation",
+    "StepSettings": "cfddem.run.time_steps",
+    "Weight": "cfddem.coupling.forces.weight",
 }
 __all__ = ["__version__", *sorted(_MODULES)]
 
