@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.analysis.report import report as report
     from cfddem.analysis.report_text import Report as Report
     from cfddem.backend.errors import CfddemError as CfddemError
+    from cfddem.case.feature_table import FeatureTable as FeatureTable
     from cfddem.case.gallery import gallery as gallery
     from cfddem.case.materials import Fluid as Fluid
     from cfddem.case.materials import Material as Material
@@ -72,6 +73,7 @@ _MODULES = {
     "Drag": "cfddem.coupling.forces.drag",
     "Equipment": "cfddem.model.feature",
     "Feature": "cfddem.model.feature",
+    "FeatureTable": "cfddem.case.feature_table",
     "Field": "cfddem.data.fields",
     "FilterKernel": "cfddem.coupling.kernel",
     "Fluid": "cfddem.case.materials",

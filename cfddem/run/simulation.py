@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
@@ -231,6 +232,20 @@ class Simulation:
         for callback in self.callbacks:
             with part(f"callback {getattr(callback, '__name__', 'without a name')}"):
                 callback(self)
+
+    @contextmanager
+    def exchange(self) -> Iterator[ParticleSolver]:
+        """Let particles enter and leave inside a `with` block, by `insert` and `remove` of the particle solver.
+
+        A particle that enters replaces fluid of its own volume, or leaves room for it.
+        """
+        before = self.owned
+        yield self.particle_solver
+        after = self.owned
+        same = np.array_equal(before.id, after.id)  # local: of this rank
+        if self.fluid is not None and self.coupling is not None and self.communicator.any(not same):
+            solids = self.coupling.solid_fraction
+            self.fluid.add_voidage(solids(before) - solids(after))
 
     def until(self, time: float) -> None:
         """Continue until a time [s]."""
