@@ -67,7 +67,7 @@ def run_page(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Pa
         if ("slow" in block.mark and not slow) or lacks(block):
             continue
         if block.kind == "python":
-            exec(compile("\n" * block.line + block.text, page, "exec"), names)
+            exec(compile("\n" * block.line + block.text, page, "exec", dont_inherit=True), names)
             continue
         for command in block.text.splitlines():
             words = shlex.split(command, comments=True)
