@@ -75,7 +75,7 @@ class Coupling:
         self.forces = ForceList(particles, forces)
         self._stored = (*declared, *(field.name for force in self.forces for field in force.fields))
         if self.sets_inertia:
-            terms = self._terms(owned, cell_map, 0.0)
+            terms = self._terms(particles.without_ghosts(), cell_map, 0.0)  # with the fields of the forces
             for force in self.forces:
                 if force.sets_inertia:
                     force.begin(terms)
