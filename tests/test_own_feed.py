@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from in_process_ranks import on_ranks
 
+from cfddem.backend.communicator import Communicator
 from cfddem.case.schema import Case
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
@@ -64,3 +66,25 @@ def test_it_continues_with_the_same_bits(page: dict[str, Any]) -> None:
         each.until(0.015)
     assert whole.particles.count == part.particles.count == 33
     assert np.array_equal(whole.particles.position, part.particles.position)
+
+
+def test_two_ranks_feed_the_same_beads_with_the_same_bits(page: dict[str, Any]) -> None:
+    """Dry particles have the bits of one process; in water the solids are conserved on two ranks, too."""
+
+    def moved(communicator: Communicator) -> tuple[np.ndarray, np.ndarray]:
+        simulation = Simulation(Case.from_text(CASE), communicator=communicator, features=[page["Layers"]()])
+        simulation.until(0.012)
+        return simulation.whole("id"), simulation.whole("position")
+
+    def solids(communicator: Communicator) -> tuple[float, float]:
+        case = Case.from_text(CASE + WATER).with_(**{"column.width": 0.03})
+        simulation = Simulation(case, communicator=communicator, features=[page["Layers"]()])
+        simulation.step()
+        assert simulation.fluid is not None
+        fluid = (1.0 - simulation.fluid.whole("voidage")).sum() * simulation.fluid.grid.cell_volume
+        return float(fluid), float((4.0 / 3.0 * np.pi * simulation.whole("radius") ** 3).sum())
+
+    (one,), two = on_ranks(1, moved), on_ranks(2, moved)
+    assert np.array_equal(one[1][np.argsort(one[0])], two[0][1][np.argsort(two[0][0])]) and len(one[0]) == 33
+    for fluid, particles in on_ranks(2, solids):
+        assert fluid == pytest.approx(particles, rel=1e-9)
