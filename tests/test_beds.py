@@ -11,7 +11,7 @@ import pytest
 from cfddem.analysis.bed_laws import buoyant_weight
 from cfddem.analysis.bubbles import BubbleProfile
 from cfddem.analysis.series import block_average
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
@@ -47,7 +47,7 @@ from scenarios.validation.beds.study import frequency, growing
     "name", ["gas-bed", "gas-bed-flat", "defluidisation", "sedimentation", "segregation", "spouted-bed"]
 )
 def test_no_bed_of_the_gallery_is_refused(name: str) -> None:
-    assert preflight(Case.from_toml(gallery()[name])).status != "error"
+    assert preflight(gallery()[name]).status != "error"
 
 
 def test_weights_of_measured_beds() -> None:
@@ -78,7 +78,7 @@ def test_exponent_of_an_exact_power_law() -> None:
 
 def exact_ramp() -> tuple[Case, dict[str, np.ndarray], Layers, float]:
     """Pressure drop by Ergun at voidage 0.42 up to the weight, then the weight; and the balance."""
-    case = Case.from_toml(gallery()["defluidisation"], {"laws.drag": "ergun"})
+    case = Case.from_toml(gallery_files()["defluidisation"], {"laws.drag": "ergun"})
     assert case.fluid is not None and not isinstance(case.bed.inlet_velocity, float)
     balance = fluidising_velocity(1.2e-3, 1000.0, case.fluid.density, case.fluid.viscosity, 0.42, ergun)
     times, speeds = np.array(case.bed.inlet_velocity).T

@@ -10,7 +10,7 @@ import pytest
 from example_case import TEXT
 
 from cfddem.backend.errors import InputError
-from cfddem.case.gallery import gallery, overrides
+from cfddem.case.gallery import gallery_files, overrides
 from cfddem.case.input_errors import InputErrors, sections_of
 from cfddem.case.renamed import KEYS
 from cfddem.case.schema import Case
@@ -18,7 +18,7 @@ from cfddem.case.toml_text import DEEPEST_KEY, LONGEST_FILE
 from cfddem.preflight.summary import preflight
 from cfddem.run.build import laws_of
 
-GALLERY = gallery()
+GALLERY = gallery_files()
 LONGEST_LINE = 600
 
 

@@ -111,10 +111,10 @@ def test_a_run_resumes_bit_for_bit_without_its_surface_file(tmp_path: Path) -> N
     run = open_run(tmp_path / "moved")
     assert run.status == "finished"
     found = report(run.folder)
-    assert found["ledger"]["particles_lost"] == 0.0 and found["preflight"]["status"] != "error"
-    (answer,) = (each for each in found["key_results"] if each["name"] == "particles")
+    assert found.ledger["particles_lost"] == 0.0 and found.preflight["status"] != "error"
+    (answer,) = (each for each in found.key_results if each.name == "particles")
     counts = (run.history[name][-1] for name in ("fed_count", "removed_count"))
-    assert "100 at the start; {:.0f} fed".format(*counts) in answer["verdict"] and "removed" in answer["verdict"]
+    assert "100 at the start; {:.0f} fed".format(*counts) in answer.verdict and "removed" in answer.verdict
     surface = tmp_path / "moved" / "surfaces" / "wall_2.stl"
     surface.rename(tmp_path / "elsewhere.stl")
     surface.symlink_to(tmp_path / "elsewhere.stl")

@@ -15,12 +15,12 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from cfddem.backend.errors import InputError
-from cfddem.case.gallery import gallery, overrides
+from cfddem.case.gallery import gallery_files, overrides
 from cfddem.case.input_errors import sections_of
 from cfddem.case.schema import Case
 from cfddem.cli.explain_pages import matching
 
-GALLERY = gallery()
+GALLERY = gallery_files()
 SAMPLE = ("liquid-bed", "segregation", "settling", "wet-bed")
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from cfddem.backend.errors import InputError
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.cli.explain_pages import matching
 from cfddem.preflight.summary import preflight
 
-GALLERY = {name: Case.from_toml(path) for name, path in gallery().items()}
+GALLERY = gallery()
 
 
 # ---------------------------------------------------------------- values beyond all scales, missing tables
@@ -45,7 +45,7 @@ def test_a_seed_and_rounding_of_components_are_free() -> None:
 @pytest.mark.parametrize("name", GALLERY)
 def test_a_missing_table_or_its_missing_line_is_one_short_line(name: str) -> None:
     """Without its first line the keys of a table fall to the table above; one error says so, not one for each key."""
-    text = gallery()[name].read_text()
+    text = gallery_files()[name].read_text()
     headers = [line for line in text.split("\n") if line.startswith("[") and not line.startswith(("[[", "[bed."))]
     for header in headers:
         for changed in (text.replace(f"{header}\n", "", 1), _without_table(text, header)):
@@ -73,7 +73,7 @@ def _refusal(text: str) -> InputError:
 
 
 def test_a_material_that_many_species_name_is_missed_once() -> None:
-    text = gallery()["segregation"].read_text().replace('material = "graphite"', 'material = "glas"')
+    text = gallery_files()["segregation"].read_text().replace('material = "graphite"', 'material = "glas"')
     message = str(_refusal(text.replace('material = "glass"', 'material = "glas"').replace("seed = 1", "sed = 1")))
     assert message.count("bed.species.") == 1 and "1 more keys name it, too" in message, message
 

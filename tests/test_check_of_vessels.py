@@ -15,7 +15,7 @@ from test_case_walls_in_fluid import CONE, FED
 
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.preflight.issue import Issue
@@ -112,7 +112,7 @@ def test_the_numbers_of_a_conical_vessel_are_those_of_its_cross_section(tmp_path
 
 def test_a_bed_of_given_height_fills_the_part_of_the_column_that_walls_leave() -> None:
     """A plane in the middle halves the column, and the number of particles that fill it to a height."""
-    liquid = Case.from_toml(gallery()["liquid-bed"])
+    liquid = gallery()["liquid-bed"]
     bed = liquid.model_dump(exclude_defaults=True)["bed"] | {"count": None, "height": 0.01, "start": "poured"}
     whole = liquid.with_(bed=bed)
     half = whole.with_(wall=[{"shape": "plane", "point": [0.005, 0.0, 0.0], "normal": [1.0, 0.0, 0.0]}])
@@ -126,9 +126,9 @@ def test_the_run_of_a_conical_vessel_has_the_height_and_pressure_drop_of_the_che
     Run.begin(case, tmp_path / "run").go()
     at_rest = open_run(tmp_path / "run").history["bed_height"][0]
     assert at_rest == pytest.approx(numbers(case)["bed height"], rel=0.5 * TOLERANCE)
-    measured, expected = report(tmp_path / "run")["measures"], numbers(case)
+    measured, expected = report(tmp_path / "run").measures, numbers(case)
     for name, measure in (("bed height", "bed_height"), ("pressure drop", "pressure_drop")):
-        assert measured[measure]["mean"] == pytest.approx(expected[name], rel=TOLERANCE), name
+        assert measured[measure].mean == pytest.approx(expected[name], rel=TOLERANCE), name
 
 
 def test_a_closed_vessel_without_solid_is_refused_before_pouring_with_one_remedy(
@@ -199,9 +199,9 @@ def test_the_report_of_a_bead_with_a_feed_and_a_thin_tube_warns_of_the_tube_and_
     Run.begin(case, tmp_path / "run").go()
     told = report(tmp_path / "run")
     assert open_run(tmp_path / "run").status == "finished"
-    assert not [each for each in told["key_results"] if each["name"] == "settling speed"] and not told["laws"]
-    assert next(each["value"] for each in told["key_results"] if each["name"] == "regime") != "sphere in motion"
-    assert any("the wall closes no cell: the fluid passes through it" in each for each in told["warnings"])
+    assert not [each for each in told.key_results if each.name == "settling speed"] and not told.laws
+    assert next(each.value for each in told.key_results if each.name == "regime") != "sphere in motion"
+    assert any("the wall closes no cell: the fluid passes through it" in each for each in told.warnings)
 
 
 # ---------------------------------------------------------------- cells
@@ -211,9 +211,9 @@ def _of_cells(case: Case) -> list[str]:
     return [each.remedy for each in preflight(case).issues if each.key == "column.cell" and "memory" not in each.reason]
 
 
-@pytest.mark.parametrize("name", [name for name, path in gallery().items() if Case.from_toml(path).fluid is not None])
+@pytest.mark.parametrize("name", [name for name, each in gallery().items() if each.fluid is not None])
 def test_the_check_of_a_suggested_cell_suggests_nothing(name: str) -> None:
-    case = Case.from_toml(gallery()[name])
+    case = gallery()[name]
     for cell in (1e-4, 1e-3, 1.3e-3, 2e-3, 2.5e-3, 3e-3, 3.7e-3, 4e-3, 6.1e-3, 7.5e-3, 0.011, 0.02, 0.05):
         for remedy in _of_cells(case.with_(**{"column.cell": cell})):
             (edges,) = re.findall(r"(\[[^\]]*\]|[\d.e-]+) m fits", remedy)
@@ -224,7 +224,7 @@ def test_the_check_of_a_suggested_cell_suggests_nothing(name: str) -> None:
 
 def test_a_cell_of_7_5_mm_suggests_8_mm_and_not_one_that_suggests_it() -> None:
     box = {"column.width": 0.2, "column.depth": 0.12, "column.height": 0.4, "bed.diameter": 0.003}
-    case = Case.from_toml(gallery()["liquid-bed"], box)
+    case = Case.from_toml(gallery_files()["liquid-bed"], box)
     for cell in (0.0075, 0.00740741):
         assert _of_cells(case.with_(**{"column.cell": cell})) == ["0.008 m fits along x, y and z"]
     assert not _of_cells(case.with_(**{"column.cell": 0.008}))

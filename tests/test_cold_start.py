@@ -19,7 +19,7 @@ LOOPS = {"liquid-bed": 43, "gas-bed": 39, "settling": 42, "wet-bed": 49}
 COUNT = """
 import sys
 from numba.core import event
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.run.simulation import Simulation
 
@@ -34,7 +34,7 @@ class Counter(event.Listener):
 counter = Counter()
 event.register("numba:compile", counter)
 few = {"bed.count": 100, "bed.start": "suspended"}
-case = Case.from_toml(gallery()[sys.argv[1]], {} if sys.argv[1] == "settling" else few)
+case = Case.from_toml(gallery_files()[sys.argv[1]], {} if sys.argv[1] == "settling" else few)
 simulation = Simulation(case)
 simulation.step()
 simulation.step()

@@ -133,7 +133,7 @@ def test_a_report_shows_the_map_where_collisions_were_recorded(tmp_path: Path) -
     folder = tmp_path / "run"
     Run.begin(Case.from_text(TINY.replace("until = 0.024", "until = 0.06")), folder).go()
     found = report(folder)
-    met = found["collisions"]
+    met = found.collisions
     assert met["number"] >= 1.0 and met["median_stokes"] > 0.0 and 0.0 <= met["contact_fraction"] <= 1.0
     assert any("collisions with films: median St" in line for line in lines(found))
     assert "collisions in the averaging window" in page(folder, tmp_path / "page.html", found).read_text()

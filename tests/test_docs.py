@@ -44,6 +44,21 @@ def blocks(page: Path) -> Iterator[Block]:
             yield Block(found["kind"], found["text"], found["mark"] or "", text.count("\n", 0, found.start("text")))
 
 
+@pytest.fixture
+def clean_names() -> Iterator[None]:
+    """Measures and tables that a page declares do not appear in the runs of other tests."""
+    from cfddem.case.feature_table import forget_table
+    from cfddem.case.schema import Case
+    from cfddem.run import history
+
+    measures, tables = dict(history.MEASURES), set(Case.model_fields)
+    yield
+    history.MEASURES.clear()
+    history.MEASURES.update(measures)
+    for name in set(Case.model_fields) - tables:
+        forget_table(name)
+
+
 def run_page(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Run the blocks of a page, from the first to the last."""
     monkeypatch.chdir(folder)
@@ -52,7 +67,7 @@ def run_page(page: Path, slow: bool, monkeypatch: pytest.MonkeyPatch, folder: Pa
         if ("slow" in block.mark and not slow) or lacks(block):
             continue
         if block.kind == "python":
-            exec(compile("\n" * block.line + block.text, page, "exec"), names)
+            exec(compile("\n" * block.line + block.text, page, "exec", dont_inherit=True), names)
             continue
         for command in block.text.splitlines():
             words = shlex.split(command, comments=True)
@@ -99,6 +114,7 @@ def pages_with(mark: str | None) -> list[Any]:
     ]
 
 
+@pytest.mark.usefixtures("clean_names")
 @pytest.mark.parametrize("page", pages_with(None))
 def test_commands_and_python_of_a_page_run(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """All blocks of a page in one empty folder, except those that take minutes."""
@@ -106,6 +122,7 @@ def test_commands_and_python_of_a_page_run(page: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("clean_names")
 @pytest.mark.parametrize("page", pages_with("slow"))
 def test_slow_commands_and_python_of_a_page_run(page: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     run_page(page, True, monkeypatch, tmp_path)

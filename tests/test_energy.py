@@ -180,11 +180,11 @@ def test_a_liquid_bed_accounts_for_its_energy(tmp_path: Path) -> None:
     whole = Run.begin(case, tmp_path / "whole")
     whole.go()
     found = report(tmp_path / "whole")
-    ledger = found["energy"]
+    ledger = found.energy
     assert abs(ledger["remainder"]) < 0.01 * ledger["put_in"], ledger
     assert ledger["inflow"] > 0.0 and ledger["drag"] > 0.3 * ledger["put_in"]
     assert ledger["film"] > 0.0 and ledger["viscous"] > 0.0
-    assert sum(each["fraction"] for each in found["energy_lines"] if each["group"] == "lost") < 1.1
+    assert sum(each.fraction for each in found.energy_lines if each.group == "lost") < 1.1
     between = ledger["drag"] + ledger["drag_in_cells"] + ledger["implicit_drag"]
     assert ledger["drag_from_fluid"] - ledger["drag_to_particles"] == pytest.approx(between, rel=1e-9)
     assert ledger["pressure_from_fluid"] == pytest.approx(ledger["pressure_to_particles"], abs=0.05 * ledger["put_in"])
@@ -204,7 +204,7 @@ def test_a_liquid_bed_accounts_for_its_energy(tmp_path: Path) -> None:
 def test_dry_spheres_that_fall_on_a_floor_account_for_their_energy(tmp_path: Path) -> None:
     changes = {"fluid": None, "bed.inlet_velocity": 0.0, "run.until": 0.1, "run.every": 0.05}
     Run.begin(Case.from_text(LIQUID).with_(**changes), tmp_path / "run").go()
-    ledger = report(tmp_path / "run")["energy"]
+    ledger = report(tmp_path / "run").energy
     assert -ledger["potential"] > 0.5 * ledger["put_in"]
     assert ledger["contact_damping"] > 0.1 * ledger["put_in"] and ledger["friction"] > 0.0
     assert not {"drag", "inflow", "fluid_kinetic"} & ledger.keys()

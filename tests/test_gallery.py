@@ -17,7 +17,7 @@ SHARE = 5
 
 def try_out(name: str, folder: Path, overrides: dict[str, Any]) -> None:
     """Run a few fluid steps, report and draw."""
-    end = Case.from_toml(gallery()[name]).run.until
+    end = gallery()[name].run.until
     times = {"until": 2e-3 * end, "every": 1e-3 * end, "history_every": 5e-4 * end, "average_from": 1e-3 * end}
     settings = {**{f"run.{key}": value for key, value in times.items()}, **overrides}
     words = [word for key, value in settings.items() for word in ("--set", f"{key}={value!r}")]
@@ -42,7 +42,7 @@ def fewer(case: Case) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", gallery())
 def test_a_fifth_of_every_gallery_case_starts_reports_and_draws(name: str, tmp_path: Path) -> None:
-    try_out(name, tmp_path, fewer(Case.from_toml(gallery()[name])))
+    try_out(name, tmp_path, fewer(gallery()[name]))
 
 
 @pytest.mark.slow

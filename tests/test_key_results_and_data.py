@@ -19,6 +19,7 @@ from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.report import case_of, report
 from cfddem.analysis.report_text import lines as report_lines
 from cfddem.analysis.report_text import markdown
+from cfddem.analysis.report_values import KeyResult
 from cfddem.backend.errors import InputError
 from cfddem.case.compare import CaseData, points_of
 from cfddem.case.data_table import read_table
@@ -30,20 +31,20 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.runner import Run
 
 
-def answer(folder: Path, name: str) -> dict[str, object]:
+def answer(folder: Path, name: str) -> KeyResult:
     """One answer of a report."""
-    return next(each for each in report(folder)["key_results"] if each["name"] == name)
+    return next(each for each in report(folder).key_results if each.name == name)
 
 
 def test_the_answer_says_which_voidage_to_believe_and_what_carries_the_bed(tmp_path: Path) -> None:
     folder = made_up(tmp_path / "run")
-    assert [each["name"] for each in report(folder)["key_results"]] == [
+    assert [each.name for each in report(folder).key_results] == [
         "bed height", "bed voidage", "pressure drop", "regime",
     ]  # fmt: skip
-    assert answer(folder, "regime")["value"] == "fluidised, expanded"
+    assert answer(folder, "regime").value == "fluidised, expanded"
     drop = answer(folder, "pressure drop")
-    assert drop["value"] == pytest.approx(WEIGHT, rel=0.003) and drop["holds"] is True
-    assert "the buoyant weight" in str(drop["verdict"])
+    assert drop.value == pytest.approx(WEIGHT, rel=0.003) and drop.holds is True
+    assert "the buoyant weight" in str(drop.verdict)
     text = report_lines(report(folder))
     assert text[3].startswith("  bed height") and max(map(len, text)) <= 100
 
@@ -61,16 +62,14 @@ def test_the_regime_follows_from_pressure_and_velocity(
     tmp_path: Path, change: tuple[str, str], regime: str, holds: bool | None
 ) -> None:
     found = answer(made_up(tmp_path / "run", BED.replace(*change) if change else BED), "regime")
-    assert (found["value"], found["holds"]) == (regime, holds)
+    assert (found.value, found.holds) == (regime, holds)
 
 
 def test_a_mean_that_drifts_much_is_not_to_be_used(tmp_path: Path) -> None:
     little = answer(made_up(tmp_path / "little", trend=5e-4), "bed height")
     much = answer(made_up(tmp_path / "much", trend=2e-2), "bed height")
-    assert "still drifts by 1.3 % from 1 to 2 s" in str(little["verdict"]) and "do not use" not in str(
-        little["verdict"]
-    )
-    assert "do not use the mean" in str(much["verdict"]) and much["holds"] is False
+    assert "still drifts by 1.3 % from 1 to 2 s" in str(little.verdict) and "do not use" not in str(little.verdict)
+    assert "do not use the mean" in str(much.verdict) and much.holds is False
 
 
 def test_agreement_is_counted_in_standard_errors() -> None:
@@ -179,7 +178,7 @@ def test_measured_points_are_scored_by_their_errors(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(text)
     case = Case.from_toml(tmp_path / "case.toml")
     folder = made_up(tmp_path / "run", text.replace("points.csv", case.compare["heights"].file))
-    score = report(folder)["measured"][0]
+    score = report(folder).measured[0]
     assert (score["points"], score["outside"], score["quantity"], score["against"]) == (2, 1, "bed_height", "time")
     assert score["bias"] == pytest.approx(-1e-3, abs=2e-4) and score["errors"] == pytest.approx(2.0, abs=0.4)
     assert score["holds"] is False and "differs by more than the errors" in score["verdict"]
@@ -189,7 +188,7 @@ def test_means_and_data_without_errors(tmp_path: Path) -> None:
     folder = made_up(tmp_path / "run")
     mean = csv_file(tmp_path, "bed voidage [%], error [%]\n60.1, 0.2\n", "mean.csv")
     bare = csv_file(tmp_path, "bed voidage [-]\n0.66\n", "bare.csv")
-    good, unknown = report(folder, [mean, bare])["measured"]
+    good, unknown = report(folder, [mean, bare]).measured
     assert good["holds"] is True and good["against"] == "mean"
     assert unknown["holds"] is None and unknown["relative_rms"] == pytest.approx(0.06 / 0.66, rel=0.01)
 
@@ -200,7 +199,7 @@ def test_profiles_are_compared_at_the_measured_heights(tmp_path: Path) -> None:
     run = open_run(made)
     profiles = profiles_of(run, case_of(run), 1.0)
     assert profiles is not None and profiles.voidage is not None
-    score = report(made, [profile])["measured"][0]
+    score = report(made, [profile]).measured[0]
     off = np.interp([0.01, 0.02], profiles.height, profiles.voidage) - 0.6
     assert score["points"] == 2 and score["rms"] == pytest.approx(math.sqrt((off**2).mean()))
 
@@ -218,12 +217,12 @@ def test_a_curve_over_velocity_is_compared_with_the_steps_of_the_inlet(tmp_path:
         f"20, 40.75, 0.1, {WEIGHT}\n50, 41.75, 0.1, {WEIGHT}\n80, 45, 0.1, {WEIGHT}\n",
         "curve.csv",
     )
-    height, drop = report(folder, [curve])["measured"]
+    height, drop = report(folder, [curve]).measured
     assert (height["points"], height["outside"], height["against"]) == (2, 1, "inlet_velocity")
     assert height["holds"] is True and abs(height["bias"]) < 5e-5, "second half of each step"
     assert drop["holds"] is None and drop["relative_rms"] < 0.01
     steady = made_up(tmp_path / "steady")  # at 50 mm/s all the time
-    (one, _) = report(steady, [curve])["measured"]
+    (one, _) = report(steady, [curve]).measured
     assert one["points"] == 1 and one["outside"] == 2
 
 
@@ -308,7 +307,7 @@ def test_the_largest_score_is_that_of_chance() -> None:
 def test_every_kind_of_case_is_drawn(name: str) -> None:
     from cfddem.case.gallery import gallery
 
-    assert len(case_drawing(Case.from_toml(gallery()[name]), 0.02).axes) == 2
+    assert len(case_drawing(gallery()[name], 0.02).axes) == 2
 
 
 @pytest.mark.parametrize(

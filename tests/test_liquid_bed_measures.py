@@ -113,7 +113,7 @@ def test_a_liquid_bed_reports_its_motion(tmp_path: Path) -> None:
     assert history["granular_temperature"] == pytest.approx((along + 2.0 * across) / 3.0, rel=1e-12)
     assert history["floor_pressure"].min() >= 0.0 and history["collisional_pressure"].max() > 0.0
     result = report(tmp_path / "run")
-    found = result["impacts"]
+    found = result.impacts
     assert found["rate"] >= found["contact_rate"] >= 0.0
     assert "collisions of a particle" in "\n".join(lines(result))
     picture = wave_map(tmp_path / "run", tmp_path / "waves.png")

@@ -25,11 +25,11 @@ def test_the_drift_is_that_of_the_rows_that_are_averaged(tmp_path: Path) -> None
     with h5py.File(folder / "history.h5", "r+") as file:
         part = np.clip((file["time"][:] - 1.0) / 0.75, 0.0, 1.0)
         file["bed_height"][:] = 0.04 * (1.0 - 0.035 * part) + 1e-6 * np.sin(np.arange(121))
-    found = next(each for each in report(folder)["key_results"] if each["name"] == "bed height")
-    assert str(found["verdict"]).startswith("still drifts by 4 % from 1 to 2 s, do not use the mean")
-    assert found["holds"] is False
-    measure = report(folder)["measures"]["bed_height"]
-    assert measure["drift"] == pytest.approx(-0.0394 * 0.04, rel=0.05)
+    found = next(each for each in report(folder).key_results if each.name == "bed height")
+    assert str(found.verdict).startswith("still drifts by 4 % from 1 to 2 s, do not use the mean")
+    assert found.holds is False
+    measure = report(folder).measures["bed_height"]
+    assert measure.drift == pytest.approx(-0.0394 * 0.04, rel=0.05)
 
 
 def test_an_error_that_is_a_lower_bound_is_marked_everywhere_and_judges_nothing(tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ def test_an_error_that_is_a_lower_bound_is_marked_everywhere_and_judges_nothing(
         with h5py.File(made_up(tmp_path / name) / "history.h5", "r+") as file:
             file["bed_height"][:] = level + 1e-3 * np.sin(2.0 * np.pi * 4.0 * file["time"][:])
     result = report(tmp_path / "a")
-    assert result["measures"]["bed_height"]["error_is_lower_bound"]
+    assert result.measures["bed_height"].error_is_lower_bound
     for text in ("\n".join(report_lines(result)), markdown(result), render(open_run(tmp_path / "a"), result)):
         assert "at least" in text
     found = compare([tmp_path / "a", tmp_path / "b"])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from closures.agitation import free_spheres
 from closures.registry import law_of
@@ -28,7 +28,9 @@ from scenarios.validation.targets import validate
 
 def liquid_bed(**changes: Any) -> Case:
     """The liquid bed of the gallery."""
-    return Case.from_toml(gallery()["liquid-bed"], {name.replace("__", "."): value for name, value in changes.items()})
+    return Case.from_toml(
+        gallery_files()["liquid-bed"], {name.replace("__", "."): value for name, value in changes.items()}
+    )
 
 
 def test_the_measured_law_is_the_default_within_its_range() -> None:

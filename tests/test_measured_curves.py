@@ -74,9 +74,9 @@ def test_means_of_a_run_in_steps_are_those_of_its_last_velocity(tmp_path: Path) 
     text = BED.replace("inlet_velocity = 0.05", f"inlet_velocity = {down}").replace("average_from", "# average_from")
     folder = made_up(tmp_path / "run", text, largest_speed=0.0, wall_load=WEIGHT)
     found = report(folder)
-    assert found["window"] == pytest.approx([0.5 * (1.21 + 2.0), 2.0])
-    regime = next(each for each in found["key_results"] if each["name"] == "regime")
-    assert "although" not in regime["verdict"] and "the inlet velocity is 0." in regime["verdict"]
+    assert found.window == pytest.approx((0.5 * (1.21 + 2.0), 2.0))
+    regime = next(each for each in found.key_results if each.name == "regime")
+    assert "although" not in regime.verdict and "the inlet velocity is 0." in regime.verdict
 
 
 def test_a_sweep_refuses_data_before_its_first_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -217,4 +217,4 @@ def test_a_run_records_species_and_resumes_to_the_same_bits(tmp_path: Path) -> N
         mean = (volume[mine] * height[mine]).sum() / volume[mine].sum()
         assert whole.history[f"mean_height_{name}"][-1] == pytest.approx(mean, rel=1e-5)
         assert whole.unit(f"mean_height_{name}") == "m"
-    assert "mean_height_pellets" in report(tmp_path / "whole")["measures"]
+    assert "mean_height_pellets" in report(tmp_path / "whole").measures

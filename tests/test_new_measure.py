@@ -52,8 +52,8 @@ def test_a_declared_function_appears_in_history_report_and_page(tmp_path: Path) 
         assert file["mean_speed"].attrs["unit"] == "m/s"
     history.forget("mean_speed")  # the report needs the files only
     result = report(tmp_path / "run")
-    window = seen.history["time"] >= result["window"][0]
-    assert result["measures"]["mean_speed"]["mean"] == pytest.approx(seen.history["mean_speed"][window].mean())
+    window = seen.history["time"] >= result.window[0]
+    assert result.measures["mean_speed"].mean == pytest.approx(seen.history["mean_speed"][window].mean())
     assert any(line.startswith("  mean speed") and "m/s" in line for line in lines(result))
     assert "mean speed of the particles" in page(tmp_path / "run", tmp_path / "page.html").read_text()
 

@@ -15,13 +15,13 @@ from made_up_run import BED, made_up
 from cfddem.analysis import run_warnings
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.preflight.summary import preflight
 
 
 def test_a_note_needs_no_action_and_stands_before_the_word_ok() -> None:
-    lines = preflight(Case.from_toml(gallery()["gas-bed"])).issue_lines()
+    lines = preflight(gallery()["gas-bed"]).issue_lines()
     assert lines[0].startswith("note: ") and lines[-1] == "ok: no errors, no warnings"
     assert "2600000 Pa" in " ".join(lines), "a modulus is no power of ten where it has few digits"
 
@@ -51,10 +51,10 @@ def test_a_bed_that_lies_on_soft_contacts_gets_a_warning_where_collisions_overla
 
 def test_a_long_run_with_hard_contacts_is_told_the_modulus_that_saves_time() -> None:
     hard = {"material.glass.contact_modulus": 6e10, "run.particle_step": None}
-    (note,) = preflight(Case.from_toml(gallery()["liquid-bed"], hard)).issues
+    (note,) = preflight(Case.from_toml(gallery_files()["liquid-bed"], hard)).issues
     assert note.severity == "note" and "the run takes about" in note.reason
     short = hard | {"run.until": 0.05, "run.average_from": 0.0}
-    assert not preflight(Case.from_toml(gallery()["liquid-bed"], short)).issues
+    assert not preflight(Case.from_toml(gallery_files()["liquid-bed"], short)).issues
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_long_run_with_hard_contacts_is_told_the_modulus_that_saves_time() -> 
 def test_values_in_other_units_are_found_in_gallery_cases(
     name: str, given: dict[str, Any], key: str, said: str
 ) -> None:
-    issues = preflight(Case.from_toml(gallery()[name], given)).issues
+    issues = preflight(Case.from_toml(gallery_files()[name], given)).issues
     assert [key] == [each.key for each in issues if said in each.reason], issues
 
 
@@ -89,12 +89,12 @@ def test_a_report_says_that_a_spray_misses_the_particles(tmp_path: Path) -> None
         folder = made_up(
             tmp_path / f"{key}{missed}", BED.replace("[run]", spray), liquid_missed=missed, liquid_sprayed=1e-8 - missed
         )
-        said = [each for each in report(folder)["warnings"] if "found no particle in its zone" in each]
+        said = [each for each in report(folder).warnings if "found no particle in its zone" in each]
         assert [each.startswith("90 % of the spray") and f"spray.{key}" in each for each in said] == [True] * warned
 
 
 def test_a_value_of_a_case_cannot_be_set_and_a_key_is_found_by_its_nearest_name() -> None:
-    case = Case.from_toml(gallery()["liquid-bed"])
+    case = gallery()["liquid-bed"]
     with pytest.raises(InputError, match=r"density = 3\.0: must be left as it is; case\.with_"):
         case.fluid.density = 3.0  # type: ignore[misc, union-attr]
     assert "did you mean 'bed.diameter'" in call("explain", "bed.diametr")[2]
@@ -103,7 +103,7 @@ def test_a_value_of_a_case_cannot_be_set_and_a_key_is_found_by_its_nearest_name(
 def test_the_height_of_a_single_falling_sphere_is_no_mean(tmp_path: Path) -> None:
     """Where a bed height drifts, the report names the curves; a sphere that falls has no bed."""
     found = report(made_up(tmp_path / "bed", trend=0.01))
-    (drifts,) = found["actions"]["run longer, or average over another window"]
+    (drifts,) = found.actions["run longer, or average over another window"]
     assert "window: bed height; run longer" in drifts and "curves over time (cfddem view --history)" in drifts
     sphere = Case.from_text(BED.replace("count = 2000", "count = 1"))
-    assert not list(run_warnings._series_warnings(sphere, {"bed_height": found["measures"]["bed_height"]}))
+    assert not list(run_warnings._series_warnings(sphere, {"bed_height": found.measures["bed_height"]}))

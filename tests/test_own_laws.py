@@ -169,9 +169,9 @@ def test_a_package_that_could_not_be_loaded_is_named() -> None:
 def test_a_run_is_read_without_the_law_that_it_used(tmp_path: Path) -> None:
     text = BED.replace('agitation = "none"', 'drag = "narrow"\nagitation = "wild"')
     result = report(_with_case(made_up(tmp_path / "run"), text))
-    said = "\n".join(result["warnings"])
+    said = "\n".join(result.warnings)
     assert "law narrow (laws.drag) is not installed here: no prediction" in said and "law wild" in said
-    assert result["preflight"]["numbers"] == {}
+    assert result.preflight["numbers"] == {}
     assert "law narrow is not installed here" in page(tmp_path / "run", tmp_path / "run.html").read_text()
     found = compare([made_up(tmp_path / "other"), tmp_path / "run"])
     assert found["changed"]["laws.drag"] == ["di_felice", "narrow"]
@@ -223,7 +223,7 @@ def test_any_use_outside_of_the_range_is_reported(tmp_path: Path) -> None:
 
     with h5py.File(made_up(tmp_path / "run") / "history.h5", "r+") as file:
         file["out_of_range_count"][:] = 3.0
-    said = "\n".join(each for group in report(tmp_path / "run")["actions"].values() for each in group)
+    said = "\n".join(each for group in report(tmp_path / "run").actions.values() for each in group)
     assert "outside of its range in 3.75e-05 % of its uses (3 times)" in said
 
 

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 from example_case import TEXT
 
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import percent
 from cfddem.preflight.summary import Preflight, PreflightError, preflight, refuse_errors
 from closures import bed, numbers
 
-GALLERY = {name: Case.from_toml(path) for name, path in gallery().items()}
+GALLERY = gallery()
 
 
 def made(**given: Any) -> Preflight:
@@ -49,7 +49,7 @@ def test_a_gallery_case_with_a_warning_explains_it() -> None:
         found = preflight(GALLERY[name])
         assert [(each.key, each.severity) for each in found.issues] == [(key, severity)]
         assert found.status == ("ok" if severity == "note" else "warning")
-        assert ("`cfddem check` warns" if severity == "warning" else "`cfddem check` notes") in gallery()[
+        assert ("`cfddem check` warns" if severity == "warning" else "`cfddem check` notes") in gallery_files()[
             name
         ].read_text()
 
@@ -88,7 +88,7 @@ def test_a_sphere_larger_than_the_column_is_the_only_error() -> None:
     ],
 )  # fmt: skip
 def test_the_first_issue_of_a_bed_in_wrong_units_or_of_few_cells(changes: dict[str, Any], key: str, words: str) -> None:
-    first = preflight(Case.from_toml(gallery()["liquid-bed"], changes)).issues[0]
+    first = preflight(Case.from_toml(gallery_files()["liquid-bed"], changes)).issues[0]
     assert first.key == key and words in str(first)
 
 
@@ -322,8 +322,8 @@ import json, sys, time
 begun = time.process_time()
 from cfddem.preflight.summary import preflight
 from cfddem.case.schema import Case
-from cfddem.case.gallery import gallery
-made = preflight(Case.from_toml(gallery()["packed-bed"]))
+from cfddem.case.gallery import gallery, gallery_files
+made = preflight(gallery()["packed-bed"])
 print(json.dumps([made.status, time.process_time() - begun, "numba" in sys.modules, "vtkmodules" in sys.modules]))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
@@ -352,6 +352,6 @@ def test_json_holds_the_whole_result() -> None:
 )
 def test_values_beyond_all_correlations_are_named(given: dict[str, Any], key: str) -> None:
     """One error with the key, and no traceback."""
-    text = gallery()["liquid-bed"].read_text()
+    text = gallery_files()["liquid-bed"].read_text()
     errors = [each.key for each in preflight(Case.from_text(text, "x", given)).issues if each.severity == "error"]
     assert errors[:1] == [key]

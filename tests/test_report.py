@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -29,21 +30,21 @@ from closures.registry import REGISTRY, Law
 
 def test_means_errors_and_laws_match_the_record(tmp_path: Path) -> None:
     result = report(made_up(tmp_path / "run"))
-    assert result["window"] == [1.0, 2.0] and result["status"] == "finished"
-    height = result["measures"]["bed_height"]
-    assert height["mean"] == pytest.approx(0.04, abs=4.0 * height["error"])
-    assert height["error"] == pytest.approx(1e-4 / math.sqrt(201), rel=0.3)
-    assert height["stationary"] is True
-    assert "bed_voidage_from_pressure" not in result["measures"]  # NaN in every row
-    rows = {row["law"]: row for row in result["laws"]}
-    assert rows["pressure drop by the buoyant weight"]["ratio"] == pytest.approx(1.0, abs=0.003)
+    assert result.window == (1.0, 2.0) and result.status == "finished"
+    height = result.measures["bed_height"]
+    assert height.mean == pytest.approx(0.04, abs=4.0 * height.error)
+    assert height.error == pytest.approx(1e-4 / math.sqrt(201), rel=0.3)
+    assert height.stationary is True
+    assert "bed_voidage_from_pressure" not in result.measures  # NaN in every row
+    rows = {row.law: row for row in result.laws}
+    assert rows["pressure drop by the buoyant weight"].ratio == pytest.approx(1.0, abs=0.003)
     archimedes = 1000.0 * 1500.0 * 9.81 * 8e-9 / 1e-6
     reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
     exponent = laws_of_beds.exponent_richardson_zaki(reynolds, 0.0)
     expected = (0.05 / (reynolds * 1e-3 / (1000.0 * 2e-3))) ** (1.0 / exponent)
-    assert rows["voidage by Richardson-Zaki"]["expected"] == pytest.approx(expected, rel=1e-12)
-    assert result["ledger"] == {"momentum_imbalance": 1e-15, "volume_imbalance": 1e-9, "particles_lost": 0.0}
-    assert result["steps"] == {"particles": 40_000, "fluid": 4000}
+    assert rows["voidage by Richardson-Zaki"].expected == pytest.approx(expected, rel=1e-12)
+    assert result.ledger == {"momentum_imbalance": 1e-15, "volume_imbalance": 1e-9, "particles_lost": 0.0}
+    assert result.steps == {"particles": 40_000, "fluid": 4000}
 
 
 def test_a_sentence_says_where_the_voidages_lie_among_the_published_ones(tmp_path: Path) -> None:
@@ -51,45 +52,46 @@ def test_a_sentence_says_where_the_voidages_lie_among_the_published_ones(tmp_pat
     spread = "the published voidages differ by 0.030, 0.590 to 0.620"
     assert expansion_note(laws, {}) == f"{spread}; that of the run lies within"
     assert expansion_note(laws[:1], {}).endswith("that of the run lies 0.010 above them")
-    both = expansion_note(laws, {"bed_voidage_from_pressure": {"mean": 0.63}})
+    height = report(made_up(tmp_path / "other")).measures["bed_height"]
+    both = expansion_note(laws, {"bed_voidage_from_pressure": replace(height, mean=0.63)})
     assert "Compare the bed voidage, from the height" in both and "from the pressure, 0.030 higher" in both
     assert expansion_note([], {}) == ""
     assert any("published voidages differ" in line for line in lines(report(made_up(tmp_path / "run"))))
 
 
 def test_no_slip_walls_increase_the_expected_voidage(tmp_path: Path) -> None:
-    free = report(made_up(tmp_path / "free"))["laws"]
-    stuck = report(made_up(tmp_path / "stuck", BED.replace("free_slip", "no_slip")))["laws"]
+    free = report(made_up(tmp_path / "free")).laws
+    stuck = report(made_up(tmp_path / "stuck", BED.replace("free_slip", "no_slip"))).laws
     for one, other in zip(free[1:], stuck[1:]):
-        assert other["expected"] > one["expected"] + 0.005, one["law"]
+        assert other.expected > one.expected + 0.005, one.law
 
 
 def test_a_packed_bed_is_compared_with_ergun(tmp_path: Path) -> None:
-    fixed = report(made_up(tmp_path / "run", BED.replace("[run]", "fixed = true\n[run]")))["laws"]
+    fixed = report(made_up(tmp_path / "run", BED.replace("[run]", "fixed = true\n[run]"))).laws
     slope = laws_of_beds.ergun_gradient(0.05, 2e-3, 1000.0, 1e-3, 0.6)
-    assert [row["law"] for row in fixed] == ["pressure drop by di_felice", "pressure drop by Ergun"]
-    assert fixed[1]["expected"] == pytest.approx(slope * 0.04 / 0.99, rel=0.003)
+    assert [row.law for row in fixed] == ["pressure drop by di_felice", "pressure drop by Ergun"]
+    assert fixed[1].expected == pytest.approx(slope * 0.04 / 0.99, rel=0.003)
     factor = di_felice(100.0, 0.6) / ergun(100.0, 0.6)
-    assert fixed[0]["expected"] == pytest.approx(factor * fixed[1]["expected"], rel=0.01)
+    assert fixed[0].expected == pytest.approx(factor * fixed[1].expected, rel=0.01)
 
 
 def test_the_pressure_drop_of_a_shallow_packed_bed_says_that_it_is_too_low(tmp_path: Path) -> None:
     """A bed of 40 mm in cells of 10 mm, and of 4 mm; one that is fluidised carries its weight in any cells."""
     fixed = BED.replace("[run]", "fixed = true\n[run]")
     for number, (text, cell, said) in enumerate(((fixed, 0.01, True), (fixed, 0.004, False), (BED, 0.01, False))):
-        found = report(made_up(tmp_path / str(number), text.replace("cell = 0.005", f"cell = {cell}")))["key_results"]
-        (drop,) = (each for each in found if each["name"] == "pressure drop")
-        assert ("too low, as the bed is only 4 cells high" in drop["verdict"]) == said
+        found = report(made_up(tmp_path / str(number), text.replace("cell = 0.005", f"cell = {cell}"))).key_results
+        (drop,) = (each for each in found if each.name == "pressure drop")
+        assert ("too low, as the bed is only 4 cells high" in drop.verdict) == said
 
 
 def test_warnings_of_the_check_are_repeated_where_they_affect_the_answers(tmp_path: Path) -> None:
     soft = BED.replace("contact_modulus = 1e7", "contact_modulus = 8e4").replace("[run]", "[run]\nevery = 1e-5")
-    said = report(made_up(tmp_path / "run", soft))["actions"]["check the case: before the run, it had these warnings"]
+    said = report(made_up(tmp_path / "run", soft)).actions["check the case: before the run, it had these warnings"]
     assert [each.split(":")[0] for each in said] == ["material.glass.contact_modulus"]  # not that of run.every
 
 
 def test_a_page_names_the_sources_of_the_laws_of_its_case(tmp_path: Path) -> None:
-    cited = {each["name"]: each["reference"] for each in report(made_up(tmp_path / "run"))["references"]}
+    cited = {each.name: each.reference for each in report(made_up(tmp_path / "run")).references}
     assert {"di_felice", "film_strength", "elastohydrodynamic", "hertz"} <= cited.keys() and "ergun" not in cited
     text = page(tmp_path / "run", tmp_path / "run.html").read_text()
     assert "Di Felice, Int. J. Multiphase Flow 20 (1994) 153" in text
@@ -98,24 +100,24 @@ def test_a_page_names_the_sources_of_the_laws_of_its_case(tmp_path: Path) -> Non
 def test_a_run_without_a_fluid_has_a_report(tmp_path: Path) -> None:
     dry = BED[: BED.index("[fluid]")] + BED[BED.index("[material") :].replace("inlet_velocity = 0.05\n", "")
     result = report(made_up(tmp_path / "run", dry))
-    assert result["laws"] == [] and "pressure_drop" not in result["measures"]
-    assert result["ledger"] == {"particles_lost": 0.0}
+    assert result.laws == [] and "pressure_drop" not in result.measures
+    assert result.ledger == {"particles_lost": 0.0}
     assert "No warnings." in page(tmp_path / "run", tmp_path / "dry.html").read_text()
 
 
 def test_warnings_of_ranges_drifts_and_short_windows(tmp_path: Path) -> None:
     steady = report(made_up(tmp_path / "steady"))
-    said = "\n".join(each for group in steady["actions"].values() for each in group)
-    assert not steady["warnings"] and "the bed as a whole is inside" in said and "cfddem explain" not in said
+    said = "\n".join(each for group in steady.actions.values() for each in group)
+    assert not steady.warnings and "the bed as a whole is inside" in said and "cfddem explain" not in said
     assert (
         "the drag law di_felice was evaluated outside of its range in 10 % of its uses (800000 times): voidage" in said
     )
     assert "not stationary" not in said
     drifting = report(made_up(tmp_path / "drifts", trend=5e-3))
-    assert drifting["measures"]["bed_height"]["stationary"] is False
-    assert any("not stationary in the averaging window: bed height" in each for each in drifting["warnings"])
+    assert drifting.measures["bed_height"].stationary is False
+    assert any("not stationary in the averaging window: bed height" in each for each in drifting.warnings)
     short = report(made_up(tmp_path / "short", rows=11))
-    assert any("too few rows" in each for each in short["warnings"])
+    assert any("too few rows" in each for each in short.warnings)
     assert max(map(len, lines(drifting))) <= 100
 
 
@@ -133,7 +135,7 @@ def test_a_law_evaluated_outside_of_its_range_is_named_with_the_range(
     own = Law("of_ones_own", "minimum_gap", "here", {"approach_speed": (0.0, 0.1)}, lambda roughness: roughness)
     monkeypatch.setitem(REGISTRY["minimum_gap"], "of_ones_own", own)
     run = report(made_up(tmp_path / "run", f"{BED}{laws}\n"))
-    said = [each for each in run["warnings"] if "outside of" in each]
+    said = [each for each in run.warnings if "outside of" in each]
     assert len(said) == 1 and all(each in said[0] for each in [*ranges, "cfddem explain"])
     first = next(place for place, line in enumerate(lines(run)) if "warning: " in line and "outside of" in line)
     assert all(len(line) <= 100 for line in lines(run))
@@ -184,11 +186,11 @@ def test_a_single_sphere_is_compared_with_its_drag_law(tmp_path: Path, density: 
             "position": np.full((1, 3), 0.01), "velocity": np.array(velocity), "id": np.zeros(1, int),
         })  # fmt: skip
     run.finish("finished")
-    last, worst = report(tmp_path / "run")["laws"]
-    assert last["law"] == "terminal velocity by stokes"
-    assert last["expected"] == pytest.approx(abs(terminal), rel=1e-9)
-    assert last["computed"] == pytest.approx(1.02 * abs(terminal) * -math.expm1(-0.0098 * 1.8e6 / density), rel=1e-4)
-    assert worst["law"].startswith("equation of motion") and worst["ratio"] == pytest.approx(1.02, rel=1e-4)
+    last, worst = report(tmp_path / "run").laws
+    assert last.law == "terminal velocity by stokes"
+    assert last.expected == pytest.approx(abs(terminal), rel=1e-9)
+    assert last.computed == pytest.approx(1.02 * abs(terminal) * -math.expm1(-0.0098 * 1.8e6 / density), rel=1e-4)
+    assert worst.law.startswith("equation of motion") and worst.ratio == pytest.approx(1.02, rel=1e-4)
     assert "terminal velocity by stokes" in page(tmp_path / "run", tmp_path / "alone.html").read_text()
 
 
@@ -242,7 +244,7 @@ def test_json_is_strict_and_has_null_for_nan(tmp_path: Path) -> None:
     result = report(made_up(tmp_path / "run", rows=11))
     read = json.loads(as_json(result), parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
     assert read["measures"]["bed_height"]["error"] is None
-    assert read["measures"]["bed_height"]["mean"] == result["measures"]["bed_height"]["mean"]
+    assert read["measures"]["bed_height"]["mean"] == result.measures["bed_height"].mean
 
 
 def test_the_report_command_writes_a_page(

@@ -49,7 +49,7 @@ def test_a_run_ends_when_its_means_are_known_and_continues_on_demand(tmp_path: P
     Run.begin(case, tmp_path / "run").go()
     run = open_run(tmp_path / "run")
     assert run.status == "finished" and run.times[-1] < 0.1 and "bed height" in run.message
-    assert report(tmp_path / "run")["window"] == [run.averages_from, run.times[-1]]
+    assert report(tmp_path / "run").window == (run.averages_from, run.times[-1])
     later = run.times[-1] + 2e-3
     Run.resume(tmp_path / "run", until=later).go()
     assert open_run(tmp_path / "run").times[-1] == pytest.approx(later)

@@ -8,7 +8,7 @@ import pytest
 from command_line import call
 
 from cfddem.backend.errors import InputError
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.run.threads import threads_for
 
@@ -24,7 +24,7 @@ from cfddem.run.threads import threads_for
     ],
 )
 def test_small_cases_take_one_thread(name: str, changes: dict[str, float], expected: int | None) -> None:
-    assert threads_for(Case.from_toml(gallery()[name], changes), None) == expected
+    assert threads_for(Case.from_toml(gallery_files()[name], changes), None) == expected
 
 
 def test_what_the_user_asks_for_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,12 +19,12 @@ from cfddem.run import warmup
 @pytest.mark.parametrize("name", ["liquid-bed", "segregation", "spouted-bed"])
 def test_one_species_two_and_a_jet_can_be_rehearsed(name: str) -> None:
     """A warmup that fails says nothing; here it would."""
-    warmup.warm_up(Case.from_toml(gallery()[name]))
+    warmup.warm_up(gallery()[name])
     assert not warmup.is_new()
 
 
 def test_a_machine_that_has_run_a_fluid_is_not_new(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    case = Case.from_toml(gallery()["liquid-bed"])
+    case = gallery()["liquid-bed"]
     warmup.warm_up(case)
     assert not warmup.is_new()
     monkeypatch.setattr(subprocess, "Popen", None)  # nothing is started
@@ -62,7 +62,7 @@ def test_the_loop_that_is_sought_in_the_cache_may_have_any_name(threads: int, mo
 
 
 def test_the_other_process_rehearses_the_case_it_reads() -> None:
-    case = Case.from_toml(gallery()["liquid-bed"])
+    case = gallery()["liquid-bed"]
     done = subprocess.run(
         [sys.executable, "-m", "cfddem.run.warmup"], input=case.to_toml().encode(), capture_output=True
     )
@@ -82,7 +82,7 @@ def test_the_other_process_is_given_the_case_and_stopped(monkeypatch: pytest.Mon
     monkeypatch.setattr(subprocess, "Popen", watched)
     monkeypatch.setattr(warmup, "is_new", lambda: True)
     monkeypatch.setattr(warmup, "_cores", lambda: 2)
-    case = Case.from_toml(gallery()["liquid-bed"])
+    case = gallery()["liquid-bed"]
     with warmup.warmup(case):
         assert started[0].poll() is None
         while not (tmp_path / "case.toml").exists() or not (tmp_path / "case.toml").read_text():

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 from cfddem.analysis.measures import OF_THE_BED
+from cfddem.analysis.report_values import LawComparison, Measure, comparison
 from cfddem.case.particle_properties import particle_properties
 from cfddem.case.schema import Case
 from cfddem.preflight.mixture import bed_drag
@@ -23,7 +23,7 @@ FREE_SIDES = ("free_slip", "periodic")
 """Sides that do not retard the flow: no wall correction applies."""
 
 
-def compared_with_bed_laws(case: Case, measures: dict[str, Any]) -> list[dict[str, Any]]:
+def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[LawComparison]:
     """One row for each law that applies to the case.
 
     measures  of the report
@@ -38,24 +38,24 @@ def compared_with_bed_laws(case: Case, measures: dict[str, Any]) -> list[dict[st
         or not {"bed_voidage", "pressure_drop"} <= {*measures}
     ):
         return []
-    drop = measures["pressure_drop"]["mean"]
+    drop = measures["pressure_drop"].mean
     if case.bed.fixed:
         return list(_of_a_fixed_bed(case, measures, drop))
     weight = buoyant_weight(case) / case.column.floor_area
     rows = [comparison("pressure drop by the buoyant weight", drop, weight, "Pa")]
     if "wall_load" in measures:
-        carried = drop + measures["wall_load"]["mean"]
+        carried = drop + measures["wall_load"].mean
         rows.append(comparison("pressure drop and wall load by the weight", carried, weight, "Pa"))
     if case.fluid.is_liquid and abs(case.laws.gravity[2]) > 0.0 and not case.bed.species:
         for law, voidage in expansion_laws(case).items():
-            rows.append(comparison(f"voidage by {law}", measures[FROM_HEIGHT]["mean"], voidage, "1"))
+            rows.append(comparison(f"voidage by {law}", measures[FROM_HEIGHT].mean, voidage, "1"))
     return rows
 
 
-def _of_a_fixed_bed(case: Case, measures: dict[str, Any], drop: float) -> Iterator[dict[str, Any]]:
+def _of_a_fixed_bed(case: Case, measures: Mapping[str, Measure], drop: float) -> Iterator[LawComparison]:
     """The pressure drop by the drag law of the case, and by Ergun, over the length that all particles fill."""
     assert case.fluid is not None and isinstance(case.bed.inlet_velocity, float)
-    length, voidage = measures["bed_height"]["mean"] / OF_THE_BED, measures["bed_voidage"]["mean"]
+    length, voidage = measures["bed_height"].mean / OF_THE_BED, measures["bed_voidage"].mean
     flow = case.bed.inlet_velocity, case.bed.diameter, case.fluid.density, case.fluid.viscosity, voidage
     drag = bed_drag(case)
     if drag is not ergun:
@@ -65,36 +65,28 @@ def _of_a_fixed_bed(case: Case, measures: dict[str, Any], drop: float) -> Iterat
     yield comparison("pressure drop by Ergun", drop, length * laws_of_beds.ergun_gradient(*flow), "Pa", outside)
 
 
-def expansion_note(laws: list[dict[str, Any]], measures: dict[str, Any]) -> str:
+def expansion_note(laws: list[LawComparison], measures: Mapping[str, Measure]) -> str:
     """Where the voidage of a run lies in the range of the published ones, and which of its two voidages to compare.
 
     laws      rows of the comparison
     measures  of the report
     returns   one sentence; empty if no voidage is compared
     """
-    rows = [each for each in laws if each["law"].startswith("voidage by ")]
+    rows = [each for each in laws if each.law.startswith("voidage by ")]
     if not rows:
         return ""
-    low, high = (pick(row["expected"] for row in rows) for pick in (min, max))
-    computed = rows[0]["computed"]
+    low, high = (pick(row.expected for row in rows) for pick in (min, max))
+    computed = rows[0].computed
     off = max(low - computed, computed - high)
     where = f"{off:.3f} {'below' if computed < low else 'above'} them" if off > 0.0 else "within"
     note = f"the published voidages differ by {high - low:.3f}, {low:.3f} to {high:.3f}; that of the run lies {where}"
     if FROM_PRESSURE in measures:
-        other = measures[FROM_PRESSURE]["mean"] - computed
+        other = measures[FROM_PRESSURE].mean - computed
         note += (
             f". Compare the bed voidage, from the height, as the laws were fitted to heights; that from the pressure, "
             f"{abs(other):.3f} {'higher' if other > 0.0 else 'lower'}, is of the middle of the bed"
         )
     return note
-
-
-def comparison(law: str, computed: float, expected: float, unit: str, outside_range: str = "") -> dict[str, Any]:
-    """A row of the comparison: value of the run, value of the law, their ratio."""
-    return {
-        "law": law, "computed": computed, "expected": expected, "ratio": computed / expected, "unit": unit,
-        "outside_range": outside_range,
-    }  # fmt: skip
 
 
 def expansion_laws(case: Case) -> dict[str, float]:

@@ -7,12 +7,14 @@ import os
 import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from cfddem.analysis.key_results import AGREES
 from cfddem.analysis.report import case_of, report
-from cfddem.analysis.report_text import WIDTH, spelled, with_error
+from cfddem.analysis.report_text import WIDTH, Report, number, spelled
+from cfddem.analysis.report_values import KeyResult
 from cfddem.backend.errors import InputError
 from cfddem.backend.tables import table
 from cfddem.case.schema import Case
@@ -51,7 +53,7 @@ def compare(folders: Sequence[Path]) -> dict[str, Any]:
             measures[name] = {"unit": first["unit"], "runs": [_difference(row, first) for row in rows]}
     return {
         "runs": [
-            {"name": name, **{key: result[key] for key in ("folder", "case", "status", "window", "warnings")}}
+            {"name": name, **{key: getattr(result, key) for key in ("folder", "case", "status", "window", "warnings")}}
             for name, result in zip(run_names(folders, keys), results)
         ],
         "changed": keys,
@@ -140,6 +142,11 @@ def relative(row: Mapping[str, Any]) -> str:
     return f"{100.0 * row['difference'] / abs(first):+.2f} %" if first else f"{row['difference']:+.3g}"
 
 
+def mean_of(row: Mapping[str, Any], unit: str) -> str:
+    """The mean of a run with its error and unit."""
+    return number(row["mean"], row["error"], unit, row["error_is_lower_bound"])
+
+
 def _difference(row: dict[str, Any] | None, first: dict[str, Any]) -> dict[str, Any]:
     """A mean beside that of the first run."""
     if row is None:
@@ -167,22 +174,22 @@ def _judged(z: float, rows: Sequence[dict[str, Any]]) -> tuple[float, str]:
     return z, f"differs by {min(abs(z), 999.0):.1f} errors"
 
 
-def _numbers(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _numbers(result: Report) -> dict[str, dict[str, Any]]:
     """The key results of a report that are numbers, and then all other means, by their names."""
     first = {
-        each["name"].replace(" ", "_"): {**each, "mean": each["value"], "stationary": None}
-        for each in result["key_results"]
-        if not isinstance(each["value"], str)
+        each.name.replace(" ", "_"): {**asdict(each), "mean": each.value, "stationary": None}
+        for each in result.key_results
+        if not isinstance(each.value, str)
     }
-    return first | result["measures"]
+    return first | {name: asdict(each) for name, each in result.measures.items()}
 
 
-def _key_results(results: Sequence[dict[str, Any]]) -> dict[str, list[dict[str, Any] | None]]:
+def _key_results(results: Sequence[Report]) -> dict[str, list[KeyResult | None]]:
     """The key results of all runs by name."""
-    found: dict[str, list[dict[str, Any] | None]] = {}
+    found: dict[str, list[KeyResult | None]] = {}
     for place, result in enumerate(results):
-        for each in result["key_results"]:
-            found.setdefault(each["name"], [None] * len(results))[place] = each
+        for each in result.key_results:
+            found.setdefault(each.name, [None] * len(results))[place] = each
     return found
 
 
@@ -212,8 +219,8 @@ def _runs(result: dict[str, Any]) -> Iterator[str]:
         name = each["name"] if each["folder"].endswith(each["name"]) else f"{each['name']} ({each['folder']})"
         yield f"{head:<10} {name}: {each['status']}; means from {begin:g} to {end:g} s"
     for name, row in result["key_results"].items():
-        if any(each is not None and isinstance(each["value"], str) for each in row):
-            words = "; ".join(each["value"] if each else "-" for each in row)
+        if any(each is not None and isinstance(each.value, str) for each in row):
+            words = "; ".join(str(each.value) if each else "-" for each in row)
             yield from textwrap.wrap(f"{name:<10} {words}", WIDTH, subsequent_indent=" " * 11)
 
 
@@ -233,7 +240,7 @@ def _means(result: dict[str, Any]) -> Iterator[str]:
         yield spelled(name)
         rows = []
         for place, (run, row) in enumerate(zip(names, measure["runs"])):
-            value = "-" if row["mean"] is None else with_error(row, measure["unit"])
+            value = "-" if row["mean"] is None else mean_of(row, measure["unit"])
             judged = ("", "") if place == 0 or row["mean"] is None else (relative(row), f" {row['verdict']}")
             rows.append((run[:wide], value, *judged))
         yield from table(rows, right=(2,), widths=(wide, 30, 10), indent=2)

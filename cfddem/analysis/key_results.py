@@ -6,14 +6,14 @@ A verdict compares a mean with what it should be, in units of its standard error
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from cfddem.analysis.bed_laws import FROM_HEIGHT, FROM_PRESSURE, weight_over_floor
 from cfddem.analysis.measures import OF_THE_BED
+from cfddem.analysis.report_values import KeyResult, LawComparison, Measure
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.io.reading import RunData
@@ -49,33 +49,20 @@ COUNTED = 1000.0
 """Most standard errors that are written as a number."""
 
 
-class KeyResult(NamedTuple):
-    """One quantity that a reader asks for first."""
-
-    name: str
-    value: float | str  # a number, or a regime in words
-    error: float  # standard error of a number; NaN if unknown
-    unit: str
-    verdict: str  # in words
-    holds: bool | None  # true: as expected; false: not as expected, or not to be used; None: nothing to compare with
-    error_is_lower_bound: bool = False
-
-
 def key_results(
-    run: RunData, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], defluidised: bool = False
-) -> list[dict[str, Any]]:
+    run: RunData, case: Case, measures: Mapping[str, Measure], laws: Sequence[LawComparison], defluidised: bool = False
+) -> list[KeyResult]:
     """The key results of a run, most important first.
 
     measures, laws  of :func:`cfddem.analysis.report.report`
     defluidised     a wet bed has come to rest although it is blown
-    returns         fields of :class:`KeyResult` as plain values
     """
     found = [*_speed(laws), *_height(case, measures, laws), *_voidage(measures, laws), *_drop(case, measures, laws)]
     found += _particles(run)
     regime, reason, holds = _classified(run, case, measures)
     if defluidised:
         regime, holds = "defluidised", False
-    return [each._asdict() for each in (*found, KeyResult("regime", regime, math.nan, "", reason, holds))]
+    return [*found, KeyResult("regime", regime, math.nan, "", reason, holds)]
 
 
 def agreement(computed: float, error: float, expected: float, name: str) -> tuple[str, bool | None]:
@@ -103,40 +90,40 @@ def agreement(computed: float, error: float, expected: float, name: str) -> tupl
     return f"{word} {name}: {side}{count}", errors <= AGREES
 
 
-def _speed(laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
+def _speed(laws: Sequence[LawComparison]) -> Iterator[KeyResult]:
     """Last speed of a single sphere against its terminal velocity."""
     for row in laws:
-        if row["law"].startswith("terminal velocity"):
-            words, holds = agreement(row["computed"], math.nan, row["expected"], f"the {row['law']}")
-            yield KeyResult("settling speed", row["computed"], math.nan, "m/s", words, holds)
+        if row.law.startswith("terminal velocity"):
+            words, holds = agreement(row.computed, math.nan, row.expected, f"the {row.law}")
+            yield KeyResult("settling speed", row.computed, math.nan, "m/s", words, holds)
 
 
-def _usable(measure: dict[str, Any]) -> bool:
+def _usable(measure: Measure) -> bool:
     """Whether a mean can be used: it is steady, or drifts little."""
-    drift = measure["drift"]  # NaN with too few rows
-    return bool(measure["stationary"]) or abs(drift) <= DRIFTING * abs(measure["mean"])
+    drift = measure.drift  # NaN with too few rows
+    return bool(measure.stationary) or abs(drift) <= DRIFTING * abs(measure.mean)
 
 
-def _mean(name: str, measure: dict[str, Any], verdict: str, holds: bool | None) -> KeyResult:
+def _mean(name: str, measure: Measure, verdict: str, holds: bool | None) -> KeyResult:
     """A key result from a measure, with how steady it is; a mean that drifts much is not to be used."""
-    drift, mean = measure["drift"], measure["mean"]
-    if measure["stationary"] or drift == 0.0:
+    drift, mean = measure.drift, measure.mean
+    if measure.stationary or drift == 0.0:
         steady = "steady"
     elif math.isnan(drift):
         steady = "too few rows to say whether it is steady"
     else:
         share = abs(drift) / abs(mean) if mean else math.inf
-        begin, end = measure["drift_times"]
+        begin, end = measure.drift_times
         steady = f"still drifts by {percent(float(f'{share:.2g}'))} from {begin:g} to {end:g} s"
-        steady += ", in which the inlet velocity changes" * bool(measure.get("inlet_changes"))
+        steady += ", in which the inlet velocity changes" * bool(measure.inlet_changes)
         if share > DRIFTING:
             steady, holds = f"{steady}, do not use the mean", False
     verdict = f"{steady}; {verdict}" if verdict else steady
-    bound = measure["error_is_lower_bound"]
-    return KeyResult(name, measure["mean"], measure["error"], measure["unit"], verdict, holds, bound)
+    bound = measure.error_is_lower_bound
+    return KeyResult(name, measure.mean, measure.error, measure.unit, verdict, holds, bound)
 
 
-def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
+def _height(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawComparison]) -> Iterator[KeyResult]:
     """Bed height, and the heights that published expansion laws give for the same particles."""
     if "bed_height" not in measures or case.is_one_sphere:
         return
@@ -150,50 +137,50 @@ def _height(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) ->
     yield _mean("bed height", height, verdict, None)
 
 
-def _published(laws: list[dict[str, Any]]) -> list[float]:
+def _published(laws: Sequence[LawComparison]) -> list[float]:
     """Voidages by published expansion laws."""
-    return [row["expected"] for row in laws if row["law"].startswith("voidage by ")]
+    return [row.expected for row in laws if row.law.startswith("voidage by ")]
 
 
-def _voidage(measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
+def _voidage(measures: Mapping[str, Measure], laws: Sequence[LawComparison]) -> Iterator[KeyResult]:
     """The voidage to believe: that from the bed height, which published laws were fitted to."""
     if FROM_HEIGHT not in measures:
         return
     voidage, published = measures[FROM_HEIGHT], _published(laws)
     verdict, holds = "", None
     if published:
-        low, high, mean = min(published), max(published), voidage["mean"]
-        margin = AGREES * (0.0 if math.isnan(voidage["error"]) else voidage["error"])
+        low, high, mean = min(published), max(published), voidage.mean
+        margin = AGREES * (0.0 if math.isnan(voidage.error) else voidage.error)
         holds = low - margin <= mean <= high + margin
         off = max(low - mean, mean - high)
         where = "within" if off <= 0.0 else f"{off:.3f} {'below' if mean < low else 'above'}"
         verdict = f"{where} the published laws, {low:.3f} to {high:.3f}"
     if FROM_PRESSURE in measures and _usable(voidage):
-        verdict += f"; use this value, from the height; the pressure gives {measures[FROM_PRESSURE]['mean']:.3f}"
+        verdict += f"; use this value, from the height; the pressure gives {measures[FROM_PRESSURE].mean:.3f}"
     yield _mean("bed voidage", voidage, verdict.removeprefix("; "), holds)
 
 
-def _drop(case: Case, measures: dict[str, Any], laws: list[dict[str, Any]]) -> Iterator[KeyResult]:
+def _drop(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawComparison]) -> Iterator[KeyResult]:
     """Pressure drop against the weight of the bed, or against the drag law for a fixed one."""
     if "pressure_drop" not in measures:
         return
     drop, opening = measures["pressure_drop"], "pressure drop by "
     for row in laws:
-        if row["law"].startswith(opening):
-            expected = row["law"].removeprefix(opening)
-            words, holds = agreement(drop["mean"], drop["error"], row["expected"], expected)
+        if row.law.startswith(opening):
+            expected = row.law.removeprefix(opening)
+            words, holds = agreement(drop.mean, drop.error, row.expected, expected)
             yield _mean("pressure drop", drop, "; ".join(filter(None, (words, _shallow(case, measures)))), holds)
             return
     yield _mean("pressure drop", drop, _shallow(case, measures), None)
 
 
-def _shallow(case: Case, measures: dict[str, Any]) -> str:
+def _shallow(case: Case, measures: Mapping[str, Measure]) -> str:
     """What the kernel does to the pressure drop of a packed bed of few cells, in words; empty for others."""
     if "bed_height" not in measures or case.bed.start == "packed":
         return ""
     bed, count = _bed_at_end(case, measures["bed_height"]), cell_counts(case.column.size, case.column.cell)[2]
-    cells = measures["bed_height"]["mean"] / case.column.height * count
-    packed = bed.inlet <= bed.onset and measures.get(FROM_HEIGHT, {}).get("mean", 1.0) < LOOSE
+    cells = measures["bed_height"].mean / case.column.height * count
+    packed = bed.inlet <= bed.onset and FROM_HEIGHT in measures and measures[FROM_HEIGHT].mean < LOOSE
     if cells >= SHALLOW or not (case.bed.fixed or packed):
         return ""
     return (
@@ -220,7 +207,7 @@ def _particles(run: RunData) -> Iterator[KeyResult]:
 # ---------------------------------------------------------------- regime
 
 
-def _classified(run: RunData, case: Case, measures: dict[str, Any]) -> tuple[str, str, bool | None]:
+def _classified(run: RunData, case: Case, measures: Mapping[str, Measure]) -> tuple[str, str, bool | None]:
     """The state of the particles in words, what it was concluded from, and whether it is as expected."""
     fastest = run.history.get("largest_speed", np.zeros(1))[-1]
     moving = f"the fastest particle moves at {fastest:.2g} m/s"
@@ -236,13 +223,13 @@ def _classified(run: RunData, case: Case, measures: dict[str, Any]) -> tuple[str
     bed = estimate_bed(case) if drop is None else _bed_at_end(case, drop)
     if not flows or drop is None or weight is None or not weight > 0.0 or not bed.onset > 0.0:
         return ("particles at rest", moving, None) if at_rest else ("particles in motion", moving, None)
-    share, error = drop["mean"] / weight, 100.0 * drop["error"] / weight
+    share, error = drop.mean / weight, 100.0 * drop.error / weight
     spread = f" +- {error:.1f}" if error >= 0.05 else ""
-    changes = bool(drop.get("inlet_changes"))
+    changes = bool(drop.inlet_changes)
     carried = f"the flow carries {100.0 * share:.1f}{spread} % of the buoyant weight" + " on average" * changes
     when = " at the end" * changes
     ratio = f"the inlet velocity{when} is {bed.inlet / bed.onset:.2g} times that of minimum fluidisation"
-    lying = measures["wall_load"]["mean"] > LYING * weight if "wall_load" in measures else share < 1.0 - LYING
+    lying = measures["wall_load"].mean > LYING * weight if "wall_load" in measures else share < 1.0 - LYING
     if at_rest and lying and bed.inlet > bed.onset:
         return "at rest, not fluidised", f"{carried}, although {ratio}; {moving}", False
     regime, reason = _of_a_bed(case, bed, share), f"{carried}; {ratio}"
@@ -251,12 +238,12 @@ def _classified(run: RunData, case: Case, measures: dict[str, Any]) -> tuple[str
     return regime, reason, (share >= CARRIED) == (bed.inlet > bed.onset)
 
 
-def _bed_at_end(case: Case, measure: dict[str, Any]) -> BedEstimate:
+def _bed_at_end(case: Case, measure: Measure) -> BedEstimate:
     """The bed of a case at the inlet velocity with which the averaging window of a measure ends."""
     bed, inlet = estimate_bed(case), case.bed.inlet_velocity
     if isinstance(inlet, float) or not case.bed.highest_inlet_velocity:
         return bed
-    last = float(np.interp(measure["drift_times"][1], *np.array(inlet).T))
+    last = float(np.interp(measure.drift_times[1], *np.array(inlet).T))
     return replace(bed, inlet=bed.inlet * last / case.bed.highest_inlet_velocity)
 
 

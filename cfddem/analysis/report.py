@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.bed_laws import compared_with_bed_laws, comparison, expansion_note
+from cfddem.analysis.bed_laws import compared_with_bed_laws, expansion_note
 from cfddem.analysis.fluctuations import impacts
 from cfddem.analysis.key_results import DRIFTING, key_results
 from cfddem.analysis.measured import compared_with_measured, with_files
 from cfddem.analysis.regimes import RegimeMap, regime_map
+from cfddem.analysis.report_text import Report
+from cfddem.analysis.report_values import Citation, EnergyLine, Measure, comparison
 from cfddem.analysis.run_warnings import NOTE, STATE, last_value, warnings_of
 from cfddem.analysis.series import block_average, drift_of, stationarity
 from cfddem.analysis.single_sphere import compared_with_drag_law
@@ -30,24 +31,18 @@ ENERGY = "energy_"
 """Prefix of the columns of the energy budget in the history."""
 
 
-def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
+def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
     """Means over the averaging window of a run, and the laws that apply to it.
 
     folder   of the run
     data     files of measured points beside those of the case
-    returns  plain values: `case`, `status`, `window`, `films` (in words), `key_results` (name, value, error, unit,
-             verdict), `measures` (mean, error, unit, drift over the averaged rows and their times, stationary), `laws`
-             (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
-             and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
-             the window, if recorded), `warnings`, `actions` (the warnings by what to do), `wall_time`, `preflight`,
-             `provenance`, `references` (kind, name and reference of each law), `measured` (scores against measured
-             data)
     errors   InputError if the run has no history, or for data that cannot be read
     """
+    folder = Path(folder)
     run = open_run(folder)
     if not len(run.history.get("time", ())):
         raise InputError("folder", str(folder), "a run with a history", "the run ended before its first row")
-    case = with_files(case_of(run), data)
+    case = with_files(case_of(run), [Path(each) for each in data])
     begin, end = window_of(run, case)
     measures = _measures(run, begin, inlet_changes(case, begin, end))
     drag_law = (comparison(*row) for row in compared_with_drag_law(run, case))
@@ -55,31 +50,31 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
     energy = _energy(run)
     checked = preflight(case)
     actions = warnings_of(run, case, measures, laws, checked.issues)
-    return {
-        "case": case.title or folder.resolve().name,
-        "folder": str(folder),
-        "status": run.status,
-        "message": run.message,
-        "window": [begin, end],
-        "films": "" if case.bed.fixed else case.laws.film_in_words(case.fluid),
-        "key_results": key_results(run, case, measures, laws, STATE in actions),
-        "measures": measures,
-        "measured": [each.score() for each in compared_with_measured(run, case, begin)],
-        "laws": laws,
-        "laws_note": expansion_note(laws, measures),
-        "ledger": _ledger(run),
-        "energy": energy,
-        "energy_lines": _energy_lines(run, energy),
-        "collisions": _collisions(run, begin),
-        "impacts": _impacts(run, begin, end),
-        "warnings": [each for action, group in actions.items() for each in group if action != NOTE],
-        "actions": actions,
-        "wall_time": run.about.get("wall_time", {}),
-        "steps": {"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
-        "preflight": checked.summary(),
-        "provenance": run.provenance,
-        "references": references_of(case),
-    }
+    return Report(
+        case=case.title or folder.resolve().name,
+        folder=str(folder),
+        status=run.status,
+        message=run.message,
+        window=(begin, end),
+        films="" if case.bed.fixed else case.laws.film_in_words(case.fluid),
+        key_results=key_results(run, case, measures, laws, STATE in actions),
+        measures=measures,
+        measured=[each.score() for each in compared_with_measured(run, case, begin)],
+        laws=laws,
+        laws_note=expansion_note(laws, measures),
+        ledger=_ledger(run),
+        energy=energy,
+        energy_lines=_energy_lines(run, energy),
+        collisions=_collisions(run, begin),
+        impacts=_impacts(run, begin, end),
+        warnings=[each for action, group in actions.items() for each in group if action != NOTE],
+        actions=actions,
+        wall_time=run.about.get("wall_time", {}),
+        steps={"particles": int(run.steps[-1]) if len(run.steps) else 0, "fluid": last_value(run, "fluid_steps")},
+        preflight=checked.summary(),
+        provenance=run.provenance,
+        references=references_of(case),
+    )
 
 
 def case_of(run: RunData) -> Case:
@@ -140,14 +135,14 @@ def inlet_changes(case: Case, begin: float, end: float) -> str:
     return f"the inlet velocity changes within that time, {low:.3g} to {high:.3g} m/s" if high > low else ""
 
 
-def _measures(run: RunData, begin: float, changes: str) -> dict[str, Any]:
+def _measures(run: RunData, begin: float, changes: str) -> dict[str, Measure]:
     """Every measure with a value in at least half of the rows of the window: its mean and error, and its drift.
 
     Mean and drift are of the same rows. A start-up within them counts where it moves the mean.
 
     changes  how the inlet velocity changes in these rows, in words
     """
-    inside, measures = run.history["time"] >= begin, {}
+    inside, measures = run.history["time"] >= begin, dict[str, Measure]()
     for name in _in_group(run, "measure"):
         column, quantity = run.history[name][inside], run.quantity(name)
         known = np.isfinite(column)
@@ -157,18 +152,18 @@ def _measures(run: RunData, begin: float, changes: str) -> dict[str, Any]:
         average, (drift, drift_error) = block_average(values), drift_of(time, values)
         steady = stationarity(values).stationary or abs(drift) <= NO_DRIFT * abs(average.mean)
         start_up = abs(drift) > max(3.0 * drift_error, DRIFTING * abs(average.mean))
-        measures[name] = {
-            "mean": average.mean,
-            "error": average.error,
-            "error_is_lower_bound": not average.enough,
-            "unit": quantity.unit,
-            "meaning": quantity.meaning,
-            "drift": drift,
-            "drift_error": drift_error,
-            "drift_times": [float(time[0]), float(time[-1])],
-            "stationary": None if math.isnan(drift) else steady and not start_up,
-            "inlet_changes": changes,
-        }
+        measures[name] = Measure(
+            mean=average.mean,
+            error=average.error,
+            error_is_lower_bound=not average.enough,
+            unit=quantity.unit,
+            meaning=quantity.meaning,
+            drift=drift,
+            drift_error=drift_error,
+            drift_times=(float(time[0]), float(time[-1])),
+            stationary=None if math.isnan(drift) else steady and not start_up,
+            inlet_changes=changes,
+        )
     return measures
 
 
@@ -188,7 +183,7 @@ def _energy(run: RunData) -> dict[str, float]:
     return {name.removeprefix(ENERGY): float(run.history[name][-1]) for name in _in_group(run, "energy")}
 
 
-def _energy_lines(run: RunData, energy: dict[str, float]) -> list[dict[str, Any]]:
+def _energy_lines(run: RunData, energy: dict[str, float]) -> list[EnergyLine]:
     """Lines of the energy budget in reading order: group, name, energy [J] and its fraction of the input [-].
 
     Terms that are zero are omitted.
@@ -198,7 +193,7 @@ def _energy_lines(run: RunData, energy: dict[str, float]) -> list[dict[str, Any]
         group = run.quantity(ENERGY + name).group.removeprefix("energy: ")
         if name != "put_in" and (energy[name] != 0.0 or group == "balance"):
             share = energy[name] / max(energy["put_in"], 1e-300)
-            lines.append({"group": group, "name": name, "energy": energy[name], "fraction": share})
+            lines.append(EnergyLine(group, name, energy[name], share))
     return lines
 
 
@@ -242,13 +237,13 @@ BRIDGE = (
 """Kind of the laws of a bridge, key of `[liquid]` that names one, and the ending of its name in the registry."""
 
 
-def references_of(case: Case) -> list[dict[str, str]]:
+def references_of(case: Case) -> list[Citation]:
     """Kind, name and reference of each law of a case."""
     load_built_in_laws()
-    found = [{"kind": law.kind.replace("_", " "), "name": law.name, "reference": law.reference} for law in _used(case)]
+    found = [Citation(law.kind.replace("_", " "), law.name, law.reference) for law in _used(case)]
     if not case.bed.fixed and case.particle_count > 1 and "contact" not in case.laws.missing:
         contact = case.laws.contact_law
-        found.append({"kind": "contact law", "name": contact.name, "reference": contact.reference})
+        found.append(Citation("contact law", contact.name, contact.reference))
     return [each for place, each in enumerate(found) if each not in found[:place]]
 
 

@@ -6,10 +6,13 @@ import json
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any
 
 from cfddem.analysis.bed_laws import FROM_PRESSURE
+from cfddem.analysis.report_values import Citation, EnergyLine, KeyResult, LawComparison, Measure
 from cfddem.analysis.run_warnings import NOTE
+from cfddem.backend import html
 from cfddem.backend.tables import table
 from cfddem.io.quantities import shown_unit
 
@@ -25,30 +28,86 @@ LOWER_BOUND = "'at least' before an error: the averaging window is too short to 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
-def lines(result: dict[str, Any]) -> list[str]:
-    """The report as text, at most 100 columns wide.
+@dataclass(frozen=True)
+class Report:
+    """The report of a run, of :func:`cfddem.analysis.report.report`. `print` shows it as `cfddem report` does.
 
-    result  of :func:`cfddem.analysis.report.report`
+    window        start and end of the averaging window [s]
+    films         lubrication films, in words
+    key_results   most important first
+    measures      by name
+    measured      scores against measured data
+    laws_note     a sentence on the published laws
+    ledger        largest relative imbalance of each conserved quantity
+    energy        energy budget at the end by line [J]; empty if the case does not ask for it
+    collisions    of the window, if recorded; so are impacts
+    actions       all warnings by what to do about them, and notes
+    wall_time     of each part of the run [s]
+    preflight     the check of the case before the run
+    provenance    versions, platform, random seed
+    references    laws of the case
     """
+
+    case: str
+    folder: str
+    status: str
+    message: str
+    window: tuple[float, float]
+    films: str
+    key_results: list[KeyResult]
+    measures: dict[str, Measure]
+    measured: list[dict[str, Any]]
+    laws: list[LawComparison]
+    laws_note: str
+    ledger: dict[str, float]
+    energy: dict[str, float]
+    energy_lines: list[EnergyLine]
+    collisions: dict[str, float]
+    impacts: dict[str, float]
+    warnings: list[str]
+    actions: dict[str, list[str]]
+    wall_time: dict[str, float]
+    steps: dict[str, int]
+    preflight: dict[str, Any]
+    provenance: dict[str, Any]
+    references: list[Citation]
+
+    def __str__(self) -> str:
+        return "\n".join(lines(self))
+
+    def _repr_html_(self) -> str:
+        """The key results, in a notebook."""
+        rows = [(each.name, with_error(each), each.verdict) for each in self.key_results]
+        return html.table(f"{self.case}: {self.status}; {window(self)}", rows)
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values, as in `cfddem report --json`, where null stands for NaN."""
+        return asdict(self)
+
+
+def lines(result: Report) -> list[str]:
+    """The report as text, at most 100 columns wide."""
     return [
         *_headline(result),
-        *_key_results(result["key_results"]),
-        *_measured(result["measured"]),
-        *_actions(result["actions"]),
+        *_key_results(result.key_results),
+        *_measured(result.measured),
+        *_actions(result.actions),
         *_measures(result),
-        *_laws(result["laws"], result["laws_note"]),
-        *_ledger(result["ledger"]),
-        *_collisions(result["collisions"]),
-        *_impacts(result["impacts"]),
+        *_laws(result.laws, result.laws_note),
+        *_ledger(result.ledger),
+        *_collisions(result.collisions),
+        *_impacts(result.impacts),
         *_energy(result),
-        *_wall_time(result["wall_time"]),
+        *_wall_time(result.wall_time),
     ]
 
 
 def as_json(result: Any) -> str:
-    """The report as JSON, with null for NaN and infinity."""
+    """A report or comparison as JSON, with null for NaN and infinity."""
 
     def plain(value: Any) -> Any:
+        if is_dataclass(value) and not isinstance(value, type):
+            value = asdict(value)
         if isinstance(value, dict):
             return {name: plain(each) for name, each in value.items()}
         if isinstance(value, list | tuple):
@@ -58,14 +117,14 @@ def as_json(result: Any) -> str:
     return json.dumps(plain(result), allow_nan=False)
 
 
-def steadiness(measure: dict[str, Any]) -> str:
+def steadiness(measure: Measure) -> str:
     """Whether a measure is stationary, in words."""
-    if measure["stationary"] is None:
+    if measure.stationary is None:
         return "too few rows"
-    if measure["stationary"]:
+    if measure.stationary:
         return "stationary"
-    drift, unit = measure["drift"], "" if measure["unit"] == "1" else f" {measure['unit']}"
-    return f"drifts by {drift:+.2g}{unit}" if abs(drift) > 3.0 * measure["drift_error"] else "still settling"
+    drift, unit = measure.drift, "" if measure.unit == "1" else f" {measure.unit}"
+    return f"drifts by {drift:+.2g}{unit}" if abs(drift) > 3.0 * measure.drift_error else "still settling"
 
 
 def spelled(name: str) -> str:
@@ -89,40 +148,40 @@ def number(value: float | str, error: float = math.nan, unit: str = "", at_least
     return f"{value:.4g}{shown} {'' if unit == '1' else unit}".rstrip()
 
 
-def with_error(row: dict[str, Any], unit: str | None = None) -> str:
+def with_error(row: KeyResult | Measure) -> str:
     """The value of a key result or the mean of a measure, with its error and unit."""
-    value = row["mean"] if "mean" in row else row["value"]
-    return number(value, row["error"], row["unit"] if unit is None else unit, row["error_is_lower_bound"])
+    value = row.mean if isinstance(row, Measure) else row.value
+    return number(value, row.error, row.unit, row.error_is_lower_bound)
 
 
-def window(result: dict[str, Any]) -> str:
+def window(result: Report) -> str:
     """The averaging window and the lubrication films of a run in words."""
-    begin, end = result["window"]
-    return f"means from {begin:g} to {end:g} s" + f"; lubrication films: {result['films']}" * bool(result["films"])
+    begin, end = result.window
+    return f"means from {begin:g} to {end:g} s" + f"; lubrication films: {result.films}" * bool(result.films)
 
 
-def bounds_note(result: dict[str, Any]) -> list[str]:
+def bounds_note(result: Report) -> list[str]:
     """What "at least" means, if a key result says it."""
-    bounds = (each["error_is_lower_bound"] and not math.isnan(each["error"]) for each in result["key_results"])
+    bounds = (each.error_is_lower_bound and not math.isnan(each.error) for each in result.key_results)
     return [LOWER_BOUND] * any(bounds)
 
 
-def _headline(result: dict[str, Any]) -> Iterator[str]:
-    reason = f", {result['message']}" if result["status"] == "finished" and result["message"] else ""
-    yield f"{result['case']}: {result['status']}{reason}"
+def _headline(result: Report) -> Iterator[str]:
+    reason = f", {result.message}" if result.status == "finished" and result.message else ""
+    yield f"{result.case}: {result.status}{reason}"
     yield window(result)
     yield from bounds_note(result)
 
 
-def _key_results(found: list[dict[str, Any]]) -> Iterator[str]:
+def _key_results(found: Sequence[KeyResult]) -> Iterator[str]:
     yield ""
-    wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each["value"], str)), 0)
+    wide = max(26, *(len(with_error(each)) for each in found if not isinstance(each.value, str)), 0)
     for each in found:
-        opening = f"  {each['name']:<16} {with_error(each):<{wide}} "
-        if isinstance(each["value"], str) and len(opening) > wide + 20:
+        opening = f"  {each.name:<16} {with_error(each):<{wide}} "
+        if isinstance(each.value, str) and len(opening) > wide + 20:
             yield opening.rstrip()
             opening = " " * (wide + 20)
-        yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * (wide + 20)) or [opening]
+        yield from textwrap.wrap(opening + each.verdict, WIDTH, subsequent_indent=" " * (wide + 20)) or [opening]
 
 
 def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
@@ -136,23 +195,23 @@ def _measured(found: list[dict[str, Any]]) -> Iterator[str]:
         yield from textwrap.wrap(opening + each["verdict"], WIDTH, subsequent_indent=" " * 19)
 
 
-def _measures(result: dict[str, Any]) -> Iterator[str]:
-    shown = {each["name"] for each in result["key_results"]}
+def _measures(result: Report) -> Iterator[str]:
+    shown = {each.name for each in result.key_results}
     yield ""
     yield "  all other means"
-    others = {name: each for name, each in result["measures"].items() if spelled(name) not in shown}
+    others = {name: each for name, each in result.measures.items() if spelled(name) not in shown}
     rows = (
         (spelled(name), with_error(each), f"{steadiness(each)}{REMARKS.get(name, '')}") for name, each in others.items()
     )
     yield from table(rows, widths=(28, 28), indent=2)
 
 
-def _laws(rows: list[dict[str, Any]], note: str) -> Iterator[str]:
+def _laws(rows: Sequence[LawComparison], note: str) -> Iterator[str]:
     if not rows:
         return
     yield ""
     shown = (
-        (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
+        (row.law, f"{row.computed:.4g}", f"{row.expected:.4g}", f"{row.ratio:.3f}", shown_unit(row.unit))
         for row in rows
     )
     headings = ("law", "run", "law", "ratio", "unit")
@@ -184,13 +243,13 @@ def _impacts(found: dict[str, float]) -> Iterator[str]:
         yield f"  mean speed of approach {found['mean_speed']:.3g} m/s"
 
 
-def _energy(result: dict[str, Any]) -> Iterator[str]:
-    if result["energy"]:
+def _energy(result: Report) -> Iterator[str]:
+    if result.energy:
         yield ""
-        yield f"  energy budget, of an input of {result['energy']['put_in']:.4g} J"
+        yield f"  energy budget, of an input of {result.energy['put_in']:.4g} J"
         rows = (
-            (row["group"], spelled(row["name"]), f"{row['energy']:.4g} J", f"{100.0 * row['fraction']:.3f} %")
-            for row in result["energy_lines"]
+            (row.group, spelled(row.name), f"{row.energy:.4g} J", f"{100.0 * row.fraction:.3f} %")
+            for row in result.energy_lines
         )
         yield from table(rows, right=(2, 3), widths=(26, 24, 14, 11), indent=2)
 
@@ -217,43 +276,42 @@ def _actions(grouped: dict[str, list[str]]) -> Iterator[str]:
 # ---------------------------------------------------------------- Markdown
 
 
-def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -> str:
+def markdown(result: Report, figures: Mapping[str, str] | None = None) -> str:
     """The report as Markdown.
 
-    result   of :func:`cfddem.analysis.report.report`
     figures  caption -> place of a picture
     """
-    end = result["window"][1]
+    end = result.window[1]
     laws = (
-        (row["law"], f"{row['computed']:.4g}", f"{row['expected']:.4g}", f"{row['ratio']:.3f}", shown_unit(row["unit"]))
-        for row in result["laws"]
+        (row.law, f"{row.computed:.4g}", f"{row.expected:.4g}", f"{row.ratio:.3f}", shown_unit(row.unit))
+        for row in result.laws
     )
     parts = [
-        f"# {_escaped(result['case'])}",
-        f"{result['status']} at {end:g} s; {_escaped(window(result))}",
-        *_markdown_table(("", "value", "verdict"), map(_key_result_cells, result["key_results"])),
+        f"# {_escaped(result.case)}",
+        f"{result.status} at {end:g} s; {_escaped(window(result))}",
+        *_markdown_table(("", "value", "verdict"), map(_key_result_cells, result.key_results)),
         *bounds_note(result),
-        *_measured_rows(result["measured"]),
-        *_action_lists(result["actions"]),
+        *_measured_rows(result.measured),
+        *_action_lists(result.actions),
         *(f"![{caption}](<{place}>)" for caption, place in (figures or {}).items()),
         "## Means",
-        *_markdown_table(("measure", "mean", "in time"), map(_measure_cells, result["measures"].items())),
+        *_markdown_table(("measure", "mean", "in time"), map(_measure_cells, result.measures.items())),
         *(
             ["## Published laws", *_markdown_table(("law", "run", "law", "run / law", "unit"), laws)]
-            if result["laws"]
+            if result.laws
             else ()
         ),
-        *([result["laws_note"]] if result["laws_note"] else ()),
+        *([result.laws_note] if result.laws_note else ()),
         "## Conservation",
-        *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result["ledger"].items())),
+        *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result.ledger.items())),
         "## References of the laws",
-        "\n".join(f"- {_escaped(' '.join(law.values()))}" for law in result["references"]),
+        "\n".join(f"- {_escaped(f'{law.kind} {law.name} {law.reference}')}" for law in result.references),
     ]
     return "\n\n".join(parts) + "\n"
 
 
-def _key_result_cells(each: dict[str, Any]) -> tuple[str, ...]:
-    return f"**{each['name']}**", with_error(each), each["verdict"]
+def _key_result_cells(each: KeyResult) -> tuple[str, ...]:
+    return f"**{each.name}**", with_error(each), each.verdict
 
 
 def _measured_rows(found: list[dict[str, Any]]) -> list[str]:
@@ -261,7 +319,7 @@ def _measured_rows(found: list[dict[str, Any]]) -> list[str]:
     return _markdown_table(("measured data", "points", "verdict"), rows) if found else []
 
 
-def _measure_cells(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
+def _measure_cells(item: tuple[str, Measure]) -> tuple[str, ...]:
     name, each = item
     return spelled(name), with_error(each), steadiness(each)
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from cfddem.analysis.defluidisation import defluidisation_of
+from cfddem.analysis.report_values import LawComparison, Measure
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 from cfddem.preflight import law_ranges
@@ -52,7 +52,7 @@ drag law does if the bed as a whole is inside: dense and loose places are outsid
 
 
 def warnings_of(
-    run: RunData, case: Case, measures: dict[str, Any], laws: list[dict[str, Any]], issues: Sequence[Issue]
+    run: RunData, case: Case, measures: Mapping[str, Measure], laws: Sequence[LawComparison], issues: Sequence[Issue]
 ) -> Grouped:
     """All warnings, one line each, by what to do.
 
@@ -72,7 +72,7 @@ def warnings_of(
             if each.in_report and not case.laws.missing
         ),
         *_range_warnings(run, case),
-        *((COMPARE, f"{row['law']}: {row['outside_range']}") for row in laws if row["outside_range"]),
+        *((COMPARE, f"{row.law}: {row.outside_range}") for row in laws if row.outside_range),
     ):
         grouped.setdefault(action, []).append(text)
     if NOTE in grouped:
@@ -171,16 +171,16 @@ def _beyond(kind: str, law: Law, outside: int, evaluations: float, share: float 
         yield LAWS, f"the {kind} {law.name} {what}"
 
 
-def _series_warnings(case: Case, measures: dict[str, Any]) -> Found:
+def _series_warnings(case: Case, measures: Mapping[str, Measure]) -> Found:
     """Series without a stationary mean, or without an error."""
     left_out = ("bed_height",) if case.is_one_sphere else ()  # a sphere that falls is no bed
-    unsteady = [name for name, each in measures.items() if each["stationary"] is False and name not in left_out]
+    unsteady = [name for name, each in measures.items() if each.stationary is False and name not in left_out]
     drifting = [name.replace("_", " ") for name in unsteady]
     if drifting:
-        changes = next(iter(measures.values()))["inlet_changes"]
+        changes = next(iter(measures.values())).inlet_changes
         remedy = f"run longer, or increase run.average_from; {CURVES}"
         if changes:
             remedy = f"{changes}: set run.average_from to the start of its last value, or compare with data by velocity"
         yield LONGER, f"not stationary in the averaging window: {', '.join(drifting)}; {remedy}"
-    if any(each["stationary"] is None for each in measures.values()):
+    if any(each.stationary is None for each in measures.values()):
         yield LONGER, "the averaging window has too few rows for errors; run longer, or decrease run.history_every"

@@ -1,7 +1,7 @@
 """Tables of a case that features own: the schema finds them, and names none of them.
 
-A feature writes its keys as a class in a file `cfddem/features/NAME_keys.py`, next to its own file. `Case` then has the
-table: it is read, checked, written and explained like any other.
+A feature writes its keys as a class in a file `cfddem/features/NAME_keys.py`, next to its own file; a user writes such
+a class in a script. `Case` then has the table: it is read, checked, written and explained like any other.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, ClassVar, Literal, Self, TypeVar
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from cfddem.backend.errors import InputError
 from cfddem.case.materials import Checked
 
 ROOM = Path(__file__).parents[1] / "features"
@@ -23,7 +24,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 class FeatureTable(Checked):
-    """A table of a case that a feature owns.
+    """A table of a case that a feature or a user owns; cases have it as soon as the class is there.
 
     table    its name in the case
     meaning  one line on what it does
@@ -33,9 +34,16 @@ class FeatureTable(Checked):
     meaning: ClassVar[str]
 
     @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        for case in _CASES:
+            if cls.table in case.model_fields and cls.table not in _OWNED:
+                raise InputError("table", cls.table, "a name that no table or key of a case has")
+            _add(case, cls)
+
+    @classmethod
     def of(cls, case: Any) -> Self | None:
         """The table of a case; None if the case has none."""
-        return getattr(case, cls.table)  # type: ignore[no-any-return]
+        return getattr(case, cls.table, None)  # type: ignore[no-any-return]  # a case may be older than the table
 
     def refuse(self, case: Any) -> None:
         """Raise InputError where the table does not go with the rest of a case."""
@@ -53,14 +61,34 @@ def feature_tables() -> list[type[FeatureTable]]:
     return FeatureTable.__subclasses__()
 
 
+_CASES: list[type[BaseModel]] = []
+_OWNED: set[str] = set()
+"""Schemas that have the tables, and names of the tables."""
+
+
 def with_feature_tables(case: type[Model]) -> type[Model]:
     """Decorator: give the schema of a case the tables that features own."""
     for each in feature_tables():
-        case.__annotations__[each.table] = each | None
-        case.__pydantic_fields__[each.table] = FieldInfo(
-            annotation=each | None,  # type: ignore[arg-type]
-            default=None,
-            description=each.meaning,
-        )
-    case.model_rebuild(force=True)
+        _add(case, each)
+    _CASES.append(case)
     return case
+
+
+def _add(case: type[BaseModel], table: type[FeatureTable]) -> None:
+    """Give a schema a table; a class of the same name, as in a cell of a notebook that runs again, is replaced."""
+    _OWNED.add(table.table)
+    case.__annotations__[table.table] = table | None
+    case.__pydantic_fields__[table.table] = FieldInfo(
+        annotation=table | None,  # type: ignore[arg-type]
+        default=None,
+        description=table.meaning,
+    )
+    case.model_rebuild(force=True)
+
+
+def forget_table(name: str) -> None:
+    """Remove a user's table from all cases."""
+    _OWNED.remove(name)
+    for case in _CASES:
+        del case.__annotations__[name], case.__pydantic_fields__[name]
+        case.model_rebuild(force=True)

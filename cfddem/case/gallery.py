@@ -17,7 +17,16 @@ from cfddem.case.renamed import new_name
 from cfddem.case.schema import Case
 
 
-def gallery() -> dict[str, Path]:
+def gallery() -> dict[str, Case]:
+    """Cases of the gallery by name.
+
+    >>> gallery()["settling"].title
+    'A glass bead settles in water'
+    """
+    return {name: Case.from_toml(path) for name, path in gallery_files().items()}
+
+
+def gallery_files() -> dict[str, Path]:
     """Case files of the gallery by name."""
     home = Path(str(files("scenarios"))) / "beds"
     return {path.parent.name.replace("_", "-"): path for path in sorted(home.glob("*/case.toml"))}
@@ -30,7 +39,7 @@ def copy_from_gallery(name: str, output: Path | None = None) -> Path:
     output   file to write; default: NAME.toml in the working directory
     returns  the file
     """
-    known = gallery()
+    known = gallery_files()
     if name.replace("_", "-") not in known:
         raise InputError("name", name, nearest(name, known), "cfddem new lists the gallery")
     source = known[name.replace("_", "-")]
@@ -58,7 +67,7 @@ def find_case(name: Path | None) -> Path:
         return here[0]
     if name.is_file():
         return name
-    known = gallery()
+    known = gallery_files()
     if str(name) in known:
         return known[str(name)]
     raise InputError("case", str(name), f"a file, or {nearest(str(name), known)}")

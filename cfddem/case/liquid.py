@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import NonNegative, Point, Positive
@@ -24,6 +24,21 @@ SAME_VISCOSITY = 0.01
 ROUND_OFF = 1e-9
 """Share of the size of the column by which a spray zone may leave it: a corner and an edge need not sum exactly [-]."""
 
+LAWS = {
+    "pull": ("willett", "rabinovich", "lambert", "pendular", "constant", "none"),
+    "film": ("pitois", "deforming", "static", "none"),
+    "tangential": ("davis", "nase", "none"),
+    "rupture": ("capillary", "lian", "willett", "film"),
+    "redistribution": ("half", "radius", "contact_angle"),
+}
+"""Built-in laws of bridges by their keys, the default first; users register others."""
+
+
+def _law(key: str, meaning: str) -> Any:
+    """The field of a law of bridges."""
+    words = ", ".join(f"'{word}'" for word in LAWS[key])
+    return Field(LAWS[key][0], description=f"{meaning}; one of {words}", json_schema_extra={"examples": [*LAWS[key]]})
+
 
 class Liquid(Checked):
     """Liquid on the particles: it forms bridges between particles and at walls."""
@@ -39,15 +54,13 @@ class Liquid(Checked):
         None, description="volume of liquid on a wet particle over its own volume, instead of a thickness [-]"
     )
     share_of_wet_particles: Share = Field(1.0, description="share of the particles that are wet at the start [-]")
-    pull: Literal["willett", "rabinovich", "lambert", "pendular", "constant", "none"] = Field(
-        "willett", description="capillary force of a bridge"
+    pull: str = _law("pull", "capillary force of a bridge")
+    film: str = _law(
+        "film",
+        "viscous resistance of a bridge along the line of centres, by its volume (pitois) or by the thickness of the "
+        "films",
     )
-    film: Literal["pitois", "deforming", "static", "none"] = Field(
-        "pitois",
-        description="viscous resistance of a bridge along the line of centres, by its volume (pitois) or by the "
-        "thickness of the films",
-    )
-    tangential: Literal["davis", "nase", "none"] = Field("davis", description="resistance of a bridge to sliding")
+    tangential: str = _law("tangential", "resistance of a bridge to sliding")
     cut: Literal["constant", "zero"] = Field(
         "constant", description="resistance below the minimum gap: as at the minimum gap, or none"
     )
@@ -56,15 +69,15 @@ class Liquid(Checked):
         description="density of the liquid; if above 0, the added mass of the film is reversed with the bodies at "
         "contact; 0: films have no inertia [kg/m3]",
     )
-    rupture: Literal["capillary", "lian", "willett", "film"] = Field(
-        "capillary",
-        description="gap at which a bridge breaks: by volume and speed of separation, by volume (Lian, Willett), or "
-        "where the films part",
+    rupture: str = _law(
+        "rupture",
+        "gap at which a bridge breaks: by volume and speed of separation, by volume (Lian, Willett), or where the "
+        "films part",
     )
-    redistribution: Literal["half", "radius", "contact_angle"] = Field(
-        "half",
-        description="how the liquid of a broken bridge is shared: equally, by the radii, or by the contact angles of "
-        "particle and wall (equally between particles)",
+    redistribution: str = _law(
+        "redistribution",
+        "how the liquid of a broken bridge is shared: equally, by the radii, or by the contact angles of particle and "
+        "wall (equally between particles)",
     )
     wall_contact_angle: float | None = Field(
         None, ge=0, le=180, description="contact angle on the walls, for redistribution by contact_angle [degrees]"
@@ -79,6 +92,16 @@ class Liquid(Checked):
         "bridge; 0: walls take no liquid [-]",
     )
     wall_thickness: NonNegative = Field(0.0, description="thickness of the liquid on the walls at the start [m]")
+
+    @field_validator(*LAWS)
+    @classmethod
+    def _laws_exist(cls, value: str, about: ValidationInfo) -> str:
+        """A finished run may have used a law that this machine does not have."""
+        if value not in LAWS[about.field_name or ""] and not (about.context or {}).get("finished"):
+            from cfddem.particles.interactions.bridge_law import require_bridge_law  # takes the compiler along
+
+            require_bridge_law(about.field_name or "", value)
+        return value
 
     @model_validator(mode="after")
     def _at_most_one_amount(self) -> Liquid:

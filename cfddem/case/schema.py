@@ -29,7 +29,7 @@ from cfddem.case.vessel import vessel_of
 from cfddem.case.walls import walls_in
 from closures.agitation import SHARES, TIMES, free_spheres
 from closures.kinds import BUILT_IN
-from closures.registry import Law, law_of
+from closures.registry import Law, law_of, load_package_laws
 
 HEAVY = 2.0
 """Density ratio from which agitation is a default: lighter beads are at the edge of what was measured."""
@@ -207,8 +207,13 @@ class Case(CaseTables):
         cls, text: str, name: str = "case", overrides: Mapping[str, Any] | None = None, *, finished: bool = False
     ) -> Case:
         """Read a case from the text of a TOML file; errors call it `name`, and surface files stay as they are given. In
-        that of a finished run, laws that this machine does not have are names only."""
+        that of a finished run, laws that this machine does not have are names only, and tables of a user are left
+        out."""
         values = parse(text, name)
+        if values.keys() - cls.model_fields.keys():
+            load_package_laws()  # an installed package may declare a table
+        if finished:
+            values = {key: value for key, value in values.items() if key in cls.model_fields}
         for key, value in (overrides or {}).items():
             set_value(values, key.split("."), value, key)
         try:

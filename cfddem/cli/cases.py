@@ -44,7 +44,7 @@ def new(
     if schema:
         print(_json.dumps(Case.model_json_schema(), indent=2))
     elif name is None:
-        titles = [(known, Case.from_toml(path).title) for known, path in gallery().items()]
+        titles = [(known, each.title) for known, each in gallery().items()]
         print("\n".join(table(titles, widths=(20,), gap=2)))
     else:
         written = copy_from_gallery(name, output)
@@ -67,42 +67,11 @@ def check(
     """
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
-    from cfddem.preflight.summary import preflight
+    from cfddem.run.check import check as checked
 
-    described = Case.from_toml(find_case(case), overrides(set or []))
-    result = preflight(described)
-    if described.compare:
-        from cfddem.preflight.data_checks import check_quantities
-        from cfddem.run.history import units_of
-
-        result = result.with_errors(check_quantities(described, units_of(described)))
-    if ranks is not None and result.rows:
-        result = _with_ranks(result, described, ranks)
+    result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks)
     print(_json.dumps(result.summary()) if json else "\n".join(with_colour(result.lines())))
     sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
-
-
-def _with_ranks(result: Preflight, described: Case, ranks: int) -> Preflight:
-    """The result of a check, and whether several processes can share the case."""
-    from dataclasses import replace
-
-    from cfddem.backend.errors import InputError
-    from cfddem.preflight.issue import Issue
-    from cfddem.preflight.overview import Row
-    from cfddem.run.build import require_parallel
-
-    if ranks < 1:
-        raise InputError("--ranks", ranks, "at least 1")
-    try:
-        require_parallel(described, ranks)
-    except InputError as failure:
-        return result.with_errors(
-            [Issue("error", failure.field, f"{failure.value} must be {failure.limit}", failure.remedy)]
-        )
-    count = described.particle_count
-    share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
-    row = Row("several processes", "ranks", ranks, "", f"can share the case{share}")
-    return replace(result, rows=(*result.rows, row))
 
 
 def stability(

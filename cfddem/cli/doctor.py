@@ -145,7 +145,7 @@ def _test_run() -> Answer:
     try:
         with tempfile.TemporaryDirectory() as folder:
             Run.begin(Case.from_text(TEST_CASE, "test run"), Path(folder) / "run").go()
-            ledger = report(Path(folder) / "run")["ledger"]
+            ledger = report(Path(folder) / "run").ledger
     except (CfddemError, OSError) as failure:
         return Answer("test run", False, str(failure))
     finally:

@@ -46,9 +46,9 @@ class Coupling:
     """All forces between a fluid and its particles.
 
     particles  get the fields that the coupling stores
-    fluid      the fluid solver; its model, "A" or "B", holds for the coupling
+    fluid      the fluid solver; its model, "A" or "B", holds for the coupling. It gets the voidage of the particles,
+               and the flow that its boundaries drive between them
     kernel     deposits on cells and gathers from them
-    flow       samples the flow around each particle
     forces     in the order in which they act
     """
 
@@ -57,10 +57,14 @@ class Coupling:
         particles: Particles,
         fluid: FluidSolver,
         kernel: FilterKernel,
-        flow: FlowSampler,
         forces: Iterable[FluidForce],
     ) -> None:
-        self.fluid, self.kernel, self.flow = fluid, kernel, flow
+        forces = list(forces)
+        self.fluid, self.kernel, self.flow = fluid, kernel, FlowSampler.of_forces(fluid, kernel, forces)
+        owned = particles.without_ghosts()
+        cell_map = kernel.map_particles(owned.position, owned.radius)
+        fluid.set_voidage(1.0 - kernel.solid_fraction(cell_map))
+        fluid.set_velocity((0.0, 0.0, 0.0))
         self.momentum = Transfer(
             kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
         )
@@ -71,8 +75,7 @@ class Coupling:
         self.forces = ForceList(particles, forces)
         self._stored = (*declared, *(field.name for force in self.forces for field in force.fields))
         if self.sets_inertia:
-            owned = particles.without_ghosts()
-            terms = self._terms(owned, kernel.map_particles(owned.position, owned.radius), 0.0)
+            terms = self._terms(particles.without_ghosts(), cell_map, 0.0)  # with the fields of the forces
             for force in self.forces:
                 if force.sets_inertia:
                     force.begin(terms)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 
 
@@ -46,6 +47,13 @@ class FlowSampler:
 
     def __init__(self, fluid: FluidSolver, kernel: FilterKernel, own: Own = nothing_of_its_own, sizes: bool = False):
         self.fluid, self.kernel, self.own, self.sizes = fluid, kernel, own, sizes
+
+    @classmethod
+    def of_forces(cls, fluid: FluidSolver, kernel: FilterKernel, forces: Iterable[FluidForce]) -> FlowSampler:
+        """Samples what the forces of a run need."""
+        needs = list(forces)
+        own = next((force.own for force in needs if force.own is not None), nothing_of_its_own)
+        return cls(fluid, kernel, own, any(force.needs_sizes for force in needs))
 
     def sample(
         self, particles: Particles, cell_map: ParticleCellMap, solid: Array, mean: Array | None = None

@@ -58,16 +58,15 @@ class Feeds(CaseFeature):
 
     def after(self, simulation: Any) -> None:
         """Insert the particles that are due, and remove those that have left."""
-        before = simulation.owned
-        if self._exchange(simulation.particle_solver) and simulation.fluid is not None:
-            solids = simulation.coupling.solid_fraction
-            simulation.fluid.add_voidage(solids(before) - solids(simulation.owned))
+        with simulation.exchange() as solver:
+            self._exchange(solver)
 
-    def _exchange(self, solver: ParticleSolver) -> bool:
-        """Let particles enter and leave; returns whether there were any."""
+    def _exchange(self, solver: ParticleSolver) -> None:
+        """Let particles enter and leave."""
         if self.feeds:
             _note_landings(solver)
-        moved = sum(feed(solver) for feed in self.feeds)
+        for feed in self.feeds:
+            feed(solver)
         for number, outlet in enumerate(self.outlets):
             owned = solver.particles.without_ghosts()
             if solver.communicator.all(outlet.takes(owned.position)):
@@ -75,8 +74,7 @@ class Feeds(CaseFeature):
                     f"t = {solver.time:.6g} s: the last particles have reached outlet.{number}, and a run needs at "
                     "least one; end it earlier with run.until, or feed more"
                 )
-            moved += outlet(solver)
-        return moved > 0
+            outlet(solver)
 
     @property
     def fed(self) -> int:

@@ -63,6 +63,9 @@ class FluidForce(Feature):
     late          whether it acts after the others, since it depends on their resistance
     sets_inertia  whether it changes the inertia of particles
     needs_fluid   whether it needs the flow around the particles
+    needs_sizes   whether it needs the diameter of each particle over the Sauter mean around it
+    own           what every particle adds to the flow itself, which other forces do not see; of the type
+                  `cfddem.coupling.sampled_flow.Own`
     outside       how often its law was evaluated outside its range, on this rank
 
     In a fluid step every method is called for all forces before the next one, with the terms of the step,
@@ -73,6 +76,8 @@ class FluidForce(Feature):
     late: bool = False
     sets_inertia: bool = False
     needs_fluid: bool = True
+    needs_sizes: bool = False
+    own: Any = None
     outside: int = 0
 
     def begin(self, terms: Any) -> None:

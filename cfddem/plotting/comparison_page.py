@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.comparison import compare, relative
+from cfddem.analysis.comparison import compare, mean_of, relative
 from cfddem.analysis.profiles import profiles_of
 from cfddem.analysis.report import case_of
 from cfddem.analysis.report_text import spelled, with_error
+from cfddem.analysis.report_values import KeyResult
 from cfddem.backend.errors import RunFailed
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
@@ -99,7 +100,7 @@ def _template() -> Any:
 
 
 def _key_results(result: dict[str, Any]) -> list[tuple[str, list[str]]]:
-    def words(each: dict[str, Any] | None) -> str:
+    def words(each: KeyResult | None) -> str:
         return "-" if each is None else with_error(each)
 
     return [(name, [words(each) for each in row]) for name, row in result["key_results"].items()]
@@ -111,7 +112,7 @@ def _measures(result: dict[str, Any]) -> list[tuple[str, str, list[tuple[str, st
     for name, measure in result["measures"].items():
         cells = []
         for place, row in enumerate(measure["runs"]):
-            value = "-" if row["mean"] is None else with_error(row, "")
+            value = "-" if row["mean"] is None else mean_of(row, "")
             apart = "" if place == 0 or row["mean"] is None else relative(row)
             cells.append((value, apart, "" if place == 0 else row["verdict"]))
         rows.append((spelled(name), shown_unit(measure["unit"]), cells))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from cfddem.analysis.measured import MeasuredComparison, compared_with_measured,
 from cfddem.analysis.profiles import Profiles, profiles_of
 from cfddem.analysis.report import case_of, recorded_regimes
 from cfddem.analysis.report import report as summary
-from cfddem.analysis.report_text import bounds_note, markdown, spelled, steadiness, window, with_error
+from cfddem.analysis.report_text import Report, bounds_note, markdown, spelled, steadiness, window, with_error
+from cfddem.analysis.report_values import EnergyLine, KeyResult, LawComparison, Measure
 from cfddem.analysis.run_warnings import NOTE
 from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
 from cfddem.backend.errors import CfddemError, RunFailed
@@ -48,9 +49,7 @@ from cfddem.preflight.bed_waves import is_liquid_bed
 Rows = list[tuple[str, ...]]
 
 
-def page(
-    folder: Path, output: Path | None = None, result: dict[str, Any] | None = None, data: Sequence[Path] = ()
-) -> Path:
+def page(folder: Path, output: Path | None = None, result: Report | None = None, data: Sequence[Path] = ()) -> Path:
     """Write the report of a run as a page.
 
     folder   of the run
@@ -66,7 +65,7 @@ def page(
     return output
 
 
-def markdown_page(folder: Path, output: Path, result: dict[str, Any] | None = None, data: Sequence[Path] = ()) -> Path:
+def markdown_page(folder: Path, output: Path, result: Report | None = None, data: Sequence[Path] = ()) -> Path:
     """Write the report of a run as Markdown, with its figures as PNG files beside it.
 
     output  Markdown; figures are named after it
@@ -83,24 +82,24 @@ def markdown_page(folder: Path, output: Path, result: dict[str, Any] | None = No
     return output
 
 
-def render(run: RunData, result: dict[str, Any], data: Sequence[Path] = ()) -> str:
+def render(run: RunData, result: Report, data: Sequence[Path] = ()) -> str:
     """The page as text."""
-    case, end, steps = with_files(case_of(run), data), result["window"][1], result["steps"]
+    case, end, steps = with_files(case_of(run), data), result.window[1], result.steps
     counts = f"{steps['particles']} particle steps, {steps['fluid']} fluid steps"
     drawn = figures_of(run, case, result)
     text: str = _template().render(
         result=result,
-        status=f"{result['status']} at {end:g} s; {counts}; {window(result)}",
+        status=f"{result.status} at {end:g} s; {counts}; {window(result)}",
         bounds_note=bounds_note(result),
         note=NOTE,
-        key_results=_key_results(result["key_results"]),
-        measures=_measures(result["measures"]),
-        laws=_laws(result["laws"]),
-        ledger=[(spelled(name), f"{value:.2g}") for name, value in result["ledger"].items()],
-        energy=_energy(result["energy_lines"]),
-        preflight=_preflight(result["preflight"]),
-        wall_time=_wall_time(result["wall_time"]),
-        provenance=_provenance(result["provenance"]),
+        key_results=_key_results(result.key_results),
+        measures=_measures(result.measures),
+        laws=_laws(result.laws),
+        ledger=[(spelled(name), f"{value:.2g}") for name, value in result.ledger.items()],
+        energy=_energy(result.energy_lines),
+        preflight=_preflight(result.preflight),
+        wall_time=_wall_time(result.wall_time),
+        provenance=_provenance(result.provenance),
         case_text=run.case_text,
         figures={name: (encoded(figure), caption) for name, (figure, caption) in drawn.items()},
     )
@@ -117,49 +116,46 @@ def _template() -> Any:
 # ---------------------------------------------------------------- tables
 
 
-def _key_results(found: list[dict[str, Any]]) -> list[dict[str, str]]:
+def _key_results(found: Sequence[KeyResult]) -> list[dict[str, str]]:
     marks = {True: "good", False: "bad", None: "open"}
     return [
         {
-            "name": each["name"],
+            "name": each.name,
             "value": with_error(each).replace("+-", "±"),
-            "verdict": each["verdict"].replace("+-", "±"),
-            "mark": marks[each["holds"]],
+            "verdict": each.verdict.replace("+-", "±"),
+            "mark": marks[each.holds],
         }
         for each in found
     ]
 
 
-def _measures(measures: dict[str, Any]) -> list[dict[str, str]]:
+def _measures(measures: Mapping[str, Measure]) -> list[dict[str, str]]:
     rows = []
     for name, each in measures.items():
-        error = "-" if math.isnan(each["error"]) else f"{each['error']:.2g}"
+        error = "-" if math.isnan(each.error) else f"{each.error:.2g}"
         rows.append(
             {
                 "name": spelled(name),
-                "meaning": each["meaning"],
-                "mean": f"{each['mean']:.4g}",
-                "error": f"at least {error}" if each["error_is_lower_bound"] and error != "-" else error,
-                "unit": shown_unit(each["unit"]),
+                "meaning": each.meaning,
+                "mean": f"{each.mean:.4g}",
+                "error": f"at least {error}" if each.error_is_lower_bound and error != "-" else error,
+                "unit": shown_unit(each.unit),
                 "steadiness": steadiness(each),
             }
         )
     return rows
 
 
-def _laws(laws: list[dict[str, Any]]) -> Rows:
+def _laws(laws: Sequence[LawComparison]) -> Rows:
     return [
-        (each["law"], f"{each['computed']:.4g}", f"{each['expected']:.4g}", f"{each['ratio']:.3f}",
-         shown_unit(each["unit"]), each["outside_range"])
+        (each.law, f"{each.computed:.4g}", f"{each.expected:.4g}", f"{each.ratio:.3f}",
+         shown_unit(each.unit), each.outside_range)
         for each in laws
     ]  # fmt: skip
 
 
-def _energy(lines: list[dict[str, Any]]) -> Rows:
-    return [
-        (each["group"], spelled(each["name"]), f"{each['energy']:.4g}", f"{100.0 * each['fraction']:.3f}")
-        for each in lines
-    ]
+def _energy(lines: Sequence[EnergyLine]) -> Rows:
+    return [(each.group, spelled(each.name), f"{each.energy:.4g}", f"{100.0 * each.fraction:.3f}") for each in lines]
 
 
 def _preflight(made: dict[str, Any]) -> Rows:
@@ -200,7 +196,7 @@ Figures = dict[str, tuple[Any, str]]
 """Name of a figure, the figure, and its caption."""
 
 
-def figures_of(run: RunData, case: Case, result: dict[str, Any]) -> Figures:
+def figures_of(run: RunData, case: Case, result: Report) -> Figures:
     """All figures that a run has, in reading order.
 
     result  of :func:`cfddem.analysis.report.report`
@@ -208,9 +204,10 @@ def figures_of(run: RunData, case: Case, result: dict[str, Any]) -> Figures:
     return {name: (figure, caption) for name, figure, caption in _all(run, case, result)}
 
 
-def _all(run: RunData, case: Case, result: dict[str, Any]) -> Iterator[tuple[str, Any, str]]:
-    begin, end = result["window"]
-    height = result["measures"].get("bed_height", {}).get("mean")
+def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, str]]:
+    begin, end = result.window
+    means = {name: each.mean for name, each in result.measures.items()}
+    height = means.get("bed_height")
     if compared := compared_with_measured(run, case, begin):
         yield "measured", measured_figure(compared), "Measured points with their standard errors, and the run."
     if (picture := _picture(run)) is not None:
@@ -219,7 +216,12 @@ def _all(run: RunData, case: Case, result: dict[str, Any]) -> Iterator[tuple[str
     if (found := _profiles(run, case, begin)) is not None:
         caption = f"Means over {found.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: "
         yield "profiles", _draw_profiles(found, height), f"{caption}bed height."
-    if is_liquid_bed(case) and len(run.times) >= FEWEST_TIMES and "radius" in run.particle_fields:
+    if (
+        height is not None
+        and is_liquid_bed(case)
+        and len(run.times) >= FEWEST_TIMES
+        and "radius" in run.particle_fields
+    ):
         figure, axes = panels(1, width=8.0, height=3.8)
         found_map = layer_map(run, case)
         draw_map(axes, found_map, waves(found_map, BED[0] * height, BED[1] * height, begin), (begin, end))
@@ -227,9 +229,9 @@ def _all(run: RunData, case: Case, result: dict[str, Any]) -> Iterator[tuple[str
             "Solid fraction of layers of 2.5 diameters in all snapshots. The line shows the speed of the waves; it "
         )
         yield "waves", figure, f"{caption}needs several snapshots per period."
-    if result["impacts"].get("rate", 0.0) > 0.0:
+    if result.impacts.get("rate", 0.0) > 0.0:
         figure, axes = panels(1, width=6.4, height=3.8)
-        temperature = result["measures"].get("granular_temperature", {}).get("mean")
+        temperature = means.get("granular_temperature")
         draw_impacts(axes, impacts(run.collisions, begin, end, int(run.history["particle_count"][-1])), temperature)
         caption = "Normal speed of approach of collisions between particles in the averaging window, and a Maxwellian "
         yield "impacts", figure, f"{caption}gas of the same granular temperature."

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,12 +30,11 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
-from cfddem.run.forces import forces_of, sampler_of, wall_drag_of
+from cfddem.run.forces import forces_of, wall_drag_of
 from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
 
 
-@dataclass(frozen=True)
-class Parts:
+class Parts(NamedTuple):
     """The solvers of a run and their coupling; no fluid and no coupling for a case of particles only."""
 
     particle_solver: ParticleSolver
@@ -136,12 +134,9 @@ def flow_of(
         smoothing=case.laws.kernel_width * case.bed.largest_diameter,
         communicator=communicator,
     )
-    owned = spheres.without_ghosts()
-    fluid.set_voidage(1.0 - kernel.solid_fraction(kernel.map_particles(owned.position, owned.radius)))
-    fluid.set_velocity((0.0, 0.0, 0.0))  # the flow at the start passes between the particles
     beside = wall_drag_of(case.laws.wall_drag, walls_of(case), laws_of(case))
     forces = forces_of(case, fluid, kernel, beside)
-    return fluid, Coupling(spheres, fluid, kernel, sampler_of(fluid, kernel, forces), forces)
+    return fluid, Coupling(spheres, fluid, kernel, forces)
 
 
 def materials_of(case: Case) -> np.ndarray:

@@ -21,7 +21,6 @@ from cfddem.coupling.forces.viscous_stress import ViscousStress
 from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.forces.weight import Weight
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.coupling.sampled_flow import FlowSampler, nothing_of_its_own
 from cfddem.coupling.self_disturbance import SelfDisturbance
 from cfddem.coupling.self_disturbance_walls import WallsOfGrid
 from cfddem.coupling.velocity_gradient import change_along
@@ -63,12 +62,6 @@ def forces_of(
         walls = WallsOfGrid(kernel, fluid.boundaries) if beside else None
         forces.append(SelfDisturbance(fluid, kernel, walls))
     return forces
-
-
-def sampler_of(fluid: FluidSolver, kernel: FilterKernel, forces: Sequence[FluidForce]) -> FlowSampler:
-    """Samples the flow that these forces need."""
-    own = next((force.own for force in forces if isinstance(force, SelfDisturbance)), nothing_of_its_own)
-    return FlowSampler(fluid, kernel, own, any(isinstance(force, Drag) and force.needs_sizes for force in forces))
 
 
 def wall_drag_of(which: Literal["none", "nearest", "all"], walls: Sequence[Wall], laws: Laws) -> list[WallDrag]:

@@ -10,7 +10,7 @@ from typing import Any
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.case.toml_text import read_text
+from cfddem.case.toml_text import parse, read_text
 from cfddem.io.writer import RunFolder
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
@@ -41,13 +41,17 @@ def status_restored_on_refusal(written: RunFolder, before: Mapping[str, Any]) ->
 def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float | None) -> Case:
     """The case of a folder, with the intervals of a checkpoint and perhaps a new end [s].
 
-    errors  InputError if its laws are not known here
+    errors  InputError if its laws or tables are not known here
     """
     overrides = ({} if state is None else state["overrides"]) | (
         {} if until is None else {"run.until": until, "run.until_error": {}}
     )
     path = folder / "case.toml"
-    case = Case.from_text(read_text(path), str(path), overrides, finished=True)
+    text = read_text(path)
+    case = Case.from_text(text, str(path), overrides, finished=True)
+    for table in sorted(parse(text, str(path)).keys() - Case.model_fields.keys()):
+        remedy = f"resume it with the file that declares the table: cfddem resume {folder} --laws FILE.py"
+        raise InputError(table, None, "a table that is known here", remedy)
     for key, name in case.laws.missing.items():
         if name in REGISTRY.get(key, {}):
             return Case.from_toml(path, overrides)  # it says why the law cannot be used

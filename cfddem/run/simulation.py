@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,9 +21,10 @@ from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import Equipment, Feature, FluidForce, Function, On, OwnForce
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, particles_in
-from cfddem.run.build import parts_of
-from cfddem.run.time_steps import TimeSteps
+from cfddem.run.build import Parts, parts_of
+from cfddem.run.time_steps import StepSettings, TimeSteps
 
 Kind = TypeVar("Kind", bound=Equipment)
 
@@ -57,16 +59,58 @@ class Simulation:
         communicator: Communicator = SERIAL,
     ) -> None:
         keep_freed_memory()
-        self.case, self.gravity, self.communicator = case, np.array(case.laws.gravity), communicator
-        kinds = [each for each in FEATURES if each.is_in(case)]
-        self.callbacks, fields = (
-            list(callbacks),
-            [*fields, *(field for each in kinds for field in each.fields_of(case))],
-        )
         particles = None if state is None else particles_in(state["particles"]["particles"])
         parts = parts_of(case, progress, particles, communicator)
-        self.particle_solver, self.fluid, self.coupling = parts.particle_solver, parts.fluid, parts.coupling
-        self.wall = self.particle_solver.wall
+        settings = StepSettings(
+            case.reference_speed, case.run.particle_step, case.run.fluid_step, case.bed.fastest_inflow
+        )
+        self._begin(case, parts, settings, fields, callbacks, features, state)
+
+    @classmethod
+    def of(
+        cls,
+        particle_solver: ParticleSolver,
+        coupling: Coupling | None = None,
+        *,
+        steps: StepSettings,
+        fields: Iterable[Field] = (),
+        callbacks: Iterable[Callback] = (),
+        features: Iterable[Feature | Function] = (),
+        state: dict[str, Any] | None = None,
+    ) -> Simulation:
+        """A simulation of solvers that a script has made, without a case.
+
+        particle_solver  with gravity only where there is no fluid
+        coupling         of its particles with a fluid; none for particles alone
+        steps            what limits the time steps
+        others           as for a simulation of a case
+        """
+        if coupling is not None and any(particle_solver.gravity):
+            remedy = "a coupled particle has the force Weight(density of the fluid, gravity)"
+            raise InputError("gravity", tuple(particle_solver.gravity), "0 in a particle solver with a fluid", remedy)
+        made = cls.__new__(cls)
+        parts = Parts(particle_solver, None if coupling is None else coupling.fluid, coupling)
+        made._begin(None, parts, steps, fields, callbacks, features, state)
+        return made
+
+    def _begin(
+        self,
+        case: Case | None,
+        parts: Parts,
+        settings: StepSettings,
+        fields: Iterable[Field],
+        callbacks: Iterable[Callback],
+        features: Iterable[Feature | Function],
+        state: dict[str, Any] | None,
+    ) -> None:
+        """Put the parts together, and continue from a state."""
+        self._case, self.particle_solver, self.fluid, self.coupling = case, *parts
+        self.communicator, self.wall = self.particle_solver.communicator, self.particle_solver.wall
+        self.gravity = np.array(self.particle_solver.gravity if self.fluid is None else self.fluid.gravity)
+        kinds = [] if case is None else [each for each in FEATURES if each.is_in(case)]
+        if case is not None:
+            fields = [*fields, *(field for each in kinds for field in each.fields_of(case))]
+        self.callbacks, fields = list(callbacks), list(fields)
         self.terms: ForceTerms | None = None  # of the last step between fluid and particles
         self.forces = ForceList(self.particles) if self.coupling is None else self.coupling.forces
         self.features: list[Equipment] = []
@@ -77,11 +121,19 @@ class Simulation:
         particle_step = None if state is None else self._restore(state, fields)
         for field in fields:
             self.particles.declare(field)
-        self.features[:0] = [kind(case, self) for kind in kinds]
+        if case is not None:
+            self.features[:0] = [kind(case, self) for kind in kinds]
         self._restore_features({} if state is None else state.get("features", {}))
         self.time_steps = TimeSteps(
-            case, self.particle_solver, self.fluid, particle_step, communicator, self._step_limits
+            settings, self.particle_solver, self.fluid, particle_step, self.communicator, self._step_limits
         )
+
+    @property
+    def case(self) -> Case:
+        """The case; a simulation of solvers has none, and refuses what needs one."""
+        if self._case is None:
+            raise InputError("case", None, "there", "this simulation was made of solvers, without a case")
+        return self._case
 
     def add(self, feature: Feature | Function, on: On = "particles") -> None:
         """Add a force or equipment of a user, like those of the case.
@@ -108,7 +160,7 @@ class Simulation:
     @property
     def _taken(self) -> set[str]:
         """Names that equipment cannot have: those of the features of the case, which may come later, and of others."""
-        of_case = (each.name for each in FEATURES if each.is_in(self.case))
+        of_case = (each.name for each in FEATURES if self._case is not None and each.is_in(self._case))
         return {"", *of_case, *(each.name for each in self.features)}
 
     def feature(self, kind: type[Kind]) -> Kind:
@@ -199,6 +251,20 @@ class Simulation:
             with part(f"callback {getattr(callback, '__name__', 'without a name')}"):
                 callback(self)
 
+    @contextmanager
+    def exchange(self) -> Iterator[ParticleSolver]:
+        """Let particles enter and leave inside a `with` block, by `insert` and `remove` of the particle solver.
+
+        A particle that enters replaces fluid of its own volume, or leaves room for it.
+        """
+        before = self.owned
+        yield self.particle_solver
+        after = self.owned
+        same = np.array_equal(before.id, after.id)  # local: of this rank
+        if self.fluid is not None and self.coupling is not None and self.communicator.any(not same):
+            solids = self.coupling.solid_fraction
+            self.fluid.add_voidage(solids(before) - solids(after))
+
     def until(self, time: float) -> None:
         """Continue until a time [s]."""
         while self.time < time * (1.0 - 1e-12):
@@ -207,14 +273,15 @@ class Simulation:
     def _repr_html_(self) -> str:
         """The state in a few numbers, and the particles, in a notebook."""
         rows = [
-            ("time", f"{self.time:.4g} s of {self.case.run.until:g} s"),
+            ("time", f"{self.time:.4g} s" + (f" of {self._case.run.until:g} s" if self._case is not None else "")),
             ("fluid steps", f"{self.steps}"),
             ("particles", f"{len(self.owned.position)}"),
             ("limit of the last step", self.limiting if self.steps else "-"),
         ]
         owned = self.owned
-        drawing = html.spheres(owned.position, owned.radius, owned.velocity, self.case.column.size)
-        return html.table(self.case.title or "Simulation", rows, drawing)
+        size, title = (None, "") if self._case is None else (self._case.column.size, self._case.title)
+        drawing = html.spheres(owned.position, owned.radius, owned.velocity, size)
+        return html.table(title or "Simulation", rows, drawing)
 
     # ------------------------------------------------------------ checkpoints
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
-from cfddem.case.schema import Case
 from cfddem.coupling.fluid_step_limits import COURANT, courant_step, crossing_rate, fluid_step_limits
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.solver import ParticleSolver
@@ -21,10 +21,26 @@ SLACK = 1e-6
 up to a row of history would occasionally change by one."""
 
 
+@dataclass(frozen=True)
+class StepSettings:
+    """What limits the steps of a run beside its present state.
+
+    reference_speed  highest collision speed to expect [m/s]
+    particle_step    of the particles; recommended by their time scales if None [s]
+    fluid_step       longest fluid step; None for no limit of this kind [s]
+    fastest_inflow   highest inlet velocity to come [m/s]
+    """
+
+    reference_speed: float
+    particle_step: float | None = None
+    fluid_step: float | None = None
+    fastest_inflow: float = 0.0
+
+
 class TimeSteps:
     """Chooses every step of a run.
 
-    case             with steps given or not
+    settings         what limits the steps
     particle_solver  its stiffness and speeds limit the particle step
     fluid            limits the fluid step; None without a fluid
     particle_step    of an earlier part of the run; evaluated if None [s]
@@ -36,7 +52,7 @@ class TimeSteps:
 
     def __init__(
         self,
-        case: Case,
+        settings: StepSettings,
         particle_solver: ParticleSolver,
         fluid: FluidSolver | None,
         particle_step: float | None = None,
@@ -44,7 +60,7 @@ class TimeSteps:
         features: Callable[[], dict[str, float]] = dict,
     ) -> None:
         self.features = features
-        self.case, self.particle_solver, self.fluid = case, particle_solver, fluid
+        self.settings, self.particle_solver, self.fluid = settings, particle_solver, fluid
         self.communicator = communicator
         self.particle_step = self._largest_particle_step() if particle_step is None else particle_step
         self.limiting = ""
@@ -57,7 +73,7 @@ class TimeSteps:
         """
         if steps % CHECK_EVERY == 0 and steps > 0:
             self.particle_step = min(self._largest_particle_step(), self.particle_step)
-        limits = fluid_step_limits(self.particle_step, self.case.run.fluid_step, self._flow_limits())
+        limits = fluid_step_limits(self.particle_step, self.settings.fluid_step, self._flow_limits())
         self.limiting = min(limits, key=limits.__getitem__)
         largest, time = limits[self.limiting], self.particle_solver.time
         left = until - time
@@ -73,8 +89,8 @@ class TimeSteps:
         """Step of the particles: given, or recommended by their time scales [s]; infinite where none can move."""
         if not self.communicator.any(self.particle_solver.particles.inverse_mass > 0.0):
             return math.inf
-        scales = self.particle_solver.time_scales(self.case.reference_speed)
-        step = self.case.run.particle_step or scales.recommended
+        scales = self.particle_solver.time_scales(self.settings.reference_speed)
+        step = self.settings.particle_step or scales.recommended
         check_step(step, scales)
         return step
 
@@ -87,6 +103,6 @@ class TimeSteps:
         crossing = crossing_rate(self.particle_solver.particles.velocity, spacing, self.communicator)
         return limits | {
             flow.criterion: flow.step,
-            "inlet Courant": courant_step(self.case.bed.fastest_inflow, spacing),
+            "inlet Courant": courant_step(self.settings.fastest_inflow, spacing),
             "particle Courant": COURANT / max(crossing, 1e-300),
         }

@@ -247,8 +247,8 @@ def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
     values = asdict(outcome) | {"seconds": seconds, "kept": kept}
     if outcome.status == "finished":
         found = report(Path(outcome.folder))
-        means = {name: (each["mean"], each["error"], each["unit"]) for name, each in found["measures"].items()}
-        laws = {row["law"]: (row["expected"], math.nan, row["unit"]) for row in found["laws"]}
+        means = {name: (each.mean, each.error, each.unit) for name, each in found.measures.items()}
+        laws = {row.law: (row.expected, math.nan, row.unit) for row in found.laws}
         values["measures"] = means | {name: law for name, law in laws.items() if name.startswith(PUBLISHED)}
     return Outcome(**values)
 

@@ -5,7 +5,6 @@
 
 # %%
 import cfddem
-from cfddem.preflight.summary import preflight
 
 case = cfddem.Case(
     title="Glass beads in water",
@@ -26,7 +25,7 @@ case
 # All numbers are in SI units. The check shows what to expect, before anything is run:
 
 # %%
-preflight(case)
+cfddem.check(case)
 
 # %% [markdown]
 # The run writes a folder. A bar shows its progress, and which loop is being compiled when a case is run for the first time.

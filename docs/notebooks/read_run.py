@@ -3,11 +3,9 @@
 
 # %%
 import cfddem
-from cfddem.case.gallery import gallery
 
-case = cfddem.Case.from_toml(
-    gallery()["liquid-bed"],
-    {"bed.count": 400, "column.height": 0.0125, "run.until": 0.15, "run.every": 0.01, "run.average_from": 0.1},
+case = cfddem.gallery()["liquid-bed"].with_(
+    **{"bed.count": 400, "column.height": 0.0125, "run.until": 0.15, "run.every": 0.01, "run.average_from": 0.1},
 )
 run = cfddem.run_case(case, "bed", overwrite=True)
 run

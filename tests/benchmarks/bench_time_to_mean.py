@@ -18,7 +18,7 @@ from typing import Any
 
 from cfddem.analysis.report import report
 from cfddem.backend.compile import use_threads
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.run.runner import Run
 
@@ -33,20 +33,20 @@ LONGEST = 3.0
 
 def measured(name: str, changes: dict[str, Any], measure: str, folder: Path) -> dict[str, Any]:
     """Mean, error and processor time of a run, and where it ended."""
-    case = Case.from_toml(gallery()[name], changes)
+    case = Case.from_toml(gallery_files()[name], changes)
     run = Run.begin(case, folder)
     run.simulation.step()  # compiles
     begin = process_time()
     run.go()
     seconds = process_time() - begin
     found = report(folder)
-    mean = found["measures"][measure]
-    return {"mean": mean["mean"], "error": mean["error"], "processor [s]": seconds, "window [s]": found["window"]}
+    mean = found.measures[measure]
+    return {"mean": mean.mean, "error": mean.error, "processor [s]": seconds, "window [s]": found.window}
 
 
 def compared(name: str, changes: dict[str, Any], measure: str) -> dict[str, Any]:
     """Both runs of a case."""
-    case = Case.from_toml(gallery()[name], changes)
+    case = Case.from_toml(gallery_files()[name], changes)
     start = "expanded" if case.bed.start == "suspended" else case.bed.start
     with tempfile.TemporaryDirectory() as place:
         fixed = measured(name, changes, measure, Path(place, "fixed"))

@@ -81,13 +81,13 @@ class Surroundings:
         from made_up_run import BED, made_up
         from test_case_walls import HOPPER
 
-        from cfddem.case.gallery import gallery
+        from cfddem.case.gallery import gallery_files
         from cfddem.case.schema import Case
         from cfddem.io import checkpoint
         from cfddem.io.reading import open_run
 
         self.home = home
-        self.texts = [TEXT, MIXTURE, HOPPER, WET, BED, *(path.read_text() for path in gallery().values())]
+        self.texts = [TEXT, MIXTURE, HOPPER, WET, BED, *(path.read_text() for path in gallery_files().values())]
         tables = {name: part["properties"] for name, part in Case.model_json_schema()["$defs"].items()}
         self.keys = sorted({name for properties in tables.values() for name in properties})
         self.case_keys = sorted({f"{table}.{key}" for text in self.texts for table, key in _keys(text)})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from inspect import signature
 
 import numpy as np
@@ -17,7 +18,7 @@ from cfddem.fluid.grid import Array
 from cfddem.model.feature import FluidForce
 from cfddem.particles.state import Particles
 from closures.kinds import DRAG_ARGUMENTS
-from closures.registry import Law
+from closures.registry import Law, law_of
 
 drag_factor = Slot("drag_factor")
 
@@ -25,7 +26,7 @@ drag_factor = Slot("drag_factor")
 class Drag(FluidForce):
     """Drag over slip of every particle.
 
-    law    drag law
+    law    drag law, or its function
     model  "A" or "B" of the fluid
 
     outside  how often the law was evaluated outside its range
@@ -33,7 +34,8 @@ class Drag(FluidForce):
 
     name, lines = "drag", ("drag",)
 
-    def __init__(self, law: Law, model: str) -> None:
+    def __init__(self, law: Law | Callable[..., float], model: str = "A") -> None:
+        law = law if isinstance(law, Law) else law_of(law)
         self.law_name, self.model = law.name, model
         self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
         factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})

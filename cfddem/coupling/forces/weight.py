@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cfddem.coupling.terms import ForceTerms
@@ -18,7 +20,7 @@ class Weight(FluidForce):
 
     name, lines = "weight", ("weight",)
 
-    def __init__(self, density: float, gravity: Array) -> None:
+    def __init__(self, density: float, gravity: Sequence[float] | Array) -> None:
         self.density, self.gravity = density, np.array(gravity, float)
 
     def act(self, terms: ForceTerms) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError, nearest, shown
 from cfddem.backend.law_set import adapted, check_compiles
 from cfddem.backend.named import can_be_named
 from cfddem.data.fields import Field
@@ -21,6 +21,7 @@ from cfddem.particles.interactions.slots import BridgeState
 from cfddem.particles.system import numbers
 from closures import bridge, capillary, capillary_pull, rupture
 from closures.lubrication import film_strength
+from closures.registry import load_package_laws
 
 Function = Callable[..., float]
 
@@ -130,7 +131,7 @@ REDISTRIBUTIONS: dict[str, Function] = {
     "contact_angle": rupture.share_by_contact_angle,
 }
 
-_WORDS: dict[str, Mapping[str, Any]] = {
+_WORDS: dict[str, dict[str, Any]] = {
     "film": FILMS,
     "tangential": TANGENTIALS,
     "pull": PULLS,
@@ -138,6 +139,28 @@ _WORDS: dict[str, Mapping[str, Any]] = {
     "share": SHARES,
     "redistribution": REDISTRIBUTIONS,
 }
+
+_BUILT_IN = {kind: tuple(words) for kind, words in _WORDS.items()}
+
+
+def register(kind: str, name: str, law: Function | BridgeFilm | BridgePull) -> None:
+    """Make a user's law available by a name, in `BridgeLaws` and in the table [liquid] of a case.
+
+    kind  "film", "tangential", "pull", "rupture", "share" or "redistribution"
+    """
+    if kind not in _WORDS:
+        raise InputError("kind", kind, nearest(kind, _WORDS))
+    if name in _BUILT_IN[kind]:
+        raise InputError("name", name, f"a name that no built-in law of the kind {kind!r} has")
+    _WORDS[kind][name] = law
+
+
+def require_bridge_law(kind: str, name: str) -> None:
+    """Refuse a name that no law of a kind has: built-in, registered, or of an installed package."""
+    if name not in _WORDS[kind]:
+        load_package_laws()
+    if name not in _WORDS[kind]:
+        raise InputError(kind, shown(name), nearest(name, _WORDS[kind]))
 
 
 class BridgeNumbers(NamedTuple):
@@ -234,10 +257,10 @@ class BridgeLaws:
             )
         if self.share == "none" and self.film == "pitois":
             raise InputError("share", "none", "a law that fills bridges: the film 'pitois' follows from the volume")
-        for name, words in _WORDS.items():
+        for name in _WORDS:
             law = getattr(self, name)
-            if isinstance(law, str) and law not in words:
-                raise InputError(name, law, nearest(law, words))
+            if isinstance(law, str):
+                require_bridge_law(name, law)
         for name, function in self._functions().items():
             check_compiles(f"laws.bridge.{name}", function)
 

@@ -34,6 +34,9 @@ LARGEST_CHANGE = 0.1
 LARGEST_SAMPLED_CHANGE = 0.05
 """The same without one: Gauss' rule of three points then integrates A/h to 1e-11."""
 
+SLIDING_ARGUMENTS = ("gap", "viscosity", "reduced_radius", "minimum_gap", "asymmetry")
+"""Arguments that a user's resistance to sliding may take, by name."""
+
 _NODES, _WEIGHTS = (tuple(float(x) for x in each) for each in np.polynomial.legendre.leggauss(5))
 _ASIDE = math.sqrt(0.6)
 
@@ -46,15 +49,19 @@ class FilmLaw:
     potential        its integral over the gap from `gap` to `end_gap`, both in that range [N s]
     short_potential  the same for gaps that differ by less than a tenth, without branches or logarithm, so that the
                      loop works on several pairs at once
+    sliding          force over the slip of the surfaces, at gaps from the minimum gap on, also by `asymmetry`, the
+                     difference of the radii over their sum, -1 at a wall [kg/s]. The resistance to rolling, and that
+                     which couples both, follow by the ratios of two spheres (Jeffrey & Onishi 1984)
     """
 
     resistance: Callable[..., float]
     potential: Callable[..., float] | None = None
     short_potential: Callable[..., float] | None = None
+    sliding: Callable[..., float] | None = None
 
     def check(self) -> None:
         """Refuse functions that cannot be compiled."""
-        for each in (self.resistance, self.potential, self.short_potential):
+        for each in (self.resistance, self.potential, self.short_potential, self.sliding):
             if each is not None:
                 check_compiles("laws.lubrication", each)
 
@@ -65,7 +72,12 @@ class FilmLaw:
         potentials = {
             name: law for name in ("potential", "short_potential") if (law := getattr(self, name)) is not None
         }
+        of_sliding = [*SLIDING_ARGUMENTS]
+        sliding = {} if self.sliding is None else {"film_sliding": adapted(
+            self.sliding, ", ".join(["scale", *of_sliding]), dict(zip(of_sliding, of_sliding)), "scale * {}"
+        )}  # fmt: skip
         return {
+            **sliding,
             "user_resistance": adapted(self.resistance, "film", sources),
             **{f"user_{name}": adapted(law, "gap, end_gap, film", ends) for name, law in potentials.items()},
             "POTENTIAL": self.potential is not None,

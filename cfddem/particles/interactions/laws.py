@@ -17,6 +17,7 @@ from cfddem.particles.interactions.contact_slots import check_contact_law, conta
 from cfddem.particles.interactions.film_law import FilmLaw, built_in, gap_choices, range_check
 from cfddem.particles.interactions.slots import FilmState, GapState
 from cfddem.particles.system import Parameters, numbers
+from closures.registry import REGISTRY
 
 CHOICES = {
     "integrator": ("drift", "verlet"),
@@ -41,7 +42,8 @@ class Laws(NamedTuple):
     rolling_damping       of the rolling dashpot, over critical; 0.3 as in Ai et al. (2011) [-]
     minimum_gap           a user's law of the minimum gap; the built-in elastohydrodynamic one if not given
     lubrication           a user's film: its resistance, or a
-                          :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given
+                          :class:`~cfddem.particles.interactions.film_law.FilmLaw`; the built-in one if not given. A
+                          registered law NAME resists sliding, too, where a law NAME_sliding is registered
     film_motions          motions that films resist: along the line of centres ("normal"), and sliding and rolling
                           ("full"), and twisting ("full_twist")
     film_tolerance        of the impulses of films that are solved together, over the first residual [-]
@@ -79,6 +81,12 @@ class Laws(NamedTuple):
             raise InputError(
                 "film_motions", self.film_motions, '"normal" without films, and with the integrator "verlet"'
             )
+        if self.film_motions == "full_twist" and self.film_law is not None and self.film_law.sliding is not None:
+            limit, remedy = (
+                '"full" for a film with its own resistance to sliding',
+                "twisting is known for the built-in film",
+            )
+            raise InputError("film_motions", self.film_motions, limit, remedy)
         if not 0.0 < self.film_tolerance <= 1.0:
             raise InputError("film_tolerance", self.film_tolerance, "above 0 and at most 1")
         self.bridges.check()
@@ -88,10 +96,10 @@ class Laws(NamedTuple):
             if not self.film:
                 name = getattr(law, "__name__", type(law).__name__)
                 raise InputError(kind, name, "absent where there are no films", "take Laws(film=True)")
-            if isinstance(law, FilmLaw):
-                law.check()
+            if kind == "lubrication" and self.film_law is not None:
+                self.film_law.check()
             else:
-                check_compiles(f"laws.{kind}", chosen(kind, law).function)
+                check_compiles(f"laws.{kind}", chosen(kind, law).function)  # type: ignore[arg-type]
 
     @property
     def contact_law(self) -> ContactLaw:
@@ -106,7 +114,7 @@ class Laws(NamedTuple):
     @property
     def shears(self) -> bool:
         """Whether films resist sliding and rolling."""
-        return self.film_motions != "normal"
+        return self.film_motions != "normal" or (self.film_law is not None and self.film_law.sliding is not None)
 
     @property
     def drifting(self) -> bool:
@@ -118,7 +126,9 @@ class Laws(NamedTuple):
         """The user's film law; None where the built-in one holds or there is no film."""
         if self.lubrication is None or isinstance(self.lubrication, FilmLaw):
             return self.lubrication
-        return FilmLaw(chosen("lubrication", self.lubrication).function)
+        law = chosen("lubrication", self.lubrication)
+        sliding = REGISTRY["lubrication"].get(f"{law.name}_sliding")
+        return FilmLaw(law.function, sliding=None if sliding is None else sliding.function)
 
     def parameters(
         self, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), free: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -185,6 +195,7 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "ROLLING": laws.rolling != "none",
         "rolling_torque": rolling.ROLLINGS[laws.rolling],
         **(built_in() if laws.film else {}),
+        **({"film_sliding": shear_film.built_in_sliding} if laws.shears else {}),
         "POTENTIAL": False,
         "SHEAR": laws.shears,
         "TWIST": laws.film_motions == "full_twist",

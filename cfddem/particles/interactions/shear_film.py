@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.kinematics import relative_velocity
-from cfddem.particles.interactions.slots import TWIST
+from cfddem.particles.interactions.slots import TWIST, film_sliding
 from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times
 from closures.tangential_lubrication import (
     roll_resistance,
@@ -112,6 +112,14 @@ def motion_at_wall(k, normal, system):
 
 
 @inline
+def built_in_sliding(scale, gap, viscosity, reduced_radius, minimum_gap, asymmetry):
+    """A share of the resistance to sliding by Jeffrey & Onishi; the gap is at least h_min."""
+    # the smaller radius; at a wall, where the asymmetry is -1, that of the sphere
+    smaller = 2.0 * reduced_radius / (1.0 + abs(asymmetry))
+    return scale * max(logarithm(smaller / gap), 0.0) * shear_resistance(viscosity, reduced_radius, asymmetry)
+
+
+@inline
 def renew_shear(k, viscosity, reduced_radius, asymmetry, share, motion, memory, step):
     """Resistance to sliding of the film of edge k, whose normal resistance is known, and what it does by itself.
 
@@ -119,13 +127,10 @@ def renew_shear(k, viscosity, reduced_radius, asymmetry, share, motion, memory, 
     motion  slip and roll, see `slip_and_roll`, and the lever arms of slip
     step    since the last positions; 0 if these are the same [s]
     """
-    # the smaller radius; at a wall, where the asymmetry is -1, that of the sphere
-    smaller = 2.0 * reduced_radius / (1.0 + abs(asymmetry))
     gap, minimum_gap, normal = memory.film_gap[k], memory.minimum_gap[k], at(memory.film_normal, k)
     lever = min(max(gap, 0.0) / minimum_gap, 1.0)
-    size = max(logarithm(smaller / max(gap, minimum_gap)), 0.0)
     before = memory.shear_resistance[k]
-    resistance = share * lever * size * shear_resistance(viscosity, reduced_radius, asymmetry)
+    resistance = film_sliding(share * lever, max(gap, minimum_gap), viscosity, reduced_radius, minimum_gap, asymmetry)
     resistance = resistance if memory.resistance[k] > 0.0 else 0.0
     memory.shear_resistance[k] = resistance
     # one that begins, or has been solved with the others, does nothing by itself

@@ -95,6 +95,7 @@ film_resistance = Slot("film_resistance")  # at this gap or h_min, without lever
 explicit_resistance = Slot("explicit_resistance")  # with lever; 0 for overlaps and out of reach [kg/s]
 speed_after_short_film = Slot("speed_after_short_film")
 speed_after_film = Slot("speed_after_film")
+film_sliding = Slot("film_sliding")  # (scale, gap, viscosity, R*, h_min, asymmetry): scale times the resistance [kg/s]
 user_resistance = Slot("user_resistance")
 user_potential = Slot("user_potential")
 user_short_potential = Slot("user_short_potential")

@@ -18,7 +18,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.particles.vectors import Vector
 from cfddem.particles.walls.nearest_point import PLANE, REVOLVED, SOLID_CYLINDER, TRIANGLE
-from cfddem.particles.walls.stl import read_stl
+from cfddem.particles.walls.stl import read_stl, write_stl
 
 ROUNDING = 1e-9
 """Relative difference below which directions and positions are equal."""
@@ -288,6 +288,10 @@ class Mesh(Wall):
         corners = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
         vertices = np.array(place) + scale * np.asarray(surface.points, float)
         return cls(vertices=vertices, triangles=corners, **options)
+
+    def to_stl(self, path: str | Path) -> None:
+        """Write the surface as an STL file in metres, for a wall of a case."""
+        write_stl(path, self.vertices[self.triangles])
 
     def pieces(self) -> list[tuple[int, list[float]]]:
         """Corners and unit normal of every triangle."""

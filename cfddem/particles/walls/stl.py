@@ -35,6 +35,16 @@ def read_stl(path: str | Path) -> np.ndarray:
     return corners
 
 
+def write_stl(path: str | Path, corners: np.ndarray) -> None:
+    """Write triangles (T, 3, 3) as a binary STL file, which holds seven digits."""
+    corners = np.asarray(corners, float)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    records = np.zeros(len(corners), RECORD)
+    records["normal"] = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    records["corners"] = corners
+    Path(path).write_bytes(b"triangles".ljust(HEADER) + len(corners).to_bytes(4, "little") + records.tobytes())
+
+
 def triangles_in(path: str | Path, content: bytes | None = None) -> int:
     """Number of triangles of an STL file.
 

@@ -31,7 +31,7 @@ class Coating:
 
 def bed() -> Case:
     """The case of the gallery."""
-    return Case.from_toml(gallery()["coating"])
+    return gallery()["coating"]
 
 
 def coating(run: RunData, snapshot: int = -1) -> Coating:

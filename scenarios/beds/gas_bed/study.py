@@ -32,12 +32,12 @@ MEASURED = 2e-3
 
 def mueller() -> Case:
     """The small bubbling bed of the gallery."""
-    return Case.from_toml(gallery()["gas-bed"])
+    return gallery()["gas-bed"]
 
 
 def van_wachem() -> Case:
     """The flat bubbling bed of the gallery."""
-    return Case.from_toml(gallery()["gas-bed-flat"])
+    return gallery()["gas-bed-flat"]
 
 
 def standard_bed(fluid_step: float = FLUID_STEPS[0]) -> Case:

@@ -2,7 +2,7 @@
 
 >>> from cfddem.case.gallery import gallery
 >>> from cfddem.case.schema import Case
->>> round(beverloo(Case.from_toml(gallery()["hopper"])), 3)
+>>> round(beverloo(gallery()["hopper"]), 3)
 0.404
 """
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.analysis.bed_laws import buoyant_weight, expansion_exponents, expansion_laws
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.run import history
@@ -50,7 +50,7 @@ class FluidisedBed:
 
 def glass(velocity: float) -> Case:
     """The case of the gallery at another velocity [m/s], in a column high enough."""
-    return Case.from_toml(gallery()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.04})
+    return Case.from_toml(gallery_files()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.04})
 
 
 def coarse_glass(velocity: float) -> Case:

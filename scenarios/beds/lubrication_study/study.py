@@ -96,7 +96,7 @@ class Mean(NamedTuple):
 
 def bed(setting: Setting, seed: int) -> Case:
     """A case of the study."""
-    case = Case.from_toml(gallery()["lubrication-study"])
+    case = gallery()["lubrication-study"]
     case = case.with_(**{
         "fluid.viscosity": setting.viscosity,
         "material.sphere.contact_modulus": setting.modulus,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfddem.analysis.measures import pressure_drop, profile
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.run.simulation import Simulation
 from closures.balance import pressure_gradient
@@ -30,7 +30,7 @@ class Drop:
 
 def case(**overrides: object) -> Case:
     """The case of the gallery with other values."""
-    return Case.from_toml(gallery()["packed-bed"], overrides)
+    return Case.from_toml(gallery_files()["packed-bed"], overrides)
 
 
 def flow_through(described: Case, velocity: float, slab: tuple[float, float] = (0.25, 0.75)) -> Drop:

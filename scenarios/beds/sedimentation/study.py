@@ -41,7 +41,7 @@ class Settling:
 
 def vessel() -> Case:
     """The closed vessel of the case file."""
-    return Case.from_toml(gallery()["sedimentation"])
+    return gallery()["sedimentation"]
 
 
 def alone(case: Case) -> float:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from cfddem.analysis.bed_laws import expansion_exponents
-from cfddem.case.gallery import gallery
+from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
@@ -29,7 +29,7 @@ VELOCITIES = (0.04, 0.105)
 
 def mixture(velocity: float = VELOCITIES[0]) -> Case:
     """The case of the gallery at a superficial velocity [m/s]."""
-    return Case.from_toml(gallery()["segregation"], {"bed.inlet_velocity": velocity})
+    return Case.from_toml(gallery_files()["segregation"], {"bed.inlet_velocity": velocity})
 
 
 def thresholds(case: Case) -> dict[str, float]:

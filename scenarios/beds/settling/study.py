@@ -148,7 +148,7 @@ def _with_memory(case: Case, times: np.ndarray, step: float) -> np.ndarray:
 
 def mordant() -> Case:
     """The bead of the gallery case."""
-    return Case.from_toml(gallery()["settling"])
+    return gallery()["settling"]
 
 
 def unbounded(case: Case, drag: str) -> float:

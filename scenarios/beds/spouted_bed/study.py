@@ -41,7 +41,7 @@ class Profile:
 
 def bed() -> Case:
     """The slice of the gallery."""
-    return Case.from_toml(gallery()["spouted-bed"])
+    return gallery()["spouted-bed"]
 
 
 def profiles(

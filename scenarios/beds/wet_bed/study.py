@@ -46,7 +46,7 @@ class Effects:
 
 def bed(state: str = "oil 0.1 %") -> Case:
     """The case of the gallery in one of the states of `LIQUIDS`."""
-    case = Case.from_toml(gallery()["wet-bed"])
+    case = gallery()["wet-bed"]
     changes = LIQUIDS[state]
     if changes is None:
         return case.with_(liquid=None, title=f"{case.title}, {state}")

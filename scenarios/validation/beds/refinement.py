@@ -66,7 +66,7 @@ def liquid() -> RefinementBed:
 
 def gas() -> RefinementBed:
     """Slugs of air in the narrow column of the gallery's ramp."""
-    case = Case.from_toml(gallery()["defluidisation"])
+    case = gallery()["defluidisation"]
     changes = {"title": "Slugging bed, for refinement", "bed.inlet_velocity": 0.6, "run.every": 0.25}
     return RefinementBed(case.with_(**changes), 1.0, 6.0)
 

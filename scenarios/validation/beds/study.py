@@ -93,7 +93,7 @@ def sedimentation(progress: Progress) -> list[Row]:
 
 def defluidised(folder: Path, progress: Progress) -> list[Row]:
     """Minimum fluidisation on a slow ramp."""
-    case = Case.from_toml(gallery()["defluidisation"])
+    case = gallery()["defluidisation"]
     assert not isinstance(case.bed.inlet_velocity, float)
     slow = tuple((5.0 * time, speed) for time, speed in case.bed.inlet_velocity)
     run = finished(case, folder, "defluidisation", progress, {"bed.inlet_velocity": slow, "run.until": 6.5})

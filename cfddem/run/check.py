@@ -1,0 +1,43 @@
+"""All that `cfddem check` finds out about a case: the pre-run check, its measured data, and several processes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.preflight.data_checks import check_quantities
+from cfddem.preflight.issue import Issue
+from cfddem.preflight.overview import Row
+from cfddem.preflight.summary import Preflight, preflight
+from cfddem.run.build import require_parallel
+from cfddem.run.history import units_of
+
+
+def check(case: Case, ranks: int | None = None) -> Preflight:
+    """Check a case before it runs. Nothing is run or written.
+
+    ranks    number of processes that are to share the run
+    returns  `status` ("ok", "warning" or "error"), `issues` (severity, key, reason, remedy) and `rows` (name, value,
+             unit, note); `print` shows all as `cfddem check` does
+    """
+    result = preflight(case)
+    if case.compare:
+        result = result.with_errors(check_quantities(case, units_of(case)))
+    return result if ranks is None or not result.rows else _with_ranks(result, case, ranks)
+
+
+def _with_ranks(result: Preflight, case: Case, ranks: int) -> Preflight:
+    """The result of a check, and whether several processes can share the case."""
+    if ranks < 1:
+        raise InputError("ranks", ranks, "at least 1")
+    try:
+        require_parallel(case, ranks)
+    except InputError as failure:
+        return result.with_errors(
+            [Issue("error", failure.field, f"{failure.value} must be {failure.limit}", failure.remedy)]
+        )
+    count = case.particle_count
+    share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
+    row = Row("several processes", "ranks", ranks, "", f"can share the case{share}")
+    return replace(result, rows=(*result.rows, row))
