@@ -40,9 +40,9 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
              verdict), `measures` (mean, error, unit, drift over the averaged rows and their times, stationary), `laws`
              (law, computed, expected, ratio), `laws_note` (a sentence on them), `ledger` (largest imbalances), `energy`
              and `energy_lines` (energy budget at the end [J], if the case asks for it), `collisions` and `impacts` (of
-             the window, if recorded), `warnings`, `actions` (the warnings by what to do), `wall_time`, `preflight`,
-             `provenance`, `references` (kind, name and reference of each law), `measured` (scores against measured
-             data)
+             the window, if recorded), `film_solution` (iterations a step and largest damping number in the window),
+             `warnings`, `actions` (the warnings by what to do), `wall_time`, `preflight`, `provenance`, `references`
+             (kind, name and reference of each law), `measured` (scores against measured data)
     errors   InputError if the run has no history, or for data that cannot be read
     """
     run = open_run(folder)
@@ -73,6 +73,7 @@ def report(folder: Path, data: Sequence[Path] = ()) -> dict[str, Any]:
         "energy_lines": _energy_lines(run, energy),
         "collisions": _collisions(run, begin),
         "impacts": _impacts(run, begin, end),
+        "film_solution": _film_solution(run, begin),
         "warnings": [each for action, group in actions.items() for each in group if action != NOTE],
         "actions": actions,
         "wall_time": run.about.get("wall_time", {}),
@@ -221,6 +222,19 @@ def _impacts(run: RunData, begin: float, end: float) -> dict[str, float]:
         return {}
     found = impacts(run.collisions, begin, end, int(run.history["particle_count"][-1]))
     return {"rate": found.rate, "contact_rate": found.contact_rate, "mean_speed": found.mean_speed}
+
+
+def _film_solution(run: RunData, begin: float) -> dict[str, float]:
+    """Iterations of films solved together in a step, and their largest damping number in the window; empty if none."""
+    steps, iterations, damping = (
+        run.history.get(name, np.zeros(0))
+        for name in ("film_step_count", "film_iteration_count", "film_damping_number")
+    )
+    inside = run.history["time"] >= begin
+    if not steps.size or not steps[inside][-1] > steps[inside][0]:
+        return {}
+    made = (iterations[inside][-1] - iterations[inside][0]) / (steps[inside][-1] - steps[inside][0])
+    return {"iterations": float(made), "damping_number": float(np.nanmax(damping[inside]))}
 
 
 # ---------------------------------------------------------------- laws that a case uses, with their sources

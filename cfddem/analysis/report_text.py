@@ -40,6 +40,7 @@ def lines(result: dict[str, Any]) -> list[str]:
         *_ledger(result["ledger"]),
         *_collisions(result["collisions"]),
         *_impacts(result["impacts"]),
+        *_film_solution(result["film_solution"]),
         *_energy(result),
         *_wall_time(result["wall_time"]),
     ]
@@ -184,6 +185,22 @@ def _impacts(found: dict[str, float]) -> Iterator[str]:
         yield f"  mean speed of approach {found['mean_speed']:.3g} m/s"
 
 
+def film_solution(found: dict[str, float]) -> str:
+    """How films were solved together, in words; empty if none were."""
+    if not found:
+        return ""
+    return (
+        f"films solved together: {found['iterations']:.3g} iterations a step, largest damping number X = "
+        f"{found['damping_number']:.3g}"
+    )
+
+
+def _film_solution(found: dict[str, float]) -> Iterator[str]:
+    if found:
+        yield ""
+        yield f"  {film_solution(found)}"
+
+
 def _energy(result: dict[str, Any]) -> Iterator[str]:
     if result["energy"]:
         yield ""
@@ -246,6 +263,7 @@ def markdown(result: dict[str, Any], figures: Mapping[str, str] | None = None) -
         *([result["laws_note"]] if result["laws_note"] else ()),
         "## Conservation",
         *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result["ledger"].items())),
+        *filter(None, [film_solution(result["film_solution"])]),
         "## References of the laws",
         "\n".join(f"- {_escaped(' '.join(law.values()))}" for law in result["references"]),
     ]
