@@ -291,7 +291,7 @@ def test_bits_on_threads() -> None:
 @pytest.mark.parametrize("press", [0.0, 20.0])
 def test_films_dissipate_the_work_of_shear(press: float) -> None:
     """Within 1 %, at a solid fraction of 0.5 between plates and under a lid; most of it by sliding and rolling."""
-    from scenarios.validation.particles.sheared_films import sheared
+    from scenarios.validation.sheared_films.shear import sheared
 
     found = sheared(0.5, "full", press)
     assert found.dissipated == pytest.approx(1.0, abs=0.01)

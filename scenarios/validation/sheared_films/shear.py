@@ -27,6 +27,12 @@ SMOOTH = SUSPENDED.model_copy(update={"friction": 0.0, "restitution": 1.0, "cont
 VISCOSITY, SPEED = 0.05, 0.2
 """Of the fluid [Pa s] and of the upper plate [m/s]: a Stokes number of 0.1."""
 
+CLOSE_PACKING = 0.64
+"""Solid fraction of a random close packing of equal spheres."""
+
+MORRIS_BOULAY_PACKING, MORRIS_BOULAY_FACTOR = 0.68, 0.1
+"""phi_m and K_s of the fit of Morris & Boulay (1999)."""
+
 
 class Sheared(NamedTuple):
     """What was measured over a strain."""
@@ -49,7 +55,7 @@ class _Work(NamedTuple):
 
 def sheared(
     solid_fraction: float, motions: str = "full", press: float = 0.0, strain: float = 0.5, count: int = 400,
-    steps_in_one: float = 1.0,
+    steps_in_one: float = 1.0, roughness: float = SMOOTH.roughness, cutoff_ratio: float = Laws().cutoff_ratio,
 ) -> Sheared:  # fmt: skip
     """Shear a suspension between two layers of its own spheres, and measure over the second half of the strain.
 
@@ -58,6 +64,8 @@ def sheared(
     strain   of the whole run [-]
     count    of spheres, with the layers
     steps_in_one  time step over that which is recommended [-]
+    roughness     of the spheres [m]
+    cutoff_ratio  reach of films over the reduced radius [-]
     """
     made, upper = suspension(count, solid_fraction, fixed=True, viscosity=VISCOSITY)
     spheres, (width, depth, _) = made.particles, made.box
@@ -67,9 +75,10 @@ def sheared(
         spheres.applied[upper] = np.array([0.5, 0.0, -1.0]) * press * width * depth / int(upper.sum())
     else:
         spheres.velocity[upper, 0] = SPEED
-    laws = Laws(film=True, film_motions=motions)
+    laws = Laws(film=True, film_motions=motions, cutoff_ratio=cutoff_ratio)
+    solid = SMOOTH.model_copy(update={"roughness": roughness})
     run = ParticleSolver(
-        spheres, pair_table([SMOOTH]), laws=laws, box=(width, depth, None), energies=True, check_steps=False
+        spheres, pair_table([solid]), laws=laws, box=(width, depth, None), energies=True, check_steps=False
     )
     lid = run.particles.id[upper]
     height = _height(run, lid)
@@ -155,3 +164,32 @@ def _taken_back(run: ParticleSolver, before: tuple[np.ndarray, np.ndarray, np.nd
     order = np.argsort(run.particles.id)
     moved = run.particles.displacement[order][np.isin(run.particles.id[order], ids)]
     return float((kick * (velocity - moved / step)).sum())
+
+
+# ---------------------------------------------------------------- published curves
+
+
+def krieger_dougherty(solid_fraction: float) -> float:
+    """Relative viscosity, (1 - phi/0.64)^-1.6: Krieger & Dougherty, Trans. Soc. Rheol. 3 (1959) 137.
+
+    The intrinsic viscosity is Einstein's 2.5, and the maximum the random close packing of equal spheres.
+
+    >>> round(krieger_dougherty(0.5), 2)
+    11.39
+    """
+    return float((1.0 - solid_fraction / CLOSE_PACKING) ** (-2.5 * CLOSE_PACKING))
+
+
+def morris_boulay(solid_fraction: float) -> float:
+    r"""Relative viscosity by the fit of Morris & Boulay, J. Rheol. 43 (1999) 1213, doi:10.1122/1.551021.
+
+    .. math:: \eta_r = 1 + \frac{2.5\,\phi}{1-\phi/\phi_m} + K_s\left(\frac{\phi/\phi_m}{1-\phi/\phi_m}\right)^2
+
+    The constants phi_m = 0.68 and K_s = 0.1 are from memory.
+
+    >>> round(morris_boulay(0.5), 2)
+    6.49
+    """
+    filled = solid_fraction / MORRIS_BOULAY_PACKING
+    ratio = filled / (1.0 - filled)
+    return 1.0 + 2.5 * MORRIS_BOULAY_PACKING * ratio + MORRIS_BOULAY_FACTOR * ratio**2
