@@ -68,7 +68,7 @@ def conditions(curves: Curves) -> list[Row]:
 
 def _draw(folder: Path, curves: Curves) -> None:
     """Viscosity against solid fraction."""
-    figure, (axes,) = panels(1)
+    figure, axes = panels()
     at = np.linspace(0.25, 0.57, 100)
     axes.plot(at, [krieger_dougherty(each) for each in at], color=GREY, label="Krieger & Dougherty (1959)")
     axes.plot(at, [morris_boulay(each) for each in at], color=ORANGE, label="Morris & Boulay (1999)")
