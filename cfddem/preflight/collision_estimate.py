@@ -10,7 +10,6 @@ import numpy as np
 from cfddem.backend.law_choice import called_by_name
 from cfddem.case.bed import Species
 from cfddem.case.schema import Case
-from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.preflight.bed_estimate import BedEstimate
 from closures import lubrication, minimum_gap, numbers
@@ -91,10 +90,10 @@ def _film_rate(case: Case, species: Species, viscosity: float) -> float:
     """Resistance of the film of two of the smallest particles of a species at its smallest gap, over m* [1/s]."""
     mass, radius = reduced(case, species, species.smallest_diameter)
     gap, law = float(pair_row(case, species)["roughness_gap"]), case.laws.pair_laws.get("lubrication")
-    cutoff_gap = Laws().cutoff_ratio * radius
+    # films of a run end at the gap R*
     if law is None:
-        return lubrication.film_resistance(lubrication.film_strength(viscosity, radius), gap, gap, cutoff_gap) / mass
-    return called_by_name(law.function, FILM_ARGUMENTS, (gap, viscosity, radius, gap, cutoff_gap)) / mass
+        return lubrication.film_resistance(lubrication.film_strength(viscosity, radius), gap, gap, radius) / mass
+    return called_by_name(law.function, FILM_ARGUMENTS, (gap, viscosity, radius, gap, radius)) / mass
 
 
 def _film_gap(case: Case, values: tuple[float, float, float, float, float]) -> float:
