@@ -79,6 +79,8 @@ def made_up(folder: Path, text: str = BED, rows: int = 401, trend: float = 0.0, 
             "volume_imbalance": 1e-9,
             "out_of_range_count": 2000.0 * k,
         } | constant
+        if "film_step_count" in all_columns(case):
+            row |= {"film_step_count": 50.0 * k, "film_iteration_count": 60.0 * k + 1.0, "film_damping_number": k / 4.0}
         run.append_history({name: value for name, value in row.items() if wet or name not in OF_THE_FLUID})
         if k % 100 == 0:
             fluid = {"voidage": np.full(grid.shape, 0.6)} if wet else None

@@ -403,6 +403,21 @@ def test_any_cluster_loses_energy_and_keeps_momentum(
         assert drift <= 1e-12 * float((mass * np.abs(run.particles.velocity)).sum()) + 1e-30
 
 
+def said(run: ParticleSolver) -> tuple[float, float, float]:
+    """What a report says of the solution: its steps and iterations so far, and the largest damping rate [1/s]."""
+    return run.film_counts[0], run.film_counts[1], run.largest_film_rate
+
+
+def test_the_largest_damping_rate_is_that_of_the_nearest_pair() -> None:
+    run = row_of(3, [2])
+    run.particles.position[2, 0] += GAP  # twice as far, and with half the inverse mass
+    run.refresh()
+    assert run.largest_film_rate * STEP_OF_ONE == pytest.approx(1.0, rel=0.02)
+    run.particles.position[0, 0] -= 9.0 * GAP
+    run.refresh()
+    assert run.largest_film_rate * STEP_OF_ONE == pytest.approx(0.25, rel=0.05)
+
+
 def test_one_and_two_threads_give_the_same_bits_and_a_resumed_run_goes_on_with_them() -> None:
     """A network over 12 steps: on two threads, and from a checkpoint after 5."""
     before, states = use_threads(None), []
@@ -413,11 +428,11 @@ def test_one_and_two_threads_give_the_same_bits_and_a_resumed_run_goes_on_with_t
             run.advance(2.5e-7, 5)
             kept = run.checkpoint()
             run.advance(2.5e-7, 7)
-            states.append((run.particles.velocity.copy(), run.particles.spin.copy()))
+            states.append((run.particles.velocity.copy(), run.particles.spin.copy(), *said(run)))
         resumed = network("full", 1500, 1e-3)
         resumed.restore(kept)
         resumed.advance(2.5e-7, 7)
-        states.append((resumed.particles.velocity.copy(), resumed.particles.spin.copy()))
+        states.append((resumed.particles.velocity.copy(), resumed.particles.spin.copy(), *said(resumed)))
     finally:
         use_threads(before)
     for state in states[1:]:

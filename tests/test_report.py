@@ -16,7 +16,7 @@ from made_up_run import BED, made_up, quantities
 from cfddem.analysis.bed_laws import comparison, expansion_note
 from cfddem.analysis.measures import voidage_from_pressure
 from cfddem.analysis.report import report
-from cfddem.analysis.report_text import as_json, lines
+from cfddem.analysis.report_text import as_json, lines, markdown
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
@@ -45,6 +45,15 @@ def test_means_errors_and_laws_match_the_record(tmp_path: Path) -> None:
     assert rows["voidage by Richardson-Zaki"].expected == pytest.approx(expected, rel=1e-12)
     assert result.ledger == {"momentum_imbalance": 1e-15, "volume_imbalance": 1e-9, "particles_lost": 0.0}
     assert result.steps == {"particles": 40_000, "fluid": 4000}
+
+
+def test_iterations_and_damping_number_of_films_are_those_of_the_window(tmp_path: Path) -> None:
+    folder, without = made_up(tmp_path / "run"), made_up(tmp_path / "none", BED + 'lubrication = "none"')
+    result, words = report(folder), "ilms solved together: 1.2 iterations a step, largest damping number X = 100"
+    assert result["film_solution"] == {"iterations": pytest.approx(1.2), "damping_number": 100.0}
+    assert any(words in line for line in lines(result))
+    assert words in page(folder, tmp_path / "run.html").read_text() and words in markdown(result)
+    assert report(without)["film_solution"] == {} and "solved together" not in "\n".join(lines(report(without)))
 
 
 def test_a_sentence_says_where_the_voidages_lie_among_the_published_ones(tmp_path: Path) -> None:

@@ -67,6 +67,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
         energy_lines=_energy_lines(run, energy),
         collisions=_collisions(run, begin),
         impacts=_impacts(run, begin, end),
+        film_solution=_film_solution(run, begin),
         warnings=[each for action, group in actions.items() for each in group if action != NOTE],
         actions=actions,
         wall_time=run.about.get("wall_time", {}),
@@ -216,6 +217,19 @@ def _impacts(run: RunData, begin: float, end: float) -> dict[str, float]:
         return {}
     found = impacts(run.collisions, begin, end, int(run.history["particle_count"][-1]))
     return {"rate": found.rate, "contact_rate": found.contact_rate, "mean_speed": found.mean_speed}
+
+
+def _film_solution(run: RunData, begin: float) -> dict[str, float]:
+    """Iterations of films solved together in a step, and their largest damping number in the window; empty if none."""
+    steps, iterations, damping = (
+        run.history.get(name, np.zeros(0))
+        for name in ("film_step_count", "film_iteration_count", "film_damping_number")
+    )
+    inside = run.history["time"] >= begin
+    if not steps.size or not steps[inside][-1] > steps[inside][0]:
+        return {}
+    made = (iterations[inside][-1] - iterations[inside][0]) / (steps[inside][-1] - steps[inside][0])
+    return {"iterations": float(made), "damping_number": float(np.nanmax(damping[inside]))}
 
 
 # ---------------------------------------------------------------- laws that a case uses, with their sources

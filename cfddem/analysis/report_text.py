@@ -41,6 +41,7 @@ class Report:
     ledger        largest relative imbalance of each conserved quantity
     energy        energy budget at the end by line [J]; empty if the case does not ask for it
     collisions    of the window, if recorded; so are impacts
+    film_solution iterations a step and largest damping number in the window; empty without films
     actions       all warnings by what to do about them, and notes
     wall_time     of each part of the run [s]
     preflight     the check of the case before the run
@@ -64,6 +65,7 @@ class Report:
     energy_lines: list[EnergyLine]
     collisions: dict[str, float]
     impacts: dict[str, float]
+    film_solution: dict[str, float]
     warnings: list[str]
     actions: dict[str, list[str]]
     wall_time: dict[str, float]
@@ -97,6 +99,7 @@ def lines(result: Report) -> list[str]:
         *_ledger(result.ledger),
         *_collisions(result.collisions),
         *_impacts(result.impacts),
+        *_film_solution(result.film_solution),
         *_energy(result),
         *_wall_time(result.wall_time),
     ]
@@ -243,6 +246,22 @@ def _impacts(found: dict[str, float]) -> Iterator[str]:
         yield f"  mean speed of approach {found['mean_speed']:.3g} m/s"
 
 
+def film_solution(found: dict[str, float]) -> str:
+    """How films were solved together, in words; empty if none were."""
+    if not found:
+        return ""
+    return (
+        f"films solved together: {found['iterations']:.3g} iterations a step, largest damping number X = "
+        f"{found['damping_number']:.3g}"
+    )
+
+
+def _film_solution(found: dict[str, float]) -> Iterator[str]:
+    if found:
+        yield ""
+        yield f"  {film_solution(found)}"
+
+
 def _energy(result: Report) -> Iterator[str]:
     if result.energy:
         yield ""
@@ -304,6 +323,7 @@ def markdown(result: Report, figures: Mapping[str, str] | None = None) -> str:
         *([result.laws_note] if result.laws_note else ()),
         "## Conservation",
         *_markdown_table(("largest imbalance", ""), ((spelled(k), f"{v:.2g}") for k, v in result.ledger.items())),
+        *filter(None, [film_solution(result.film_solution)]),
         "## References of the laws",
         "\n".join(f"- {_escaped(f'{law.kind} {law.name} {law.reference}')}" for law in result.references),
     ]

@@ -176,6 +176,14 @@ class ParticleSolver:
         """Number of uses of a user's law, minimum gap or film, outside of its range."""
         return self._outside + self.edges.uses_outside(self._owned)
 
+    @property
+    def largest_film_rate(self) -> float:
+        """Largest damping rate of a film now, its resistance over the reduced mass of its pair [1/s]."""
+        edges, inverse, pairs = self.edges, self.particles.inverse_mass, self.edges.between_particles
+        weight = inverse[edges.first]
+        weight[:pairs] += inverse[edges.second[:pairs]]
+        return self.communicator.largest(edges.resistance * weight, default=0.0) if self.laws.film else 0.0
+
     def refresh(self) -> None:
         """Find the forces at the present positions, for instance after a change of state from outside."""
         self._integrate(0.0, 0)
@@ -259,6 +267,7 @@ class ParticleSolver:
             "counters": {
                 "time": self.time, "steps": self.steps, "accepted": self._accepted, "outside": outside,
                 "reach": self._reach,
+                "film_steps": self.film_counts[0], "film_iterations": self.film_counts[1],
             },
         }  # fmt: skip
 
@@ -277,6 +286,7 @@ class ParticleSolver:
         self.time, self.steps = float(counters["time"]), int(counters["steps"])
         self._next_id = max(self._next_id, self.communicator.largest(self.particles.id, default=-1) + 1)
         self._accepted = float(counters["accepted"])
+        self.film_counts[:2] = float(counters["film_steps"]), float(counters["film_iterations"])
         self._outside = int(counters["outside"]) if self.communicator.rank == 0 else 0
         self.walls, touch = restored_walls(walls), edges.touch.copy()
         self._take_list(edges)

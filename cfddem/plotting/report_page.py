@@ -16,7 +16,16 @@ from cfddem.analysis.measured import MeasuredComparison, compared_with_measured,
 from cfddem.analysis.profiles import Profiles, profiles_of
 from cfddem.analysis.report import case_of, recorded_regimes
 from cfddem.analysis.report import report as summary
-from cfddem.analysis.report_text import Report, bounds_note, markdown, spelled, steadiness, window, with_error
+from cfddem.analysis.report_text import (
+    Report,
+    bounds_note,
+    film_solution,
+    markdown,
+    spelled,
+    steadiness,
+    window,
+    with_error,
+)
 from cfddem.analysis.report_values import EnergyLine, KeyResult, LawComparison, Measure
 from cfddem.analysis.run_warnings import NOTE
 from cfddem.analysis.waves import FEWEST_TIMES, layer_map, waves
@@ -91,6 +100,7 @@ def render(run: RunData, result: Report, data: Sequence[Path] = ()) -> str:
         result=result,
         status=f"{result.status} at {end:g} s; {counts}; {window(result)}",
         bounds_note=bounds_note(result),
+        film_solution=film_solution(result.film_solution),
         note=NOTE,
         key_results=_key_results(result.key_results),
         measures=_measures(result.measures),

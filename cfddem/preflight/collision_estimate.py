@@ -12,8 +12,8 @@ from cfddem.case.bed import Species
 from cfddem.case.schema import Case
 from cfddem.particles.material_pairs import pair_table
 from cfddem.preflight.bed_estimate import BedEstimate
-from closures import minimum_gap, numbers
-from closures.kinds import GAP_ARGUMENTS
+from closures import lubrication, minimum_gap, numbers
+from closures.kinds import FILM_ARGUMENTS, GAP_ARGUMENTS
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,7 @@ class CollisionEstimate:
     real_overlap: float  # the same with the real modulus [m]
     resting_overlap: float  # under the weight of the bed [m]
     softening: float  # contact modulus over real modulus
+    film_rate: float  # of all species, largest resistance of a film over the reduced mass; 0 without films [1/s]
 
     @property
     def gap(self) -> float:
@@ -81,7 +82,18 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
         real_overlap=law.largest_overlap(mass, radius, hard, speed),
         resting_overlap=law.resting_overlap(mass, radius, row, load),
         softening=soft / real if law.takes("contact_modulus") else 1.0,
+        film_rate=max(_film_rate(case, each, viscosity) for each in case.species.values()) if films else 0.0,
     )
+
+
+def _film_rate(case: Case, species: Species, viscosity: float) -> float:
+    """Resistance of the film of two of the smallest particles of a species at its smallest gap, over m* [1/s]."""
+    mass, radius = reduced(case, species, species.smallest_diameter)
+    gap, law = float(pair_row(case, species)["roughness_gap"]), case.laws.pair_laws.get("lubrication")
+    # films of a run end at the gap R*
+    if law is None:
+        return lubrication.film_resistance(lubrication.film_strength(viscosity, radius), gap, gap, radius) / mass
+    return called_by_name(law.function, FILM_ARGUMENTS, (gap, viscosity, radius, gap, radius)) / mass
 
 
 def _film_gap(case: Case, values: tuple[float, float, float, float, float]) -> float:

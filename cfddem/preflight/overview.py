@@ -52,7 +52,7 @@ def overview(
     return (
         *_particles_and_flow(case, bed),
         *_species(case, bed),
-        *_collisions_and_film(case, collision),
+        *_collisions_and_film(case, collision, steps.particle),
         *_bridges(wet),
         *_equipment(case, bed),
         *_time_scales(case, bed, steps),
@@ -101,7 +101,7 @@ def _species(case: Case, bed: BedEstimate) -> Iterator[Row]:
             yield Row(group, f"{name}: net force / weight", forces[name], "", note)
 
 
-def _collisions_and_film(case: Case, collision: CollisionEstimate) -> Iterator[Row]:
+def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) -> Iterator[Row]:
     if case.bed.fixed:
         return
     group, diameter = "collisions and film", case.species[collision.species].diameter
@@ -119,6 +119,9 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate) -> Iterator[R
         if collision.softening < 1.0:
             note = "if films used the contact modulus"
             yield Row(group, "minimum gap, softened", collision.softened_gap, "m", note)
+    if collision.film_rate > 0.0:
+        note = "at the smallest gap and the particle step; films limit no step"
+        yield Row(group, "damping number X, largest", collision.film_rate * step, "", note)
     if case.laws.contact_law.takes("contact_modulus"):
         yield Row(group, "contact modulus / real", collision.softening)
     yield Row(group, "overlap / diameter", collision.overlap / diameter, "", "largest, dry collision")

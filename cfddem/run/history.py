@@ -148,6 +148,10 @@ def _is_agitated(case: Case) -> bool:
     return case.fluid is not None and case.agitation != "none"
 
 
+def _has_moving_films(case: Case) -> bool:
+    return case.has_films and not case.bed.fixed
+
+
 def _is_mixture(case: Case) -> bool:
     return bool(case.bed.species)
 
@@ -248,6 +252,27 @@ def out_of_range_count(simulation: Simulation) -> float:
 def agitation_out_of_range_count(simulation: Simulation) -> float:
     """How often the law of agitation was evaluated outside of its range so far."""
     return simulation.required_coupling.outside["agitation"]
+
+
+# ---------------------------------------------------------------- films
+
+
+@measure("1", group="recorded", when=_has_moving_films)
+def film_step_count(simulation: Simulation) -> float:
+    """Number of particle steps so far in which films were solved together."""
+    return float(simulation.particle_solver.film_counts[0])
+
+
+@measure("1", group="recorded", when=_has_moving_films)
+def film_iteration_count(simulation: Simulation) -> float:
+    """Number of iterations of these solutions so far."""
+    return float(simulation.particle_solver.film_counts[1])
+
+
+@measure("1", group="recorded", when=_has_moving_films)
+def film_damping_number(simulation: Simulation) -> float:
+    """Largest damping number of a film, its resistance times the particle step over the reduced mass."""
+    return simulation.particle_solver.largest_film_rate * simulation.time_steps.particle_step
 
 
 # ---------------------------------------------------------------- mixtures

@@ -31,6 +31,7 @@ TARGETS: dict[str, str] = {
     "wet-beds": "scenarios.beds.wet_bed.validation",
     "waves": "scenarios.validation.bed_waves.study",
     "agitation": "scenarios.validation.agitation.study",
+    "sheared-films": "scenarios.validation.sheared_films.study",
     "resolved": "scenarios.references.resolved_suspension.study",
 }
 """Name of each target, and the module that holds its `study`."""

@@ -30,8 +30,8 @@ DIAMETER, DENSITY, SPEED = 0.01, 2000.0, 1.0
 FILM_STEP = 1e-3
 """Step where no solids touch, over delta_12 / v_n0."""
 
-IMPACT_STEP = 0.02
-"""Step in contact, over the Hertz time."""
+IMPACT_STEP = 0.005
+"""Step in contact, over the Hertz time; with 0.02, contacts that stick are 0.3 % late."""
 
 
 def _along(gap: float, film: float, viscosity: float, reduced_radius: float, touch: float) -> float:
@@ -71,6 +71,7 @@ def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float)
         near = pairs[:, 0] - touch < 3.0 * long * np.maximum(pairs[:, 1], 0.1 * SPEED)
         step = short if near.any() else long
         run.advance(step)
+        _release(run)
         before, pairs = pairs, _pairs(run)
         times.append(run.time * SPEED / film)
         states.append(_polar(run, film))
@@ -123,6 +124,21 @@ def _spheres(state: np.ndarray, numbers: Numbers, overlap: float, films: np.ndar
     )
     # the steps are chosen here: short in contact, long where only films act
     return ParticleSolver(spheres, pair_table([solid]), laws=Laws(bridge=laws), check_steps=False)
+
+
+def _release(run: ParticleSolver) -> None:
+    """Release the tangential springs of contacts whose slip has turned back.
+
+    Hard contacts that stick end without slip. Mindlin's spring gives slip back after it has stopped it, in a share that
+    does not fall with the softness of the solids.
+    """
+    particles, pairs = run.particles, slice(run.edges.between_particles)
+    first, second, spring = run.edges.first[pairs], run.edges.second[pairs], run.edges.spring[pairs]
+    normal = particles.position[first] - particles.position[second]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    surface = particles.radius[:, None] * particles.spin
+    slip = particles.velocity[first] - particles.velocity[second] - np.cross(surface[first] + surface[second], normal)
+    spring[(spring * slip).sum(axis=1) < 0.0] = 0.0  # springs lie across the normal
 
 
 def _pairs(run: ParticleSolver) -> np.ndarray:

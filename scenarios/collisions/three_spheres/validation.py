@@ -140,6 +140,7 @@ IN_ENGINE: tuple[dict[str, Any], ...] = (
     {"stokes": 20.0, "theta12": 30.0},
     {"stokes": 8.0, "theta12": 45.0},
     {"stokes": 8.0, "theta12": 45.0, "friction": 0.1},
+    {"stokes": 15.0, "theta12": 37.5, "friction": 0.15, "restitution": 0.95},
     {"stokes": 15.0, "theta12": 20.0, "theta23": 40.0, "capillary_number": 60.0, "restitution": 0.9},
 )
 ENGINE_UNTIL = 5.0

@@ -16,7 +16,8 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation.particles import granular_beds, sheared_films, single_sphere, suspensions, two_spheres
+from scenarios.validation.particles import granular_beds, single_sphere, suspensions, two_spheres
+from scenarios.validation.sheared_films.shear import krieger_dougherty, sheared
 from scenarios.validation.table import Curves, Progress, Row, in_parts, reference, worst
 
 ANGLE = 9.0
@@ -173,8 +174,8 @@ def sliding_films(curves: Curves) -> list[Row]:
     rows += [Row(f"{name} at 0.05 R less Stokes' and the film's", value) for name, value in zip(names, left)]
     cases = {"at 0.4": (0.4, 0.0), "at 0.5": (0.5, 0.0), "under a lid": (0.5, 20.0)}
     for name, (fraction, press) in cases.items():
-        full = sheared_films.sheared(fraction, "full", press)
-        curve = (1.0 - full.solid_fraction / 0.64) ** -1.6
+        full = sheared(fraction, "full", press)
+        curve = krieger_dougherty(full.solid_fraction)
         note = f"Krieger & Dougherty at {full.solid_fraction:.2f}, with the fluid itself; films alone here"
         rows += [
             Row(f"sheared {name}, sliding films: dissipated over work", full.dissipated, 1.0, 0.01),
@@ -182,7 +183,7 @@ def sliding_films(curves: Curves) -> list[Row]:
             Row(f"sheared {name}: relative viscosity of all films", full.viscosity, curve, note=note),
         ]
         if press == 0.0:
-            normal = sheared_films.sheared(fraction, "normal").viscosity
+            normal = sheared(fraction, "normal").viscosity
             rows.append(Row(f"sheared {name}: relative viscosity of normal films", normal))
     return rows
 
