@@ -11,6 +11,10 @@ import numpy as np
 import pytest
 from impacts import rows
 
+from cfddem.case.materials import Material
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import make_particles
 from scenarios.validation.particles.granular_beds import hopper, rest, slope
 from scenarios.validation.particles.single_sphere import BALL_RADIUS, DROP_HEIGHT, drop, drop_exactly, slide, strike
 
@@ -150,3 +154,16 @@ def test_hopper_discharges_as_beverloo_says() -> None:
     """Round hole of eight diameters in a flat bottom: within 15 % of Beverloo, Leniger & van de Velde (1961)."""
     flow, beverloo = hopper(5000, 8.0, 0.4)
     assert flow == pytest.approx(beverloo, rel=0.15)
+
+
+def test_a_change_of_gravity_acts_from_the_next_forces_on() -> None:
+    """Slopes tilt gravity: a sphere falls along z, then along x."""
+    glass = Material(density=2500.0, youngs_modulus=1e7, poisson=0.25)
+    spheres = make_particles(np.zeros((1, 3)), 1e-3, glass.density)
+    run = ParticleSolver(spheres, pair_table([glass]), gravity=(0.0, 0.0, -10.0))
+    run.advance(1e-3, 10)
+    run.gravity = (10.0, 0.0, 0.0)
+    run.refresh()
+    run.advance(1e-3, 10)
+    assert run.gravity == (10.0, 0.0, 0.0)
+    assert run.particles.velocity[0] == pytest.approx([0.1, 0.0, -0.1], abs=1e-12)

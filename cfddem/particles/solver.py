@@ -107,7 +107,7 @@ class ParticleSolver:
         self.choices: Mapping[str, Any] = choices | loop_choices(self.pair_fields, choices, kept_apart, self.parameters)
         self._loop, self._threads, self.film_counts = _NO_LOOP, False, np.zeros(4)
         self._touch_walls = specialise(wall_contacts, self.choices)
-        self.gravity, self.free = gravity, free
+        self.free = free
         self.domain = None if domain is None else np.array(domain, float)
         self._checking, self._accepted = check_steps, 0.0
         self._next_id = communicator.largest(particles.id, default=-1) + 1
@@ -165,6 +165,16 @@ class ParticleSolver:
         """Reach that the next list must have; `after` a change to these particles."""
         reach = self.laws.cutoff_ratio if self.laws.film else 0.0
         return max(reach, *(each.reach_ratio(self, after) for each in self.features), 0.0)
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Gravity [m/s2]; a new value acts from the next forces on."""
+        return self.parameters.gravity
+
+    @gravity.setter
+    def gravity(self, gravity: tuple[float, float, float]) -> None:
+        self.parameters = self.parameters._replace(gravity=self.laws.parameters(gravity).gravity)
+        self.system = self.system._replace(parameters=self.parameters)
 
     @property
     def gap(self) -> np.ndarray:

@@ -86,7 +86,8 @@ def slope(
     onset    of friction: "film" or "overlap"
     shape    of the bed along, across and normal to the slope, in diameters
     rolling_friction  mu_r of a yielding rolling spring with a dashpot; 0 for no resistance to rolling [-]
-    returns  angle at which the mean speed reaches 0.2 sqrt(g d) [deg], and the history of angle [deg] and speed [m/s]
+    returns  angle at which the mean speed reaches 0.2 sqrt(g d) [deg], NaN if it does not up to 60 degrees; and the
+             history of angle [deg] and speed [m/s]
     """
     glass = Material(
         density=2500,
@@ -117,7 +118,8 @@ def slope(
     step, moving = 1e-5, run.particles.inverse_mass > 0.0
     run.advance(step, 5000)
     angle, speed, angles, speeds = 0.0, 0.0, [0.0], [0.0]
-    while angle < 60.0 and speed < 0.2 * math.sqrt(GRAVITY * DIAMETER):
+    flowing = 0.2 * math.sqrt(GRAVITY * DIAMETER)
+    while angle < 60.0 and speed < flowing:
         angle += 0.1
         lean = math.radians(angle)
         run.gravity = (GRAVITY * math.sin(lean), 0.0, -GRAVITY * math.cos(lean))
@@ -125,7 +127,7 @@ def slope(
         speed = float(run.particles.velocity[moving, 0].mean())
         angles.append(angle)
         speeds.append(speed)
-    return angle, np.array(angles), np.array(speeds)
+    return angle if speed >= flowing else math.nan, np.array(angles), np.array(speeds)
 
 
 def hopper(count: int, outlet: float, seconds: float) -> tuple[float, float]:
