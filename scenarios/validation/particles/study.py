@@ -150,7 +150,12 @@ def films(curves: Curves) -> list[Row]:
     curves["shear"] = {"energy": (crowd.energy, "J")}
     return [
         worst("films alone: rise of kinetic energy, to 20 film times", [p for p in gains if p[0] < 2e-7], 0.0),
-        worst("films alone: rise, 100 and 1000 film times a step", [p for p in gains if p[0] > 2e-7], 0.0),
+        worst(
+            "films alone: rise, 100 and 1000 film times a step",
+            [p for p in gains if p[0] > 2e-7],
+            1e-15,
+            note="rounding, where the spheres are at rest relative to each other",
+        ),
         worst("films alone: change of momentum", [(s, run.momentum, 0.0) for s, run in alone.items()], 1e-13),
         Row("sheared at 0.5 in 1 Pa s: smallest gap over h_min", crowd.smallest_gap, 1.0, 1.0),
         Row("sheared at 0.5 in 1 Pa s: largest speed over that of the plate", crowd.speed),
