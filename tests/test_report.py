@@ -50,10 +50,10 @@ def test_means_errors_and_laws_match_the_record(tmp_path: Path) -> None:
 def test_iterations_and_damping_number_of_films_are_those_of_the_window(tmp_path: Path) -> None:
     folder, without = made_up(tmp_path / "run"), made_up(tmp_path / "none", BED + 'lubrication = "none"')
     result, words = report(folder), "ilms solved together: 1.2 iterations a step, largest damping number X = 100"
-    assert result["film_solution"] == {"iterations": pytest.approx(1.2), "damping_number": 100.0}
+    assert result.film_solution == {"iterations": pytest.approx(1.2), "damping_number": 100.0}
     assert any(words in line for line in lines(result))
     assert words in page(folder, tmp_path / "run.html").read_text() and words in markdown(result)
-    assert report(without)["film_solution"] == {} and "solved together" not in "\n".join(lines(report(without)))
+    assert report(without).film_solution == {} and "solved together" not in "\n".join(lines(report(without)))
 
 
 def test_a_sentence_says_where_the_voidages_lie_among_the_published_ones(tmp_path: Path) -> None:
