@@ -136,22 +136,26 @@ def momentum(simulation: Simulation) -> np.ndarray:
     particles = simulation.particles
     assert simulation.fluid is not None
     total: np.ndarray = (particles.mass[:, None] * particles.velocity).sum(axis=0) + budgets.momentum(simulation.fluid)
-    deferred_momentum = (
-        simulation.forces["added_mass"].deferred_momentum(particles).sum(axis=0)
-        if simulation.steps and "added_mass" in simulation.forces
-        else 0.0
-    )
-    return total + deferred_momentum
+    if simulation.steps and "added_mass" in simulation.forces:
+        total += simulation.forces["added_mass"].deferred_momentum(particles).sum(axis=0)
+    if "drag_momentum" in particles.fields:
+        total -= particles.drag_momentum.sum(axis=0)
+    return total
 
 
 @pytest.mark.parametrize(
-    ("model", "viscosity", "added_mass"),
-    [("A", 1e-3, 0.0), ("B", 1.0, 0.0), ("A", 1.0, 0.5), ("A", 1e-3, "zuber")],
-)
-def test_momentum_of_fluid_and_particles_is_kept(model: str, viscosity: float, added_mass: float | str) -> None:
+    ("model", "viscosity", "added_mass", "surface"),
+    [
+        ("A", 1e-3, 0.0, "smeared"), ("B", 1.0, 0.0, "smeared"), ("A", 1.0, 0.5, "smeared"),
+        ("A", 1e-3, "zuber", "smeared"), ("A", 1.0, 0.5, "sharp"),
+    ],
+)  # fmt: skip
+def test_momentum_of_fluid_and_particles_is_kept(
+    model: str, viscosity: float, added_mass: float | str, surface: str
+) -> None:
     """In a periodic box, for weak drag and drag that stops a sphere in a step; with lift, stress, added mass or not."""
     forces = added_mass != 0.0
-    more = {"laws.added_mass": added_mass, "laws.lift": forces, "laws.viscous_stress": forces}
+    more = {"laws.added_mass": added_mass, "laws.lift": forces, "laws.viscous_stress": forces, "laws.surface": surface}
     case = suspension(**{"laws.model": model, "fluid.viscosity": viscosity} | more)
     simulation = stirred(case)
     particles = simulation.particles
@@ -180,14 +184,15 @@ def test_rest_stays_rest() -> None:
     assert np.abs(simulation.particles.velocity).max() < 1e-10 * math.sqrt(9.81 * 0.02)
 
 
-def test_stiff_drag_is_stable_and_right() -> None:
+@pytest.mark.parametrize("surface", ["smeared", "sharp"])
+def test_stiff_drag_is_stable_and_right(surface: str) -> None:
     """50 um spheres in syrup, beta dt/(eps rho) of 1e4: at once at the balance of weight and drag."""
     case = suspension(
         **{
             "fluid.viscosity": 1.0,
             "column": {"width": 0.5e-3, "height": 1e-3, "cell": 0.125e-3, "sides": "periodic", "ends": "periodic"},
             "bed": {"diameter": 50e-6, "count": 1200, "start": "suspended"},
-            "laws": {"lubrication": "none", "drag": "wen_yu", "self_disturbance_correction": False},
+            "laws": {"lubrication": "none", "drag": "wen_yu", "self_disturbance_correction": False, "surface": surface},
             "run": {"until": 1.0, "particle_step": 2e-5, "fluid_step": 1e-3, "reference_speed": 1e-6},
         }
     )

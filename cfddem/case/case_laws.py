@@ -100,6 +100,11 @@ class CaseLaws(Checked):
     kernel_width: float = Field(
         1.5, ge=0, description="standard deviation of the filter kernel over the mean diameter [-]"
     )
+    surface: Literal["smeared", "sharp"] = Field(
+        "smeared",
+        description="what particles at the surface of a bed see: smeared by the kernel, or sharp, the suspension that "
+        "they belong to; model A only",
+    )
     self_disturbance_correction: bool = Field(
         True, description="remove the disturbance that each particle causes at its own position from the sampled flow"
     )
@@ -133,6 +138,12 @@ class CaseLaws(Checked):
     @classmethod
     def _contact_is_installed(cls, value: str, about: ValidationInfo) -> str:
         return _installed("contact", value, about)
+
+    @model_validator(mode="after")
+    def _surfaces_are_sharp_in_model_a(self) -> CaseLaws:
+        if self.surface == "sharp" and self.model == "B":
+            raise InputError("surface", self.surface, "smeared in model B", 'take laws.model = "A"')
+        return self
 
     @model_validator(mode="after")
     def _contact_exists(self) -> CaseLaws:

@@ -20,6 +20,7 @@ import numpy as np
 from cfddem.coupling.force_list import ForceList
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler
+from cfddem.coupling.sharp_flow import SharpFlowSampler
 from cfddem.coupling.terms import CouplingTerms, inertia, total
 from cfddem.coupling.transfer import Transfer
 from cfddem.data.fields import Field
@@ -60,7 +61,9 @@ class Coupling:
         forces: Iterable[FluidForce],
     ) -> None:
         forces = list(forces)
-        self.fluid, self.kernel, self.flow = fluid, kernel, FlowSampler.of_forces(fluid, kernel, forces)
+        self.fluid, self.kernel = fluid, kernel
+        sampler = SharpFlowSampler if any(force.sharp for force in forces) else FlowSampler
+        self.flow = sampler.of_forces(fluid, kernel, forces)
         owned = particles.without_ghosts()
         cell_map = kernel.map_particles(owned.position, owned.radius)
         fluid.set_voidage(1.0 - kernel.solid_fraction(cell_map))
@@ -98,7 +101,7 @@ class Coupling:
         cell_map = self.kernel.map_particles(self._mapped_position(particles, step), particles.radius)
         terms = self._terms(particles, cell_map, step)
         self.forces.act(terms)
-        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen)
+        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen, terms.sent)
         if terms.on_fluid:
             terms.source = self._source(cell_map, total(terms.on_fluid, terms.unseen))
         return terms

@@ -71,16 +71,20 @@ class FilterKernel:
     periodic      whether x, y, z are periodic
     mapping       "linear", "centroid" or "divided", see `MAPPINGS`
     smoothing     standard deviation of the whole kernel [m]; 0 for the mapping alone
+    twice         whether this is that of a deposit and a gather together, both with the mapping
+    parts         into how many the cells of the fluid are divided along x, y, z
     communicator  of the run
     """
 
     def __init__(
         self,
         grid: Grid,
-        periodic: Sequence[bool],
+        periodic: Sequence[bool] | np.ndarray,
         *,
         mapping: str = "linear",
         smoothing: float = 0.0,
+        twice: bool = False,
+        parts: Sequence[int] = (1, 1, 1),
         communicator: Communicator = SERIAL,
     ) -> None:
         if mapping not in MAPPINGS:
@@ -88,10 +92,11 @@ class FilterKernel:
         if not (np.isfinite(smoothing) and smoothing >= 0.0):
             raise InputError("kernel width", smoothing, "zero or positive, in m")
         self.grid, self.mapping, self.smoothing, self.communicator = grid, mapping, float(smoothing), communicator
-        self._periodic = np.array(periodic, bool)
+        self.twice = twice
+        self.periodic = np.array(periodic, bool)
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
-        self.reach = Reach(grid, periodic)
+        self.reach = Reach(grid, periodic, parts)
         self._origin, self._inverse = self.reach.origin, 1.0 / np.array(grid.spacing)
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
         self._buffers: dict[int, Array] = {}
@@ -106,6 +111,7 @@ class FilterKernel:
         """Number of sweeps, and strength of each along x, y, z, that widen the mapping to the whole kernel."""
         spacing = np.array(self.grid.spacing)
         own = spacing**2 / 6.0  # mean variance of the linear mapping, twice that of a point within its cell
+        own *= 1.0 + self.twice
         missing = np.maximum(self.smoothing**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
         total = missing / (2.0 * spacing**2)
         sweeps = math.ceil(2.0 * float(total.sum()) - 1e-9)  # local: three directions
@@ -125,13 +131,13 @@ class FilterKernel:
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""
         size, origin = np.array(self.grid.whole.size), np.array(self.grid.whole.origin)
-        inside: Array = position - self._periodic * size * np.floor((position - origin) / size)
+        inside: Array = position - self.periodic * size * np.floor((position - origin) / size)
         return inside
 
     def nearest(self, way: Array) -> Array:
         """The shortest of the ways that are equal along periodic directions (N, 3) [m]."""
         size = np.array(self.grid.whole.size)
-        shortest: Array = way - self._periodic * size * np.round(way / size)
+        shortest: Array = way - self.periodic * size * np.round(way / size)
         return shortest
 
     def stencil(self, position: Array, radius: Array) -> Stencil:
@@ -157,6 +163,12 @@ class FilterKernel:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
         values = np.empty((len(stencil.first), len(fields)))
         loops.gather(*stencil, self._corners, self._layered(fields), values)
+        return values
+
+    def gather_with_slope(self, stencil: Stencil, field: Array) -> Array:
+        """As `gather`, of one field (nz, ny, nx), and the derivatives of this value along x, y, z (N, 4)."""
+        values = np.empty((len(stencil.first), 4))
+        loops.gather_with_slope(*stencil, self._corners, self._layered(field[None]), self._inverse, values)
         return values
 
     def gather_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, fields: Array) -> Array:
@@ -214,7 +226,7 @@ class FilterKernel:
         if grid.whole is not grid:
             raise InputError("solid_flux", None, "computed in a run of one process")
         moved = new.position - old.position
-        moved -= self._periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
+        moved -= self.periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
         farthest = self.communicator.largest(np.abs(moved * self._inverse), default=0.0)
         if farthest >= 1.0:
             raise InputError(
@@ -226,7 +238,7 @@ class FilterKernel:
         volume = new.volume
         loops.carry_all(
             old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
-            self._periodic, *flux,
+            self.periodic, *flux,
         )  # fmt: skip
         change = self.halo.padded(self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None]))
         other, passed = np.empty_like(change), np.zeros_like(change)
@@ -249,7 +261,7 @@ class FilterKernel:
         through = self.strength[axis] * self._gates[axis] * (np.roll(passed, 1, axis=at) - passed)
         out = np.moveaxis(flux, at, 0)
         out[:-1] += np.moveaxis(self.halo.inner(through), at, 0)
-        out[-1] = out[0] if self._periodic[axis] else out[-1]
+        out[-1] = out[0] if self.periodic[axis] else out[-1]
 
 
 def _pieces(count: int) -> Array:

@@ -176,6 +176,29 @@ def _add_mean(n, share, weights, cells, fields, values):
 
 
 @threaded
+def gather_with_slope(first, shares, corners, field, inverse, values):
+    """Weighted mean of a field (cells, 1) around every particle, and its derivatives along x, y, z [1/m]: (N, 4)."""
+    part = 1.0 / first.shape[1]
+    for n in prange(len(values)):
+        for m in range(4):
+            values[n, m] = 0.0
+        for s in range(first.shape[1]):
+            a, b, c, cells = shares[n, s, 0], shares[n, s, 1], shares[n, s, 2], _cells(first[n, s], corners)
+            values[n, 0] += part * _mean(_weights(n, s, shares), cells, field, 0)
+            for up in range(2):  # b and c, a and c, a and b are the shares across x, y, z
+                for right in range(2):
+                    across = part * (c if up else 1.0 - c) * (b if right else 1.0 - b)
+                    at = 4 * up + 2 * right
+                    values[n, 1] += across * inverse[0] * (field[cells[at + 1], 0] - field[cells[at], 0])
+                    across = part * (c if up else 1.0 - c) * (a if right else 1.0 - a)
+                    at = 4 * up + right
+                    values[n, 2] += across * inverse[1] * (field[cells[at + 2], 0] - field[cells[at], 0])
+                    across = part * (b if up else 1.0 - b) * (a if right else 1.0 - a)
+                    at = 2 * up + right
+                    values[n, 3] += across * inverse[2] * (field[cells[at + 4], 0] - field[cells[at], 0])
+
+
+@threaded
 def gather_over_steps(earlier, shares_earlier, last, shares_last, now, shares_now, corners, fields, values):
     """As `gather`, the mean of particles at three places, with the weights 1/4, 1/2 and 1/4."""
     quarter = 0.25 / now.shape[1]

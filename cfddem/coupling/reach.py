@@ -37,15 +37,16 @@ class Reach:
 
     grid      cells of the rank
     periodic  whether x, y, z are periodic
+    parts     into how many the cells of the fluid are divided along x, y, z
 
     Attributes: `shape` (nz, ny, nx), ghosts included; `origin`, lowest corner of these cells [m].
     """
 
-    def __init__(self, grid: Grid, periodic: Sequence[bool] | np.ndarray) -> None:
+    def __init__(self, grid: Grid, periodic: Sequence[bool] | np.ndarray, parts: Sequence[int] = (1, 1, 1)) -> None:
         self.grid, self.periodic, self.borders = grid, np.array(periodic, bool), grid.borders(periodic)
         self._ghosts = np.zeros(3, np.int64)
         for each in self.borders:
-            self._ghosts[each.axis] = LAYERS
+            self._ghosts[each.axis] = LAYERS * parts[each.axis]
         nx, ny, nz = (int(n) for n in np.array(grid.cells) + 2 * self._ghosts)
         self.shape = (nz, ny, nx)
         self.origin = np.array(grid.origin) - self._ghosts * np.array(grid.spacing)
@@ -99,10 +100,11 @@ class Reach:
             below = 0.0 if each.below is None else np.max(begin - place + around, initial=0.0)  # local: own particles
             above = 0.0 if each.above is None else np.max(place - end + around, initial=0.0)  # local: own particles
             farthest = max(float(below), float(above))
-            if not farthest <= (LAYERS - 0.5) * h:
+            layers = int(self._ghosts[axis])
+            if not farthest <= (layers - 0.5) * h:
                 raise RunFailed(
                     f"a particle reaches {farthest / h:.3g} cells beyond the cells of its rank, must be at most "
-                    f"{LAYERS - 0.5}; take larger cells, or a smaller run.fluid_step"
+                    f"{layers - 0.5}; take larger cells, or a smaller run.fluid_step"
                 )
         return position
 
@@ -112,7 +114,7 @@ class Reach:
         fields  on the cells of this rank and its ghosts; ghosts are added to the cells that they stand for
         """
         for each in self.borders:
-            each.add(fields, LAYERS)
+            each.add(fields, int(self._ghosts[each.axis]))
         return fields if not self.borders else np.ascontiguousarray(self._inner(fields))
 
     def spread(self, fields: Array) -> Array:
@@ -122,7 +124,8 @@ class Reach:
         made = np.zeros((len(fields), *self.shape))
         self._inner(made)[:] = fields
         for each in self.borders:
-            each.fill(made, LAYERS, LAYERS)
+            layers = int(self._ghosts[each.axis])
+            each.fill(made, layers, layers)
         return made
 
     def _inner(self, fields: Array) -> Array:

@@ -20,20 +20,30 @@ class SampledFlow(NamedTuple):
     """The undisturbed flow around every particle."""
 
     slip: Array  # u - v (N, 3) [m/s]
-    disturbance: Array  # self-disturbance in the gathered velocity (N, 3) [m/s]
+    unseen: Array  # part of the gathered velocity that does not act: the self-disturbance (N, 3) [m/s]
     voidage: Array  # (N,)
     reynolds: Array  # of the superficial slip (N,)
     others: Array  # number of other particles per volume (N,) [1/m3]
     diameter_ratio: Array  # diameter over the Sauter mean of the particles around (N,)
+    narrowing: Array | float = 1.0  # slip over gathered velocity less unseen part and v (N,) [-]
+    solid: Array | float = 0.0  # solid fraction of the others at the end of the step (N,) [-]
+    company: Array | float = 1.0  # share of the others in the solids of the cells around (N,) [-]
 
 
-Own = Callable[[Particles, ParticleCellMap], tuple[Array, Array]]
-"""What every particle adds to the flow: modes of its disturbance (N, modes, 3) [m/s], and solid fraction (N,)."""
+class Own(NamedTuple):
+    """What every particle adds to the flow."""
+
+    modes: Array  # of its disturbance (N, modes, 3) [m/s]
+    solid: Array  # solid fraction that it gathers from the cells (N,) [-]
+    seen: Array  # solid fraction that it sees, where surfaces are sharp (N,) [-]
 
 
-def nothing_of_its_own(particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
+def nothing_of_its_own(particles: Particles, cell_map: ParticleCellMap) -> Own:
     """No modes, and no solid fraction: the flow is sampled as it is."""
-    return np.zeros((particles.count, 0, 3)), np.zeros(particles.count)
+    return Own(np.zeros((particles.count, 0, 3)), np.zeros(particles.count), np.zeros(particles.count))
+
+
+Sampled = Callable[[Particles, ParticleCellMap], Own]
 
 
 class FlowSampler:
@@ -45,7 +55,9 @@ class FlowSampler:
     sizes   whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
     """
 
-    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, own: Own = nothing_of_its_own, sizes: bool = False):
+    def __init__(
+        self, fluid: FluidSolver, kernel: FilterKernel, own: Sampled = nothing_of_its_own, sizes: bool = False
+    ):
         self.fluid, self.kernel, self.own, self.sizes = fluid, kernel, own, sizes
 
     @classmethod
@@ -64,11 +76,11 @@ class FlowSampler:
         mean   the same in the middle of the step, which particles see; `solid` if None
         """
         gathered = self._gathered(cell_map, solid if mean is None else mean)
-        modes, own = self.own(particles, cell_map)
+        own = self.own(particles, cell_map)
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
         _sample(
-            gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, modes, own,
+            gathered, cell_map.volume, particles.radius, particles.velocity, particles.viscosity, own.modes, own.solid,
             self.fluid.density, slip, disturbance, voidage, reynolds, others,
         )  # fmt: skip
         ratio = self._diameter_ratio(particles, cell_map, solid)

@@ -28,8 +28,10 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.sampled_flow import Own
+from cfddem.coupling.seen_solids import cells_of
 from cfddem.coupling.self_disturbance_tables import MODES, PER_DECADE, tables
-from cfddem.coupling.self_disturbance_walls import WallsOfGrid
+from cfddem.coupling.self_disturbance_walls import OwnSolids, WallsOfGrid, at_shares, shares_in_cell
 from cfddem.coupling.terms import CouplingTerms, total
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -47,32 +49,38 @@ DISTURBANCE = Field(
 class SelfDisturbance(FluidForce):
     """Disturbance of every particle by its own force and volume.
 
-    fluid   the fluid solver
-    kernel  of the run; its tables are found once for each grid
-    walls   of the grid that stop the disturbance, where a law of the drag beside walls acts; None for none
+    fluid         the fluid solver
+    kernel        of the run; its tables are found once for each grid
+    beside_walls  whether a law of the drag beside walls acts, so that walls of the grid stop the disturbance
+    sharp         whether the surfaces of beds are sharp
     """
 
     name, fields = "self_disturbance", (DISTURBANCE,)
 
-    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, walls: WallsOfGrid | None = None) -> None:
-        grid, self.fluid, self._walls = kernel.grid, fluid, walls
+    def __init__(
+        self, fluid: FluidSolver, kernel: FilterKernel, beside_walls: bool = False, sharp: bool = False
+    ) -> None:
+        grid, self.fluid = kernel.grid, fluid
+        walls = fluid.boundaries if beside_walls else None
+        self._in_cells = OwnSolids(kernel, 2 if sharp else 1, walls)
+        self._seen = OwnSolids(cells_of(kernel), 1, walls) if sharp else None
+        self._walls = WallsOfGrid(kernel, fluid.boundaries) if beside_walls else None
         self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
         self._tables = tables(kernel)
 
-    def own(self, particles: Particles, cell_map: ParticleCellMap) -> tuple[Array, Array]:
-        """What every particle gathers of its own: modes (N, modes, 3) [m/s], and solid fraction (N,) [-]."""
-        modes, solid = particles[DISTURBANCE.name], np.empty(len(cell_map.volume))
-        _self_solid_fraction(cell_map.position, cell_map.volume, self._tables.solid, *self._cell, solid)
-        if self._walls is None:
-            return modes, solid
-        left = self._walls.left(cell_map)
-        return modes * left.flow, solid * left.solid
+    def own(self, particles: Particles, cell_map: ParticleCellMap) -> Own:
+        """What every particle gathers of its own."""
+        modes = particles[DISTURBANCE.name]
+        left = modes if self._walls is None else modes * self._walls.left(cell_map.position)
+        in_cells = self._in_cells.of(cell_map)
+        return Own(left, in_cells, in_cells if self._seen is None else self._seen.of(cell_map))
 
     def end(self, terms: CouplingTerms) -> None:
         """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""
         if self.fluid.viscous:
             on_slip = total({line: terms.force(line) for line in terms.conductances}, terms.force("drag"))
-            screening = terms.conductance("drag") * terms.flow.others / (self.fluid.density * terms.flow.voidage)
+            drag = terms.conductance("drag") - terms.withheld
+            screening = drag * terms.flow.others / (self.fluid.density * terms.flow.voidage)
             self.advance(
                 terms.particles, terms.cell_map, terms.flow.slip, on_slip, screening, self.fluid.density, terms.step
             )
@@ -94,38 +102,11 @@ class SelfDisturbance(FluidForce):
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         density    of the fluid [kg/m3]
         """
-        left = np.empty((0, 0, 3)) if self._walls is None else self._walls.left(cell_map).flow
+        left = np.empty((0, 0, 3)) if self._walls is None else self._walls.left(cell_map.position)
         _build_up(
-            cell_map.position, *self._cell, drag, slip, screening, *self._tables[1:], density, particles.viscosity,
+            cell_map.position, *self._cell, drag, slip, screening, *self._tables, density, particles.viscosity,
             step, left, particles.disturbance_modes,
         )  # fmt: skip
-
-
-@inline
-def _shares(n, position, origin, inverse, linear):
-    """Along x, y, z, the share that a particle gathers from the neighbours of the cells on which it has deposited."""
-    x = (position[n, 0] - origin[0]) * inverse[0] - 0.5
-    y = (position[n, 1] - origin[1]) * inverse[1] - 0.5
-    z = (position[n, 2] - origin[2]) * inverse[2] - 0.5
-    a, b, c = linear * (x - math.floor(x)), linear * (y - math.floor(y)), linear * (z - math.floor(z))
-    return 2.0 * a * (1.0 - a), 2.0 * b * (1.0 - b), 2.0 * c * (1.0 - c)
-
-
-@inline
-def _at_shares(table, shares):
-    """A table (2, 2, 2) by distance in cells between deposit and gather, averaged with these shares."""
-    a, b, c = shares
-    near = (1.0 - b) * ((1.0 - a) * table[0, 0, 0] + a * table[0, 0, 1])
-    near += b * ((1.0 - a) * table[0, 1, 0] + a * table[0, 1, 1])
-    far = (1.0 - b) * ((1.0 - a) * table[1, 0, 0] + a * table[1, 0, 1])
-    far += b * ((1.0 - a) * table[1, 1, 0] + a * table[1, 1, 1])
-    return (1.0 - c) * near + c * far
-
-
-@threaded
-def _self_solid_fraction(position, volume, table, origin, inverse, linear, own):
-    for n in prange(len(volume)):
-        own[n] = volume[n] * _at_shares(table, _shares(n, position, origin, inverse, linear))
 
 
 @inline
@@ -133,7 +114,7 @@ def _steady(moving, slowest, wave_number, shares):
     """Steady velocity times viscosity per force [1/m] at U/nu [1/m], interpolated in logarithms."""
     place = max(PER_DECADE * math.log10(max(wave_number, slowest) / slowest), 0.0)
     node = min(int(place), len(moving) - 2)
-    low, high = _at_shares(moving[node], shares), _at_shares(moving[node + 1], shares)
+    low, high = at_shares(moving[node], shares), at_shares(moving[node + 1], shares)
     return low * (high / low) ** (place - node)
 
 
@@ -146,20 +127,20 @@ def _build_up(
     modes = rates.shape[1]
     for n in prange(len(position)):
         diffusivity = viscosity[n] / density
-        shares = _shares(n, position, origin, inverse, linear)
+        shares = shares_in_cell(n, position, origin, inverse, linear)
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
         for d in range(3):
             at_rest = 0.0
             for k in range(modes):
-                at_rest += _at_shares(flow[d, k], shares)
-            square = 0.5 * at_rest / _at_shares(start[d], shares)
+                at_rest += at_shares(flow[d, k], shares)
+            square = 0.5 * at_rest / at_shares(start[d], shares)
             decay = wake_decay(speed * math.sqrt(square) / diffusivity) / square
             total = 0.0
             for k in range(modes):
-                total += _at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
+                total += at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
             scale = -_steady(moving[d], slowest, speed / diffusivity, shares) / total * drag[n, d] / viscosity[n]
             for k in range(modes):
-                steady = scale * _at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
+                steady = scale * at_shares(flow[d, k], shares) * rates[d, k] / (rates[d, k] + decay)
                 rate = diffusivity * (rates[d, k] + decay)
                 remaining = math.exp(-step * (rate + screening[n]))
                 steady *= rate / (rate + screening[n])

@@ -31,7 +31,6 @@ class Tables(NamedTuple):
     Velocities are those along a force in the directions x, y, z, per force and times the viscosity.
     """
 
-    solid: Array  # solid fraction per volume of the particle (2, 2, 2) [1/m3]
     flow: Array  # steady velocity of every mode of a particle at rest (3, MODES, 2, 2, 2) [1/m]
     rates: Array  # of the modes, over the kinematic viscosity (3, MODES) [1/m2]
     start: Array  # first acceleration, times density and not viscosity (3, 2, 2, 2) [1/m3]
@@ -51,16 +50,44 @@ def spacing_of(kernel: FilterKernel) -> tuple[float, ...]:
     return tuple(np.where(flat, spacing[~flat].min() if (~flat).any() else spacing[0], spacing))
 
 
+class Waves:
+    """The waves of a lattice of cells.
+
+    spacing   of the cells along x, y, z [m]
+    strength  of each sweep of the kernel's second stage along x, y, z
+    """
+
+    def __init__(self, spacing: tuple[float, ...], strength: tuple[float, ...]) -> None:
+        self.counts = np.rint(CELLS * max(spacing) / np.array(spacing)).astype(int)
+        grid = np.meshgrid(*(2.0 * np.pi * np.fft.fftfreq(n) for n in self.counts[::-1]), indexing="ij")
+        self.waves: list[Array] = list(grid[::-1])
+        self.steps = [2.0 * np.sin(0.5 * wave) / h for wave, h in zip(self.waves, spacing)]
+        diffused = sum(a * (h * step) ** 2 for a, h, step in zip(strength, spacing, self.steps))
+        self.sweep: Array = np.asarray(1.0 - diffused)
+        near = [np.cos(sum(n * wave for n, wave in zip(apart[::-1], self.waves))) for apart in np.ndindex(2, 2, 2)]
+        self._near = np.stack(near).reshape(8, -1) / (self.sweep.size * float(np.prod(spacing)))
+
+    def gathered(self, symbol: Array) -> Array:
+        """Response of a cell to one that lies 0 or 1 apart along z, y, x, per volume (2, 2, 2)."""
+        values: Array = (self._near @ symbol.ravel()).reshape(2, 2, 2)
+        return values
+
+
+@lru_cache(maxsize=16)
+def solid_table(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Array:
+    """Solid fraction per volume of a particle in its cell, and in a neighbour of the cell (2, 2, 2) [1/m3]."""
+    lattice = Waves(spacing, strength)
+    return lattice.gathered(lattice.sweep**sweeps)
+
+
 @lru_cache(maxsize=16)
 def tables_of(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Tables:
     """Sums over the waves of a lattice; the flow of its periodic images is subtracted in the mean."""
-    counts = np.rint(CELLS * max(spacing) / np.array(spacing)).astype(int)
-    waves = np.meshgrid(*(2.0 * np.pi * np.fft.fftfreq(n) for n in counts[::-1]), indexing="ij")[::-1]
-    steps = [2.0 * np.sin(0.5 * wave) / h for wave, h in zip(waves, spacing)]
-    laplacian = sum(step**2 for step in steps)
+    lattice = Waves(spacing, strength)
+    counts, waves, steps, gathered = lattice.counts, lattice.waves, lattice.steps, lattice.gathered
+    laplacian = np.asarray(sum(step**2 for step in steps))
     laplacian[0, 0, 0] = np.inf
-    smoothing = 1.0 - sum(a * (h * step) ** 2 for a, h, step in zip(strength, spacing, steps))
-    kernel = smoothing**sweeps
+    kernel = lattice.sweep**sweeps
     pitch = float(np.cbrt(np.prod(counts * spacing)))
     images = _PERIODIC_STOKES / (6.0 * math.pi * pitch)
     wide = pitch / (math.sqrt(math.pi) * _PERIODIC_STOKES)  # width of the Gaussian with the same velocity per force
@@ -68,13 +95,6 @@ def tables_of(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: i
     speeds = SLOWEST / min(spacing) * 10.0 ** (np.arange(DECADES * PER_DECADE + 1) / PER_DECADE)
     flow, moving, start = np.empty((3, MODES, 2, 2, 2)), np.empty((3, len(speeds), 2, 2, 2)), np.empty((3, 2, 2, 2))
     rates = np.empty((3, MODES))
-
-    near = np.stack([np.cos(sum(n * wave for n, wave in zip(apart[::-1], waves))) for apart in np.ndindex(2, 2, 2)])
-    near = near.reshape(8, -1) / (laplacian.size * float(np.prod(spacing)))
-
-    def gathered(symbol: Array) -> Array:
-        values: Array = (near @ symbol.ravel()).reshape(2, 2, 2)
-        return values
 
     for d in range(3):
         # half of the force of a cell acts on each of its faces; a cell gathers the mean of its faces
@@ -88,7 +108,7 @@ def tables_of(spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: i
         for n, speed in enumerate(speeds):
             remaining = _remaining(waves[d] / spacing[d], 2.0 * np.pi / (counts[d] * spacing[d]), laplacian, speed)
             moving[d, n] = gathered(steady * remaining) + images * oseen_share(speed * wide)
-    return Tables(gathered(kernel), flow, rates, start, float(speeds[0]), moving)
+    return Tables(flow, rates, start, float(speeds[0]), moving)
 
 
 def _modes(laplacian: Array) -> Array:

@@ -19,6 +19,7 @@ it is gathered.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -26,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 
-from cfddem.backend.compile import prange, threaded
+from cfddem.backend.compile import inline, prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.self_disturbance_tables import CELLS, MODES, Tables, mode_of, spacing_of, tables_of
+from cfddem.coupling.self_disturbance_tables import CELLS, MODES, mode_of, solid_table, spacing_of, tables_of
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import Array
 
@@ -39,11 +40,13 @@ FARTHEST = 5
 """Last tabulated distance in cells; beyond it the effect of the wall falls as the inverse distance."""
 
 
-class WallShares(NamedTuple):
-    """Shares of the self-disturbance that are left beside a wall, by distance from it."""
+class _Side(NamedTuple):
+    """A side of the grid that stops the self-disturbance."""
 
-    flow: Array  # of every mode of a force along x, y, z (places, MODES, 3) [-]
-    solid: Array  # own solid fraction over that far from walls (places,) [-]
+    axis: int
+    place: float  # [m]
+    inward: float  # 1 or -1 per spacing of the cells [1/m]
+    slips: bool  # whether the fluid slips along it
 
 
 class WallsOfGrid:
@@ -54,44 +57,122 @@ class WallsOfGrid:
     """
 
     def __init__(self, kernel: FilterKernel, boundaries: Boundaries) -> None:
-        grid = kernel.grid.whole
-        self._sides = []
-        for side in boundaries.box.sides:
-            if grid.cells[side.axis] > 1 and not side.outlet.any():  # local: every rank has the whole box
-                slips = bool((side.mirror > 0.0).all())  # local: likewise
-                shares = shares_beside(side.axis, slips, spacing_of(kernel), tuple(kernel.strength), kernel.sweeps)
-                place = grid.origin[side.axis] + (grid.size[side.axis] if side.high else 0.0)
-                self._sides.append((side.axis, place, side.inward / grid.spacing[side.axis], shares))
+        lattice = spacing_of(kernel), tuple(kernel.strength), kernel.sweeps
+        self._sides = [(side, flow_beside(side.axis, side.slips, *lattice)) for side in _sides(kernel, boundaries)]
 
-    def left(self, cell_map: ParticleCellMap) -> WallShares:
-        """What the walls leave to particles: root of the share of their modes (N, MODES, 3), share of solids (N,)."""
-        count = len(cell_map.position)
-        left = WallShares(np.ones((count, MODES, 3)), np.ones(count))
-        for axis, place, inward, shares in self._sides:
-            _leave(cell_map.position, axis, place, inward, *shares, *left)
-        return left._replace(flow=np.sqrt(left.flow))
+    def left(self, position: Array) -> Array:
+        """Root of the share of the modes of particles at these places (N, 3) [m] that the walls leave (N, MODES, 3)."""
+        left = np.ones((len(position), MODES * 3))
+        for side, shares in self._sides:
+            _leave(position, side.axis, side.place, side.inward, shares.reshape(len(shares), -1), left)
+        return np.sqrt(left).reshape(-1, MODES, 3)
+
+
+class OwnSolids:
+    """The solid fraction that particles gather of their own volume.
+
+    kernel      of the run
+    passes      how often the gathered volume has passed the second stage of the kernel: 1 or 2
+    boundaries  of the fluid, whose walls throw it back; None to leave them out
+    """
+
+    def __init__(self, kernel: FilterKernel, passes: int, boundaries: Boundaries | None) -> None:
+        lattice = spacing_of(kernel), tuple(kernel.strength), passes * kernel.sweeps
+        self._cell = (
+            np.array(kernel.grid.origin),
+            1.0 / np.array(kernel.grid.spacing),
+            float(kernel.mapping == "linear"),
+        )
+        self._table, sides = solid_table(*lattice), [] if boundaries is None else _sides(kernel, boundaries)
+        self._sides = [(side, solid_beside(side.axis, *lattice)) for side in sides]
+
+    def of(self, cell_map: ParticleCellMap) -> Array:
+        """Of every particle (N,) [-]."""
+        own = np.empty((len(cell_map.volume), 1))
+        _own_solids(cell_map.position, cell_map.volume, self._table, *self._cell, own)
+        for side, shares in self._sides:
+            _leave(cell_map.position, side.axis, side.place, side.inward, shares[:, None], own)
+        return own[:, 0]
+
+
+def _sides(kernel: FilterKernel, boundaries: Boundaries) -> Iterator[_Side]:
+    """The sides that stop the self-disturbance, among the cells of a kernel."""
+    grid = kernel.grid.whole
+    for side in boundaries.box.sides:
+        if grid.cells[side.axis] > 1 and not side.outlet.any():  # local: every rank has the whole box
+            slips = bool((side.mirror > 0.0).all())  # local: likewise
+            place = grid.origin[side.axis] + (grid.size[side.axis] if side.high else 0.0)
+            yield _Side(side.axis, place, side.inward / grid.spacing[side.axis], slips)
+
+
+@inline
+def shares_in_cell(n, position, origin, inverse, linear):
+    """Along x, y, z, the share that a particle gathers from the neighbours of the cells on which it has deposited."""
+    x = (position[n, 0] - origin[0]) * inverse[0] - 0.5
+    y = (position[n, 1] - origin[1]) * inverse[1] - 0.5
+    z = (position[n, 2] - origin[2]) * inverse[2] - 0.5
+    a, b, c = linear * (x - math.floor(x)), linear * (y - math.floor(y)), linear * (z - math.floor(z))
+    return 2.0 * a * (1.0 - a), 2.0 * b * (1.0 - b), 2.0 * c * (1.0 - c)
+
+
+@inline
+def at_shares(table, shares):
+    """A table (2, 2, 2) by distance in cells between deposit and gather, averaged with these shares."""
+    a, b, c = shares
+    near = (1.0 - b) * ((1.0 - a) * table[0, 0, 0] + a * table[0, 0, 1])
+    near += b * ((1.0 - a) * table[0, 1, 0] + a * table[0, 1, 1])
+    far = (1.0 - b) * ((1.0 - a) * table[1, 0, 0] + a * table[1, 0, 1])
+    far += b * ((1.0 - a) * table[1, 1, 0] + a * table[1, 1, 1])
+    return (1.0 - c) * near + c * far
 
 
 @threaded
-def _leave(position, axis, place, inward, flow, solid, modes, own):
-    """Multiply the shares of modes and of own solid fractions by those at the distance of every particle."""
-    last = len(solid) - 1
+def _own_solids(position, volume, table, origin, inverse, linear, own):
+    for n in prange(len(volume)):
+        own[n, 0] = volume[n] * at_shares(table, shares_in_cell(n, position, origin, inverse, linear))
+
+
+@threaded
+def _leave(position, axis, place, inward, shares, left):
+    """Multiply values of every particle (N, m) by the shares of a wall (places, m) at its distance."""
+    last = len(shares) - 1
     for n in prange(len(position)):
         away = max((position[n, axis] - place) * inward, 0.0) * PLACES
         row, beyond = min(int(away), last - 1), max(away / last, 1.0)
         part = min(away - row, 1.0)
-        own[n] *= 1.0 + (solid[row] + part * (solid[row + 1] - solid[row]) - 1.0) / beyond
-        for k in range(modes.shape[1]):
-            for d in range(3):
-                share = flow[row, k, d] + part * (flow[row + 1, k, d] - flow[row, k, d])
-                modes[n, k, d] *= 1.0 + (share - 1.0) / beyond
+        for m in range(left.shape[1]):
+            share = shares[row, m] + part * (shares[row + 1, m] - shares[row, m])
+            left[n, m] *= 1.0 + (share - 1.0) / beyond
 
 
 @lru_cache(maxsize=16)
-def shares_beside(
-    axis: int, slips: bool, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int
-) -> WallShares:
-    """Shares beside a wall.
+def solid_beside(axis: int, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Array:
+    """Own solid fraction beside a wall, by distance from it, over that far from walls (places,) [-]; see
+    `flow_beside`."""
+    counts = np.rint(CELLS * max(spacing) / np.array(spacing)).astype(int)
+    across, normal = [d for d in range(3) if d != axis], _Normal(int(counts[axis]), spacing[axis], True)
+    solid = np.zeros(len(normal.weights))
+    for _, squares, weight in _waves_along(across, counts, spacing):
+        smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * each for each, e in zip(squares, across))
+        given = normal.smoothed(smoothing, strength[axis], sweeps)
+        solid += weight * (given * normal.weights).sum(axis=1)  # local: of a table
+    return solid / _alone(solid_table(spacing, strength, sweeps), len(solid), axis)
+
+
+def _waves_along(
+    across: list[int], counts: Array, spacing: tuple[float, ...]
+) -> Iterator[tuple[list[float], list[float], float]]:
+    """Waves along a wall: phase over a cell, squares of the wave number [1/m2], and weight in the sum [1/m3]."""
+    for numbers in product(*(range(counts[e] // 2 + 1) for e in across)):
+        waves = [2.0 * math.pi * n / counts[e] for n, e in zip(numbers, across)]
+        squares = [(2.0 * math.sin(0.5 * wave) / spacing[e]) ** 2 for wave, e in zip(waves, across)]
+        weight = math.prod(1.0 if 2 * n in (0, counts[e]) else 2.0 for n, e in zip(numbers, across))
+        yield waves, squares, weight / (math.prod(int(counts[e]) for e in across) * math.prod(spacing))
+
+
+@lru_cache(maxsize=16)
+def flow_beside(axis: int, slips: bool, spacing: tuple[float, ...], strength: tuple[float, ...], sweeps: int) -> Array:
+    """Shares of the self-disturbance that are left beside a wall, by distance from it (places, MODES, 3) [-].
 
     axis      of its normal
     slips     whether the fluid slips along it
@@ -104,7 +185,7 @@ def shares_beside(
         min((2.0 * math.sin(math.pi / n) / h) ** 2 for n, h in zip(counts, spacing)),
         sum(4.0 / h**2 for h in spacing),
     )
-    flow, solid = np.zeros((len(normal.weights), MODES, 3)), np.zeros(len(normal.weights))
+    flow = np.zeros((len(normal.weights), MODES, 3))
 
     def add(d: int, driven: Array, rates: Array, weight: float) -> None:
         """Add the flow of eigenvectors that a force along d drives (places, n) at rates over the viscosity (n,)."""
@@ -112,15 +193,10 @@ def shares_beside(
         for k in range(MODES):
             flow[:, k, d] += weight * (driven[:, mode == k] ** 2 / rates[mode == k]).sum(axis=1)  # local: of a table
 
-    for numbers in product(*(range(counts[e] // 2 + 1) for e in across)):
-        waves = [2.0 * math.pi * n / counts[e] for n, e in zip(numbers, across)]
-        squares = [(2.0 * math.sin(0.5 * wave) / spacing[e]) ** 2 for wave, e in zip(waves, across)]
+    for waves, squares, weight in _waves_along(across, counts, spacing):
         square = sum(squares)
-        weight = math.prod(1.0 if 2 * n in (0, counts[e]) else 2.0 for n, e in zip(numbers, across))
-        weight /= math.prod(int(counts[e]) for e in across) * math.prod(spacing)
         smoothing = 1.0 - sum(strength[e] * spacing[e] ** 2 * each for each, e in zip(squares, across))
         given = normal.smoothed(smoothing, strength[axis], sweeps)
-        solid += weight * (given * normal.weights).sum(axis=1)  # local: of a table
         if square > 0.0:
             rates, stream = normal.stokes(square)
             add(axis, math.sqrt(square) * given @ normal.mean @ stream, rates, weight)
@@ -132,22 +208,17 @@ def shares_beside(
             apart = normal.rates + square
             moving = apart > 1e-9 * ends[0]  # all but the fluid as a whole, over a wall without friction
             add(d, (given @ normal.vectors)[:, moving], apart[moving], staggered * (1.0 - share))
-    return _over(flow, solid, free, axis)
+    shares: Array = flow / np.moveaxis(_alone(free.flow, len(flow), axis), 1, 2)
+    return shares
 
 
-def _over(flow: Array, solid: Array, free: Tables, axis: int) -> WallShares:
-    """Flow and solid fraction beside the wall over those far from it, at the same places within a cell."""
-    place = np.arange(len(solid)) / PLACES - 0.5
+def _alone(table: Array, places: int, axis: int) -> Array:
+    """A table by distance between deposit and gather, far from a wall, at the tabulated distances from it."""
+    place = np.arange(places) / PLACES - 0.5
     part = place - np.floor(place)
-    apart = 2.0 * part * (1.0 - part)
-
-    def alone(table: Array) -> Array:
-        """A table by distance between deposit and gather, at all places."""
-        near, far = table[..., 0, 0, 0], np.moveaxis(table, -1 - axis, -3)[..., 1, 0, 0]
-        return near + np.multiply.outer(apart, far - near)
-
-    of_flow = np.moveaxis(alone(free.flow), 1, 2)
-    return WallShares(flow / of_flow, solid / alone(free.solid))
+    near, far = table[..., 0, 0, 0], np.moveaxis(table, -1 - axis, -3)[..., 1, 0, 0]
+    made: Array = near + np.multiply.outer(2.0 * part * (1.0 - part), far - near)
+    return made
 
 
 class _Normal:

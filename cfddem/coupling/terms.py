@@ -32,11 +32,13 @@ class ForceTerms:
 
     A force adds its part of a line of `LINES`:
 
-    resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid
-    fluctuate   a velocity u'' (N, 3) [m/s], added to u in the resistance of a line
+    resist      a conductance b (N,) [kg/s]: the force b (u - v), implicit on particles and fluid. It is stored as
+                that of the slip of the cells, b N
+    fluctuate   a velocity u'' (N, 3) [m/s], added to that of the cells in the resistance of a line
     push        a force on the particles (N, 3) [N]
     pull        a force on the fluid around them (N, 3) [N]
     between     a force on the particles (N, 3) [N], and its opposite on the fluid
+    withhold    a conductance (N,) [kg/s], part of the resistance of which the fluid receives nothing in this step
     """
 
     flow: SampledFlow
@@ -48,12 +50,13 @@ class ForceTerms:
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
+        self.withheld: Array = np.zeros(particles.count)  # [kg/s]
         self.added: Array = np.zeros(particles.count)  # change of the added mass at the start of the step (N,) [kg]
         self.spin_work = 0.0  # kinetic energy that torques of the fluid have given to the particles [J]
 
     def resist(self, line: str, conductance: Array) -> None:
         """Add a resistance to the slip of the particles."""
-        _add(self.conductances, line, conductance)
+        _add(self.conductances, line, conductance * self.flow.narrowing)
 
     def fluctuate(self, line: str, velocity: Array) -> None:
         """Add a fluctuation of the fluid velocity that acts through the resistance of a line."""
@@ -72,14 +75,30 @@ class ForceTerms:
         self.push(line, force)
         self.pull(line, -force)
 
+    def withhold(self, conductance: Array) -> None:
+        """Withhold a part of the resistance from the fluid."""
+        self.withheld = self.withheld + conductance
+
     def conductance(self, line: str) -> Array:
-        """Conductance of a line so far (N,) [kg/s]; zero for a line without resistance."""
+        """Conductance b N of a line so far (N,) [kg/s]; zero for a line without resistance."""
         return self.conductances[line] if line in self.conductances else np.zeros(self.particles.count)
 
     @property
     def resistance(self) -> Array:
-        """Conductance of all lines (N,) [kg/s]."""
+        """Conductance b N of all lines (N,) [kg/s]."""
         return total(self.conductances, np.zeros(self.particles.count))
+
+    @property
+    def sent(self) -> Array:
+        """Share of the force of all resistance that the fluid receives in this step (N,) [-]."""
+        share: Array = 1.0 - self.withheld / np.maximum(self.resistance, 1e-300)
+        return share
+
+    @property
+    def unsent(self) -> Array:
+        """Force of the resistance of which the fluid receives nothing in this step (N, 3) [N]."""
+        force: Array = (1.0 - self.sent)[:, None] * sum(self.implicit_force.values())
+        return force
 
     @property
     def inertia(self) -> Array:
@@ -90,13 +109,13 @@ class ForceTerms:
     def unseen(self) -> Array:
         """Part of the cells' velocity that does not act on every particle (N, 3) [m/s].
 
-        It is the velocity that the particle causes itself, less the fluctuation, which acts through its lines alone.
+        It is what the sampled flow lacks, less the fluctuation, which acts through its lines alone.
         """
-        seen = self.flow.disturbance
+        unseen = self.flow.unseen
         for line, velocity in self.fluctuations.items():
             share = self.conductance(line) / np.maximum(self.resistance, 1e-300)
-            seen = seen - share[:, None] * velocity
-        return seen
+            unseen = unseen - share[:, None] * velocity
+        return unseen
 
     def receive(self, force: Array) -> None:
         """Divide the force of all resistance among its lines, by their conductances and fluctuations (N, 3) [N].

@@ -32,6 +32,7 @@ class ImplicitWork(NamedTuple):
     of_fluctuation: float  # work of that part of the drag [J]
     history: float  # of the implicit part of the history force [J]
     explicit_history: float  # of the rest [J]
+    explicit_drag: float  # of drag and its pressure, of which the fluid receives nothing in the step [J]
     external: float  # of forces from outside on the fluid [J]
 
 
@@ -45,6 +46,7 @@ class ParticleWork(NamedTuple):
     history: float
     history_on_fluid: float  # of the implicit part of the same force at the velocity with which the fluid acts
     explicit_history_on_fluid: float  # of its other part
+    explicit_drag_on_fluid: float  # of the part of drag and its pressure that the fluid receives a step later
     explicit: float  # lift, viscous stress, added mass and wall drag across the slip
     agitation: float  # other forces of agitation
     external: float  # forces from outside, and of a user
@@ -67,7 +69,7 @@ class CouplingWork:
         self.coupling = coupling
         for field in (*FORCES.values(), FLUCTUATING, PRESSURE):
             particles.declare(field)
-        self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0, 0.0)
+        self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0, 0.0, 0.0)
         self._added = 0.0
         self._pressure = np.zeros(0)  # of the cells, smoothed by the kernel (1, nz, ny, nx) [Pa]
 
@@ -102,6 +104,7 @@ class CouplingWork:
             history=work("history"),
             history_on_fluid=self._on_fluid.history,
             explicit_history_on_fluid=self._on_fluid.explicit_history,
+            explicit_drag_on_fluid=self._on_fluid.explicit_drag,
             explicit=work("explicit"),
             agitation=work("agitation"),
             external=work("external"),
@@ -127,10 +130,11 @@ class CouplingWork:
         for line, velocity in terms.fluctuations.items():
             share = terms.conductance(line) / np.maximum(terms.resistance, 1e-300)
             fluctuating = share[:, None] * conductance * velocity
-        none = np.zeros_like(received)
+        none, unsent = np.zeros_like(received), terms.unsent
         return ImplicitWork(
-            work(terms.implicit_force["drag"]), fluctuating, work(fluctuating),
+            work(terms.implicit_force["drag"] - unsent), fluctuating, work(fluctuating),
             work(terms.implicit_force.get("history", none)), work(terms.explicit.get("history", none)),
+            work(unsent + terms.explicit.get("drag", none)),
             self._external_work(terms),
         )  # fmt: skip
 

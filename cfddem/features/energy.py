@@ -166,12 +166,13 @@ class EnergyLedger(CaseFeature):
         sums["external"] += done.external + done.external_on_fluid
         agitation = done.fluctuating - done.fluctuating_on_fluid
         sums["agitation"] += agitation + done.agitation
-        sums["drag"] += done.drag_on_fluid - done.drag + agitation
-        sums["drag_from_fluid"] += done.explicit_history_on_fluid
+        sums["drag"] += done.drag_on_fluid + done.explicit_drag_on_fluid - done.drag + agitation
+        sums["drag_from_fluid"] += done.explicit_history_on_fluid + done.explicit_drag_on_fluid
         sums["drag_to_particles"] += done.drag + done.history
         sums["drag_in_cells"] -= done.drag_on_fluid + done.history_on_fluid
         sums["history"] += done.history_on_fluid + done.explicit_history_on_fluid - done.history
-        sums["lift_and_added_mass"] -= done.explicit + done.added + done.explicit_history_on_fluid
+        sums["lift_and_added_mass"] -= done.explicit + done.added
+        sums["lift_and_added_mass"] -= done.explicit_history_on_fluid + done.explicit_drag_on_fluid
         sums["lift_and_added_mass"] += done.external_on_fluid  # not between the phases
         sums["fallen"] += done.weight
         sums["driving"] += done.driving

@@ -112,6 +112,11 @@ class Block(Grid):
         """See `Grid.first`."""
         return self._first
 
+    def divided(self, parts: tuple[int, int, int]) -> Block:
+        """See `Grid.divided`; the rank owns the same part of the box."""
+        starts = tuple(first * parts[self.division.axis] for first in self.division.starts)
+        return Block(self.whole.divided(parts), Division(self.division.axis, starts), self.communicator)
+
     def touches(self, axis: int, high: bool) -> bool:
         """See `Grid.touches`."""
         if axis != self.division.axis:

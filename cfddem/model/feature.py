@@ -63,6 +63,7 @@ class FluidForce(Feature):
     late          whether it acts after the others, since it depends on their resistance
     sets_inertia  whether it changes the inertia of particles
     needs_fluid   whether it needs the flow around the particles
+    sharp         whether the surfaces of beds are sharp in the flow that all forces see
     needs_sizes   whether it needs the diameter of each particle over the Sauter mean around it
     own           what every particle adds to the flow itself, which other forces do not see; of the type
                   `cfddem.coupling.sampled_flow.Own`
@@ -77,6 +78,7 @@ class FluidForce(Feature):
     sets_inertia: bool = False
     needs_fluid: bool = True
     needs_sizes: bool = False
+    sharp: bool = False
     own: Any = None
     outside: int = 0
 

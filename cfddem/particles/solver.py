@@ -70,6 +70,8 @@ class ParticleSolver:
     balance   move its planes when particles become unequally many
     """
 
+    system: System
+
     def __init__(
         self,
         particles: Particles,

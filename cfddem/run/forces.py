@@ -22,7 +22,6 @@ from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.forces.weight import Weight
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.self_disturbance import SelfDisturbance
-from cfddem.coupling.self_disturbance_walls import WallsOfGrid
 from cfddem.coupling.velocity_gradient import change_along
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
@@ -49,7 +48,7 @@ def forces_of(
     if laws.lift:
         forces.append(Lift(fluid, kernel))
     if laws.drag_law:
-        forces.append(Drag(laws.drag_law, fluid.model))
+        forces.append(Drag(laws.drag_law, fluid.model, kernel if laws.surface == "sharp" else None))
     forces += [*agitation_of(case, fluid, kernel, *added_mass), *beside, *added_mass]
     if laws.history != "none":
         forces.append(History(laws.history, fluid.density, fluid.model))
@@ -59,8 +58,7 @@ def forces_of(
     if laws.torque:
         forces.append(Torque(fluid, kernel))
     if laws.self_disturbance_correction:
-        walls = WallsOfGrid(kernel, fluid.boundaries) if beside else None
-        forces.append(SelfDisturbance(fluid, kernel, walls))
+        forces.append(SelfDisturbance(fluid, kernel, bool(beside), any(force.sharp for force in forces)))
     return forces
 
 

@@ -60,10 +60,13 @@ class Agitation(FluidForce):
 
     def act(self, terms: CouplingTerms) -> None:
         """The fluctuation acts through the drag, the rest as a force."""
-        drag = terms.conductance("drag")
+        # with sharp surfaces drag has its total form, and the laws are measured with that of model A
+        whole = terms.conductance("drag")
+        share = (1.0 - terms.withheld / np.maximum(whole, 1e-300)) / terms.flow.narrowing
+        drag = whole * share
         around = Neighbourhood(terms.cell_map, terms.flow, self._mean_slip, drag, terms.solid)
         made = self.terms(terms.particles, around, terms.step)
-        terms.fluctuate("drag", made.velocity)
+        terms.fluctuate("drag", share[:, None] * made.velocity)
         if self.pushes:
             terms.between("agitation", made.force)
 

@@ -1,0 +1,126 @@
+"""What a particle sees of the particles around it: in an even suspension, in a wave, alone, and at a surface."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.seen_solids import SeenSolids, cells_of
+from cfddem.coupling.self_disturbance_walls import OwnSolids
+from cfddem.fluid.conditions import NoSlip
+from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.solver import FluidSolver
+from cfddem.run import history
+from cfddem.run.simulation import Simulation
+from closures.balance import pressure_gradient
+from closures.drag import di_felice
+from scenarios.beds.liquid_bed.study import glass
+
+PITCH, LAYER = 0.01 / 9, 81
+"""Of a cubic lattice of glass spheres of 1 mm in a column of 10 mm, and spheres in a layer [m]."""
+
+SPHERE = math.pi / 6.0 * 1e-9
+SIDES = ("x_low", "x_high", "y_low", "y_high", "z_low", "z_high")
+
+
+def fixed_bed(layers: int, cell: float) -> tuple[float, Array]:
+    """Pressure drop of a fixed cubic lattice over the law's, and force on its layers over the law's, from the top.
+
+    The law holds for the lattice up to its last layer: without a kernel all of these are 1.
+    """
+    places = [((i + 0.5) * PITCH, (j + 0.5) * PITCH, (k + 0.5) * PITCH)
+              for k in range(layers) for j in range(9) for i in range(9)]  # fmt: skip
+    bed = {"start": "placed", "positions": places, "count": None, "fixed": True}
+    laws = {"laws.agitation": "none", "laws.surface": "sharp"}
+    case = glass(0.03).with_(**{f"bed.{key}": value for key, value in bed.items()}, **{"column.cell": cell}, **laws)
+    simulation = Simulation(case)
+    simulation.until(0.05)
+    voidage = 1.0 - SPHERE / PITCH**3
+    law = layers * PITCH * pressure_gradient(0.03, 1e-3, 998.0, 1e-3, voidage, di_felice)
+    particles = simulation.particles
+    force = particles.applied[:, 2] + (2500.0 - 998.0) * 9.81 * SPHERE
+    layer = np.floor(particles.position[:, 2] / PITCH).astype(int)
+    means = np.array([force[layer == k].mean() for k in reversed(range(layers))])
+    return history.row(simulation)["pressure_drop"] / law, means * layers * LAYER / (law * 1e-4)
+
+
+LIMITS = [(10.0 / 6.0, 0.05), (1.25, 0.05), (2.5, 0.08), (10.0 / 3.0, 0.12)]
+"""Cell in diameters, and the error of the pressure drop that is accepted."""
+
+
+@pytest.mark.parametrize(("cell", "limit"), [pytest.param(*LIMITS[0]), *(pytest.param(*each, marks=pytest.mark.slow)
+                                                                         for each in LIMITS[1:])])  # fmt: skip
+def test_a_fixed_bed_has_the_drag_of_the_law_up_to_its_last_layer(cell: float, limit: float) -> None:
+    """Six layers; each carries its load within a tenth (the last one half of it with a plain kernel)."""
+    drop, layers = fixed_bed(6, 1e-3 * cell)
+    assert drop == pytest.approx(1.0, abs=limit)
+    assert layers == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cell", "limit"), LIMITS)
+def test_a_deeper_fixed_bed_has_the_drag_of_the_law(cell: float, limit: float) -> None:
+    drop, layers = fixed_bed(15, 1e-3 * cell)
+    assert drop == pytest.approx(1.0, abs=limit)
+    assert layers == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("cell", [1.0, 5.0 / 3.0, 2.5])
+def test_the_kernel_that_a_particle_sees_with_has_the_given_deviation(cell: float) -> None:
+    """Second moment of deposit, sweeps and gather around a particle, averaged over its place in the cell."""
+    grid, sigma, along = Grid((20, 20, 20), (cell,) * 3), 1.5, []
+    kernel = SeenSolids(FilterKernel(grid, (True,) * 3, smoothing=sigma)).cells
+    centres, middle = kernel.grid.centres()[0].ravel(), 10.0 * cell
+    width = kernel.grid.spacing[0]
+    for place in np.arange(8) / 8.0 * width + 0.5 * width / 8.0:
+        at, radius = np.array([[middle + place, middle, middle]]), np.array([0.5])
+        cell_map = kernel.map_particles(at, radius)
+        spread = kernel.smooth(kernel.deposit(cell_map, np.ones((1, 1))))[0].sum(axis=(0, 1))
+        points = at[0, 0] + np.arange(-8 * 8, 8 * 8 + 1) / 8.0 * width
+        weights = np.maximum(1.0 - np.abs(points[:, None] - centres) / width, 0.0)
+        response = weights @ spread
+        along.append((response * (points - at[0, 0]) ** 2).sum() / response.sum())
+    assert np.mean(along) == pytest.approx(sigma**2, rel=5e-3)
+
+
+def lattice_of(box: float, count: int) -> Array:
+    """A cubic lattice in a periodic box (count^3, 3)."""
+    line = (np.arange(count) + 0.5) * box / count
+    return np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("cell", [1.0, 5.0 / 3.0, 2.5])
+def test_a_small_wave_is_seen_alike_in_all_cells(cell: float) -> None:
+    """In an even lattice the solid fraction of the box; in a wave exp(-k^2 sigma^2) of its amplitude."""
+    box, count, sigma, solid, shift = 15.0, 15, 1.5, math.pi / 6.0, 1e-3
+    kernel = FilterKernel(Grid.of_size((box,) * 3, cell), (True,) * 3, smoothing=sigma)
+    seen, number = SeenSolids(kernel), 2.0 * math.pi / box
+    places = lattice_of(box, count)
+
+    def around(position: Array) -> Array:
+        return seen.around(kernel.map_particles(position, np.full(count**3, 0.5)))
+
+    changes = []
+    for offset in np.arange(5) / 5.0 * cell:
+        begin = places + offset
+        even = around(begin)
+        limit = 1e-12 if cell == 1.0 else 0.05  # a lattice of spheres beats with other cells
+        assert even.mean() == pytest.approx(solid, rel=limit)
+        moved = begin.copy()
+        moved[:, 2] -= shift / number * np.sin(number * begin[:, 2])  # the solid fraction changes by shift cos(k z)
+        changes.append(2.0 * ((around(moved) - even) * np.cos(number * begin[:, 2])).mean())
+    assert np.mean(changes) == pytest.approx(solid * shift * math.exp(-((number * sigma) ** 2)), rel=0.01)
+
+
+def test_a_lone_sphere_sees_only_itself() -> None:
+    """Its own part is all that it sees, at every place in a cell, and nearly so beside a wall."""
+    grid = Grid((12, 12, 12), (2.5e-3,) * 3)
+    kernel = FilterKernel(grid, (False,) * 3, smoothing=1.5e-3)
+    fluid = FluidSolver(grid, dict.fromkeys(SIDES, NoSlip()), density=1000.0, viscosity=1e-3)
+    seen, own = SeenSolids(kernel), OwnSolids(cells_of(kernel), 1, fluid.boundaries)
+    for height in (0.5e-3, 1.1e-3, 2e-3, 14.3e-3, 15e-3, 16.1e-3):
+        cell_map = kernel.map_particles(np.array([[15.2e-3, 14.6e-3, height]]), np.array([0.5e-3]))
+        assert own.of(cell_map) == pytest.approx(seen.around(cell_map), rel=0.06 if height < 2e-3 else 5e-3)
