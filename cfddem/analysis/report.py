@@ -226,7 +226,9 @@ def _film_solution(run: RunData, begin: float) -> dict[str, float]:
         for name in ("film_step_count", "film_iteration_count", "film_damping_number")
     )
     inside = run.history["time"] >= begin
-    if not steps.size or not steps[inside][-1] > steps[inside][0]:
+    if not len(steps) == len(iterations) == len(damping) == len(inside) or not inside.any():
+        return {}  # a run without films, or a history that lacks a column
+    if not steps[inside][-1] > steps[inside][0]:
         return {}
     made = (iterations[inside][-1] - iterations[inside][0]) / (steps[inside][-1] - steps[inside][0])
     return {"iterations": float(made), "damping_number": float(np.nanmax(damping[inside]))}

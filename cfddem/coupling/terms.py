@@ -86,7 +86,7 @@ class ForceTerms:
     @property
     def resistance(self) -> Array:
         """Conductance b N of all lines (N,) [kg/s]."""
-        return total(self.conductances, np.zeros(self.particles.count))
+        return total(self.conductances, np.zeros(len(self.withheld)))
 
     @property
     def sent(self) -> Array:
@@ -97,7 +97,8 @@ class ForceTerms:
     @property
     def unsent(self) -> Array:
         """Force of the resistance of which the fluid receives nothing in this step (N, 3) [N]."""
-        force: Array = (1.0 - self.sent)[:, None] * sum(self.implicit_force.values())
+        received = sum(self.implicit_force.values(), np.zeros((len(self.withheld), 3)))
+        force: Array = (1.0 - self.sent)[:, None] * received
         return force
 
     @property

@@ -175,7 +175,7 @@ def krieger_dougherty(solid_fraction: float) -> float:
     The intrinsic viscosity is Einstein's 2.5, and the maximum the random close packing of equal spheres.
 
     >>> round(krieger_dougherty(0.5), 2)
-    11.39
+    11.38
     """
     return float((1.0 - solid_fraction / CLOSE_PACKING) ** (-2.5 * CLOSE_PACKING))
 
