@@ -13,6 +13,7 @@ from cfddem.backend.errors import InputError
 from cfddem.io import checkpoint
 from cfddem.io.files import write_whole
 from cfddem.io.folder import WRITTEN
+from cfddem.io.reading import open_run
 from cfddem.io.writer import RunFolder
 
 
@@ -82,6 +83,8 @@ def test_a_run_folder_may_itself_be_a_link(tmp_path: Path) -> None:
     """Its name was chosen by the user, for instance to have it on another disk."""
     (tmp_path / "link").symlink_to(made_up(tmp_path / "run", rows=101))
     RunFolder.reopen(tmp_path / "link").finish("finished")
+    assert open_run(tmp_path / "run").status == "finished"
+    assert (tmp_path / "link").is_symlink()
 
 
 def test_no_file_is_written_through_a_link_with_the_name_of_its_temporary_file(tmp_path: Path) -> None:

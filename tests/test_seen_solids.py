@@ -68,6 +68,23 @@ def test_a_deeper_fixed_bed_has_the_drag_of_the_law(cell: float, limit: float) -
     assert layers == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
+def test_a_fluidised_bed_has_no_packed_layer_at_its_surface() -> None:
+    """Over 0.4 to 1 s no half diameter near the surface is denser than 0.52, and the voidage is near its balance."""
+    start = {"bed.start": "expanded"}  # from which waves need longer to grow
+    simulation = Simulation(glass(0.037).with_(**start, **{"column.cell": 2.5e-3, "laws.surface": "sharp"}))
+    edges, dense, voidage = 0.5e-3 * np.arange(11), [], []
+    for time in 0.4 + 0.02 * np.arange(31):
+        simulation.until(time)
+        row, centres = history.row(simulation), simulation.particles.position[:, 2]
+        below = np.clip(row["bed_height"] - edges[:, None] - centres + 0.5e-3, 0.0, 1e-3)
+        solids = (math.pi * below**2 * (0.5e-3 - below / 3.0)).sum(axis=1)  # of spheres, below each height
+        dense.append(-np.diff(solids) / (1e-4 * 0.5e-3))
+        voidage.append(row["bed_voidage"])
+    assert np.mean(dense, axis=0).max() < 0.52
+    assert np.mean(voidage) == pytest.approx(0.616, abs=0.010)
+
+
 @pytest.mark.parametrize("cell", [1.0, 5.0 / 3.0, 2.5])
 def test_the_kernel_that_a_particle_sees_with_has_the_given_deviation(cell: float) -> None:
     """Second moment of deposit, sweeps and gather around a particle, averaged over its place in the cell."""

@@ -72,9 +72,10 @@ class Coupling:
             kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
         )
         self._mean_step = 0.0
-        for field in (MAPPED, RESPONSE):
+        own = (MAPPED, RESPONSE, *self.flow.fields)
+        for field in own:
             particles.declare(field)
-        declared = [MAPPED.name, RESPONSE.name, *self.momentum.declare(particles)]
+        declared = [*(field.name for field in own), *self.momentum.declare(particles)]
         self.forces = ForceList(particles, forces)
         self._stored = (*declared, *(field.name for force in self.forces for field in force.fields))
         if self.sets_inertia:
@@ -113,6 +114,7 @@ class Coupling:
         """
         terms.receive(self.momentum.apply(particles, terms.cell_map, terms.implicit, *self.fluid.drag_response()))
         self.forces.finish(terms)
+        self.flow.remember(particles, terms.flow)
         particles.mapped_position = terms.cell_map.position
         particles.response_rate = terms.resistance / terms.inertia
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
@@ -53,7 +54,11 @@ class FlowSampler:
     kernel  gathers the fields of the fluid
     own     what every particle adds itself, which is taken away
     sizes   whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
+
+    fields  of the particles that it remembers from step to step
     """
+
+    fields: tuple[Field, ...] = ()
 
     def __init__(
         self, fluid: FluidSolver, kernel: FilterKernel, own: Sampled = nothing_of_its_own, sizes: bool = False
@@ -85,6 +90,9 @@ class FlowSampler:
         )  # fmt: skip
         ratio = self._diameter_ratio(particles, cell_map, solid)
         return SampledFlow(slip, disturbance, voidage, reynolds, others, ratio)
+
+    def remember(self, particles: Particles, flow: SampledFlow) -> None:
+        """Store in `fields` what the next step needs of this one."""
 
     def _gathered(self, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Mean velocity of the fluid and solid fraction around every particle (N, 4) [m/s], [-]."""

@@ -35,6 +35,8 @@ SEEN = Field("seen_solids", "1", 0, "memory", np.nan, meaning="solid fraction th
 class SharpFlowSampler(FlowSampler):
     """As `FlowSampler`, with sharp surfaces of beds."""
 
+    fields = (SEEN,)
+
     def __init__(
         self, fluid: FluidSolver, kernel: FilterKernel, own: Sampled = nothing_of_its_own, sizes: bool = False
     ) -> None:
@@ -54,6 +56,10 @@ class SharpFlowSampler(FlowSampler):
         spheres = _Spheres(cell_map.volume, particles.radius, particles.velocity, particles.viscosity)
         _sample(gathered, around, last, spheres, own, self.fluid.density, flow)
         return flow
+
+    def remember(self, particles: Particles, flow: SampledFlow) -> None:
+        """Store the solid fraction seen at the end of the step."""
+        particles[SEEN.name][:] = flow.solid
 
     def _means(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Means of the cells around every particle: velocity of the fluid, solid fraction, solid fraction times

@@ -27,7 +27,6 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import Slot, adapted, specialise
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.sampled_flow import SampledFlow
-from cfddem.coupling.sharp_flow import SEEN
 from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
@@ -59,7 +58,7 @@ class Drag(FluidForce):
         law = law if isinstance(law, Law) else law_of(law)
         self.law_name, self._kernel = law.name, sharp
         self.sharp, self._total = sharp is not None, model == "B" or sharp is not None
-        self.fields = (OWED, SEEN) if self.sharp else ()
+        self.fields = (OWED,) if self.sharp else ()
         self._alone = np.zeros(0)  # conductance of the drag law alone
         self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
         factor = adapted(law.function, ", ".join(DRAG_ARGUMENTS), {name: name for name in DRAG_ARGUMENTS})
@@ -91,13 +90,8 @@ class Drag(FluidForce):
         terms.push("drag", around)
         terms.particles[OWED.name][:] = terms.step * (terms.unsent + around)
 
-    def end(self, terms: Any) -> None:
-        """Store the solid fraction seen at the end of the step."""
-        if self.sharp:
-            terms.particles.seen_solids = terms.flow.solid
-
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
-        r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
+        r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`; total form: over eps."""
         conductance = np.empty(particles.count)
         outside, wrong = self._loop(
             particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges,
@@ -120,9 +114,9 @@ class Drag(FluidForce):
 
 
 @threaded
-def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, model_b, conductance):
-    """Drag over slip of every particle; returns how many flows are outside the range of the law, and how many numbers
-    are negative or not finite."""
+def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, total, conductance):
+    """Drag over slip of every particle, in its `total` form or that of model A; returns how many flows are outside the
+    range of the law, and how many numbers are negative or not finite."""
     slowest, fastest = numbers
     densest, loosest = voidages
     smallest, largest = ratios
@@ -136,5 +130,5 @@ def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages
         wrong += 0 if factor >= 0.0 and factor < math.inf else 1
     # In the same loop the compiler would evaluate all branches of a law.
     for n in prange(len(reynolds)):
-        conductance[n] *= 6.0 * math.pi * viscosity[n] * radius[n] * (1.0 if model_b else voidage[n])
+        conductance[n] *= 6.0 * math.pi * viscosity[n] * radius[n] * (1.0 if total else voidage[n])
     return outside, wrong

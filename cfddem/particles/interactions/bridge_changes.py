@@ -102,12 +102,17 @@ def mark_bodies(system):
 @serial
 def exchange_liquid(system):
     """Let bridges form and break where they are marked; liquid goes from bodies to bridges and back."""
-    edges, memory = system.edges, system.memory
     fill_bridges(system)
+    return_liquid(system)
+
+
+@serial
+def return_liquid(system):
+    """Give the liquid of marked bridges to their bodies and back, and forget the broken ones."""
     if WALLS and WALL_LIQUID:
         transfer_wall_liquid(system)
     transfer_liquid(system)
-    clear_bridges(edges, memory)
+    clear_bridges(system.edges, system.memory)
 
 
 @inline

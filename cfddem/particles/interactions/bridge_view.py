@@ -14,10 +14,9 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.particles.agglomerates import agglomerates
 from cfddem.particles.interactions.bridge import thickness_of_films
-from cfddem.particles.interactions.bridge_changes import clear_bridges, longest_gap, mark_bodies, transfer_liquid
+from cfddem.particles.interactions.bridge_changes import longest_gap, mark_bodies, return_liquid
 from cfddem.particles.interactions.bridge_law import BridgeLaws
-from cfddem.particles.interactions.slots import WALL_LIQUID, WALLS
-from cfddem.particles.interactions.wall_liquid import gained_by_walls, transfer_wall_liquid, with_room
+from cfddem.particles.interactions.wall_liquid import gained_by_walls, with_room
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles
@@ -192,9 +191,5 @@ def _longest(rows, system, longest):
 
 @serial
 def _break(system):
-    edges, memory = system.edges, system.memory
     mark_bodies(system)
-    if WALLS and WALL_LIQUID:
-        transfer_wall_liquid(system)
-    transfer_liquid(system)
-    clear_bridges(edges, memory)
+    return_liquid(system)

@@ -185,7 +185,7 @@ def morris_boulay(solid_fraction: float) -> float:
 
     .. math:: \eta_r = 1 + \frac{2.5\,\phi}{1-\phi/\phi_m} + K_s\left(\frac{\phi/\phi_m}{1-\phi/\phi_m}\right)^2
 
-    The constants phi_m = 0.68 and K_s = 0.1 are from memory.
+    The constants phi_m = 0.68 and K_s = 0.1 have not been compared with the paper.
 
     >>> round(morris_boulay(0.5), 2)
     6.49
