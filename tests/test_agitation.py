@@ -253,6 +253,7 @@ def test_a_law_with_unknown_arguments_is_refused() -> None:
     registry.REGISTRY["agitation"].pop("wrong")
 
 
+@pytest.mark.slow
 def test_same_bits_on_one_and_two_threads_and_after_a_restart() -> None:
     states, kept = [], []
     for threads in (1, 2):

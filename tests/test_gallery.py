@@ -13,6 +13,8 @@ from cfddem.case.schema import Case
 
 SHARE = 5
 """The plain test takes a fifth of the particles."""
+OWN_LAWS = {name: pytest.param(name, marks=pytest.mark.slow) for name in ("lubrication-study",)}
+"""Cases whose laws no other test compiles."""
 
 
 def try_out(name: str, folder: Path, overrides: dict[str, Any]) -> None:
@@ -40,7 +42,7 @@ def fewer(case: Case) -> dict[str, Any]:
     return {"bed.height": bed.height / SHARE} if bed.height else {"bed.count": (bed.count or 0) // SHARE}
 
 
-@pytest.mark.parametrize("name", gallery())
+@pytest.mark.parametrize("name", [OWN_LAWS.get(name, name) for name in gallery()])
 def test_a_fifth_of_every_gallery_case_starts_reports_and_draws(name: str, tmp_path: Path) -> None:
     try_out(name, tmp_path, fewer(gallery()[name]))
 

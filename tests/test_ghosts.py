@@ -132,6 +132,7 @@ def test_bits_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> Non
     assert_same_bits(joined([state(finished(mixed, given, 300))]), joined([state(plain)]))
 
 
+@pytest.mark.slow
 def test_bits_do_not_depend_on_sorting(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that sorts its rows at every list."""
     spheres, given = settings(True, False)

@@ -78,7 +78,7 @@ def stirred(count: int, **laws: Any) -> ParticleSolver:
 @pytest.mark.parametrize(
     ("count", "integrator"),
     [
-        (100, "drift"),
+        pytest.param(100, "drift", marks=pytest.mark.slow),
         pytest.param(100, "verlet", marks=pytest.mark.slow),
         pytest.param(1500, "drift", marks=pytest.mark.slow),
     ],
