@@ -27,11 +27,23 @@ from scenarios.references.three_spheres.motion import APART, FIRST, JOINED, SECO
 DIAMETER, DENSITY, SPEED = 0.01, 2000.0, 1.0
 """Scales of the run; outcomes depend on dimensionless numbers only [m, kg/m3, m/s]."""
 
-FILM_STEP = 1e-3
-"""Step where no solids touch, over delta_12 / v_n0."""
+FILM_STEP, LONGEST_FILM_STEP = 1e-3, 0.05
+"""Way in a step in a film over delta_12, and longest step there over delta_12 / v_n0."""
 
 IMPACT_STEP = 0.005
 """Step in contact, over the Hertz time; with 0.02, contacts that stick are 0.3 % late."""
+
+WARY = 0.03
+"""Speed over v_n0 at which a pair in its film is expected to touch, where it is slower."""
+
+RESTING, RESTING_STEP, RESTING_STEPS = 0.01, 0.1, 50
+"""Speed over v_n0 below which solids count as pressed together; their step over the Hertz time, and steps at once."""
+
+SLOWEST = 1e-5
+"""Speed of a contact over v_n0 below which its step no longer grows."""
+
+FLIGHT = 0.1
+"""Longest step where films are apart: way at the speed of impact over the diameter."""
 
 
 def _along(gap: float, film: float, viscosity: float, reduced_radius: float, touch: float) -> float:
@@ -62,15 +74,13 @@ def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float)
     film = numbers.film_ratio * DIAMETER
     touch, films = numbers.minimum_gap * film, film * np.array(numbers.films)
     run = _spheres(state, numbers, overlap * touch, films)
-    stiffness = contact.hertz_stiffness(float(run.table[0, 0]["contact_modulus"]), 0.5 * float(run.particles.radius[0]))
-    reduced_mass = 0.5 * float(run.particles.mass[0])
-    short, long = IMPACT_STEP * timescales.hertz_time(reduced_mass, stiffness, SPEED), FILM_STEP * film / SPEED
     path, pairs = Path(state.copy(), np.full(3, APART)), _pairs(run)
-    times, states = [0.0], [_polar(run, film)]
-    while run.time * SPEED / film < until:
-        near = pairs[:, 0] - touch < 3.0 * long * np.maximum(pairs[:, 1], 0.1 * SPEED)
-        step = short if near.any() else long
-        run.advance(step)
+    pairs[:, 0] = np.where(pairs[:, 0] < films + 1e-9 * film, np.minimum(pairs[:, 0], films), pairs[:, 0])  # rounding
+    times, states, end = [0.0], [_polar(run, film)], until * film / SPEED
+    while run.time < end * (1.0 - 1e-12):
+        steps, spans = zip(*(_step(run, *pair, touch, reach, film) for pair, reach in zip(pairs, films)))
+        step = min(*steps, end - run.time)
+        run.advance(step, max(1, int(min(*spans, end - run.time) / step)))
         _release(run)
         before, pairs = pairs, _pairs(run)
         times.append(run.time * SPEED / film)
@@ -82,6 +92,37 @@ def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float)
     path.time, path.state = times[-1], columns[:, -1]
     path.modes[:] = np.where(pairs[:, 0] <= films, JOINED, APART)
     return path
+
+
+def _step(
+    run: ParticleSolver, gap: float, approach: float, speed: float, touch: float, reach: float, film: float
+) -> tuple[float, float]:
+    """Longest time step that a pair allows, and the longest time without a look at it [s].
+
+    gap       between the solids [m]
+    approach  speed of approach [m/s]
+    speed     relative speed in all directions [m/s]
+    touch     minimum gap [m]
+    reach     thickness of the film of the pair [m]
+    film      that of the first pair [m]
+    """
+    unit = film / SPEED
+    if gap > reach:  # in flight nothing changes, up to just before the films can meet
+        step = min(FLIGHT * DIAMETER / SPEED, max(FILM_STEP * unit, (gap - reach) / max(speed, 1e-9 * SPEED)))
+        return step, step
+    stiffness = contact.hertz_stiffness(float(run.table[0, 0]["contact_modulus"]), 0.5 * float(run.particles.radius[0]))
+    reduced_mass, overlap = 0.5 * float(run.particles.mass[0]), max(touch - gap, 0.0)
+    # speed of the impact that leads to this state of a contact
+    impact = math.sqrt(0.8 * stiffness / reduced_mass * overlap**2.5 + approach**2)
+    hertz = timescales.hertz_time(reduced_mass, stiffness, max(impact, SLOWEST * SPEED))
+    rests = impact < RESTING * SPEED
+    short = (RESTING_STEP if rests else IMPACT_STEP) * hertz
+    span = RESTING_STEPS * short if rests else short
+    if overlap > 0.0:
+        return short, span
+    fast = max(abs(approach), WARY * SPEED)
+    way = min(FILM_STEP * film / fast, LONGEST_FILM_STEP * unit, 0.5 * (gap - touch) / fast)
+    return max(short, way), max(span, way)
 
 
 def _spheres(state: np.ndarray, numbers: Numbers, overlap: float, films: np.ndarray) -> ParticleSolver:
@@ -108,7 +149,7 @@ def _spheres(state: np.ndarray, numbers: Numbers, overlap: float, films: np.ndar
     own = 0.5 * (np.array([[1, -1, 1], [1, 1, -1], [-1, 1, 1]]) @ (films - touch))  # of each sphere
     if own.min() < 0.0:
         limit = "films that three coated spheres can have: none above the sum of the others"
-        raise InputError("films of the pairs", str(tuple(numbers.films)), limit)
+        raise InputError("films of the pairs", str(tuple(numbers.films)), limit, 'use solver="equations"')
     coat(spheres, own)
     viscosity = 0.5 * mass * SPEED / (film_strength(1.0, 0.25 * DIAMETER) * numbers.stokes)
     laws = BridgeLaws(
@@ -132,21 +173,23 @@ def _release(run: ParticleSolver) -> None:
     Hard contacts that stick end without slip. Mindlin's spring gives slip back after it has stopped it, in a share that
     does not fall with the softness of the solids.
     """
-    particles, pairs = run.particles, slice(run.edges.between_particles)
-    first, second, spring = run.edges.first[pairs], run.edges.second[pairs], run.edges.spring[pairs]
-    normal = particles.position[first] - particles.position[second]
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    surface = particles.radius[:, None] * particles.spin
-    slip = particles.velocity[first] - particles.velocity[second] - np.cross(surface[first] + surface[second], normal)
-    spring[(spring * slip).sum(axis=1) < 0.0] = 0.0  # springs lie across the normal
+    particles, edges = run.particles, run.edges
+    for pair in np.flatnonzero(edges.spring[: edges.between_particles].any(axis=1)):
+        first, second, spring = edges.first[pair], edges.second[pair], edges.spring[pair]
+        normal = particles.position[first] - particles.position[second]
+        surface = particles.radius[[first, second]] @ particles.spin[[first, second]] / np.linalg.norm(normal)
+        slip = particles.velocity[first] - particles.velocity[second] - np.cross(surface, normal)
+        if spring @ slip < 0.0:  # springs lie across the normal
+            spring[:] = 0.0
 
 
 def _pairs(run: ParticleSolver) -> np.ndarray:
-    """Gap between the solids [m] and approach speed [m/s] of each pair (3, 2)."""
+    """Gap between the solids [m], approach speed and relative speed in all directions [m/s] of each pair (3, 3)."""
     position, velocity = run.particles.position, run.particles.velocity
     apart, opening = position[SECOND] - position[FIRST], velocity[SECOND] - velocity[FIRST]
-    distance = np.linalg.norm(apart, axis=1)
-    return np.stack([distance - DIAMETER, -(apart * opening).sum(axis=1) / distance], axis=1)
+    distance = np.sqrt((apart * apart).sum(axis=1))
+    approach = -(apart * opening).sum(axis=1) / distance
+    return np.stack([distance - DIAMETER, approach, np.sqrt((opening * opening).sum(axis=1))], axis=1)
 
 
 def _polar(run: ParticleSolver, film: float) -> np.ndarray:
@@ -174,4 +217,4 @@ def _find_events(
             if before > 0.0 >= after:
                 share = before / (before - after)
                 speed = abs((1.0 - share) * pairs[0][pair, 1] + share * pairs[1][pair, 1]) / SPEED
-                path.events.append((kind, pair, times[0] + share * (times[1] - times[0]), float(speed)))
+                path.events.append((kind, pair, float(times[0] + share * (times[1] - times[0])), float(speed)))

@@ -141,8 +141,9 @@ def soft_and_hard(hard: Triplet, soft: Any, overlaps: Sequence[float], errors: d
     for pair, colour in (("12", BLUE), ("23", ORANGE)):
         title = f"spheres {pair[0]} and {pair[1]}"
         left.plot(hard.history["time"], hard.history[f"gap{pair}"], color=colour, label=f"{title}, hard, polar")
-        some = slice(None, None, 120)
-        left.plot(soft.history["time"][some], soft.history[f"gap{pair}"][some], "o", mfc="white", color=colour, ms=4,
+        time = soft.history["time"]
+        some = np.searchsorted(time, np.arange(0.0, time[-1], 0.12))
+        left.plot(time[some], soft.history[f"gap{pair}"][some], "o", mfc="white", color=colour, ms=4,
                   label=f"{title}, soft, engine")  # fmt: skip
         right.loglog(overlaps, errors[pair], "o-", color=colour, label=title)
     left.set(xlim=(0, 8), ylim=(0, 1.02))

@@ -39,7 +39,7 @@ force every rotating pair separates in the end, so the outcome depends on when t
 SLOWEST_BOUNCE = 1e-4
 """Contacts slower than this fraction of the impact stay pressed together; 1e-3 to 2e-6 agree to 8 digits."""
 
-SOLVERS = ("equations", "particles")
+SOLVERS = ("particles", "equations")
 
 MAP_TOLERANCE, PARALLEL_FROM = 1e-8, 200
 """Tolerance of the runs of a map, and number of runs from which it uses all cores."""
@@ -100,7 +100,7 @@ def simulate_three_spheres(
     spheres: int = 3,
     until: float = UNTIL,
     slowest_bounce: float = SLOWEST_BOUNCE,
-    solver: str = "equations",
+    solver: str = "particles",
     overlap: float = 0.002,
     tolerance: float | None = None,
 ) -> Triplet:
@@ -121,8 +121,8 @@ def simulate_three_spheres(
     film13            film of the pair 1-3 over delta_12 [-]
     spheres           3, or 2 for a collision without sphere 3
     until             end, as the distance travelled at the speed of impact over the diameter [-]
-    slowest_bounce    contacts slower than this fraction of v_n0 stay pressed together [-]
-    solver            "equations" in polar coordinates with hard contacts, or the "particles" engine with soft ones
+    slowest_bounce    hard contacts slower than this fraction of v_n0 stay pressed together [-]
+    solver            the "particles" engine with soft contacts, or "equations" in polar coordinates with hard ones
     overlap           of soft contacts: deepest overlap of an impact without a film, over the minimum gap [-]
     tolerance         of each step of the equations, relative; 1e-11 if not given [-]
     returns           :class:`Triplet`
@@ -190,8 +190,6 @@ def _check(given: Mapping[str, Any]) -> None:
     for name, (holds, limit) in limits.items():
         if not holds(given[name]):
             raise InputError(name, given[name], limit)
-    if given["solver"] == "particles" and given["spheres"] == 2:
-        raise InputError("spheres", 2, '3 with solver="particles"', 'use solver="equations"')
 
 
 def outcome_of(modes: np.ndarray) -> str:
@@ -229,15 +227,15 @@ def outcomes(stokes: Iterable[float], theta12: Iterable[float], **conditions: An
     """Outcome and restitutions for every Stokes number (columns) at every angle (rows); large maps use all cores.
 
     stokes, theta12  values of the two axes
-    conditions       further arguments of :func:`simulate_three_spheres`, the same for all; `tolerance` is 1e-8 if not
-                     given, which keeps restitutions to 1e-5
+    conditions       further arguments of :func:`simulate_three_spheres`, the same for all. If not given, `solver` is
+                     "equations" and `tolerance` 1e-8, which keeps restitutions to 1e-5
     returns          arrays "outcome", "restitution12", "restitution23" of shape (angles, Stokes numbers)
 
     >>> outcomes([2.0, 20.0], [45.0])["outcome"].tolist()
     [['PA1', 'FS']]
     """
     numbers, angles = list(stokes), list(theta12)
-    conditions = {"tolerance": MAP_TOLERANCE} | conditions
+    conditions = {"tolerance": MAP_TOLERANCE, "solver": "equations"} | conditions
     jobs = -1 if len(numbers) * len(angles) >= PARALLEL_FROM else 1
     with safe_workers():
         table = Parallel(n_jobs=jobs)(delayed(_row)(numbers, angle, conditions) for angle in angles)

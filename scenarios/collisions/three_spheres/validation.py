@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from scenarios.references.three_spheres.cartesian import cartesian
 from scenarios.validation.table import Columns, Row, reference, worst
 
 Curves = dict[str, Columns]
+hard_spheres = partial(simulate_three_spheres, solver="equations")
 
 UNPRINTED: tuple[dict[str, Any], ...] = (
     {"stokes": 9.0, "theta12": 37.5},
@@ -45,7 +47,7 @@ def of(run: Triplet, quantity: str, pair: int) -> float:
 
 
 def printed(_: Path, __: Curves) -> list[Row]:
-    """Three spheres: numbers printed by Davis (2023)."""
+    """Three spheres: numbers printed by Davis (2023), in the particle engine."""
     data, rows = reference("davis2023_printed"), []
     for place, figure in enumerate(data["figure"]):
         stokes, one, two, gap, friction = (
@@ -71,7 +73,7 @@ def first_above(holds: Callable[[float], bool], low: float, high: float) -> floa
 
 def parts_before(stokes: float, angle: float) -> bool:
     """Whether spheres 1 and 2 separate before 2 strikes 3."""
-    run = simulate_three_spheres(stokes, angle)
+    run = hard_spheres(stokes, angle)
     return of(run, "separate t", 12) < of(run, "contact t", 23)
 
 
@@ -80,17 +82,14 @@ def thresholds(_: Path, __: Curves) -> list[Row]:
     jumps = [(angle, first_above(lambda st, a=angle: parts_before(st, a), low, high), at)  # type: ignore[misc]
              for angle, low, high, at in ((30.0, 12.0, 20.0, 14.1), (45.0, 5.0, 9.0, 7.0))]  # fmt: skip
     slower = {
-        ca: simulate_three_spheres(3.5, 45.0, capillary_number=ca, until=5.65)
-        for ca in (math.inf, 1000.0, 500.0, 200.0, 100.0)
+        ca: hard_spheres(3.5, 45.0, capillary_number=ca, until=5.65) for ca in (math.inf, 1000.0, 500.0, 200.0, 100.0)
     }
     times = [of(run, "separate t", 12) for run in slower.values()]
     pull = first_above(
-        lambda ca: simulate_three_spheres(7.0, 45.0, capillary_number=ca, until=0.5).restitution12 > 0.0, 4.0, 12.0
+        lambda ca: hard_spheres(7.0, 45.0, capillary_number=ca, until=0.5).restitution12 > 0.0, 4.0, 12.0
     )
-    touch = first_above(
-        lambda st: not math.isnan(of(simulate_three_spheres(st, 45.0, until=2.0), "contact t", 12)), 1.2, 3.0
-    )
-    leaves = first_above(lambda st: simulate_three_spheres(st, 0.0).restitution23 > 0.0, 4.0, 8.0)
+    touch = first_above(lambda st: not math.isnan(of(hard_spheres(st, 45.0, until=2.0), "contact t", 12)), 1.2, 3.0)
+    leaves = first_above(lambda st: hard_spheres(st, 0.0).restitution23 > 0.0, 4.0, 8.0)
     return [
         *(Row(f"jump of e12 at {angle:g} deg: St", value, at, 0.005 * at) for angle, value, at in jumps),
         Row(
@@ -111,7 +110,7 @@ def second_solution(_: Path, __: Curves) -> list[Row]:
     """Three spheres: other conditions, against a second solution in Cartesian coordinates."""
     times, speeds, missing = [], [], 0
     for place, conditions in enumerate(UNPRINTED):
-        ours = simulate_three_spheres(**conditions, until=2.0).events
+        ours = hard_spheres(**conditions, until=2.0).events
         theirs = cartesian(**conditions)
         for a, (kind, pair, time, speed) in zip(ours, theirs):
             missing += (a.kind, a.pair) != (kind, pair)
@@ -130,7 +129,7 @@ def two_spheres(_: Path, __: Curves) -> list[Row]:
     points = []
     for stokes in (2.0, 4.5, 6.0, 10.0, 20.0):
         for e, gap in ((1.0, 0.05), (0.8, 0.01), (0.9, 0.2)):
-            run = simulate_three_spheres(stokes, 0.0, minimum_gap=gap, restitution=e, spheres=2)
+            run = hard_spheres(stokes, 0.0, minimum_gap=gap, restitution=e, spheres=2)
             points.append((stokes, run.restitution12, davis_sitison(stokes, e, gap)))
     return [worst("two spheres head-on: restitution against the analytic law", points, 1e-4)]
 
@@ -151,20 +150,20 @@ OVERLAPS = (0.1, 0.05, 0.02, 0.01, 0.005, 0.002)
 
 def _in_engine(conditions: dict[str, Any], overlap: float = 0.002) -> Triplet:
     until = ENGINE_UNTIL * 0.01 / math.cos(math.radians(conditions["theta12"]))
-    return simulate_three_spheres(**conditions, until=until, solver="particles", overlap=overlap)
+    return simulate_three_spheres(**conditions, until=until, overlap=overlap)
 
 
 def particle_engine(folder: Path, curves: Curves) -> list[Row]:
     """Three spheres: the particle engine with soft contacts against the polar equations with hard ones."""
     times, restitutions, missing = [], [], 0
     for place, conditions in enumerate(IN_ENGINE):
-        soft, hard = _in_engine(conditions), simulate_three_spheres(**conditions)
+        soft, hard = _in_engine(conditions), hard_spheres(**conditions)
         for a, b in zip(soft.events, hard.events):
             missing += (a.kind, a.pair) != (b.kind, b.pair)
             times.append((place, a.time / b.time, 1.0))
             if a.kind == "separate":
                 restitutions.append((place, a.speed, b.speed))
-    hard = simulate_three_spheres(**IN_ENGINE[0])
+    hard = hard_spheres(**IN_ENGINE[0])
     runs = {overlap: _in_engine(IN_ENGINE[0], overlap) for overlap in OVERLAPS}
     errors = {
         pair: np.abs(
@@ -201,18 +200,18 @@ def three_sphere_figures(folder: Path, curves: Curves) -> list[Row]:
     by_angle = {angle: {key: values[row] for key, values in table.items()} for row, angle in enumerate(angles)}
     save(figures.restitution_curves(fine, by_angle, head_on), folder / "three_spheres_restitution.png")
     runs = [
-        ("St = 2: changes partners", simulate_three_spheres(2.0, 45.0), [0.0, 1.0, 2.0, 2.6, 3.5, 5.0]),
-        ("St = 5", simulate_three_spheres(5.0, 45.0), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]),
-        ("St = 10", simulate_three_spheres(10.0, 45.0), [0.0, 0.3, 0.6, 0.9, 1.2, 1.5]),
+        ("St = 2: changes partners", hard_spheres(2.0, 45.0), [0.0, 1.0, 2.0, 2.6, 3.5, 5.0]),
+        ("St = 5", hard_spheres(5.0, 45.0), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]),
+        ("St = 10", hard_spheres(10.0, 45.0), [0.0, 0.3, 0.6, 0.9, 1.2, 1.5]),
         (
             "St = 2, 2-3 at -45 deg",
-            simulate_three_spheres(2.0, 45.0, -45.0, minimum_gap=0.04),
+            hard_spheres(2.0, 45.0, -45.0, minimum_gap=0.04),
             [0.0, 0.6, 1.5, 3.0, 6.1, 7.5],
         ),
     ]
     save(figures.sequences(runs), folder / "three_spheres_sequences.png")
     save(
-        figures.gaps({f"St = {each}": simulate_three_spheres(each, 30.0) for each in (7, 12, 20)}, 0.05),
+        figures.gaps({f"St = {each}": hard_spheres(each, 30.0) for each in (7, 12, 20)}, 0.05),
         folder / "three_spheres_gaps.png",
     )
     for title, run, _ in runs:

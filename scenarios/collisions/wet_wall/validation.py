@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from scenarios.references.wet_wall.checks import independent
 from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
 
 Curves = dict[str, Columns]
+EXACT: dict[str, Any] = {"solver": "equations"}
+exact = partial(impact, **EXACT)
 CHANNELS = {"viscous": BLUE, "capillary": SKY, "contact": ORANGE, "gravity": GREY}
 SPEEDS = np.concatenate([np.arange(0.2, 1.59, 0.04), np.linspace(1.6, 3.0, 6)])
 ANGLES = np.array([1.0, 3.0, 6.0, *np.arange(10.0, 90.0, 4.0), 88.0, 89.0])
@@ -61,7 +64,7 @@ def solution(_: Path, __: Curves) -> list[Row]:
     """Wet wall: against a second solution of the same equations."""
     normal, along, spins = [], [], []
     for sphere, liquid, film, filled, speed, angle, spin, friction in IMPACTS:
-        ours = impact(sphere, liquid, film, speed, angle=angle, spin=spin, friction=friction)
+        ours = exact(sphere, liquid, film, speed, angle=angle, spin=spin, friction=friction)
         e, e_t, omega = independent(sphere, liquid, film, filled, speed, angle, spin, friction)
         normal.append((speed, ours.restitution, e))
         if angle:
@@ -79,15 +82,15 @@ def engine(_: Path, __: Curves) -> list[Row]:
     times, normal, along, spins, slowest = [], [], [], [], []
     for sphere, liquid, film, _filled, speed, angle, spin, friction in IMPACTS:
         given: dict[str, Any] = {"angle": angle, "spin": spin, "friction": friction, "spring": "cut"}
-        ours = impact(sphere, liquid, film, speed, **given, solver="particles")
-        reference = impact(sphere, liquid, film, speed, **given)
+        ours = impact(sphere, liquid, film, speed, **given)
+        reference = exact(sphere, liquid, film, speed, **given)
         times.append((speed, ours.duration / reference.duration, 1.0))
         normal.append((speed, ours.restitution, reference.restitution))
         if angle:
             along.append((angle, ours.restitution_tangential, reference.restitution_tangential))
             spins.append((angle, ours.spin / reference.spin, 1.0))
     for sphere, liquid, film, published, arc in STICKING:
-        found = sticking_velocity(sphere, liquid, film, precision=2e-3, smallest_arc=arc, solver="particles")
+        found = sticking_velocity(sphere, liquid, film, precision=2e-3, smallest_arc=arc)
         slowest.append((published, found / published, 1.0))
     return [
         worst("wet wall, particle engine over equations: time until the bridge breaks", times, 0.005),
@@ -102,18 +105,18 @@ def sticking(_: Path, __: Curves) -> list[Row]:
     """Wet wall: velocities below which spheres stick."""
     rows = []
     for sphere, liquid, film, reference, arc in STICKING:
-        found = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc)
+        found = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc, **EXACT)
         floor = "" if arc is None else f", arc >= {arc * 1e6:.0f} um"
         name = f"wet wall: {sphere} sticks, {liquid}, {film * 1e6:.0f} um{floor}"
         rows.append(Row(name, found, reference, 0.02 * reference, "m/s"))
     case = ("glass_1.74", "water")
     for least in (1e-6, FLOOR, 20e-6):
-        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least)
+        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least, **EXACT)
         rows.append(
             Row(f"wet wall: glass_1.74 sticks, 400 um, singular, arc >= {least * 1e6:.0f} um", found, unit="m/s")
         )
     for options in ({"capillary_phases": "rebound"}, {"capillary_phases": "bridge"}, {"length_from": "wall"}):
-        found = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, **options)
+        found = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, **options, **EXACT)
         chosen = " ".join(f"{name} {value}" for name, value in options.items())
         rows.append(Row(f"wet wall: glass_1.74 sticks, 100 um, {chosen}", found, 0.345, unit="m/s"))
     return rows
@@ -161,9 +164,7 @@ def head_on(folder: Path, curves: Curves) -> list[Row]:
     fastest: dict[str, float] = {}
     for place, (title, cases) in enumerate(groups):
         for name, colour, sphere, liquid, film, options in cases:
-            e = np.array(
-                [impact(sphere, liquid, film, float(v), tolerance=1e-8, **options).restitution for v in SPEEDS]
-            )
+            e = np.array([exact(sphere, liquid, film, float(v), tolerance=1e-8, **options).restitution for v in SPEEDS])
             curves[f"head_on/{sphere}/{liquid}/{film * 1e6:.0f}um"] = {"velocity": (SPEEDS, "m/s"), "e": (e, "-")}
             fastest[f"{sphere} {name}"] = float(e[-1])
             singular = "smallest_arc" in options
@@ -185,7 +186,7 @@ def energy(folder: Path, curves: Curves) -> list[Row]:
     cases = (("glass_1.74", 200e-6), ("glass_0.91", 100e-6))
     for place, (sphere, film) in enumerate(cases):
         speeds = np.linspace(0.7, 3.0, 12)
-        results = [impact(sphere, "water", film, float(v)) for v in speeds]
+        results = [exact(sphere, "water", film, float(v)) for v in speeds]
         lost = {name: np.array([r.energy_lost[name] for r in results]) for name in CHANNELS}
         for v, r in zip(speeds, results):
             points.append((float(v), sum(r.energy_lost.values()), 0.5 * v**2 * (1.0 - r.restitution**2)))
@@ -220,11 +221,11 @@ def oblique(folder: Path, curves: Curves) -> list[Row]:
     axes[1].set_ylim(-0.5, 2.5)
     legend(axes[0], loc="lower left")
     save(figure, folder / "wet_wall_oblique.png")
-    wetter = [impact("alumina_1.74", "tween", angle=a).restitution_tangential for a in (60.0, 89.0)]
-    dryer = [impact("alumina_1.74", None, angle=a).restitution_tangential for a in (60.0, 89.0)]
+    wetter = [exact("alumina_1.74", "tween", angle=a).restitution_tangential for a in (60.0, 89.0)]
+    dryer = [exact("alumina_1.74", None, angle=a).restitution_tangential for a in (60.0, 89.0)]
     e, mu, points, turned = 0.76, 0.195, [], []
     for angle in (52.0, 60.0, 70.0, 80.0, 88.0):
-        dry = impact("alumina_1.74", None, angle=angle)
+        dry = exact("alumina_1.74", None, angle=angle)
         points.append((angle, dry.restitution_tangential, 1.0 - mu * (1.0 + e) / math.tan(math.radians(angle))))
         turned.append((angle, dry.spin / (-2.5 * mu * (1.0 + e) / 0.87e-3), 1.0))
     return [
@@ -253,9 +254,9 @@ def spinning(folder: Path, curves: Curves) -> list[Row]:
     rolling = []
     for spin in spins:  # no friction where the lowest point is at rest along the wall
         angle = math.degrees(math.atan(-spin * 0.87e-3))
-        dry = impact("alumina_1.74", None, angle=angle, spin=spin)
+        dry = exact("alumina_1.74", None, angle=angle, spin=spin)
         rolling += [(spin, dry.restitution_tangential, 1.0), (spin, dry.restitution_rotational, 1.0)]
-    wet = impact("alumina_1.74", "tween", 100e-6, angle=math.degrees(math.atan(961.0 * 0.87e-3)), spin=-961.0)
+    wet = exact("alumina_1.74", "tween", 100e-6, angle=math.degrees(math.atan(961.0 * 0.87e-3)), spin=-961.0)
     return [
         worst("wet wall: e_t and e_omega of a dry rolling impact", rolling, 1e-6),
         Row("wet wall: e_omega of a wet rolling impact", wet.restitution_rotational, 1.0),
@@ -290,14 +291,14 @@ def _against_the_engine(spring: str) -> list[tuple[float, float, float]]:
     for angle in (5.0, 10.0, 20.0, 30.0, 40.0, 60.0):
         dry = {"velocity": 1.0, "viscosity": 0.0, "angle": angle, "against": "wall", "step_fraction": 2e-3}
         engine = collide(solids, diameter=1.74e-3, **dry)  # type: ignore[arg-type]
-        here = impact("alumina_1.74", None, angle=angle, spring=spring, tolerance=1e-8)
+        here = exact("alumina_1.74", None, angle=angle, spring=spring, tolerance=1e-8)
         points.append((angle, here.restitution_tangential, engine.restitution_tangential))
     return points
 
 
 def _sweep(sphere: str, liquid: str | None, film: float, spin: float, **options: Any) -> list[Impact]:
     """Impacts at 1 m/s along the normal, over the angles."""
-    return [impact(sphere, liquid, film, angle=float(a), spin=spin, tolerance=1e-9, **options) for a in ANGLES]
+    return [exact(sphere, liquid, film, angle=float(a), spin=spin, tolerance=1e-9, **options) for a in ANGLES]
 
 
 _SHOWN = {

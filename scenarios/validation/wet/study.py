@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from scenarios.collisions.wet_wall import validation as wet_wall_validation
 from scenarios.validation.table import Columns, Progress, Row, reference, worst, write_histories
 
 Curves = dict[str, Columns]
+exact_pair = partial(collide_wet, solver="equations")
 HEAD_ON_CRITICAL = {
     ("static", "constant"): 1.193,
     ("static", "zero"): 1.217,
@@ -48,7 +50,7 @@ def pairs(_: Path, __: Curves) -> list[Row]:
             float(data[name][place])
             for name in ("stokes [-]", "angle [deg]", "friction [-]", "restitution [-]", "spin [rad/s]")
         )
-        run = collide_wet(stokes, angle, bridge=bridge, cut=data["cut"][place], friction=friction)
+        run = exact_pair(stokes, angle, bridge=bridge, cut=data["cut"][place], friction=friction)
         restitutions.append((stokes, run.restitution, e))
         if not math.isnan(omega):
             spins.append((stokes, run.spin / omega, 1.0))
@@ -56,7 +58,7 @@ def pairs(_: Path, __: Curves) -> list[Row]:
     for (bridge, cut), critical in HEAD_ON_CRITICAL.items():
 
         def bounces(stokes: float, bridge: str = bridge, cut: str = cut) -> bool:
-            return collide_wet(stokes, bridge=bridge, cut=cut, duration=50.0).restitution > 0.0
+            return exact_pair(stokes, bridge=bridge, cut=cut, duration=50.0).restitution > 0.0
 
         rows.append(
             Row(f"{bridge} bridge, {cut} below h_min: critical St_n", first_above(bounces, 0.9, 1.5), critical, 0.01)
@@ -66,18 +68,18 @@ def pairs(_: Path, __: Curves) -> list[Row]:
 
 def other_films() -> list[Row]:
     """Other tangential films, a capillary force, and the largest spin."""
-    peak = max((collide_wet(stokes, 60.0).spin, stokes) for stokes in np.arange(0.70, 1.2, 0.01))
+    peak = max((exact_pair(stokes, 60.0).spin, stokes) for stokes in np.arange(0.70, 1.2, 0.01))
     return [
-        Row("60 deg, St 1.2, film of Nase: spin", collide_wet(1.2, 60.0, tangential="nase").spin, 12.3, 0.123, "rad/s"),
+        Row("60 deg, St 1.2, film of Nase: spin", exact_pair(1.2, 60.0, tangential="nase").spin, 12.3, 0.123, "rad/s"),
         Row(
             "60 deg, St 0.5, no tangential film: restitution",
-            collide_wet(0.5, 60.0, tangential="none").restitution,
+            exact_pair(0.5, 60.0, tangential="none").restitution,
             0.117,
             0.003,
         ),
         Row(
             "60 deg, St 0.5, capillary force: restitution",
-            collide_wet(0.5, 60.0, capillary=True).restitution,
+            exact_pair(0.5, 60.0, capillary=True).restitution,
             0.0716,
             0.003,
         ),
@@ -90,10 +92,16 @@ def soft_and_hard() -> list[Row]:
     """Soft contact of the wet pair against the hard contact of the three spheres without the third."""
     restitutions, spins = [], []
     for stokes in (0.5, 0.8, 1.0, 1.2, 1.4, 2.0, 4.0):
-        soft = collide_wet(stokes, 60.0)
+        soft = exact_pair(stokes, 60.0)
         film, diameter = 270e-6, 25.4e-3
         hard = simulate_three_spheres(
-            stokes, 60.0, film_ratio=film / diameter, minimum_gap=soft.minimum_gap / film, restitution=0.9, spheres=2
+            stokes,
+            60.0,
+            film_ratio=film / diameter,
+            minimum_gap=soft.minimum_gap / film,
+            restitution=0.9,
+            spheres=2,
+            solver="equations",
         )
         leaves = of(hard, "separate t", 12)
         spin = float(np.interp(leaves, hard.history["time"], hard.history["spin1"])) * soft.velocity / film
@@ -118,7 +126,7 @@ def engine_pairs(_: Path, __: Curves) -> list[Row]:
     """Wet pair: the particle engine, with its contact and a liquid bridge, against the polar equations."""
     restitutions, differences, spins, times = [], [], [], []
     for given in ENGINE:
-        polar, engine = collide_wet(**given), collide_wet(**given, solver="particles")
+        polar, engine = exact_pair(**given), collide_wet(**given)
         restitutions.append((given["stokes"], engine.restitution / polar.restitution, 1.0))
         differences.append((given["stokes"], engine.restitution, polar.restitution))
         spins.append((given["stokes"], engine.spin / polar.spin, 1.0))
@@ -148,12 +156,12 @@ def pair_figures(folder: Path, curves: Curves) -> list[Row]:
     """Wet pair: restitution and spin against the Stokes number."""
     stokes, angles = np.linspace(0.1, 4.0, 79), (0.0, 15.0, 30.0, 45.0, 60.0)
     by_film = {
-        kind: {a: np.array([collide_wet(st, a, *kind).restitution for st in stokes]) for a in angles}
+        kind: {a: np.array([exact_pair(st, a, *kind).restitution for st in stokes]) for a in angles}
         for kind in TRANSITION_PRESSURES
     }
     save(wet_pair_figures.films(stokes, by_film), folder / "wet_pair_restitution.png")
     by_friction = {
-        mu: {a: np.array([collide_wet(st, a, friction=mu).spin for st in stokes]) for a in angles[1:]}
+        mu: {a: np.array([exact_pair(st, a, friction=mu).spin for st in stokes]) for a in angles[1:]}
         for mu in (0.0, 0.05)
     }
     save(wet_pair_figures.spins(stokes, by_friction), folder / "wet_pair_spin.png")
@@ -165,7 +173,7 @@ def pair_figures(folder: Path, curves: Curves) -> list[Row]:
     }
     low = np.linspace(0.1, 2.0, 77)
     by_option = {
-        name: np.array([collide_wet(st, 60.0, **more).restitution for st in low]) for name, more in options.items()
+        name: np.array([exact_pair(st, 60.0, **more).restitution for st in low]) for name, more in options.items()
     }
     save(wet_pair_figures.tangential(low, by_option), folder / "wet_pair_tangential.png")
     for kind, curve in by_film.items():
