@@ -15,12 +15,17 @@ FILM_ARGUMENTS = ("gap", "viscosity", "reduced_radius", "minimum_gap", "cutoff_g
 AGITATION_ARGUMENTS = ("solid_fraction", "reynolds", "along", "density_ratio")
 """Arguments that a law of agitation may take, by name: of the mean slip, in the direction with this squared cosine."""
 
+HEAT_ARGUMENTS = ("reynolds", "prandtl", "voidage")
+"""Arguments that a law of heat transfer may take, by name: Reynolds number of the superficial slip; Prandtl number, or
+the Schmidt number where the law is used for mass; voidage. It must take the first two."""
+
 BUILT_IN: dict[str, tuple[str, ...]] = {
     "drag": ("none",),
     "minimum_gap": ("elastohydrodynamic",),
     "lubrication": ("auto", "nijssen", "nijssen_full", "nijssen_full_twist", "none"),
     "added_mass": (),
     "agitation": ("auto", "none", "lattanzi"),
+    "heat_transfer": (),
 }
 """Names that a case may use besides those of registered laws: no law, or the built-in one."""
 
@@ -30,6 +35,7 @@ ARGUMENTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "lubrication": (FILM_ARGUMENTS, FILM_ARGUMENTS[:3]),
     "added_mass": (("voidage",), ("voidage",)),
     "agitation": (AGITATION_ARGUMENTS, AGITATION_ARGUMENTS[:1]),
+    "heat_transfer": (HEAT_ARGUMENTS, HEAT_ARGUMENTS[:2]),
 }
 """Arguments that a law of a kind may take, and those that it must take."""
 

@@ -94,6 +94,11 @@ class CaseLaws(Checked):
     agitation_time: float | None = Field(
         None, gt=0, description="factor of the correlation time of the fluctuation, d/w; default: of the law [-]"
     )
+    heat_transfer: str | Callable[..., float] = Field(
+        "ranz_marshall",
+        description="Nusselt number of particles, where the case has heat; Sherwood number by analogy, where it has a "
+        "vapour: ranz_marshall, gunn, wakao_kaguei, a law's name, or a function",
+    )
     mapping: Literal["linear", "centroid", "divided"] = Field(
         "linear", description="distribution of particle volume over cells, before the filter kernel"
     )
@@ -117,7 +122,7 @@ class CaseLaws(Checked):
         """None means no drag, too: as a word, because a case file has no null and would fall back to the default."""
         return "none" if value is None else value
 
-    @field_validator("drag", "minimum_gap", "lubrication", "agitation")
+    @field_validator("drag", "minimum_gap", "lubrication", "agitation", "heat_transfer")
     @classmethod
     def _laws_exist(cls, value: Any, about: ValidationInfo) -> Any:
         kind = about.field_name or ""
@@ -207,6 +212,11 @@ class CaseLaws(Checked):
         return None if drag in (*BUILT_IN["drag"], *self.missing.values()) else chosen("drag", drag)
 
     @property
+    def heat_law(self) -> Law | None:
+        """Law of heat transfer; None if this machine lacks it."""
+        return None if "heat_transfer" in self.missing else chosen("heat_transfer", self.heat_transfer)
+
+    @property
     def pair_laws(self) -> dict[str, Law]:
         """Laws that replace the built-in laws of the pair loop, by kind."""
         given = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication") if kind not in self.missing}
@@ -222,6 +232,7 @@ class CaseLaws(Checked):
             "added_mass": self.added_mass_law,
             **self.pair_laws,
             "agitation": None if named else chosen("agitation", agitation),
+            "heat_transfer": self.heat_law,
         }
         return {kind: law for kind, law in found.items() if isinstance(law, Law) and not is_built_in(law.function)}
 

@@ -73,21 +73,15 @@ class Transfer:
 
         returns  names of these fields
         """
-        field, (received, unit) = particles.fields[self.value], self.received
-        particles.declare(
-            Field(
-                self.before, field.unit, field.components, "memory", _present(self.value),
-                meaning=f"{field.meaning or field.name} before the last fluid step",
-            )
-        )  # fmt: skip
-        meaning = "received from the fluid in the last fluid step"
-        particles.declare(Field(received, unit, field.components, "memory", meaning=meaning))
-        return [self.before, received]
+        stored = memory_of(particles.fields[self.value], self.received)
+        for field in stored:
+            particles.declare(field)
+        return [field.name for field in stored]
 
     @property
     def before(self) -> str:
         """Name of the field with the value before the last step."""
-        return f"{self.value}_before"
+        return before(self.value)
 
     def prepare(
         self,
@@ -136,6 +130,24 @@ class Transfer:
         if self.last_step == 0.0:
             return after_source(value, _or_zero(None if self.source is None else self.source(particles), value))
         return _columns(particles[self.before]), _columns(particles[self.received[0]]), self.last_step
+
+
+def before(value: str) -> str:
+    """Name of the field with the value before the last step."""
+    return f"{value}_before"
+
+
+def memory_of(field: Field, received: tuple[str, str]) -> tuple[Field, Field]:
+    """What a transfer stores of each particle: the value of its field before the last step, and what it received.
+
+    received  name of the second field, and its unit
+    """
+    name, unit = received
+    meaning = f"{field.meaning or field.name} before the last fluid step"
+    return (
+        Field(before(field.name), field.unit, field.components, "memory", _present(field.name), meaning=meaning),
+        Field(name, unit, field.components, "memory", meaning="received from the fluid in the last fluid step"),
+    )
 
 
 def after_source(value: Array, source: Array) -> tuple[Array, Array, float]:

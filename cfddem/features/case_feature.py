@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
+from cfddem.fluid.fields import CellField
 from cfddem.io.quantities import Quantity, of_function
 from cfddem.model.feature import Equipment
 
@@ -38,6 +39,11 @@ class CaseFeature(Equipment):
     def fields_of(cls, case: Case) -> tuple[Field, ...]:
         """Fields of the particles that it needs in a case."""
         return cls.fields
+
+    @classmethod
+    def cell_fields_of(cls, case: Case) -> tuple[CellField, ...]:
+        """Fields of the cells that it adds to snapshots of a case, see `cells_for_snapshot`."""
+        return ()
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:

@@ -1,35 +1,46 @@
-r"""Heat between particles and a fluid of one temperature.
+r"""Heat between particles and the fluid.
 
-A particle of the temperature T, lumped, exchanges heat with the fluid of the temperature :math:`T_f`:
+A particle of the temperature T, lumped, exchanges heat with the fluid of the temperature :math:`T_f` around it:
 
 .. math:: m c\,\dot T = \pi d k\,Nu\,(T_f - T)
 
-Over a step h the solution at a given fluid temperature is exact, with the conductance :math:`b^* = m c (1 - e^{-h
-\pi d k Nu / m c}) / h`. Where the fluid has a finite heat capacity, its new temperature stands on the right: implicit,
-so that no step passes the common temperature, and what the fluid gives is what the particles receive.
+**Cells.** The fluid has a temperature in every cell (:mod:`cfddem.fluid.scalar`). Heat passes between both as momentum
+does (:mod:`cfddem.coupling.transfer`): implicit on both sides, equal and opposite to round-off.
+
+**Uniform.** The fluid has one temperature, held or of a bath. Over a step h the solution at a given temperature is
+exact, with the conductance :math:`b^* = m c (1 - e^{-h \pi d k Nu / m c}) / h`. The new temperature of a bath stands
+on the right: implicit, so that no step passes the common temperature.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from cfddem.case.schema import Case
+from cfddem.coupling.exchange import ExchangeLaw
+from cfddem.coupling.transfer import Transfer, memory_of
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat
-from closures.heat_transfer import ranz_marshall
+from cfddem.fluid.fields import CellField
+from cfddem.fluid.scalar import Scalar, ScalarKind
 
-nusselt_numbers = np.vectorize(ranz_marshall, otypes=[float])
+RECEIVED = ("heat_from_fluid", "J")
+"""Name and unit of the field with the heat that a particle received in the last step."""
+
+OF_FLUID = CellField("temperature", "K", "temperature of the fluid")
 
 
 class HeatExchange(CaseFeature):
-    """Temperature of the particles, and the heat that the fluid gives them.
+    """Temperature of the particles and of the fluid, and the heat between them.
 
-    fluid_temperature  now [K]
-    given              heat given by the fluid [J]
+    cells              temperature of the fluid in every cell; None if it is uniform
+    uniform            temperature of the fluid now if it is uniform [K]
+    given              heat given to the particles by the fluid [J]
     scale              heat exchanged, without sign [J]
     other              change of the heat in the particles between exchanges: by feeds, outlets and a user [J]
     last               heat in the particles after the last exchange, from their state [J]
@@ -39,10 +50,21 @@ class HeatExchange(CaseFeature):
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Heat.of(case)
-        assert keys is not None
-        self.keys, self.fluid, self.capacities = keys, case.required_fluid, keys.capacities(case)
-        self.fluid_temperature, self.given = keys.fluid_temperature, 0.0
+        law = case.laws.heat_law
+        assert keys is not None and law is not None
+        self.keys, self.capacities, self.law = keys, keys.capacities(case), ExchangeLaw(law)
+        self.uniform, self.given = keys.fluid_temperature, 0.0
         self.communicator = simulation.communicator
+        self.cells: Scalar | None = None
+        if keys.in_cells(case):
+            fluid, kernel = simulation.required_fluid, simulation.required_coupling.kernel
+            of_volume = fluid.density * keys.fluid_heat_capacity
+            kind = ScalarKind(
+                OF_FLUID.name, OF_FLUID.unit, OF_FLUID.meaning, keys.fluid_temperature, of_volume, keys.conductivity,
+                keys.effective_conductivity,
+            )  # fmt: skip
+            self.cells = Scalar(fluid, kind, keys.sides_of(case))
+            self.transfer = Transfer(kernel, "temperature", RECEIVED, self.capacity)
         self.start = self.stored(simulation.owned)
         self.scale, self.other, self.last = 0.0, 0.0, self.start
 
@@ -56,16 +78,33 @@ class HeatExchange(CaseFeature):
         """The temperature, which snapshots contain."""
         keys = Heat.of(case)
         assert keys is not None
-        return (Field("temperature", "K", initial=keys.particle_temperature, snapshot=True, meaning="temperature"),)
+        own = Field("temperature", "K", initial=keys.particle_temperature, snapshot=True, meaning="temperature")
+        return (own, *memory_of(own, RECEIVED)) if keys.in_cells(case) else (own,)
+
+    @classmethod
+    def cell_fields_of(cls, case: Case) -> tuple[CellField, ...]:
+        """The temperature of the fluid."""
+        keys = Heat.of(case)
+        return (OF_FLUID,) if keys is not None and keys.in_cells(case) else ()
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:
         """Temperatures and heat."""
+        keys = Heat.of(case)
+        of_cells = (
+            Measured("K", "measure", outlet_temperature),
+            Measured("J", "recorded", heat_in),
+            Measured("J", "recorded", heat_out),
+            Measured("J", "recorded", heat_from_walls),
+            Measured("J", "recorded", heat_stored),
+        )
         return (
             Measured("K", "measure", mean_temperature),
             Measured("K", "recorded", fluid_temperature),
             Measured("J", "recorded", heat_received),
+            *(of_cells if keys is not None and keys.in_cells(case) else ()),
             Measured("1", "imbalance", heat_imbalance),
+            Measured("1", "recorded", heat_out_of_range_count),
         )
 
     def capacity(self, particles: Any) -> np.ndarray:
@@ -80,38 +119,65 @@ class HeatExchange(CaseFeature):
     def conductance(self, terms: Any) -> np.ndarray:
         """Conductance between every particle and the fluid (N,) [W/K]."""
         particles, k = terms.particles, self.keys.conductivity
-        slip = np.linalg.norm(terms.flow.slip, axis=1)
-        reynolds = self.fluid.density * slip * 2.0 * particles.radius / particles.viscosity
-        nusselt = nusselt_numbers(reynolds, particles.viscosity * self.keys.fluid_heat_capacity / k)
-        return np.asarray(2.0 * math.pi * particles.radius * k * nusselt)
+        numbers = self.law.numbers(terms.flow, particles.viscosity * (self.keys.fluid_heat_capacity / k))
+        return np.asarray(2.0 * math.pi * particles.radius * k * numbers)
 
     def before(self, simulation: Any, step: float) -> None:
         """Exchange heat over the step [s], at the slip of the coupling."""
         particles, total = simulation.owned, self.communicator.sum
-        capacity = self.capacity(particles)
-        share = -np.expm1(-step * self.conductance(simulation.terms) / capacity)
-        exchanged, bath = capacity * share, self.keys.fluid_total_capacity
-        if bath is not None:
-            brought = float(total(exchanged * (particles.temperature - self.fluid_temperature)))
-            self.fluid_temperature += brought / (bath + float(total(exchanged)))
-        received = exchanged * (self.fluid_temperature - particles.temperature)
+        self.other += self.stored(particles) - self.last
+        capacity, terms = self.capacity(particles), simulation.terms
+        if self.cells is None:
+            received = self._from_uniform(particles, capacity, self.conductance(terms), step)
+        else:
+            received = self._from_cells(self.cells, particles, terms, step)
         self.given += float(total(received))
         self.scale += float(total(np.abs(received)))
-        self.other += self.stored(particles) - self.last
-        particles.temperature += share * (self.fluid_temperature - particles.temperature)
+        particles.temperature += received / capacity
         self.last = self.stored(particles)
 
+    def _from_uniform(self, particles: Any, capacity: np.ndarray, conductance: np.ndarray, step: float) -> np.ndarray:
+        """Heat that every particle receives from a fluid of one temperature (N,) [J]."""
+        total, exchanged = self.communicator.sum, capacity * -np.expm1(-step * conductance / capacity)
+        if bath := self.keys.fluid_total_capacity:
+            brought = float(total(exchanged * (particles.temperature - self.uniform)))
+            self.uniform += brought / (bath + float(total(exchanged)))
+        return np.asarray(exchanged * (self.uniform - particles.temperature))
+
+    def _from_cells(self, cells: Scalar, particles: Any, terms: Any, step: float) -> np.ndarray:
+        """Heat that every particle receives from the cells around (N,) [J]; the cells make their step.
+
+        Other heat of the particles, by contacts or evaporation, has been added to their temperatures before.
+        """
+        self.transfer.last_step = 0.0
+        sent = self.transfer.prepare(particles, terms.cell_map, self.conductance(terms), step)
+        seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])[..., None]
+        return step * self.transfer.apply(particles, terms.cell_map, sent, np.ones_like(seen), seen)[:, 0]
+
+    def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
+        """The temperature of the fluid in the cells of all ranks."""
+        return {} if self.cells is None else {OF_FLUID.name: self.cells.grid.joined(self.cells.value)}
+
     def checkpoint(self) -> dict[str, Any]:
-        """The fluid's temperature and the balance."""
-        return {name: getattr(self, name) for name in _KEPT}
+        """The temperature of the fluid and the balance."""
+        kept = {name: getattr(self, name) for name in _KEPT}
+        return kept if self.cells is None else kept | {"cells": self.cells.checkpoint()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         for name in _KEPT:
             setattr(self, name, float(state[name]))
+        if self.cells is not None:
+            self.cells.restore(state["cells"])
 
 
-_KEPT = ("fluid_temperature", "given", "scale", "start", "other", "last")
+_KEPT = ("uniform", "given", "scale", "start", "other", "last")
+
+
+def _cells(simulation: Any) -> Scalar:
+    cells = simulation.feature(HeatExchange).cells
+    assert cells is not None
+    return cells
 
 
 def mean_temperature(simulation: Any) -> float:
@@ -122,8 +188,14 @@ def mean_temperature(simulation: Any) -> float:
 
 
 def fluid_temperature(simulation: Any) -> float:
-    """Temperature of the fluid."""
-    return float(simulation.feature(HeatExchange).fluid_temperature)
+    """Mean temperature of the fluid."""
+    heat = simulation.feature(HeatExchange)
+    return float(heat.uniform if heat.cells is None else heat.cells.mean)
+
+
+def outlet_temperature(simulation: Any) -> float:
+    """Mean temperature of the fluid that leaves."""
+    return float(_cells(simulation).leaving)
 
 
 def heat_received(simulation: Any) -> float:
@@ -131,8 +203,40 @@ def heat_received(simulation: Any) -> float:
     return float(simulation.feature(HeatExchange).given)
 
 
-def heat_imbalance(simulation: Any) -> float:
-    """Change of the heat in the particles that the fluid did not give, over the heat exchanged."""
+def heat_in(simulation: Any) -> float:
+    """Heat that the fluid has brought in, above its temperature at the start."""
+    return _cells(simulation).sums["inflow"]
+
+
+def heat_out(simulation: Any) -> float:
+    """Heat that the fluid has carried out, above its temperature at the start."""
+    return _cells(simulation).sums["outflow"]
+
+
+def heat_from_walls(simulation: Any) -> float:
+    """Heat that the fluid has received from walls."""
+    return _cells(simulation).sums["walls"]
+
+
+def heat_stored(simulation: Any) -> float:
+    """Change of the heat in fluid and particles since the start."""
     heat = simulation.feature(HeatExchange)
-    change = heat.last - heat.start - heat.other
-    return abs(change - heat.given) / heat.scale if heat.scale > 0.0 else 0.0
+    return float(_cells(simulation).content + heat.stored(simulation.owned) - heat.start)
+
+
+def heat_imbalance(simulation: Any) -> float:
+    """Change of heat in the particles that the fluid did not give, or in the fluid that nothing gave, over that
+    exchanged."""
+    heat = simulation.feature(HeatExchange)
+    wrong, scale = abs(heat.last - heat.start - heat.other - heat.given), heat.scale
+    if heat.cells is not None:
+        sums = heat.cells.sums
+        brought = sums["inflow"] - sums["outflow"] + sums["walls"] + sums["displaced"] - heat.given
+        wrong, scale = max(wrong, abs(heat.cells.content - brought)), scale + abs(sums["inflow"]) + abs(sums["walls"])
+    return wrong / scale if scale > 0.0 else 0.0
+
+
+def heat_out_of_range_count(simulation: Any) -> float:
+    """How often the law of heat transfer was evaluated outside of its range so far."""
+    heat = simulation.feature(HeatExchange)
+    return float(heat.communicator.sum([heat.law.outside]))

@@ -1,9 +1,10 @@
-"""Keys of the table `[heat]`: temperature of particles in a fluid of one temperature."""
+"""Keys of the table `[heat]`: temperature of particles and of the fluid."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,24 +12,61 @@ from pydantic import Field
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
 from cfddem.case.feature_table import FeatureTable
+from cfddem.fluid.scalar_conditions import SOLID, ExchangeWall, FluxWall, HeldWall, ScalarSides, Wall
 from closures.heat_transfer import ranz_marshall
+
+Temperature = Annotated[float, Field(ge=0)]
+
+CELL_KEYS = (
+    "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux",
+)  # fmt: skip
+"""Keys that need a temperature in every cell."""
 
 LARGEST_BIOT = 0.1
 """Biot number up to which a sphere has one temperature [-]."""
 
 
+AROUND = "sides"
+"""Name of all walls around a column at once, in the keys of walls."""
+
+
 class Heat(FeatureTable):
-    """Heat between particles of one temperature each and a fluid of one temperature."""
+    """Heat between particles of one temperature each and the fluid, which has a temperature in every cell."""
 
     table: ClassVar[str] = "heat"
-    meaning: ClassVar[str] = "heat between particles of one temperature each and a fluid of one temperature"
+    meaning: ClassVar[str] = "heat between particles of one temperature each and the fluid, cell by cell"
 
     particle_temperature: float = Field(ge=0, description="temperature of new particles, above absolute zero [K]")
     fluid_temperature: float = Field(ge=0, description="temperature of the fluid, at the start if it changes [K]")
+    fluid: Literal["auto", "cells", "uniform"] = Field(
+        "auto",
+        description="temperature of the fluid: in all its cells, or a uniform one; auto: cells, but uniform without "
+        "drag or with fluid_total_capacity",
+    )
     conductivity: Positive = Field(description="thermal conductivity of the fluid [W/m/K]")
     fluid_heat_capacity: Positive = Field(description="specific heat capacity of the fluid [J/kg/K]")
     fluid_total_capacity: Positive | None = Field(
         None, description="heat capacity of all the fluid, well mixed; default: its temperature is held [J/K]"
+    )
+    inlet_temperature: Temperature | None = Field(
+        None, description="temperature of the fluid that enters; default: fluid_temperature [K]"
+    )
+    outlet_temperature: Temperature | None = Field(
+        None, description="temperature of fluid that flows back through the outlet; default: that of the cell [K]"
+    )
+    wall_temperature: dict[str, Temperature] = Field(
+        {},
+        description="temperature of walls of the column for the fluid, by x_low to z_high, or sides for all around; "
+        "walls without a key are insulated [K]",
+    )
+    wall_coefficient: dict[str, Positive] = Field(
+        {},
+        description="coefficient between a wall of wall_temperature and the fluid in the cell beside it; default: "
+        "conduction from the wall to the centre of the cell [W/m2/K]",
+    )
+    wall_flux: dict[str, float] = Field({}, description="heat flux from walls into the fluid, by name [W/m2]")
+    effective_conductivity: Literal["none", "zehner_schluender"] = Field(
+        "none", description="conductivity of the fluid between particles: none, voidage times conductivity; or the law"
     )
     heat_capacity: dict[str, Positive] = Field(
         description="specific heat capacity of the particles, by material [J/kg/K]"
@@ -38,7 +76,8 @@ class Heat(FeatureTable):
     )
 
     def refuse(self, case: Any) -> None:
-        """Refuse particles without a heat capacity, unknown materials, and a case without a viscous fluid."""
+        """Refuse particles without a heat capacity, unknown materials, walls that are none, and a case without a
+        viscous fluid."""
         if case.fluid is None:
             raise InputError("heat", None, "left out without a [fluid]", "add the table [fluid]")
         if case.fluid.viscosity == 0.0:
@@ -52,6 +91,70 @@ class Heat(FeatureTable):
                 raise InputError(
                     f"heat.heat_capacity.{name}", None, "given: particles are of this material", "[J/kg/K]"
                 )
+
+        if self.in_cells(case):
+            self._refuse_walls(case)
+        else:
+            for key in CELL_KEYS:
+                if getattr(self, key):
+                    remedy = 'fluid = "cells"; leave fluid_total_capacity out'
+                    raise InputError(f"heat.{key}", None, "left out where the fluid has one temperature", remedy)
+
+    def _refuse_walls(self, case: Any) -> None:
+        """Refuse names that are no walls of the column, and walls with too much or too little."""
+        if self.fluid_total_capacity:
+            remedy = "leave it out; the fluid in the cells has its density"
+            raise InputError("heat.fluid_total_capacity", self.fluid_total_capacity, "left out with cells", remedy)
+        walls = self.names_of_walls(case)
+        for key in ("wall_temperature", "wall_coefficient", "wall_flux"):
+            for name in getattr(self, key):
+                if name not in walls:
+                    raise InputError(f"heat.{key}.{name}", None, "one of the walls " + ", ".join(walls))
+        for name in self.wall_coefficient:
+            if name not in self.wall_temperature:
+                remedy = f"add heat.wall_temperature.{name}"
+                raise InputError(f"heat.wall_coefficient.{name}", None, "of a wall with a temperature", remedy)
+        for name in self.wall_flux:
+            if name in self.wall_temperature:
+                remedy = "leave one of the two out"
+                raise InputError(f"heat.wall_flux.{name}", None, "of a wall without a temperature", remedy)
+
+    def in_cells(self, case: Any) -> bool:
+        """Whether every cell of the fluid has a temperature of its own."""
+        if self.fluid == "auto":
+            return not self.fluid_total_capacity and case.laws.drag != "none"
+        return self.fluid == "cells"
+
+    def names_of_walls(self, case: Any) -> list[str]:
+        """Names that walls of the column can have in the keys of this table."""
+        column = case.column
+        kinds = [column.sides, column.sides, column.front or column.sides, column.front or column.sides]
+        around = [name for name, kind in zip(("x_low", "x_high", "y_low", "y_high"), kinds) if kind != "periodic"]
+        ends = {"flow": ["z_low"], "closed": ["z_low", "z_high"], "periodic": []}[column.ends]
+        return [*([AROUND] if around else []), *around, *ends, SOLID]
+
+    def sides_of(self, case: Any) -> ScalarSides:
+        """Conditions of the temperature on the sides of the column."""
+        round_wall = math.pi / 4.0 if case.column.shape == "cylinder" else 1.0
+        walls: dict[str, Wall] = {}
+        for name in (*self.wall_temperature, *self.wall_flux):
+            named = [name]
+            if name == AROUND:
+                named = [each for each in self.names_of_walls(case) if each[0] in "xy"]
+                named += [SOLID] if case.column.shape == "cylinder" else []
+            for each in named:
+                area = round_wall if each[0] in "xys" else 1.0
+                if name in self.wall_flux:
+                    wall: Wall = FluxWall(self.wall_flux[name], area)
+                elif name in self.wall_coefficient:
+                    wall = ExchangeWall(self.wall_coefficient[name], self.wall_temperature[name], area)
+                else:
+                    wall = HeldWall(self.wall_temperature[name], area)
+                if name == AROUND:
+                    walls.setdefault(each, wall)
+                else:
+                    walls[each] = wall
+        return ScalarSides(given_or(self.inlet_temperature, self.fluid_temperature), self.outlet_temperature, walls)
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle has no single temperature."""
@@ -71,3 +174,8 @@ class Heat(FeatureTable):
     def capacities(self, case: Any) -> np.ndarray:
         """Specific heat capacity by number of material, NaN where none is given [J/kg/K]."""
         return np.array([self.heat_capacity.get(name, np.nan) for name in case.material])
+
+
+def given_or(value: float | None, default: float) -> float:
+    """A value, or its default where it is not given."""
+    return default if value is None else value

@@ -19,7 +19,7 @@ velocity stays uniform in a moving voidage, and momentum is conserved by constru
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,8 +77,8 @@ class FluidSolver:
 
     Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
     area of a face normal to x, y, z [m2]; `open_cells` (nz, ny, nx), 1 where a cell is open, 0 where it is solid;
-    `time` [s]; `last_step`, length of the step just made [s]. Methods return plain arrays in the index order of
-    `cfddem.fluid.grid`.
+    `time`, `last_step`, length of the step just made [s]; `followers`, called before the voidage changes without a
+    flow, by (nz, ny, nx). Methods return plain arrays in the index order of `cfddem.fluid.grid`.
     """
 
     def __init__(
@@ -111,6 +111,7 @@ class FluidSolver:
         self.density, self.model, self.gravity = float(density), model, np.asarray(gravity, dtype=float)
         self.tolerance, self.passes = float(tolerance), int(passes)
         self.time, self.last_step = 0.0, 0.0
+        self.followers: list[Callable[[Array], None]] = []
         self.fields, self.faces = CellFields(grid, FLUID_FIELDS), sides.faces()
         self.model_b, self._central = float(model == "B"), float(convection == "central")
         self.inverse_spacing = 1.0 / np.array(grid.spacing)
@@ -262,8 +263,7 @@ class FluidSolver:
         fields.swap("mean_voidage", "other_voidage")
         fields.swap("voidage_rate", "new_voidage_rate")
         self.voidage[:] = voidage
-        self.time += step
-        self.last_step = step
+        self.time, self.last_step = self.time + step, step
 
     # ------------------------------------------------------------ step size
 
@@ -327,7 +327,10 @@ class FluidSolver:
         change  (nz, ny, nx) [-]
         """
         voidage = np.minimum(self.voidage + change, 1.0)  # where all particles leave a cell, up to rounding
-        self.voidage[:] = checked_voidage(self.grid, voidage, self.communicator)
+        voidage = checked_voidage(self.grid, voidage, self.communicator)
+        for follow in self.followers:
+            follow(voidage - self.voidage)
+        self.voidage[:] = voidage
 
     def set_velocity(self, velocity: Sequence[Any]) -> None:
         """Start from a velocity, corrected by the smallest potential flow that makes it satisfy continuity.

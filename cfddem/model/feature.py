@@ -6,7 +6,7 @@ same way, `Simulation.add`. Every method does nothing unless a feature says othe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -48,6 +48,10 @@ class Equipment(Feature):
 
     def before_snapshot(self, simulation: Any) -> None:
         """Find what only snapshots hold."""
+
+    def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
+        """Its fields of the fluid in snapshots, in the cells of all ranks (nz, ny, nx)."""
+        return {}
 
     def before(self, simulation: Any, step: float) -> None:
         """Act before the particles make their steps, over `step` [s]."""

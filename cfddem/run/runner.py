@@ -19,6 +19,7 @@ from cfddem.case.column_grid import grid_of
 from cfddem.case.compare import require_measured_units
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
+from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
 from cfddem.io.folder import AVERAGES_FROM, read_about
@@ -310,6 +311,8 @@ class Run:
             fluid: dict[str, np.ndarray] | None = None
             if simulation.fluid is not None:
                 fluid = {name: simulation.fluid.whole(name) for name in RECORDED}
+                for feature in simulation.features:
+                    fluid |= feature.cells_for_snapshot()
                 if SOLID in self.folder.quantities["fluid"]:
                     fluid[SOLID] = ~simulation.fluid.grid.whole.open
             collisions = solver.collisions.take() if solver.collisions else None
@@ -355,6 +358,7 @@ def quantities_of(simulation: Simulation) -> Quantities:
         "history": history.all_columns(case),
         "particles": of_fields(field for field in simulation.particles.fields.values() if field.snapshot),
         "fluid": of_fields(field for field in FLUID_FIELDS if field.name in RECORDED)
+        | of_fields(field for kind in FEATURES if kind.is_in(case) for field in kind.cell_fields_of(case))
         | ({SOLID: Quantity("1", "1 in solid cells, 0 in the fluid")} if grid_of(case).solid is not None else {}),
         "collisions": of_fields(simulation.particle_solver.laws.bridges.collision_fields)
         if case.run.record_collisions

@@ -1,0 +1,58 @@
+"""Conditions of a scalar at the sides of the box, and on solid cells. Importing this module compiles nothing.
+
+An inlet brings its value, an outlet lets the value of the cell leave. Walls hold a value, let a flux in, or exchange
+with a coefficient. Periodic sides need no condition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+SOLID = "solid"
+"""Name of the wall around solid cells, beside the names of the six sides."""
+
+
+@dataclass(frozen=True)
+class HeldWall:
+    """A wall that holds a value; the fluid conducts between it and the centre of the cell.
+
+    area  of the wall over that of its faces, here and below: a round wall is shorter than its staircase of cells
+    """
+
+    value: float
+    area: float = 1.0
+
+
+@dataclass(frozen=True)
+class FluxWall:
+    """A wall through which a flux enters, per area: [W/m2] of heat, [kg/m2/s] of a species."""
+
+    flux: float = 0.0
+    area: float = 1.0
+
+
+@dataclass(frozen=True)
+class ExchangeWall:
+    """A wall with a coefficient between a value outside and the cell beside it: [W/m2/K] of heat, [kg/m2/s]."""
+
+    coefficient: float
+    value: float
+    area: float = 1.0
+
+
+Wall = HeldWall | FluxWall | ExchangeWall
+
+
+@dataclass(frozen=True)
+class ScalarSides:
+    """Conditions of a scalar on all sides.
+
+    inflow    value that inlets bring
+    backflow  value that flows back through outlets; that of the cell if None
+    walls     by the name of a side, or "solid" for the walls around solid cells; insulated where there is none
+    """
+
+    inflow: float
+    backflow: float | None = None
+    walls: Mapping[str, Wall] = field(default_factory=dict)
