@@ -39,7 +39,7 @@ class HeatExchange(CaseFeature):
     """Temperature of the particles and of the fluid, and the heat between them.
 
     cells              temperature of the fluid in every cell; None if it is uniform
-    uniform            temperature of the fluid now if it is uniform [K]
+    fluid_temperature  of all the fluid now, or its mean over the cells [K]
     given              heat given to the particles by the fluid [J]
     scale              heat exchanged, without sign [J]
     other              change of the heat in the particles between exchanges: by feeds, outlets and a user [J]
@@ -53,7 +53,7 @@ class HeatExchange(CaseFeature):
         law = case.laws.heat_law
         assert keys is not None and law is not None
         self.keys, self.capacities, self.law = keys, keys.capacities(case), ExchangeLaw(law)
-        self.uniform, self.given = keys.fluid_temperature, 0.0
+        self.fluid_temperature, self.given = keys.fluid_temperature, 0.0
         self.communicator = simulation.communicator
         self.cells: Scalar | None = None
         if keys.in_cells(case):
@@ -92,7 +92,7 @@ class HeatExchange(CaseFeature):
         """Temperatures and heat."""
         keys = Heat.of(case)
         of_cells = (
-            Measured("K", "measure", outlet_temperature),
+            *([Measured("K", "measure", outlet_temperature)] if case.column.ends == "flow" else []),
             Measured("J", "recorded", heat_in),
             Measured("J", "recorded", heat_out),
             Measured("J", "recorded", heat_from_walls),
@@ -140,9 +140,9 @@ class HeatExchange(CaseFeature):
         """Heat that every particle receives from a fluid of one temperature (N,) [J]."""
         total, exchanged = self.communicator.sum, capacity * -np.expm1(-step * conductance / capacity)
         if bath := self.keys.fluid_total_capacity:
-            brought = float(total(exchanged * (particles.temperature - self.uniform)))
-            self.uniform += brought / (bath + float(total(exchanged)))
-        return np.asarray(exchanged * (self.uniform - particles.temperature))
+            brought = float(total(exchanged * (particles.temperature - self.fluid_temperature)))
+            self.fluid_temperature += brought / (bath + float(total(exchanged)))
+        return np.asarray(exchanged * (self.fluid_temperature - particles.temperature))
 
     def _from_cells(self, cells: Scalar, particles: Any, terms: Any, step: float) -> np.ndarray:
         """Heat that every particle receives from the cells around (N,) [J]; the cells make their step.
@@ -152,6 +152,7 @@ class HeatExchange(CaseFeature):
         self.transfer.last_step = 0.0
         sent = self.transfer.prepare(particles, terms.cell_map, self.conductance(terms), step)
         seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])[..., None]
+        self.fluid_temperature = cells.mean
         return step * self.transfer.apply(particles, terms.cell_map, sent, np.ones_like(seen), seen)[:, 0]
 
     def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
@@ -160,18 +161,19 @@ class HeatExchange(CaseFeature):
 
     def checkpoint(self) -> dict[str, Any]:
         """The temperature of the fluid and the balance."""
-        kept = {name: getattr(self, name) for name in _KEPT}
+        kept = {name: getattr(self, name) for name in _KEPT} | {"outside": self.communicator.sum([self.law.outside])}
         return kept if self.cells is None else kept | {"cells": self.cells.checkpoint()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         for name in _KEPT:
             setattr(self, name, float(state[name]))
+        self.law.outside = int(state["outside"]) if self.communicator.rank == 0 else 0
         if self.cells is not None:
             self.cells.restore(state["cells"])
 
 
-_KEPT = ("uniform", "given", "scale", "start", "other", "last")
+_KEPT = ("fluid_temperature", "given", "scale", "start", "other", "last")
 
 
 def _cells(simulation: Any) -> Scalar:
@@ -190,7 +192,7 @@ def mean_temperature(simulation: Any) -> float:
 def fluid_temperature(simulation: Any) -> float:
     """Mean temperature of the fluid."""
     heat = simulation.feature(HeatExchange)
-    return float(heat.uniform if heat.cells is None else heat.cells.mean)
+    return float(heat.fluid_temperature)
 
 
 def outlet_temperature(simulation: Any) -> float:

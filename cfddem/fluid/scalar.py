@@ -78,7 +78,7 @@ class Scalar:
 
     sums   since the start, of the value above `kind.start` times capacity [J] or [kg]: "inflow", "outflow", "walls",
            "exchange" from the particles, "displaced" by particles that entered or left
-    leaving  mean value of what left through outlets in the last step; NaN if nothing did
+    leaving  mean value of what left through outlets in the last step in which something did; at first that at the start
     """
 
     def __init__(self, fluid: FluidSolver, kind: ScalarKind, sides: ScalarSides) -> None:
@@ -98,14 +98,13 @@ class Scalar:
         )
         self._through = np.zeros((2, 3, *self.grid.padded_shape))
         self._faces = SideFaces.of(fluid.boundaries, sides, kind.capacity)
-        self._solid = None if self.grid.solid is None else self.grid.solid
         is_open = fluid.boundaries.halo.padded(self.grid.open, outside=0.0)
         for d in range(3):
             self.fields.gate[d] = is_open * np.roll(is_open, 1, axis=2 - d)
         self._wall_rate = self._rate_of_walls()
         self.fields.owned("stored")[:] = fluid.voidage
         self.sums = dict.fromkeys(("inflow", "outflow", "walls", "exchange", "displaced"), 0.0)
-        self.leaving, self.parts = math.nan, 1
+        self.leaving, self.parts = kind.start, 1
         fluid.followers.append(self.displaced)
 
     # ------------------------------------------------------------ values
@@ -216,8 +215,8 @@ class Scalar:
                 self._faces.places, self._faces.rules, inverse, through[stage].reshape(3, -1),
             )  # fmt: skip
             balance(fields.value, fields.stored, fields.growth, through, second, step, inverse, fields.next)
-            if self._solid is not None:
-                self.grid.inner(fields.next)[self._solid] = self.kind.start
+            if self.grid.solid is not None:
+                self.grid.inner(fields.next)[self.grid.solid] = self.kind.start
         fields.swap("value", "next")
         stored = fields.owned("stored")
         stored -= step * fields.owned("growth")
@@ -245,7 +244,8 @@ class Scalar:
         self.sums["inflow"] += float(inflow)
         self.sums["outflow"] -= float(outflow)
         self.sums["walls"] += float(walls)
-        self.leaving = self.kind.start - float(outflow / (left * self.kind.capacity)) if left > 0.0 else math.nan
+        if left > 0.0:
+            self.leaving = self.kind.start - float(outflow / (left * self.kind.capacity))
 
     def _rate_of_walls(self) -> Array:
         """Rate of each cell by the coefficients of its walls (nz, ny, nx) [1/s]."""
