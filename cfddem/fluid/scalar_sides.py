@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,10 @@ class SideFaces(NamedTuple):
     def of(cls, boundaries: Boundaries, sides: ScalarSides, capacity: float) -> SideFaces:
         """The faces of a grid; capacity is that of the fluid per volume, [J/m3/K] or [kg/m3]."""
         grid = boundaries.grid
-        shape, is_open = grid.padded_shape, boundaries.halo.padded(grid.open, outside=0.0) > 0.0
-        steps, flat = (1, shape[2], shape[1] * shape[2]), np.arange(is_open.size).reshape(shape)
+        shape, steps = grid.padded_shape, (1, grid.padded_shape[2], grid.padded_shape[1] * grid.padded_shape[2])
+        is_open: Any = boundaries.halo.padded(grid.open, outside=0.0) > 0.0
+        solid: Any = boundaries.halo.padded(~grid.open, outside=0.0) > 0.0
+        flat: Any = np.arange(is_open.size).reshape(shape)
         places, rules, wall = [np.zeros((0, 4), np.int64)], [np.zeros((0, 5))], [np.zeros(0, bool)]
 
         def add(axis: int, high: bool, cells: np.ndarray, rule: np.ndarray, is_wall: np.ndarray) -> None:
@@ -45,7 +47,6 @@ class SideFaces(NamedTuple):
             rule[inlet] = sides.inflow, 0.0, 0.0, 0.0, 1.0
             rule[outlet] = math.nan if sides.backflow is None else sides.backflow, 0.0, 0.0, 0.0, 1.0
             add(side.axis, side.high, cells[own], rule[own], ~(inlet | outlet)[own])
-        solid = boundaries.halo.padded(~grid.open, outside=0.0) > 0.0
         if sides.walls.get(SOLID) is not None and grid.whole.solid is not None:
             rule = _rule(sides.walls[SOLID], capacity)
             for axis in range(3):
