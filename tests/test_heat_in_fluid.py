@@ -30,7 +30,6 @@ from cfddem.fluid.solver import FluidSolver
 from cfddem.run.history import row
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
-from closures.heat_transfer import gunn
 from closures.registry import law
 
 RHO_C, CONDUCTIVITY = 1200.0, 0.03
