@@ -158,7 +158,7 @@ def test_a_wall_at_a_temperature_warms_the_particle_that_touches_it_alone() -> N
     simulation.until(500.0)
     assert simulation.particles.temperature == pytest.approx([350.0, HOT], abs=1e-3)
     capacity = simulation.feature(HeatExchangeOfContacts).capacity(simulation.particles)[0]
-    assert row(simulation)["heat_from_walls"] == pytest.approx(capacity * (350.0 - COLD), rel=1e-3)
+    assert row(simulation)["contact_heat_from_walls"] == pytest.approx(capacity * (350.0 - COLD), rel=1e-3)
     assert contact_heat_imbalance(simulation) < 1e-11
 
 
@@ -175,7 +175,7 @@ def test_a_wall_with_a_power_gives_all_of_it() -> None:
     simulation.until(10.0)
     capacity = simulation.feature(HeatExchangeOfContacts).capacity(simulation.particles)[0]
     assert capacity * (simulation.particles.temperature[0] - COLD) == pytest.approx(1e-2, rel=1e-9)
-    assert row(simulation)["heat_from_walls"] == pytest.approx(1e-2, rel=1e-9)
+    assert row(simulation)["contact_heat_from_walls"] == pytest.approx(1e-2, rel=1e-9)
 
 
 def test_a_rough_contact_resists_and_gas_between_its_asperities_helps() -> None:
@@ -204,7 +204,9 @@ def test_history_snapshot_and_checkpoint_have_the_heat_and_continue_with_the_sam
     for each in (simulation, again):
         each.step()
     assert repr(row(again)) == repr(row(simulation))
-    assert {"mean_temperature", "heat_from_walls", "heat_radiated", "contact_heat_imbalance"} <= row(again).keys()
+    assert {"mean_temperature", "contact_heat_from_walls", "contact_heat_radiated", "contact_heat_imbalance"} <= row(
+        again
+    ).keys()
     assert np.array_equal(again.snapshot()["temperature"], simulation.snapshot()["temperature"])
 
 

@@ -100,8 +100,8 @@ class HeatExchangeOfContacts(CaseFeature):
         own = () if Heat.of(case) is not None else (Measured("K", "measure", mean_temperature),)
         return (
             *own,
-            Measured("J", "recorded", heat_from_walls),
-            Measured("J", "recorded", heat_radiated),
+            Measured("J", "recorded", contact_heat_from_walls),
+            Measured("J", "recorded", contact_heat_radiated),
             Measured("1", "imbalance", contact_heat_imbalance),
         )
 
@@ -311,12 +311,12 @@ def mean_temperature(simulation: Any) -> float:
     return float((capacity * particles.temperature).sum() / max(capacity.sum(), 1e-300))  # local: one process
 
 
-def heat_from_walls(simulation: Any) -> float:
+def contact_heat_from_walls(simulation: Any) -> float:
     """Heat that the walls have given to the particles."""
     return float(simulation.feature(HeatExchangeOfContacts).from_walls)
 
 
-def heat_radiated(simulation: Any) -> float:
+def contact_heat_radiated(simulation: Any) -> float:
     """Heat that the particles have received from the surroundings by radiation."""
     return float(simulation.feature(HeatExchangeOfContacts).radiated)
 

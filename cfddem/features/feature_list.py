@@ -9,6 +9,7 @@ from __future__ import annotations
 from cfddem.features.case_feature import CaseFeature
 from cfddem.features.contact_heat import HeatExchangeOfContacts
 from cfddem.features.energy import EnergyLedger
+from cfddem.features.evaporation import EvaporationOfLiquid
 from cfddem.features.feeds import Feeds
 from cfddem.features.heat import HeatExchange
 from cfddem.features.liquid import LiquidOnParticles
@@ -23,5 +24,6 @@ FEATURES: tuple[type[CaseFeature], ...] = (
     Feeds,
     HeatExchange,
     HeatExchangeOfContacts,
+    EvaporationOfLiquid,
 )
 """In the order in which they act, before the particles move and after."""
