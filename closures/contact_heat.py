@@ -95,11 +95,12 @@ def intersection_radius(first: float, second: float, overlap: float) -> float:
     overlap  delta, >= 0 [m]
     returns  a [m]
 
-    Range: overlap below the smaller diameter.
+    Range: overlap below the smaller radius; larger ones count as that.
 
     >>> round(intersection_radius(1.5e-3, 1.8e-3, 1.33e-7) * 1e6, 3)
     14.752
     """
+    overlap = min(overlap, min(first, second))
     if second == math.inf:
         return math.sqrt(overlap * (2.0 * first - overlap))
     distance = first + second - overlap
@@ -216,6 +217,7 @@ def macro_gap_conductance(first: float, second: float, gap: float, contact_radiu
     at_wall = first == math.inf or second == math.inf
     radius = min(first, second) if at_wall else 2.0 * first * second / (first + second)
     width = (2.0 if at_wall else 1.0) * (max(gap, 0.0) + jump)
+    contact_radius = min(contact_radius, radius)
     across = 2.0 * math.sqrt(radius**2 - contact_radius**2)
     # S - A without cancellation
     rest = (contact_radius**2 / radius) ** 2 / (2.0 * radius - contact_radius**2 / radius + across) + width
@@ -282,14 +284,14 @@ def micro_gap_conductance(contact_radius: float, pressure_ratio: float, roughnes
     jump            M, from :func:`jump_distance` [m]
     returns         G / k_g [m]
 
-    Range: P_0 < H; 0 above, where no gap is left.
+    Range: P_0 < H / 2; a_1 is 0 above, and the conductance 0 from P_0 = H on, where no gap is left.
 
     >>> round(micro_gap_conductance(8.2e-6, 0.12, 27e-9, 3.66e-7) * 1e6)
     445
     """
     if not 0.0 < pressure_ratio < 1.0:
         return 0.0
-    near = inverse_erfc(2.0 * pressure_ratio)
+    near = max(inverse_erfc(2.0 * pressure_ratio), 0.0)
     width = inverse_erfc(0.03 * pressure_ratio) - near
     scale = 2.0 * math.sqrt(2.0) * roughness
     return math.pi * contact_radius**2 / (scale * width) * math.log(1.0 + width / (near + jump / scale))
@@ -299,10 +301,12 @@ def micro_gap_conductance(contact_radius: float, pressure_ratio: float, roughnes
 def inverse_erfc(value: float) -> float:
     r"""Inverse of the complementary error function.
 
-    value    erfc(x), 0 < value < 2 [-]
+    .. math:: \mathrm{erfc}\,x = y
+
+    value    y, 0 < y < 2 [-]
     returns  x [-]
 
-    Range: 0 < value < 2.
+    Range: 0 < y < 2.
 
     >>> round(inverse_erfc(math.erfc(0.3)), 12), round(inverse_erfc(math.erfc(-1.2)), 12)
     (0.3, -1.2)

@@ -8,7 +8,6 @@ exchange. What a pair exchanges is computed once, from the new temperatures, and
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
-from cfddem.features.contact_heat_keys import ContactHeat, wall_names
+from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
 from cfddem.features.contact_heat_loops import LENS, NONE, RAREFIED, ROUGH, SMOOTH, Choices, Pairs, conductances
 from cfddem.features.heat_keys import Heat
 from cfddem.particles.pair_graph import shifts
@@ -46,13 +45,13 @@ class HeatExchangeOfContacts(CaseFeature):
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = ContactHeat.of(case)
-        assert keys is not None
+        assert keys
         if simulation.communicator.size > 1:
             raise InputError("contact_heat", None, "left out in a run of several processes", "take one process")
         self.keys, self.case = keys, case
         self.capacities = _capacities(case, keys)
         self.emissivities = keys.by_material(case, "emissivity", 0.0)
-        self.walls = [keys.wall.get(name) for name in wall_names(case)]
+        self.walls = [keys.wall.get(name, ADIABATIC) for name in wall_names(case)]
         self.from_walls, self.radiated, self.gained, self.scale, self._step = 0.0, 0.0, 0.0, 0.0, 0.0
         self.choices = Choices(
             contact={"none": NONE, "smooth": SMOOTH, "rough": ROUGH}[keys.contact],
@@ -70,7 +69,7 @@ class HeatExchangeOfContacts(CaseFeature):
 
     def _reach(self, particles: Particles) -> float:
         """Reach of the list of pairs over R* [-]."""
-        if self.choices.gap == NONE and not any(each and each.coefficient for each in self.walls):
+        if self.choices.gap == NONE and not any(each.coefficient for each in self.walls):
             return 0.0
         largest, smallest = particles.radius.max(), particles.radius.min()  # local: one process
         return float(self.keys.lens * (1.0 + largest / smallest))
@@ -78,14 +77,14 @@ class HeatExchangeOfContacts(CaseFeature):
     @classmethod
     def is_in(cls, case: Case) -> bool:
         """Whether the case has the table."""
-        return ContactHeat.of(case) is not None
+        return bool(ContactHeat.of(case))
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:
         """The temperature; `[heat]` declares it where a case has both."""
         keys = ContactHeat.of(case)
-        assert keys is not None
-        if Heat.of(case) is not None:
+        assert keys
+        if Heat.of(case):
             return ()
         by_species = keys.start_temperatures(case)
 
@@ -97,7 +96,7 @@ class HeatExchangeOfContacts(CaseFeature):
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:
         """Temperatures and heat."""
-        own = () if Heat.of(case) is not None else (Measured("K", "measure", mean_temperature),)
+        own = () if Heat.of(case) else (Measured("K", "measure", mean_temperature),)
         return (
             *own,
             Measured("J", "recorded", contact_heat_from_walls),
@@ -120,10 +119,11 @@ class HeatExchangeOfContacts(CaseFeature):
         first, second, between, body, wall, at_wall = self._links(simulation.particle_solver)
         area = 4.0 * np.pi * particles.radius**2
         seen = self._surroundings(particles)
-        radiation = area * radiation_coefficient(self.emissivities[particles.material], start, seen)
+        emissivity: Any = self.emissivities[particles.material]
+        radiation = area * radiation_coefficient(emissivity, start, seen)  # type: ignore[arg-type]  # of every particle
         count = len(capacity)
-        temperatures = np.array([math.nan if w is None or w.temperature is None else w.temperature for w in self.walls])
-        powered = np.array([w is not None and w.power is not None for w in self.walls], bool)
+        temperatures = np.array([each.fixed for each in self.walls])
+        powered = np.array([each.is_powered for each in self.walls], bool)
         node = np.full(len(self.walls), -1)
         node[powered] = count + np.arange(powered.sum())  # local: walls
 
@@ -134,7 +134,7 @@ class HeatExchangeOfContacts(CaseFeature):
         np.add.at(right, body[fixed], at_wall[fixed] * temperatures[wall[fixed]])
         ends = np.concatenate([first, body[free]]), np.concatenate([second, node[wall[free]]])
         links = np.concatenate([between, at_wall[free]])
-        power = np.array([self.walls[w].power for w in np.flatnonzero(powered)], float)  # type: ignore[union-attr]
+        power = np.array([each.power for each in self.walls if each.is_powered], float)  # type: ignore[type-var]
         diagonal, right = np.append(diagonal, np.zeros(len(power))), np.append(right, power)
         new = _solved(diagonal, *ends, links, right, np.append(start, np.zeros(len(power))))
 
@@ -168,7 +168,7 @@ class HeatExchangeOfContacts(CaseFeature):
         order = np.lexsort((gap[pairs:], wall, body))
         fresh = np.ones(len(order), bool)
         fresh[1:] = (np.diff(body[order]) != 0) | (np.diff(wall[order]) != 0)
-        heated = np.array([each is not None for each in self.walls], bool)
+        heated = np.array([each.passes_heat for each in self.walls], bool)
         rows = order[fresh]
         rows = rows[heated[wall[rows]]]
         body, wall, gap, force = body[rows], wall[rows], gap[pairs:][rows], force[pairs:][rows]
@@ -177,7 +177,7 @@ class HeatExchangeOfContacts(CaseFeature):
             particles, particles.material[body], walls.material[piece[rows]],
             (radius, np.full(len(rows), np.inf), gap, force), solver,
         )  # fmt: skip
-        coefficient = np.array([0.0 if each is None else each.coefficient or 0.0 for each in self.walls])[wall]
+        coefficient = np.array([each.coefficient or 0.0 for each in self.walls])[wall]
         touches = np.where(gap < keys.lens * radius, coefficient * np.pi * radius**2, 0.0)
         at_wall = np.where(coefficient > 0.0, touches, at_wall)
         some, there = between > 0.0, at_wall > 0.0
@@ -204,8 +204,12 @@ class HeatExchangeOfContacts(CaseFeature):
         keys, case = self.keys, self.case
         solid, hardness = keys.by_material(case, "conductivity", 1.0), keys.by_material(case, "microhardness", 1.0)
         slope, height = keys.by_material(case, "slope", 1.0), keys.by_material(case, "surface_roughness", 1.0)
+        first, second, gap, force = shape
         pairs = Pairs(
-            *shape,
+            first=first,
+            second=second,
+            gap=gap,
+            force=force,
             modulus=np.ascontiguousarray(solver.table["film_modulus"][one, other]),
             first_conductivity=solid[one],
             second_conductivity=solid[other],
@@ -246,7 +250,7 @@ class HeatExchangeOfContacts(CaseFeature):
 def _capacities(case: Case, keys: ContactHeat) -> np.ndarray:
     """Specific heat capacity by number of material [J/kg/K]."""
     heat = Heat.of(case)
-    return keys.by_material(case, "heat_capacity") if heat is None else heat.capacities(case)
+    return heat.capacities(case) if heat else keys.by_material(case, "heat_capacity")
 
 
 _KEPT = ("from_walls", "radiated", "gained", "scale")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, ClassVar, Literal
 
@@ -22,7 +23,7 @@ ROUGH = ("microhardness", "slope", "surface_roughness")
 class WallHeat(Checked):
     """What a wall does to the particles that touch it."""
 
-    temperature: float | None = Field(None, ge=0, description="temperature of the wall, above absolute zero [K]")
+    temperature: Positive | None = Field(None, description="temperature of the wall, above absolute zero [K]")
     power: float | None = Field(
         None, description="heat into the wall, which passes all of it on; flux times area, instead of a temperature [W]"
     )
@@ -32,12 +33,31 @@ class WallHeat(Checked):
         "it; default: the contact and the gas, as between particles [W/m2/K]",
     )
 
+    @property
+    def is_powered(self) -> bool:
+        """Whether the heat is given, not the temperature."""
+        return self.power is not None
+
+    @property
+    def passes_heat(self) -> bool:
+        """Whether it exchanges heat at all."""
+        return self.is_powered or bool(self.temperature)
+
+    @property
+    def fixed(self) -> float:
+        """The temperature; NaN where the heat is given [K]."""
+        return self.temperature or math.nan
+
     @model_validator(mode="after")
     def _one_condition(self) -> WallHeat:
-        if (self.temperature is None) == (self.power is None):
-            found = "found none" if self.temperature is None else "found both"
+        if bool(self.temperature) == self.is_powered:
+            found = "found both" if self.is_powered else "found none"
             raise InputError("temperature", self.temperature, "given, or power, and only one of them", found)
         return self
+
+
+ADIABATIC = WallHeat.model_construct()
+"""A wall that passes no heat."""
 
 
 class ContactHeat(FeatureTable):
@@ -88,7 +108,7 @@ class ContactHeat(FeatureTable):
     emissivity: dict[str, NonNegative] = Field(
         {}, description="emissivity of the particles by material, for radiation with the surroundings [-]"
     )
-    surroundings_temperature: float | None = Field(None, ge=0, description="temperature of what particles see [K]")
+    surroundings_temperature: Positive | None = Field(None, description="temperature of what particles see [K]")
     surroundings: Literal["uniform", "local"] = Field(
         "uniform",
         description="what particles see: that temperature, or, local, a mean of it and of the particles in the same "
@@ -118,9 +138,9 @@ class ContactHeat(FeatureTable):
         used = sorted({case.material_name_of(each) for each in case.species.values()})
         with_walls = sorted({*used, *(material_of_wall(case, name) for name in self.wall)})
         conducts = self.contact != "none" or self.gap == "rarefied"
-        heated = [name for name in self.wall if self.wall[name].coefficient is None]
+        heated = [name for name in self.wall if not self.wall[name].coefficient]
         needed: list[tuple[str, list[str]]] = [("conductivity", with_walls if heated else used)] if conducts else []
-        if Heat.of(case) is None:
+        if not Heat.of(case):
             needed.append(("heat_capacity", used))
         elif self.heat_capacity:
             raise InputError("contact_heat.heat_capacity", None, "left out with [heat]", "it has heat.heat_capacity")
@@ -133,9 +153,9 @@ class ContactHeat(FeatureTable):
                 if name not in getattr(self, table):
                     limit = "given: particles or heated walls are of this material"
                     raise InputError(f"contact_heat.{table}.{name}", None, limit)
-        if self.gap != "none" and self.gas_conductivity is None:
+        if self.gap != "none" and not self.gas_conductivity:
             raise InputError("contact_heat.gas_conductivity", None, f'given for gap = "{self.gap}"', "[W/m/K]")
-        if self.emissivity and self.surroundings_temperature is None:
+        if self.emissivity and not self.surroundings_temperature:
             remedy = "the temperature that particles see by radiation [K]"
             raise InputError("contact_heat.surroundings_temperature", None, "given with emissivity", remedy)
         if case.bed.fixed and self.contact != "none":
@@ -144,7 +164,7 @@ class ContactHeat(FeatureTable):
 
     def _refuse_temperatures(self, case: Any) -> None:
         given = self.particle_temperature
-        if Heat.of(case) is not None:
+        if Heat.of(case):
             if given is not None:
                 remedy = "it has heat.particle_temperature"
                 raise InputError("contact_heat.particle_temperature", None, "left out with [heat]", remedy)
@@ -156,10 +176,10 @@ class ContactHeat(FeatureTable):
             if name not in case.species:
                 raise InputError(f"contact_heat.particle_temperature.{name}", value, nearest(name, list(case.species)))
         for name in case.species:
-            value = by_name.get(name) if by_name else given
-            if value is None:
+            value = by_name.get(name, math.nan) if isinstance(given, dict) else given
+            if math.isnan(value):
                 raise InputError(f"contact_heat.particle_temperature.{name}", None, "given for every species", "[K]")
-            if value < 0.0:  # type: ignore[operator]
+            if value < 0.0:
                 key = f"particle_temperature.{name}" if by_name else "particle_temperature"
                 raise InputError(f"contact_heat.{key}", value, "at least 0 K, absolute zero", "temperatures are in K")
 

@@ -44,7 +44,7 @@ class EvaporationOfLiquid(CaseFeature):
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Evaporation.of(case)
-        assert keys is not None
+        assert keys
         self.keys, self.fluid, self.communicator = keys, case.required_fluid, simulation.communicator
         self.partial, self.diffusivity = keys.partial_pressure(case), keys.diffusivity_in(case)
         self.fraction = vapour_fraction(self.partial, keys.pressure)
@@ -54,7 +54,7 @@ class EvaporationOfLiquid(CaseFeature):
     @classmethod
     def is_in(cls, case: Case) -> bool:
         """Whether the case has the table."""
-        return Evaporation.of(case) is not None
+        return bool(Evaporation.of(case))
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:

@@ -63,9 +63,9 @@ class Evaporation(FeatureTable):
     def refuse(self, case: Any) -> None:
         """Refuse vapour without heat, nothing that evaporates, and air above saturation."""
         heat = Heat.of(case)
-        if heat is None:
+        if not heat:
             raise InputError("evaporation", None, "left out without [heat]", "add [heat]: it takes latent heat")
-        if heat.fluid_total_capacity is not None:
+        if heat.fluid_total_capacity:
             remedy = "the gas of [evaporation] has one state, and gains no vapour"
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
         if not COLDEST <= heat.fluid_temperature <= HOTTEST:
@@ -74,7 +74,7 @@ class Evaporation(FeatureTable):
         for name in self.drops:
             if name not in case.material:
                 raise InputError("evaporation.drops", name, nearest(name, list(case.material)))
-        if not self.drops and case.liquid is None:
+        if not self.drops and not case.liquid:
             remedy = "or name the materials of drops in evaporation.drops"
             raise InputError("evaporation", None, "left out without [liquid]", remedy)
         saturated = saturation_pressure(heat.fluid_temperature)
@@ -88,7 +88,7 @@ class Evaporation(FeatureTable):
     def partial_pressure(self, case: Any) -> float:
         """Pressure of the vapour in the gas [Pa]."""
         heat = Heat.of(case)
-        assert heat is not None
+        assert heat
         if self.relative_humidity is not None:
             return self.relative_humidity * saturation_pressure(heat.fluid_temperature)
         return vapour_pressure(self.vapour_fraction or 0.0, self.pressure)
@@ -96,13 +96,13 @@ class Evaporation(FeatureTable):
     def diffusivity_in(self, case: Any) -> float:
         """Diffusivity of the vapour [m2/s]."""
         heat = Heat.of(case)
-        assert heat is not None
+        assert heat
         return self.diffusivity or vapour_diffusivity(heat.fluid_temperature, self.pressure)
 
     def wet_bulb(self, case: Any) -> float:
         """Temperature of a wet particle at the reference speed of the case [K]."""
         heat, fluid = Heat.of(case), case.required_fluid
-        assert heat is not None
+        assert heat
         diffusivity = self.diffusivity_in(case)
         reynolds = fluid.density * case.reference_speed * case.bed.largest_diameter / fluid.viscosity
         nusselt = ranz_marshall(reynolds, fluid.viscosity * heat.fluid_heat_capacity / heat.conductivity)
