@@ -132,7 +132,9 @@ class Bed(Species):
         description="initial state: poured to rest, spread evenly over the column, at random up to the height expected "
         "in the flow, at random over the column, or at `positions`",
     )
-    positions: tuple[Point, ...] = Field((), description='particle centres, for start = "placed" [m]')
+    positions: tuple[Point, ...] = Field(
+        (), description='particle centres, for start = "placed", in the order of the species [m]'
+    )
     start_corner: Point | None = Field(
         None, description="lower corner of the box in which the particles start; default: the column [m]"
     )
@@ -180,7 +182,7 @@ class Bed(Species):
 
     def _check_mixture(self) -> None:
         """Check that the species define the particles completely, and that nothing else does."""
-        for name in ("material", "diameter", "spread", "distribution", "sizes", "count", "positions"):
+        for name in ("material", "diameter", "spread", "distribution", "sizes", "count"):
             value = getattr(self, name)
             if value != type(self).model_fields[name].default:
                 raise InputError(name, value, "left out where species are given", f"give bed.species.NAME.{name}")
@@ -198,6 +200,12 @@ class Bed(Species):
                     f"species.{name}.{other}", getattr(part, other), f"left out where bed.height is {beside}",
                     f"give {wanted} instead",
                 )  # fmt: skip
+        number = sum(part.count or 0 for part in self.species.values())
+        if self.positions and (self.height or len(self.positions) != number):
+            raise InputError(
+                "positions", len(self.positions), f"as many as the species count together, {number}",
+                "one centre for each particle, in the order of the species",
+            )  # fmt: skip
         total = sum(part.fraction or 0.0 for part in self.species.values())
         if self.height and abs(total - 1.0) > _FRACTION_TOLERANCE:
             raise InputError("species", None, "given with fractions that add up to 1", f"they add up to {total:.6g}")

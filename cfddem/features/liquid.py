@@ -31,14 +31,15 @@ SNAPSHOT_FIELDS = (CARRIED, AGGLOMERATE, SIZE)
 class LiquidOnParticles(CaseFeature):
     """Volumes of liquid of a simulation, summed over all ranks, and what snapshots of wet particles contain.
 
-    brought  liquid that came from outside since the start, such as that of a spray [m3]
+    brought     liquid that came from outside since the start, such as that of a spray [m3]
+    evaporated  liquid that has left as vapour since the start [m3]
     """
 
     name = "liquid"
     fields = SNAPSHOT_FIELDS
 
     def __init__(self, case: Case, simulation: Any) -> None:
-        self.particle_solver, self.brought = simulation.particle_solver, 0.0
+        self.particle_solver, self.brought, self.evaporated = simulation.particle_solver, 0.0, 0.0
         self.bridges: Bridges = self.particle_solver.feature(Bridges)
         self.start = self.total
 
@@ -79,17 +80,18 @@ class LiquidOnParticles(CaseFeature):
 
     @property
     def imbalance(self) -> float:
-        """Change of the total that sprays and inserted particles did not bring, over all liquid there was [-]."""
+        """Change of the total that nothing brought or took away, over all liquid there was [-]."""
         came = self.start + self.brought + self.bridges.fed
-        return abs(self.total - came) / max(came, -self.gained_by_walls, self.on_particles, 1e-300)
+        return abs(self.total + self.evaporated - came) / max(came, -self.gained_by_walls, self.on_particles, 1e-300)
 
     def checkpoint(self) -> dict[str, Any]:
-        """The liquid at the start, and what has come since."""
-        return {"start": self.start, "brought": self.brought}
+        """The liquid at the start, and what has come and gone since."""
+        return {"start": self.start, "brought": self.brought, "evaporated": self.evaporated}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.start, self.brought = float(state["start"]), float(state["brought"])
+        self.evaporated = float(state.get("evaporated", 0.0))
 
 
 # ---------------------------------------------------------------- of all ranks

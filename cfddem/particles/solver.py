@@ -115,7 +115,7 @@ class ParticleSolver:
         self._next_id = communicator.largest(particles.id, default=-1) + 1
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
-        self.time, self.steps = 0.0, 0
+        self.time, self.steps, self.held = 0.0, 0, False
         self.features: list[ParticleFeature] = [Bridges(self, self.laws.bridge)] if self.laws.bridge else []
         self._rows_for: Callable[[int], np.ndarray] = _no_rows
         if record:
@@ -236,6 +236,9 @@ class ParticleSolver:
         a position is NaN, or a particle has left the domain or was pressed through another body.
         """
         self.wall.start()
+        if self.held:
+            self.steps, self.time = self.steps + steps, self.time + steps * step
+            return
         if any(each.outgrows(self, self._reach) for each in self.features):  # local: the same on all ranks
             self._relist()
         first, at_once = True, 1 if any(each.every_step for each in self.features) else steps  # local: a choice
@@ -262,6 +265,15 @@ class ParticleSolver:
             if moved_far:
                 self._relist()
             self.wall.lap("neighbour lists")
+
+    def hold(self) -> None:
+        """Let the particles stay where they are from now on, with the forces between them; `advance` counts time."""
+        particles = self.particles
+        if self.communicator.any(particles.inverse_mass > 0.0):  # pairs of fixed particles are not listed
+            self._relist()
+        for name in ("velocity", "spin", "inverse_mass", "inverse_inertia"):
+            self.particles[name][...] = 0.0
+        self.held = True
 
     def checkpoint(self) -> dict[str, Any]:
         """Copies of everything that the next step depends on; of several ranks, on rank 0 and by ids."""

@@ -32,6 +32,7 @@ TARGETS: dict[str, str] = {
     "waves": "scenarios.validation.bed_waves.study",
     "agitation": "scenarios.validation.agitation.study",
     "sheared-films": "scenarios.validation.sheared_films.study",
+    "heated-bed": "scenarios.validation.heated_bed.study",
     "resolved": "scenarios.references.resolved_suspension.study",
 }
 """Name of each target, and the module that holds its `study`."""

@@ -1,0 +1,331 @@
+r"""Heat between particles, with walls, and by radiation with the surroundings.
+
+.. math:: m_i c_i\,\dot T_i = \sum_j G_{ij}(T_j - T_i) + \sum_w G_{iw}(T_w - T_i) + h_i A_i (T_e - T_i)
+
+One implicit step over the list of pairs: no step is too long, and no temperature leaves the range of those that
+exchange. What a pair exchanges is computed once, from the new temperatures, and is equal and opposite.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.data.fields import Field
+from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
+from cfddem.features.contact_heat_loops import LENS, NONE, RAREFIED, ROUGH, SMOOTH, Choices, Pairs, conductances
+from cfddem.features.heat_keys import Heat
+from cfddem.particles.pair_graph import shifts
+from cfddem.particles.particle_feature import Engine, ParticleFeature
+from cfddem.particles.state import Particles
+from cfddem.particles.walls.nearest_point import NORMAL
+from closures.heat_radiation import local_surroundings, radiation_coefficient
+
+TOLERANCE = 1e-13
+"""Residual of the implicit step over the right-hand side [-]."""
+
+MOST_ITERATIONS = 2000
+
+
+class HeatExchangeOfContacts(CaseFeature):
+    """Temperatures of particles that touch each other and walls.
+
+    from_walls  heat given by the walls so far [J]
+    radiated    heat received from the surroundings so far [J]
+    gained      change of the heat of the particles by this exchange, from their temperatures [J]
+    scale       heat that particles gained and lost so far, without sign [J]
+    """
+
+    name = "contact heat"
+
+    def __init__(self, case: Case, simulation: Any) -> None:
+        keys = ContactHeat.of(case)
+        assert keys
+        if simulation.communicator.size > 1:
+            raise InputError("contact_heat", None, "left out in a run of several processes", "take one process")
+        self.keys, self.case = keys, case
+        self.capacities = _capacities(case, keys)
+        self.emissivities = keys.by_material(case, "emissivity", 0.0)
+        self.walls = [keys.wall.get(name, ADIABATIC) for name in wall_names(case)]
+        self.from_walls, self.radiated, self.gained, self.scale, self._step = 0.0, 0.0, 0.0, 0.0, 0.0
+        self.choices = Choices(
+            contact={"none": NONE, "smooth": SMOOTH, "rough": ROUGH}[keys.contact],
+            by_force=keys.radius == "hertz",
+            gap={"none": NONE, "lens": LENS, "rarefied": RAREFIED}[keys.gap],
+            conductivity=keys.gas_conductivity or 0.0,
+            lens=keys.lens,
+            least_gap=keys.least_gap,
+            jump=keys.jump,
+        )
+        solver = simulation.particle_solver
+        solver.features.append(HeatReach(self._reach(solver.particles)))
+        if keys.held:
+            solver.hold()
+
+    def _reach(self, particles: Particles) -> float:
+        """Reach of the list of pairs over R* [-]."""
+        if self.choices.gap == NONE and not any(each.coefficient for each in self.walls):
+            return 0.0
+        largest, smallest = particles.radius.max(), particles.radius.min()  # local: one process
+        return float(self.keys.lens * (1.0 + largest / smallest))
+
+    @classmethod
+    def is_in(cls, case: Case) -> bool:
+        """Whether the case has the table."""
+        return bool(ContactHeat.of(case))
+
+    @classmethod
+    def fields_of(cls, case: Case) -> tuple[Field, ...]:
+        """The temperature; `[heat]` declares it where a case has both."""
+        keys = ContactHeat.of(case)
+        assert keys
+        if Heat.of(case):
+            return ()
+        by_species = keys.start_temperatures(case)
+
+        def start(particles: Any, rows: np.ndarray) -> np.ndarray:
+            return by_species[particles.species[rows]] if len(by_species) > 1 else np.full(len(rows), by_species[0])
+
+        return (Field("temperature", "K", initial=start, snapshot=True, meaning="temperature"),)
+
+    @classmethod
+    def measures(cls, case: Case) -> tuple[Measured, ...]:
+        """Temperatures and heat."""
+        own = () if Heat.of(case) else (Measured("K", "measure", mean_temperature),)
+        return (
+            *own,
+            Measured("J", "recorded", contact_heat_from_walls),
+            Measured("J", "recorded", contact_heat_radiated),
+            Measured("1", "imbalance", contact_heat_imbalance),
+        )
+
+    def capacity(self, particles: Any) -> np.ndarray:
+        """Heat capacity of every particle (N,) [J/K]."""
+        return np.asarray(particles.mass * self.capacities[particles.material])
+
+    def before(self, simulation: Any, step: float) -> None:
+        """Note the length of the step [s]."""
+        self._step = step
+
+    def after(self, simulation: Any) -> None:
+        """Exchange heat over the step."""
+        particles, step = simulation.owned, self._step
+        capacity, start = self.capacity(particles), particles.temperature.copy()
+        first, second, between, body, wall, at_wall = self._links(simulation.particle_solver)
+        area = 4.0 * np.pi * particles.radius**2
+        seen = self._surroundings(particles)
+        emissivity: Any = self.emissivities[particles.material]
+        radiation = area * radiation_coefficient(emissivity, start, seen)  # type: ignore[arg-type]  # of every particle
+        count = len(capacity)
+        temperatures = np.array([each.fixed for each in self.walls])
+        powered = np.array([each.is_powered for each in self.walls], bool)
+        node = np.full(len(self.walls), -1)
+        node[powered] = count + np.arange(powered.sum())  # local: walls
+
+        # walls of a temperature stand on the right; a wall with a power is an unknown without capacity
+        fixed, free = ~powered[wall], powered[wall]
+        diagonal, right = capacity / step + radiation, capacity / step * start + radiation * seen
+        np.add.at(diagonal, body[fixed], at_wall[fixed])
+        np.add.at(right, body[fixed], at_wall[fixed] * temperatures[wall[fixed]])
+        ends = np.concatenate([first, body[free]]), np.concatenate([second, node[wall[free]]])
+        links = np.concatenate([between, at_wall[free]])
+        power = np.array([each.power for each in self.walls if each.is_powered], float)  # type: ignore[type-var]
+        diagonal, right = np.append(diagonal, np.zeros(len(power))), np.append(right, power)
+        new = _solved(diagonal, *ends, links, right, np.append(start, np.zeros(len(power))))
+
+        heat = step * links * (new[ends[1]] - new[ends[0]])
+        passed = np.zeros(len(new))
+        np.add.at(passed, ends[0], heat)
+        np.subtract.at(passed, ends[1], heat)
+        given = step * at_wall[fixed] * (temperatures[wall[fixed]] - new[body[fixed]])
+        np.add.at(passed, body[fixed], given)
+        absorbed = step * radiation * (seen - new[:count])
+        particles.temperature += (passed[:count] + absorbed) / capacity
+
+        self.from_walls += float(given.sum() - passed[count:].sum())  # local: one process
+        self.radiated += float(absorbed.sum())  # local: one process
+        self.gained += float((capacity * (particles.temperature - start)).sum())  # local: one process
+        self.scale += float(np.abs(heat).sum() + np.abs(given).sum() + np.abs(absorbed).sum())  # local: one process
+
+    def _links(self, solver: Any) -> tuple[np.ndarray, ...]:
+        """Rows and conductance of pairs of particles, and rows, walls and conductance of particles at walls."""
+        edges, particles, walls, keys = solver.edges, solver.particles, solver.walls, self.keys
+        pairs, gap = edges.between_particles, solver.gap
+        first, second = edges.first.astype(np.int64), edges.second.astype(np.int64)
+        force = np.zeros(edges.rows) if "force" not in edges else self._normal_force(solver)
+        between = self._conductances(
+            particles, particles.material[first[:pairs]], particles.material[second[:pairs]],
+            (particles.radius[first[:pairs]], particles.radius[second[:pairs]], gap[:pairs], force[:pairs]), solver,
+        )  # fmt: skip
+        body, piece = first[pairs:], second[pairs:]
+        wall = walls.wall[piece]
+        # one link of a particle and a wall: at the nearest of its pieces
+        order = np.lexsort((gap[pairs:], wall, body))
+        fresh = np.ones(len(order), bool)
+        fresh[1:] = (np.diff(body[order]) != 0) | (np.diff(wall[order]) != 0)
+        heated = np.array([each.passes_heat for each in self.walls], bool)
+        rows = order[fresh]
+        rows = rows[heated[wall[rows]]]
+        body, wall, gap, force = body[rows], wall[rows], gap[pairs:][rows], force[pairs:][rows]
+        radius = particles.radius[body]
+        at_wall = self._conductances(
+            particles, particles.material[body], walls.material[piece[rows]],
+            (radius, np.full(len(rows), np.inf), gap, force), solver,
+        )  # fmt: skip
+        coefficient = np.array([each.coefficient or 0.0 for each in self.walls])[wall]
+        touches = np.where(gap < keys.lens * radius, coefficient * np.pi * radius**2, 0.0)
+        at_wall = np.where(coefficient > 0.0, touches, at_wall)
+        some, there = between > 0.0, at_wall > 0.0
+        return first[:pairs][some], second[:pairs][some], between[some], body[there], wall[there], at_wall[there]
+
+    def _normal_force(self, solver: Any) -> np.ndarray:
+        """Normal force of every contact, repulsive above 0 (n,) [N]."""
+        edges, particles = solver.edges, solver.particles
+        pairs = edges.between_particles
+        apart = particles.position[edges.first[:pairs]] - particles.position[edges.second[:pairs]]
+        apart += shifts(solver.box)[edges.image[:pairs]]
+        apart /= np.maximum(np.linalg.norm(apart, axis=1), 1e-300)[:, None]
+        normal = np.concatenate([apart, edges.touch[:, NORMAL : NORMAL + 3]])
+        return np.asarray(np.einsum("ij,ij->i", edges.force, normal))
+
+    def _conductances(
+        self, particles: Particles, one: np.ndarray, other: np.ndarray, shape: tuple[np.ndarray, ...], solver: Any
+    ) -> np.ndarray:
+        """Conductances of pairs (n,) [W/K].
+
+        one, other  numbers of the two materials (n,)
+        shape       radii, gap and normal force
+        """
+        keys, case = self.keys, self.case
+        solid, hardness = keys.by_material(case, "conductivity", 1.0), keys.by_material(case, "microhardness", 1.0)
+        slope, height = keys.by_material(case, "slope", 1.0), keys.by_material(case, "surface_roughness", 1.0)
+        first, second, gap, force = shape
+        pairs = Pairs(
+            first=first,
+            second=second,
+            gap=gap,
+            force=force,
+            modulus=np.ascontiguousarray(solver.table["film_modulus"][one, other]),
+            first_conductivity=solid[one],
+            second_conductivity=solid[other],
+            hardness=2.0 * hardness[one] * hardness[other] / (hardness[one] + hardness[other]),
+            roughness=np.hypot(height[one], height[other]),
+            slope=np.hypot(slope[one], slope[other]),
+        )
+        result = np.zeros(len(one))
+        conductances(pairs, self.choices, result)
+        return result
+
+    def _surroundings(self, particles: Particles) -> np.ndarray:
+        """Temperature of what every particle sees (N,) [K]."""
+        seen = np.full(len(particles.radius), self.keys.surroundings_temperature or 0.0)
+        if self.keys.surroundings == "uniform" or not self.keys.emissivity:
+            return seen
+        size = np.array(self.case.column.size)
+        cell = np.broadcast_to(np.array(self.case.column.cell, float), 3)
+        number = np.maximum(np.rint(size / cell), 1).astype(np.int64)
+        place = np.clip((particles.position / size * number).astype(np.int64), 0, number - 1)
+        row = (place[:, 0] * number[1] + place[:, 1]) * number[2] + place[:, 2]
+        cells = int(np.prod(number))
+        volume = 4.0 / 3.0 * np.pi * particles.radius**3
+        voidage = 1.0 - np.minimum(np.bincount(row, volume, cells) / np.prod(size / number), 1.0)
+        mean = np.bincount(row, particles.temperature, cells) / np.maximum(np.bincount(row, minlength=cells), 1)
+        return np.asarray(local_surroundings(voidage[row], seen, mean[row]))  # type: ignore[arg-type]
+
+    def checkpoint(self) -> dict[str, Any]:
+        """The balance."""
+        return {name: getattr(self, name) for name in _KEPT}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        for name in _KEPT:
+            setattr(self, name, float(state[name]))
+
+
+def _capacities(case: Case, keys: ContactHeat) -> np.ndarray:
+    """Specific heat capacity by number of material [J/kg/K]."""
+    heat = Heat.of(case)
+    return heat.capacities(case) if heat else keys.by_material(case, "heat_capacity")
+
+
+_KEPT = ("from_walls", "radiated", "gained", "scale")
+
+
+class HeatReach(ParticleFeature):
+    """Keeps pairs in the list up to the gap through which the gas conducts."""
+
+    name = "reach of heat"
+
+    def __init__(self, reach: float) -> None:
+        self.reach = reach
+
+    def reach_ratio(self, engine: Engine, after: Particles | None) -> float:
+        """Reach over R* [-]."""
+        return self.reach
+
+    def outgrows(self, engine: Engine, reach: float) -> bool:
+        """Whether the list is too short, as the first of a run is."""
+        return self.reach > reach
+
+
+def _solved(
+    diagonal: np.ndarray, one: np.ndarray, other: np.ndarray, links: np.ndarray, right: np.ndarray, start: np.ndarray
+) -> np.ndarray:
+    """Temperatures of the implicit step, by conjugate gradients with fixed sums (n,) [K].
+
+    diagonal    without the links (n,)
+    one, other  rows that links join
+    start       first guess
+    """
+    count = len(diagonal)
+    whole = diagonal + np.bincount(one, links, count) + np.bincount(other, links, count)
+    whole[whole == 0.0] = 1.0  # a wall with a power that nothing touches
+    apart = csr_array(
+        (np.concatenate([links, links]), (np.concatenate([one, other]), np.concatenate([other, one]))),
+        shape=(count, count),
+    )
+    values = np.where(start > 0.0, start, right / whole)
+    residual = right - (whole * values - apart @ values)
+    scale = float((right * right).sum())  # local: one process
+    direction, size = np.zeros(count), 1.0
+    for _ in range(MOST_ITERATIONS):
+        if float((residual * residual).sum()) <= TOLERANCE**2 * scale:  # local: one process
+            break
+        guess = residual / whole
+        before, size = size, float((residual * guess).sum())  # local: one process
+        direction = guess + (size / before) * direction
+        image = whole * direction - apart @ direction
+        length = size / float((direction * image).sum())  # local: one process
+        values, residual = values + length * direction, residual - length * image
+    return values
+
+
+# ---------------------------------------------------------------- measures
+
+
+def mean_temperature(simulation: Any) -> float:
+    """Mean temperature of the particles, by heat capacity."""
+    particles = simulation.owned
+    capacity = simulation.feature(HeatExchangeOfContacts).capacity(particles)
+    return float((capacity * particles.temperature).sum() / max(capacity.sum(), 1e-300))  # local: one process
+
+
+def contact_heat_from_walls(simulation: Any) -> float:
+    """Heat that the walls have given to the particles."""
+    return float(simulation.feature(HeatExchangeOfContacts).from_walls)
+
+
+def contact_heat_radiated(simulation: Any) -> float:
+    """Heat that the particles have received from the surroundings by radiation."""
+    return float(simulation.feature(HeatExchangeOfContacts).radiated)
+
+
+def contact_heat_imbalance(simulation: Any) -> float:
+    """Change of the heat in the particles that walls and surroundings did not give, over the heat exchanged."""
+    heat = simulation.feature(HeatExchangeOfContacts)
+    return abs(heat.gained - heat.from_walls - heat.radiated) / heat.scale if heat.scale > 0.0 else 0.0

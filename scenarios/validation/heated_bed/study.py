@@ -1,0 +1,160 @@
+"""A bed of 8849 steel spheres that is heated from above for 4000 s, beside the measurement of Beaulieu (2020).
+
+The hot plate is the wall at the end of x. Temperatures are means of the spheres within a diameter of the depth, and
+within two diameters of the axis of the box. The packing is not known but for its porosity: how many spheres touch the
+hot plate, 0.46 of its area here, matters most. The curves of the measurement's error in the thesis are 2.2 K away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cfddem.case.schema import Case
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
+from cfddem.run.simulation import Simulation
+from scenarios.validation.heated_bed.packing import COUNT, DEPTH, DIAMETER, HEIGHT, LENGTH, PLATE, STEEL
+from scenarios.validation.table import Curves, Progress, Row, in_parts, reference, worst
+
+TIMES = (*range(250, 3751, 250), 3950)
+"""Times at which temperatures are compared [s]."""
+
+LIMITS = {4.0: 1.0, 6.0: 0.7, 7.3: 0.7}
+"""Largest difference by depth below the hot plate [cm], [K]."""
+
+ERROR = 2.2
+"""Of the measurement, by the curves of the thesis [K]."""
+
+ZERO, COLD, HOT = 273.15, 20.0, 53.0
+
+AIR = {"gas_conductivity": 0.027, "prandtl": 1.85e-5 * 1006.0 / 0.027, "heat_ratio": 1.0, "free_path": 68e-9}
+ROUGH = {
+    "contact": "rough",
+    "microhardness": {"steel": 3e9, "plate": 1.8e9},
+    "slope": {"steel": 0.056, "plate": 0.056},
+    "surface_roughness": {"steel": 19e-9, "plate": 0.1e-9},
+}
+LAWS: Mapping[str, dict[str, Any]] = {
+    "rough contacts, gas to half a diameter": {**AIR, **ROUGH, "gap": "rarefied", "lens": 1.0},
+    "rough contacts, gas to a tenth of a diameter": {**AIR, **ROUGH, "gap": "rarefied", "lens": 0.2},
+    "rough contacts, gas around contacts alone": {**AIR, **ROUGH, "gap": "rarefied", "lens": 1e-6},
+    "ideal Hertz contacts, no gas": {},
+    "ideal Hertz contacts, lens of gas": {**AIR, "gap": "lens"},
+}
+"""Keys of [contact_heat] by name; the limits are those of the first. Spheres up to half a diameter apart conduct
+through the gas in Zhou, Yu & Zulli, Powder Technol. 197 (2010) 102."""
+
+
+def study(folder: Path, progress: Progress) -> list[Row]:
+    """Run all parts, write histories and figures, and return the table."""
+    return in_parts((rough, others), _draw, folder, progress)
+
+
+def case_of(laws: Mapping[str, Any]) -> Case:
+    """The case, with keys of [contact_heat]."""
+    with resources.as_file(resources.files("scenarios").joinpath("data", f"heated_bed_{COUNT}.npz")) as path:
+        places = np.load(path)["position"]
+    heat: dict[str, Any] = {
+        "held": True,
+        "conductivity": {"steel": 42.0, "plate": 250.0},
+        "heat_capacity": {"steel": 464.0},
+        "particle_temperature": ZERO + COLD,
+        "wall": {"x_high": {"temperature": ZERO + HOT}},
+        **laws,
+    }
+    values: dict[str, Any] = {
+        "material": {"steel": STEEL, "plate": PLATE},
+        "column": {"width": LENGTH, "depth": DEPTH, "height": HEIGHT, "cell": 0.02, "material": "plate"},
+        "bed": {"material": "steel", "diameter": DIAMETER, "positions": tuple(map(tuple, places.tolist()))},
+        "laws": {"gravity": (-9.81, 0.0, 0.0)},
+        "run": {"until": 4000.0, "fluid_step": 10.0, "reference_speed": 0.1},
+        "contact_heat": heat,
+    }
+    return Case(**values)
+
+
+def temperatures(laws: Mapping[str, Any], times: tuple[float, ...] = TIMES) -> dict[float, np.ndarray]:
+    """Temperature by depth [cm] at some times (n,) [C]."""
+    simulation = Simulation(case_of(laws))
+    place = simulation.particles.position
+    at_axis = (np.abs(place[:, 1:] - (0.5 * DEPTH, 0.5 * HEIGHT)) < 2.0 * DIAMETER).all(axis=1)  # local: two axes
+    at = {depth: at_axis & (np.abs(LENGTH - 0.01 * depth - place[:, 0]) < DIAMETER) for depth in LIMITS}
+    found: dict[float, list[float]] = {depth: [] for depth in LIMITS}
+    for time in times:
+        simulation.until(time)
+        for depth, inside in at.items():
+            found[depth].append(float(simulation.particles.temperature[inside].mean()) - ZERO)  # local: one process
+    return {depth: np.array(values) for depth, values in found.items()}
+
+
+def measured(depth: float) -> np.ndarray:
+    """Means of the measured points within 150 s of `TIMES`, after 3900 s for the last (n,) [C]."""
+    table = reference("beaulieu2020_heated_bed")
+    columns = [np.array(table[name], float) for name in ("depth [cm]", "time [s]", "temperature [C]")]
+    rows = (np.array(table["kind"]) == "measured") & (columns[0] == depth)
+    time, value = columns[1][rows], columns[2][rows]
+    near = [(time > 3900.0) if at == TIMES[-1] else (np.abs(time - at) <= 150.0) for at in TIMES]
+    return np.array([value[each].mean() for each in near])  # local: of a table
+
+
+def rough(curves: Curves) -> list[Row]:
+    """Rough contacts and gas, at three depths beside the measurement."""
+    name = next(iter(LAWS))
+    found = temperatures(LAWS[name])
+    curves["rough"] = {"time": (np.array(TIMES, float), "s")} | {
+        f"at {depth:g} cm": (values, "degC") for depth, values in found.items()
+    }
+    rows = []
+    for depth, values in found.items():
+        points = list(zip(TIMES, values, measured(depth)))
+        rows.append(worst(f"{name}: at {depth:g} cm", points, LIMITS[depth], unit="degC"))
+        rows.append(
+            worst(f"the same, beside the error of the measurement: at {depth:g} cm", points, ERROR, unit="degC")
+        )
+    return rows
+
+
+def others(curves: Curves) -> list[Row]:
+    """Other laws beside the measurement; gas around contacts alone beside the simulation of the thesis, too."""
+    rows = []
+    for name in list(LAWS)[1:]:
+        found = temperatures(LAWS[name])
+        curves[name] = {f"at {depth:g} cm": (values, "degC") for depth, values in found.items()}
+        rows += [
+            worst(f"{name}: at {depth:g} cm", zip(TIMES, values, measured(depth)), unit="degC")
+            for depth, values in found.items()
+        ]
+        if "alone" in name:
+            rows += [
+                worst(f"{name}, against the simulation of the thesis: at {depth:g} cm", points, unit="degC")
+                for depth, points in _beside_the_thesis(found).items()
+            ]
+    return rows
+
+
+def _beside_the_thesis(found: Mapping[float, np.ndarray]) -> dict[float, list[tuple[float, float, float]]]:
+    """Time [s], temperature here and simulated in the thesis [C], by depth."""
+    table = reference("beaulieu2020_heated_bed")
+    kind = np.array(table["kind"]) == "simulated"
+    depth, time, value = (np.array(table[each], float)[kind] for each in ("depth [cm]", "time [s]", "temperature [C]"))
+    result = {}
+    for at, values in found.items():
+        there = np.interp(time[depth == at], TIMES, values)
+        result[at] = list(zip(time[depth == at].tolist(), there.tolist(), value[depth == at].tolist()))
+    return result
+
+
+def _draw(folder: Path, curves: Curves) -> None:
+    """Temperatures against time, at three depths."""
+    figure, axes = panels()
+    for depth, colour in zip(LIMITS, (BLUE, ORANGE, GREY)):
+        axes.plot(TIMES, measured(depth), "o", color=colour, label=f"{depth:g} cm below the plate, Beaulieu (2020)")
+        axes.plot(TIMES, curves["rough"][f"at {depth:g} cm"][0], color=colour)
+        axes.plot(TIMES, curves["ideal Hertz contacts, no gas"][f"at {depth:g} cm"][0], ":", color=colour)
+    label(axes, "time", "s", "temperature", "degC")
+    legend(axes)
+    save(figure, folder / "heated_bed.png")
