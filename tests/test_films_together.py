@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from in_process_ranks import on_ranks
 from scipy.sparse.linalg import spsolve
+from test_ghosts import assert_same_bits, joined, state
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import use_threads
@@ -418,6 +419,28 @@ def test_the_largest_damping_rate_is_that_of_the_nearest_pair() -> None:
     assert run.largest_film_rate * STEP_OF_ONE == pytest.approx(0.25, rel=0.05)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_films_and_what_a_report_says_of_them_are_the_same_on_any_number_of_ranks(ranks: int) -> None:
+    """Velocities, impulses, iterations and the largest damping rate of a network that needs many iterations."""
+
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], tuple[float, float, float], float]:
+        length = float(suspension(900, 0.5, fixed=False, viscosity=VISCOSITY)[0].box[0])
+        planes = [length * n / ranks for n in range(1, ranks)]
+        division = Slabs(0, planes) if communicator.size > 1 else None
+        run = network("full", 900, 1e-3, communicator=communicator, division=division)
+        for _ in range(3):
+            run.advance(2.5e-7, 4)
+        return state(run), said(run), run.film_counts[3]
+
+    ((whole, counts, films),) = on_ranks(1, program)
+    found = on_ranks(ranks, program)
+    assert counts[0] == 12.0 and counts[1] > 12.0
+    assert [said_there for _, said_there, _ in found] == [counts] * ranks
+    assert sum(films_there for *_, films_there in found) == films  # each belongs to one rank
+    assert_same_bits(joined([there for there, *_ in found]), joined([whole]))
+
+
 def test_one_and_two_threads_give_the_same_bits_and_a_resumed_run_goes_on_with_them() -> None:
     """A network over 12 steps: on two threads, and from a checkpoint after 5."""
     before, states = use_threads(None), []
@@ -435,5 +458,5 @@ def test_one_and_two_threads_give_the_same_bits_and_a_resumed_run_goes_on_with_t
         states.append((resumed.particles.velocity.copy(), resumed.particles.spin.copy(), *said(resumed)))
     finally:
         use_threads(before)
-    for state in states[1:]:
-        assert all(np.array_equal(one, other) for one, other in zip(state, states[0]))
+    for other in states[1:]:
+        assert all(np.array_equal(one, same) for one, same in zip(other, states[0]))

@@ -172,23 +172,27 @@ def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, li
     spheres, given = settings(film, walls, liquid)
     length = float(spheres.position[:, 0].max())
 
-    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int]:
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int, tuple[float, ...]]:
         division = divided(ranks, 0, length)
         run = finished(spheres.copy(), given, 0, communicator=communicator, division=division)
         before, most = set(run.particles.id[: run.particles.owned].tolist()), 0
         for _ in range(3):
             run.advance(STEP, 100)
             most = max(most, run.particles.count - run.particles.owned)
-        return state(run), len(before - set(run.particles.id[: run.particles.owned].tolist())), most
+        moved = len(before - set(run.particles.id[: run.particles.owned].tolist()))
+        return state(run), moved, most, (*run.film_counts[:2], run.largest_film_rate, run.film_counts[3])
 
     results = on_ranks(ranks, program)
     whole = finished(spheres.copy(), given, 0)
     for _ in range(3):
         whole.advance(STEP, 100)
     assert whole.lists.made > 3
-    assert sum(moved for _, moved, _ in results) > 2
-    assert all(ghosts > 20 for _, _, ghosts in results)
-    assert_same_bits(joined([each for each, _, _ in results]), joined([state(whole)]))
+    assert sum(moved for _, moved, *_ in results) > 2
+    assert all(ghosts > 20 for _, _, ghosts, _ in results)
+    assert [films[:3] for *_, films in results] == [(*whole.film_counts[:2], whole.largest_film_rate)] * ranks
+    assert sum(films[3] for *_, films in results) == whole.film_counts[3]  # each film belongs to one rank
+    assert (whole.film_counts[0] == 300.0) == film
+    assert_same_bits(joined([each for each, *_ in results]), joined([state(whole)]))
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
-from cfddem.particles.interactions.joint_equations import find_residual, own, prepare, spread
+from cfddem.particles.interactions.joint_equations import find_residual, prepare, spread
 from cfddem.particles.interactions.joint_films import collect
 from cfddem.particles.interactions.joint_iteration import (
     find_direction,
@@ -116,10 +116,9 @@ def sum_of_terms(system, count, column, power):
 @serial
 def start_films(system):
     """List the films that are solved; returns their number, and that of those that are counted here."""
-    count = collect(system)
-    owned = 0
-    for e in range(count):
-        owned += 1 if own(e, system) else 0
+    count, owned = collect(system), 0
+    for e in range(count):  # the rows of the equations are not made yet
+        owned += 1 if system.edges.first[system.memory.joint_edge[e]] < system.particles.owned else 0
     return count, owned
 
 

@@ -1,7 +1,7 @@
 """Dense suspensions whose films resist sliding and rolling: work of shear, dissipation by films, relative viscosity.
 
-Spheres of 100 um without friction, whose contacts lose nothing: films must dissipate all the work. Nothing else
-resists, so the viscosity is that of the films alone.
+Spheres of 100 um whose contacts lose nothing but by friction, if they have any: films and friction must dissipate all
+the work. Nothing else resists, so the viscosity is that of films and contacts alone.
 
 What is exact for the integrator: a force at an instant acts over the half kicks around it, and an impulse between the
 first half kick and the drift. The layer that is held moves at a constant speed, so their work on it is this speed times
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cfddem.case.materials import Material
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -37,8 +38,9 @@ MORRIS_BOULAY_PACKING, MORRIS_BOULAY_FACTOR = 0.68, 0.1
 class Sheared(NamedTuple):
     """What was measured over a strain."""
 
-    dissipated: float  # by films, over the work that is not stored [-]
-    sliding: float  # part of it by sliding and rolling [-]
+    dissipated: float  # by films and friction, over the work that is not stored [-]
+    sliding: float  # part of films that slide and roll in the work [-]
+    rubbed: float  # part of friction in the work [-]
     stored: float  # in motion and contacts, over the work [-]
     viscosity: float  # over that of the fluid [-]
     solid_fraction: float  # between the plates [-]
@@ -55,7 +57,7 @@ class _Work(NamedTuple):
 
 def sheared(
     solid_fraction: float, motions: str = "full", press: float = 0.0, strain: float = 0.5, count: int = 400,
-    steps_in_one: float = 1.0, roughness: float = SMOOTH.roughness, cutoff_ratio: float = Laws().cutoff_ratio,
+    steps_in_one: float = 1.0, cutoff_ratio: float = Laws().cutoff_ratio, solid: Material = SMOOTH,
 ) -> Sheared:  # fmt: skip
     """Shear a suspension between two layers of its own spheres, and measure over the second half of the strain.
 
@@ -64,8 +66,8 @@ def sheared(
     strain   of the whole run [-]
     count    of spheres, with the layers
     steps_in_one  time step over that which is recommended [-]
-    roughness     of the spheres [m]
     cutoff_ratio  reach of films over the reduced radius [-]
+    solid         material of the spheres; its friction dissipates, too
     """
     made, upper = suspension(count, solid_fraction, fixed=True, viscosity=VISCOSITY)
     spheres, (width, depth, _) = made.particles, made.box
@@ -76,7 +78,6 @@ def sheared(
     else:
         spheres.velocity[upper, 0] = SPEED
     laws = Laws(film=True, film_motions=motions, cutoff_ratio=cutoff_ratio)
-    solid = SMOOTH.model_copy(update={"roughness": roughness})
     run = ParticleSolver(
         spheres, pair_table([solid]), laws=laws, box=(width, depth, None), energies=True, check_steps=False
     )
@@ -96,7 +97,8 @@ def sheared(
     plates = np.isin(run.particles.id, lid) | (run.particles.inverse_mass == 0.0)
     inner = run.particles.volume.sum() - 0.5 * run.particles.volume[plates].sum()
     return Sheared(
-        (lost["film"] + sliding - work.taken_back) / (work.done - stored), sliding / work.done, stored / work.done,
+        (lost["film"] + sliding + lost["friction"] - work.taken_back) / (work.done - stored),
+        sliding / work.done, lost["friction"] / work.done, stored / work.done,
         work.done / (steps * step) / (volume * (rate / height) ** 2 * VISCOSITY),
         float(inner / volume), step,
     )  # fmt: skip
@@ -185,7 +187,8 @@ def morris_boulay(solid_fraction: float) -> float:
 
     .. math:: \eta_r = 1 + \frac{2.5\,\phi}{1-\phi/\phi_m} + K_s\left(\frac{\phi/\phi_m}{1-\phi/\phi_m}\right)^2
 
-    The constants phi_m = 0.68 and K_s = 0.1 have not been compared with the paper.
+    The constants phi_m = 0.68 and K_s = 0.1 are those of the Couette case of twoFluidsNBSuspensionFoam, a program for
+    suspensions by F. Municchi; the paper itself has not been read.
 
     >>> round(morris_boulay(0.5), 2)
     6.49
@@ -193,3 +196,20 @@ def morris_boulay(solid_fraction: float) -> float:
     filled = solid_fraction / MORRIS_BOULAY_PACKING
     ratio = filled / (1.0 - filled)
     return 1.0 + 2.5 * MORRIS_BOULAY_PACKING * ratio + MORRIS_BOULAY_FACTOR * ratio**2
+
+
+def boyer(solid_fraction: float) -> float:
+    r"""Relative viscosity of real, frictional spheres: Boyer, Guazzelli & Pouliquen, PRL 107 (2011) 188301.
+
+    .. math:: \eta_r = 1 + \frac{2.5\,\phi}{1-\phi/\phi_m} + \mu_c\left(\frac{\phi}{\phi_m-\phi}\right)^2,\quad
+        \mu_c = \mu_1 + \frac{\mu_2-\mu_1}{1+I_0\,\phi^2(\phi_m-\phi)^{-2}}
+
+    The form is that of twoFluidsNBSuspensionFoam; the constants phi_m = 0.585, mu_1 = 0.32, mu_2 = 0.7 and I_0 = 0.005
+    are those of another program that cites the paper. The paper itself has not been read.
+
+    >>> round(boyer(0.5), 1)
+    31.9
+    """
+    most, low, high, number = 0.585, 0.32, 0.7, 0.005
+    ratio = solid_fraction / (most - solid_fraction)
+    return 1.0 + 2.5 * most * ratio + (low + (high - low) / (1.0 + number * ratio**2)) * ratio**2

@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation.sheared_films.shear import krieger_dougherty, morris_boulay, sheared
+from scenarios.validation.sheared_films.shear import SMOOTH, boyer, krieger_dougherty, morris_boulay, sheared
 from scenarios.validation.table import Curves, Progress, Row, in_parts, worst
 
 SOLID_FRACTIONS = (0.3, 0.4, 0.5, 0.55)
 STEPS = (1.0 / 16.0, 1.0, 4.0)
 """Time steps over that which is recommended."""
+
+FRICTION = 0.5
+"""Of the spheres of the runs with friction."""
 
 LONG = 2.0
 """Strain of the runs that are compared with published curves; the second half counts."""
@@ -53,13 +56,27 @@ def published(curves: Curves) -> list[Row]:
     return rows
 
 
+def friction(curves: Curves) -> list[Row]:
+    """What friction of contacts adds, beside the frictional suspensions of Boyer, Guazzelli & Pouliquen (2011)."""
+    rows = []
+    for name in (0.4, 0.5):
+        run = sheared(name, strain=LONG, solid=SMOOTH.model_copy(update={"friction": FRICTION}))
+        rows += [
+            Row(f"at {name:g}, friction {FRICTION:g}: fluid, films and contacts, against Boyer et al.",
+                1.0 + run.viscosity, boyer(run.solid_fraction)),
+            Row(f"at {name:g}, friction {FRICTION:g}: part of friction in the work", run.rubbed),
+            Row(f"at {name:g}, friction {FRICTION:g}: dissipated over work that is not stored", run.dissipated, 1.0),
+        ]  # fmt: skip
+    return rows
+
+
 def conditions(curves: Curves) -> list[Row]:
     """What the size of the box, the roughness and the reach of the films change at a solid fraction of 0.5."""
     usual = sheared(0.5, strain=LONG).viscosity
     changed = {
         "1200 spheres": sheared(0.5, strain=LONG, count=1200),
-        "ten times the roughness": sheared(0.5, strain=LONG, roughness=1e-6),
-        "a tenth of the roughness": sheared(0.5, strain=LONG, roughness=1e-8),
+        "ten times the roughness": sheared(0.5, strain=LONG, solid=SMOOTH.model_copy(update={"roughness": 1e-6})),
+        "a tenth of the roughness": sheared(0.5, strain=LONG, solid=SMOOTH.model_copy(update={"roughness": 1e-8})),
         "half the reach of films": sheared(0.5, strain=LONG, cutoff_ratio=0.5),
         "a quarter of the reach of films": sheared(0.5, strain=LONG, cutoff_ratio=0.25),
     }
@@ -81,4 +98,4 @@ def _draw(folder: Path, curves: Curves) -> None:
     save(figure, folder / "sheared_films.png")
 
 
-PARTS: tuple[Callable[[Curves], list[Row]], ...] = (steps, published, conditions)
+PARTS: tuple[Callable[[Curves], list[Row]], ...] = (steps, published, friction, conditions)
