@@ -113,7 +113,7 @@ def _show_triplet(result: three_spheres.Triplet, json: bool) -> None:
 
 simulate_three_spheres = command(
     three_spheres.simulate_three_spheres,
-    options={"map": (Path | None, None, "PNG file for a map of the outcomes at all St and angles")},
+    options={"map": (Path | None, None, "PNG file for a map of the outcomes at all St and angles, by the equations")},
     call=_three_spheres,
     show_result=_show_triplet,
 )

@@ -78,7 +78,7 @@ def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float)
     pairs[:, 0] = np.where(pairs[:, 0] < films + 1e-9 * film, np.minimum(pairs[:, 0], films), pairs[:, 0])  # rounding
     times, states, end = [0.0], [_polar(run, film)], until * film / SPEED
     while run.time < end * (1.0 - 1e-12):
-        steps, spans = zip(*(_step(run, *pair, touch, reach, film) for pair, reach in zip(pairs, films)))
+        steps, spans = zip(*(_step(run, pair, touch, reach, film) for pair, reach in zip(pairs, films)))
         step = min(*steps, end - run.time)
         run.advance(step, max(1, int(min(*spans, end - run.time) / step)))
         _release(run)
@@ -94,19 +94,15 @@ def integrate(state: np.ndarray, numbers: Numbers, until: float, overlap: float)
     return path
 
 
-def _step(
-    run: ParticleSolver, gap: float, approach: float, speed: float, touch: float, reach: float, film: float
-) -> tuple[float, float]:
+def _step(run: ParticleSolver, pair: np.ndarray, touch: float, reach: float, film: float) -> tuple[float, float]:
     """Longest time step that a pair allows, and the longest time without a look at it [s].
 
-    gap       between the solids [m]
-    approach  speed of approach [m/s]
-    speed     relative speed in all directions [m/s]
-    touch     minimum gap [m]
-    reach     thickness of the film of the pair [m]
-    film      that of the first pair [m]
+    pair   see `_pairs`
+    touch  minimum gap [m]
+    reach  thickness of the film of the pair [m]
+    film   that of the first pair [m]
     """
-    unit = film / SPEED
+    (gap, approach, speed), unit = pair.tolist(), film / SPEED
     if gap > reach:  # in flight nothing changes, up to just before the films can meet
         step = min(FLIGHT * DIAMETER / SPEED, max(FILM_STEP * unit, (gap - reach) / max(speed, 1e-9 * SPEED)))
         return step, step

@@ -42,9 +42,9 @@ def outcome_map(stokes: np.ndarray, theta12: np.ndarray, table: dict[str, np.nda
 
 
 def draw_map(path: Path, conditions: dict[str, Any], count: int = 40) -> None:
-    """Draw the map of outcomes for Stokes numbers up to 20 and all angles; other conditions as for a single run."""
+    """Draw the map of outcomes for Stokes numbers up to 20 and all angles, by the equations; the rest as given."""
     stokes, theta12 = np.linspace(0.5, 20.0, count), np.linspace(0.0, 85.0, count)
-    kept = {name: value for name, value in conditions.items() if name not in ("stokes", "theta12")}
+    kept = {name: value for name, value in conditions.items() if name not in ("stokes", "theta12", "solver")}
     number = kept.get("capillary_number", math.inf)
     title = "no capillary pull" if number == math.inf else f"capillary number {number:g}"
     save(outcome_map(stokes, theta12, outcomes(stokes, theta12, **kept), title), path)

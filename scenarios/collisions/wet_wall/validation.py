@@ -23,8 +23,7 @@ from scenarios.references.wet_wall.checks import independent
 from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
 
 Curves = dict[str, Columns]
-EXACT: dict[str, Any] = {"solver": "equations"}
-exact = partial(impact, **EXACT)
+exact = partial(impact, solver="equations")
 CHANNELS = {"viscous": BLUE, "capillary": SKY, "contact": ORANGE, "gravity": GREY}
 SPEEDS = np.concatenate([np.arange(0.2, 1.59, 0.04), np.linspace(1.6, 3.0, 6)])
 ANGLES = np.array([1.0, 3.0, 6.0, *np.arange(10.0, 90.0, 4.0), 88.0, 89.0])
@@ -105,18 +104,21 @@ def sticking(_: Path, __: Curves) -> list[Row]:
     """Wet wall: velocities below which spheres stick."""
     rows = []
     for sphere, liquid, film, reference, arc in STICKING:
-        found = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc, **EXACT)
+        found = sticking_velocity(sphere, liquid, film, precision=1e-3, smallest_arc=arc, solver="equations")
         floor = "" if arc is None else f", arc >= {arc * 1e6:.0f} um"
         name = f"wet wall: {sphere} sticks, {liquid}, {film * 1e6:.0f} um{floor}"
         rows.append(Row(name, found, reference, 0.02 * reference, "m/s"))
     case = ("glass_1.74", "water")
     for least in (1e-6, FLOOR, 20e-6):
-        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least, **EXACT)
+        found = sticking_velocity(*case, 400e-6, precision=1e-2, tolerance=1e-8, smallest_arc=least, solver="equations")
         rows.append(
             Row(f"wet wall: glass_1.74 sticks, 400 um, singular, arc >= {least * 1e6:.0f} um", found, unit="m/s")
         )
-    for options in ({"capillary_phases": "rebound"}, {"capillary_phases": "bridge"}, {"length_from": "wall"}):
-        found = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, **options, **EXACT)
+    readings: tuple[dict[str, Any], ...] = (
+        {"capillary_phases": "rebound"}, {"capillary_phases": "bridge"}, {"length_from": "wall"}
+    )  # fmt: skip
+    for options in readings:
+        found = sticking_velocity(*case, 100e-6, precision=1e-3, tolerance=1e-8, solver="equations", **options)
         chosen = " ".join(f"{name} {value}" for name, value in options.items())
         rows.append(Row(f"wet wall: glass_1.74 sticks, 100 um, {chosen}", found, 0.345, unit="m/s"))
     return rows
