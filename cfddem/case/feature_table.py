@@ -45,6 +45,11 @@ class FeatureTable(Checked):
         """The table of a case; None if the case has none."""
         return getattr(case, cls.table, None)  # type: ignore[no-any-return]  # a case may be older than the table
 
+    @property
+    def holds_particles(self) -> bool:
+        """Whether particles do not move, so that no step is theirs."""
+        return False
+
     def refuse(self, case: Any) -> None:
         """Raise InputError where the table does not go with the rest of a case."""
 

@@ -119,6 +119,11 @@ class ContactHeat(FeatureTable):
         description="particles stay where they start, with the forces there: steps are limited by run.fluid_step alone",
     )
 
+    @property
+    def holds_particles(self) -> bool:
+        """Whether particles are held."""
+        return self.held
+
     def refuse(self, case: Any) -> None:
         """Refuse unknown names, what is missing for a choice, and temperatures below absolute zero."""
         for table in ("conductivity", "heat_capacity", "emissivity", *ROUGH):
