@@ -43,7 +43,7 @@ HEAT: dict[str, Any] = {
 GAS = 1.239e-4 * CALORIES
 
 
-def case_of(gap: float, step: float, until: float, heat: dict[str, Any] | None = None, **changes: Any) -> Case:
+def case_of(gap: float, step: float, until: float, contacts: dict[str, Any] | None = None, **changes: Any) -> Case:
     """Two spheres in vacuum above each other, `gap` apart [m]; changes with __ for the point."""
     values: dict[str, Any] = {
         "material.light": {"density": 420.0, "youngs_modulus": 1e7, "poisson": 0.25},
@@ -58,7 +58,7 @@ def case_of(gap: float, step: float, until: float, heat: dict[str, Any] | None =
         },
         "laws": {"gravity": (0.0, 0.0, 0.0)},
         "run": {"until": until, "fluid_step": step, "reference_speed": 0.1},
-        "contact_heat": HEAT | (heat or {}),
+        "contact_heat": HEAT | (contacts or {}),
     }
     return Case.from_text("", overrides=values | {name.replace("__", "."): value for name, value in changes.items()})
 
@@ -224,6 +224,26 @@ def test_particles_that_move_exchange_heat_while_they_touch() -> None:
     now = simulation.particles.temperature.copy()
     simulation.until(0.03)
     assert np.array_equal(simulation.particles.temperature, now)
+
+
+def test_heat_of_the_fluid_and_of_contacts_act_together_on_one_temperature() -> None:
+    """Two spheres in air of 400 K: contacts even them out, and the air warms both; each budget holds."""
+    air = {"fluid_temperature": 400.0, "conductivity": 0.026, "fluid_heat_capacity": 1007.0}
+    of_both = {"particle_temperature": COLD, "heat_capacity": HEAT["heat_capacity"]}
+    case = case_of(
+        -1.33e-7, 0.01, 5.0, {"particle_temperature": None, "heat_capacity": {}},
+        fluid={"density": 1.2, "viscosity": 1.8e-5}, heat=air | of_both, laws__drag="none",
+        column__cell=(0.015, 0.01, 0.0054),
+    )  # fmt: skip
+    simulation = Simulation(case)
+    simulation.particles.temperature = (COLD, HOT)
+    simulation.until(5.0)
+    cold, hot = simulation.particles.temperature
+    now = row(simulation)
+    assert COLD < cold < 400.0 < hot < HOT
+    assert now["heat_imbalance"] < 1e-10 and now["contact_heat_imbalance"] < 1e-10
+    capacity = simulation.feature(HeatExchangeOfContacts).capacity(simulation.particles)
+    assert float(capacity @ (cold - COLD, hot - HOT)) == pytest.approx(now["heat_received"], rel=1e-9)
 
 
 @pytest.mark.parametrize(

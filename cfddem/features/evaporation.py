@@ -3,9 +3,10 @@ r"""Evaporation of the liquid of particles, and of drops, into humid air of one 
 .. math:: m c\,\dot T = \pi d k\,Nu\,(T_g - T) - L\,\dot m, \qquad
           \dot m = s\,\pi d\,Sh\,\rho D\,\ln\frac{1-Y}{1-Y_s(T)}
 
-`[heat]` exchanges heat with the gas first. At a constant rate of evaporation the particle is then colder by
-:math:`L \dot m (1 - e^{-x}) / b`, with the conductance b and x = b h / (m c): exact. The rate is that of the new
-temperature, so that a step that is far too long ends at the wet-bulb temperature.
+`[heat]` exchanges heat with the gas first. At a constant rate of evaporation in a gas of one temperature the particle
+is then colder by :math:`L \dot m (1 - e^{-x}) / b`, with the conductance b and x = b h / (m c): exact. The rate is that
+of the new temperature, so that a step that is far too long ends at the wet-bulb temperature. Where every cell of the
+fluid has a temperature, the latent heat of a step cools the particle, and the cells warm it in the next.
 """
 
 from __future__ import annotations
@@ -43,7 +44,6 @@ class EvaporationOfLiquid(CaseFeature):
         self.keys, self.fluid, self.communicator = keys, case.required_fluid, simulation.communicator
         self.partial, self.diffusivity = keys.partial_pressure(case), keys.diffusivity_in(case)
         self.fraction = vapour_fraction(self.partial, keys.pressure)
-        self.schmidt = self.fluid.viscosity / (self.fluid.density * self.diffusivity)
         self.drops = np.array([name in keys.drops for name in case.material])
         self.mass, self.heat = 0.0, 0.0
 
@@ -63,16 +63,15 @@ class EvaporationOfLiquid(CaseFeature):
         gas, is_drop = temperature_of_gas(simulation), self.drops[particles.material]
         diameter = 2.0 * particles.radius
         density = self.fluid.density
-        slip = np.linalg.norm(simulation.terms.flow.slip, axis=1)
         on_films = particles.liquid if "liquid" in particles else np.zeros(len(diameter))
         smallest = particles.density * (4.0 / 3.0 * math.pi * SMALLEST**3)
         drops = np.maximum(particles.mass - smallest, 0.0)
         surfaces = Surfaces(
             temperature=particles.temperature.copy(),
             diameter=diameter,
-            reynolds=density * slip * diameter / particles.viscosity,
+            sherwood=heat.law.numbers(simulation.terms.flow, particles.viscosity / (density * self.diffusivity)),
             film=np.where(is_drop, np.inf, on_films),
-            conductance=heat.conductance(simulation.terms),
+            conductance=np.zeros(len(diameter)) if heat.cells else heat.conductance(simulation.terms),
             capacity=heat.capacity(particles),
             mass=np.where(is_drop, drops, on_films * keys.liquid_density),
             heat=np.zeros(len(diameter)),
@@ -96,7 +95,6 @@ class EvaporationOfLiquid(CaseFeature):
             fraction=self.fraction,
             density=density,
             diffusivity=self.diffusivity,
-            schmidt=self.schmidt,
             stefan=self.keys.rate == "stefan",
             full_thickness=self.keys.full_thickness,
         )

@@ -16,7 +16,6 @@ from closures.evaporation import (
     vapour_fraction,
     wet_share,
 )
-from closures.heat_transfer import ranz_marshall
 
 CLOSEST = 1e-9
 """Difference up to which the temperature is known [K]."""
@@ -27,9 +26,9 @@ class Surfaces(NamedTuple):
 
     temperature: np.ndarray  # after the exchange of heat with the gas alone; written [K]
     diameter: np.ndarray  # [m]
-    reynolds: np.ndarray  # of the slip [-]
+    sherwood: np.ndarray  # [-]
     film: np.ndarray  # volume of liquid on the surface; infinite for a drop [m3]
-    conductance: np.ndarray  # between surface and gas [W/K]
+    conductance: np.ndarray  # between surface and a gas of one temperature; 0 for a gas of cells [W/K]
     capacity: np.ndarray  # heat capacity [J/K]
     mass: np.ndarray  # of liquid that is there; what evaporates is written, negative for vapour that condenses [kg]
     heat: np.ndarray  # latent heat of what evaporates; written [J]
@@ -44,7 +43,6 @@ class Air(NamedTuple):
     fraction: float  # mass fraction of the vapour [-]
     density: float  # [kg/m3]
     diffusivity: float  # of the vapour [m2/s]
-    schmidt: float  # [-]
     stefan: bool  # the vapour flows by itself
     full_thickness: float  # of a film that covers all [m]
 
@@ -70,10 +68,10 @@ def evaporate(surfaces, air, step):
         share = wet_share(surfaces.film[i], math.pi * diameter**2, air.full_thickness)
         if there <= 0.0 or share <= 0.0:
             continue
-        sherwood = ranz_marshall(surfaces.reynolds[i], air.schmidt)
-        transport = share * math.pi * diameter * sherwood * air.density * air.diffusivity
-        exchanged = -math.expm1(-step * surfaces.conductance[i] / surfaces.capacity[i])
-        slowness = exchanged / surfaces.conductance[i]  # cooling by a loss of 1 W over the step [K/W]
+        transport = share * math.pi * diameter * surfaces.sherwood[i] * air.density * air.diffusivity
+        slowness = step / surfaces.capacity[i]  # cooling by a loss of 1 W over the step [K/W]
+        if surfaces.conductance[i] > 0.0:
+            slowness = -math.expm1(-slowness * surfaces.conductance[i]) / surfaces.conductance[i]
         scale = slowness * transport
         low = begin
         at_low = scale * latent_heat(begin) * drive(begin, air)  # of T - T' + s L m
