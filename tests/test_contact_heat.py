@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.features.contact_heat import HeatExchangeOfContacts, contact_heat_imbalance
 from cfddem.features.contact_heat_keys import wall_names
 from cfddem.preflight.summary import preflight
+from cfddem.run.build import require_parallel
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from scenarios.validation.heated_bed import study as heated_bed
@@ -281,6 +283,11 @@ def test_check_warns_of_a_circle_of_softened_contacts() -> None:
     assert "contact_heat.radius" in [each.key for each in preflight(case).issues]
 
 
+def test_several_processes_are_refused_in_one_line() -> None:
+    with pytest.raises(InputError, match="contact_heat: must be left out in a run of several processes"):
+        require_parallel(case_of(0.0, 0.1, 1.0), 2)
+
+
 def test_walls_are_named_in_the_order_of_the_solver() -> None:
     case = case_of(0.0, 0.1, 1.0)
     names, solver = wall_names(case), Simulation(case).particle_solver
@@ -298,6 +305,19 @@ def test_the_case_of_the_page_is_checked_and_written_and_read_back() -> None:
     case = Case.from_text(block[1])
     assert not [each for each in preflight(case).issues if each.severity == "error"]
     assert Case.from_text(case.to_toml()).feature_tables == case.feature_tables
+
+
+@pytest.mark.slow
+def test_a_heated_bed_has_the_same_bits_on_two_threads() -> None:
+    found, before = [], use_threads(None)
+    for threads in (1, 2):
+        use_threads(threads)
+        simulation = Simulation(heated_bed.case_of(next(iter(heated_bed.LAWS.values()))))
+        for _ in range(3):
+            simulation.step(30.0)
+        found.append(simulation.particles.temperature.copy())
+    use_threads(before)
+    assert np.ptp(found[0]) > 1.0 and np.array_equal(*found)
 
 
 @pytest.mark.slow

@@ -26,12 +26,14 @@ Model = TypeVar("Model", bound=BaseModel)
 class FeatureTable(Checked):
     """A table of a case that a feature or a user owns; cases have it as soon as the class is there.
 
-    table    its name in the case
-    meaning  one line on what it does
+    table        its name in the case
+    meaning      one line on what it does
+    one_process  whether several processes cannot share a case with it
     """
 
     table: ClassVar[str]
     meaning: ClassVar[str]
+    one_process: ClassVar[bool] = False
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
