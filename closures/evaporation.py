@@ -83,7 +83,7 @@ def latent_heat(temperature: float) -> float:
 
 @law("evaporation", "mixture of ideal gases")
 def vapour_fraction(vapour_pressure: float, pressure: float) -> float:
-    r"""Mass fraction of water vapour in humid air.
+    r"""Share by mass of water vapour in humid air.
 
     .. math:: Y = \frac{p_v M_v}{p_v M_v + (p - p_v) M_a}
 
@@ -102,12 +102,12 @@ def vapour_fraction(vapour_pressure: float, pressure: float) -> float:
 
 
 @law("evaporation", "mixture of ideal gases")
-def vapour_pressure(fraction: float, pressure: float) -> float:
+def vapour_pressure(share: float, pressure: float) -> float:
     r"""Partial pressure of water vapour in humid air: the inverse of :func:`vapour_fraction`.
 
     .. math:: p_v = p\,\frac{Y / M_v}{Y / M_v + (1 - Y) / M_a}
 
-    fraction  Y, mass fraction of the vapour [-]
+    share     Y, share by mass of the vapour [-]
     pressure  p, of the mixture [Pa]
     returns   p_v [Pa]
 
@@ -116,8 +116,8 @@ def vapour_pressure(fraction: float, pressure: float) -> float:
     >>> round(vapour_pressure(vapour_fraction(2000.0, 101325.0), 101325.0), 6)
     2000.0
     """
-    moles = fraction / WATER
-    return pressure * moles / (moles + (1.0 - fraction) / AIR)
+    moles = share / WATER
+    return pressure * moles / (moles + (1.0 - share) / AIR)
 
 
 @law("evaporation", _SPALDING)
@@ -126,8 +126,8 @@ def stefan_drive(at_surface: float, in_gas: float) -> float:
 
     .. math:: \frac{\dot m}{\pi d\,Sh\,\rho D} = \ln(1 + B) = \ln\frac{1 - Y_\infty}{1 - Y_s}
 
-    at_surface  Y_s, mass fraction of the vapour at the surface, saturated [-]
-    in_gas      Y, mass fraction in the gas [-]
+    at_surface  Y_s, share by mass of the vapour at the surface, saturated [-]
+    in_gas      Y, share by mass in the gas [-]
     returns     the logarithm; negative where vapour condenses [-]
 
     Range: Y_s < 1.
@@ -180,13 +180,13 @@ def wet_share(volume: float, area: float, full_thickness: float) -> float:
 
 
 @law("evaporation", "balance of heat and mass, e.g. Mills, Basic Heat and Mass Transfer")
-def wet_bulb_temperature(gas_temperature: float, fraction: float, pressure: float, ratio: float) -> float:
+def wet_bulb_temperature(gas_temperature: float, vapour_share: float, pressure: float, ratio: float) -> float:
     r"""Temperature at which the heat from the gas evaporates what diffuses away.
 
     .. math:: T_g - T_w = \frac{Sh\,\rho D}{Nu\,k}\,L(T_w)\,\ln\frac{1 - Y}{1 - Y_s(T_w)}
 
     gas_temperature  T_g [K]
-    fraction         Y, mass fraction of the vapour in the gas [-]
+    vapour_share     Y, share by mass of the vapour in the gas [-]
     pressure         p [Pa]
     ratio            Sh rho D / (Nu k): 1 / (c_p Le) where Nu and Sh are in the ratio of k and rho c_p D [kg K/J]
     returns          T_w [K]
@@ -202,7 +202,7 @@ def wet_bulb_temperature(gas_temperature: float, fraction: float, pressure: floa
     for _ in range(60):
         middle = 0.5 * (low + high)
         at_surface = vapour_fraction(min(saturation_pressure(middle), 0.999 * pressure), pressure)
-        if gas_temperature - middle > ratio * latent_heat(middle) * stefan_drive(at_surface, fraction):
+        if gas_temperature - middle > ratio * latent_heat(middle) * stefan_drive(at_surface, vapour_share):
             low = middle
         else:
             high = middle

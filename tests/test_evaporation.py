@@ -118,6 +118,16 @@ def test_a_step_far_too_long_ends_at_the_wet_bulb_temperature_of_the_balance() -
     assert simulation.particles.temperature[0] == pytest.approx(keys.wet_bulb(simulation.case), abs=0.01)
 
 
+def test_a_drop_in_cells_of_their_own_temperature_cools_them_and_comes_to_the_wet_bulb() -> None:
+    simulation = Simulation(wet_bulb(heat__fluid="cells"))
+    simulation.until(6.0)
+    assert simulation.particles.temperature[0] - ZERO == pytest.approx(21.756, abs=0.1)
+    now = row(simulation)
+    assert now["fluid_temperature"] < 303.15 and now["heat_imbalance"] < 1e-10
+    gained = simulation.particles.mass[0] * 4180.0 * (simulation.particles.temperature[0] - 303.15)
+    assert now["heat_received"] == pytest.approx(now["latent_heat_taken"] + gained, rel=0.02)  # the drop has shrunk
+
+
 def test_what_a_drop_loses_is_what_evaporated_and_a_drop_that_is_gone_warms_up() -> None:
     simulation = Simulation(wet_bulb())
     before = float(simulation.particles.mass[0])

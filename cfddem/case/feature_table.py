@@ -26,12 +26,14 @@ Model = TypeVar("Model", bound=BaseModel)
 class FeatureTable(Checked):
     """A table of a case that a feature or a user owns; cases have it as soon as the class is there.
 
-    table    its name in the case
-    meaning  one line on what it does
+    table        its name in the case
+    meaning      one line on what it does
+    one_process  whether several processes cannot share a case with it
     """
 
     table: ClassVar[str]
     meaning: ClassVar[str]
+    one_process: ClassVar[bool] = False
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
@@ -44,6 +46,11 @@ class FeatureTable(Checked):
     def of(cls, case: Any) -> Self | None:
         """The table of a case; None if the case has none."""
         return getattr(case, cls.table, None)  # type: ignore[no-any-return]  # a case may be older than the table
+
+    @property
+    def holds_particles(self) -> bool:
+        """Whether particles do not move, so that no step is theirs."""
+        return False
 
     def refuse(self, case: Any) -> None:
         """Raise InputError where the table does not go with the rest of a case."""

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
@@ -46,8 +45,6 @@ class HeatExchangeOfContacts(CaseFeature):
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = ContactHeat.of(case)
         assert keys
-        if simulation.communicator.size > 1:
-            raise InputError("contact_heat", None, "left out in a run of several processes", "take one process")
         self.keys, self.case = keys, case
         self.capacities = _capacities(case, keys)
         self.emissivities = keys.by_material(case, "emissivity", 0.0)

@@ -65,6 +65,7 @@ class ContactHeat(FeatureTable):
 
     table: ClassVar[str] = "contact_heat"
     meaning: ClassVar[str] = "heat between particles, with walls, and by radiation with the surroundings"
+    one_process: ClassVar[bool] = True
 
     conductivity: dict[str, Positive] = Field({}, description="thermal conductivity of the solids, by material [W/m/K]")
     heat_capacity: dict[str, Positive] = Field(
@@ -118,6 +119,11 @@ class ContactHeat(FeatureTable):
         False,
         description="particles stay where they start, with the forces there: steps are limited by run.fluid_step alone",
     )
+
+    @property
+    def holds_particles(self) -> bool:
+        """Whether particles are held."""
+        return self.held
 
     def refuse(self, case: Any) -> None:
         """Refuse unknown names, what is missing for a choice, and temperatures below absolute zero."""

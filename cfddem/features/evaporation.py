@@ -3,9 +3,10 @@ r"""Evaporation of the liquid of particles, and of drops, into humid air of one 
 .. math:: m c\,\dot T = \pi d k\,Nu\,(T_g - T) - L\,\dot m, \qquad
           \dot m = s\,\pi d\,Sh\,\rho D\,\ln\frac{1-Y}{1-Y_s(T)}
 
-`[heat]` exchanges heat with the gas first. At a constant rate of evaporation the particle is then colder by
-:math:`L \dot m (1 - e^{-x}) / b`, with the conductance b and x = b h / (m c): exact. The rate is that of the new
-temperature, so that a step that is far too long ends at the wet-bulb temperature.
+`[heat]` exchanges heat with the gas first. At a constant rate of evaporation in a gas of one temperature the particle
+is then colder by :math:`L \dot m (1 - e^{-x}) / b`, with the conductance b and x = b h / (m c): exact. The rate is that
+of the new temperature, so that a step that is far too long ends at the wet-bulb temperature. Where every cell of the
+fluid has a temperature, the latent heat of a step cools the particle, and the cells warm it in the next.
 """
 
 from __future__ import annotations
@@ -22,15 +23,10 @@ from cfddem.features.evaporation_loops import Air, Surfaces, evaporate
 from cfddem.features.heat import HeatExchange
 from cfddem.features.heat import fluid_temperature as temperature_of_gas
 from cfddem.features.liquid import LiquidOnParticles
-from closures.evaporation import latent_heat, vapour_fraction, wet_share
-from closures.heat_transfer import ranz_marshall
+from closures.evaporation import vapour_fraction
 
 SMALLEST = 1e-6
 """Radius of a drop that has evaporated [m]."""
-
-sherwood_numbers = np.vectorize(ranz_marshall, otypes=[float])
-wet_shares = np.vectorize(wet_share, otypes=[float])
-latent_heats = np.vectorize(latent_heat, otypes=[float])
 
 
 class EvaporationOfLiquid(CaseFeature):
@@ -66,33 +62,42 @@ class EvaporationOfLiquid(CaseFeature):
         particles, heat, keys = simulation.owned, simulation.feature(HeatExchange), self.keys
         gas, is_drop = temperature_of_gas(simulation), self.drops[particles.material]
         diameter = 2.0 * particles.radius
-        slip = np.linalg.norm(simulation.terms.flow.slip, axis=1)
         density = self.fluid.density
-        reynolds = density * slip * diameter / particles.viscosity
-        sherwood = sherwood_numbers(reynolds, particles.viscosity / (density * self.diffusivity))
         on_films = particles.liquid if "liquid" in particles else np.zeros(len(diameter))
-        shares = np.where(is_drop, 1.0, wet_shares(on_films, np.pi * diameter**2, keys.full_thickness))
-        smallest = 4.0 / 3.0 * math.pi * SMALLEST**3
-        there = np.where(is_drop, np.maximum(particles.mass - particles.density * smallest, 0.0), 0.0)
-        there = np.where(is_drop, there, on_films * keys.liquid_density)
-        conductance = heat.conductance(simulation.terms)
-        exchanged = -np.expm1(-step * conductance / heat.capacity(particles))
+        smallest = particles.density * (4.0 / 3.0 * math.pi * SMALLEST**3)
+        drops = np.maximum(particles.mass - smallest, 0.0)
         surfaces = Surfaces(
-            particles.temperature.copy(),
-            shares * np.pi * diameter * sherwood * density * self.diffusivity * (there > 0.0),
-            exchanged / conductance,
-            there,
+            temperature=particles.temperature.copy(),
+            diameter=diameter,
+            sherwood=heat.law.numbers(simulation.terms.flow, particles.viscosity / (density * self.diffusivity)),
+            film=np.where(is_drop, np.inf, on_films),
+            conductance=np.zeros(len(diameter)) if heat.cells else heat.conductance(simulation.terms),
+            capacity=heat.capacity(particles),
+            mass=np.where(is_drop, drops, on_films * keys.liquid_density),
+            heat=np.zeros(len(diameter)),
         )
-        air = Air(gas, keys.pressure, self.partial, self.fraction, density, keys.rate == "stefan")
-        evaporate(surfaces, air, step)
+        evaporate(surfaces, self._air(gas, density), step)
         lost = surfaces.mass
         particles.temperature[...] = surfaces.temperature
         self._remove(particles, lost, is_drop)
         self.mass += float(self.communicator.sum(lost))
-        self.heat += float(self.communicator.sum(lost * latent_heats(surfaces.temperature)))
+        self.heat += float(self.communicator.sum(surfaces.heat))
         if "liquid" in particles:
             volume = np.where(is_drop, 0.0, lost / keys.liquid_density)
             simulation.feature(LiquidOnParticles).evaporated += float(self.communicator.sum(volume))
+
+    def _air(self, temperature: float, density: float) -> Air:
+        """The gas at a temperature [K] and density [kg/m3]."""
+        return Air(
+            temperature=temperature,
+            pressure=self.keys.pressure,
+            partial=self.partial,
+            fraction=self.fraction,
+            density=density,
+            diffusivity=self.diffusivity,
+            stefan=self.keys.rate == "stefan",
+            full_thickness=self.keys.full_thickness,
+        )
 
     def _remove(self, particles: Any, lost: np.ndarray, is_drop: np.ndarray) -> None:
         """Take the mass [kg] from films, and from drops, which shrink."""

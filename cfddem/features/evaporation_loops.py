@@ -2,37 +2,49 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.backend.compile import inline, serial
-from closures.evaporation import dilute_drive, latent_heat, saturation_pressure, stefan_drive, vapour_fraction
+from closures.evaporation import (
+    dilute_drive,
+    latent_heat,
+    saturation_pressure,
+    stefan_drive,
+    vapour_fraction,
+    wet_share,
+)
 
 CLOSEST = 1e-9
 """Difference up to which the temperature is known [K]."""
 
 
 class Surfaces(NamedTuple):
-    """Wet surfaces."""
+    """Wet surfaces of n particles."""
 
-    temperature: np.ndarray  # after the exchange of heat with the gas alone (n,); written [K]
-    transport: np.ndarray  # wet share, times pi d Sh rho D (n,) [kg/s]
-    slowness: np.ndarray  # temperature by which a loss of 1 W cools over the step (n,) [K/W]
-    mass: (
-        np.ndarray
-    )  # of liquid that is there (n,); what evaporates is written, negative for vapour that condenses [kg]
+    temperature: np.ndarray  # after the exchange of heat with the gas alone; written [K]
+    diameter: np.ndarray  # [m]
+    sherwood: np.ndarray  # [-]
+    film: np.ndarray  # volume of liquid on the surface; infinite for a drop [m3]
+    conductance: np.ndarray  # between surface and a gas of one temperature; 0 for a gas of cells [W/K]
+    capacity: np.ndarray  # heat capacity [J/K]
+    mass: np.ndarray  # of liquid that is there; what evaporates is written, negative for vapour that condenses [kg]
+    heat: np.ndarray  # latent heat of what evaporates; written [J]
 
 
 class Air(NamedTuple):
-    """State of the gas."""
+    """State of the gas, and how a film covers a surface."""
 
     temperature: float  # [K]
     pressure: float  # [Pa]
     partial: float  # pressure of the vapour [Pa]
     fraction: float  # mass fraction of the vapour [-]
     density: float  # [kg/m3]
+    diffusivity: float  # of the vapour [m2/s]
     stefan: bool  # the vapour flows by itself
+    full_thickness: float  # of a film that covers all [m]
 
 
 @inline
@@ -51,11 +63,16 @@ def evaporate(surfaces, air, step):
     The new temperature solves T = T' - s L(T) m(T), where m falls with T: the root is between T' and what m(T') gives.
     """
     for i in range(len(surfaces.mass)):
-        there, begin, transport = surfaces.mass[i], surfaces.temperature[i], surfaces.transport[i]
-        surfaces.mass[i] = 0.0
-        if transport <= 0.0:
+        there, begin, diameter = surfaces.mass[i], surfaces.temperature[i], surfaces.diameter[i]
+        surfaces.mass[i] = surfaces.heat[i] = 0.0
+        share = wet_share(surfaces.film[i], math.pi * diameter**2, air.full_thickness)
+        if there <= 0.0 or share <= 0.0:
             continue
-        scale = surfaces.slowness[i] * transport
+        transport = share * math.pi * diameter * surfaces.sherwood[i] * air.density * air.diffusivity
+        slowness = step / surfaces.capacity[i]  # cooling by a loss of 1 W over the step [K/W]
+        if surfaces.conductance[i] > 0.0:
+            slowness = -math.expm1(-slowness * surfaces.conductance[i]) / surfaces.conductance[i]
+        scale = slowness * transport
         low = begin
         at_low = scale * latent_heat(begin) * drive(begin, air)  # of T - T' + s L m
         high = max(begin - at_low, 200.0)
@@ -76,5 +93,6 @@ def evaporate(surfaces, air, step):
         mass = step * transport * drive(middle, air)
         if mass > there:
             mass = there
-            middle = begin - surfaces.slowness[i] * latent_heat(begin) * mass / step
+            middle = begin - slowness * latent_heat(begin) * mass / step
         surfaces.mass[i], surfaces.temperature[i] = mass, middle
+        surfaces.heat[i] = mass * latent_heat(middle)

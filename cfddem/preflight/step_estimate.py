@@ -45,7 +45,8 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
     run, speed = case.run, max(case.reference_speed, 1e-12)
     every = [_time_scales(case, each, speed) for each in case.species.values()]
     shortest = min(every, key=lambda each: each.recommended)
-    particle = math.inf if case.bed.fixed else run.particle_step or shortest.recommended
+    at_rest = case.bed.fixed or any(each.holds_particles for each in case.feature_tables)
+    particle = math.inf if at_rest else run.particle_step or shortest.recommended
     if case.fluid is None:
         return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, {}), None)
     cells = cell_counts(case.column.size, case.column.cell)

@@ -92,6 +92,9 @@ def require_parallel(case: Case, ranks: int) -> None:
     if ranks > 1 and case.liquid is not None and case.liquid.wall_share > 0.0:
         limit = "0 in a run of several processes"
         raise InputError("liquid.wall_share", case.liquid.wall_share, limit, "liquid on walls is for one process")
+    for table in case.feature_tables:
+        if ranks > 1 and table.one_process:
+            raise InputError(table.table, None, "left out in a run of several processes", "take one process")
     if ranks > 1 and case.fluid is not None:
         divide(grid_of(case), ranks)
 
