@@ -77,6 +77,12 @@ class Vapour(CaseFeature):
         numbers = self.law.numbers(terms.flow, particles.viscosity / self.conductivity)
         return np.asarray(2.0 * math.pi * particles.radius * self.conductivity * numbers)
 
+    def around(self, simulation: Any) -> np.ndarray:
+        """Mass fraction in the cells around every particle now (N,) [-]."""
+        kernel = simulation.required_coupling.kernel
+        gathered = kernel.gather(simulation.terms.cell_map.stencil, kernel.smooth(self.cells.value[None]))
+        return np.asarray(gathered[:, 0])
+
     def exchange(self, simulation: Any, conductance: np.ndarray, surface: np.ndarray, step: float) -> np.ndarray:
         """Make the step of the vapour with particles that exchange with it; at most once in a step.
 
