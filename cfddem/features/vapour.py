@@ -16,7 +16,6 @@ import numpy as np
 from cfddem.case.schema import Case
 from cfddem.coupling.exchange import ExchangeLaw
 from cfddem.features.case_feature import CaseFeature, Measured
-from cfddem.features.heat_keys import given_or
 from cfddem.features.vapour_keys import VapourTable
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
@@ -43,8 +42,7 @@ class Vapour(CaseFeature):
             OF_FLUID.name, OF_FLUID.unit, OF_FLUID.meaning, keys.fluid_fraction, fluid.density, self.conductivity,
             keys.effective_diffusivity,
         )  # fmt: skip
-        inflow = given_or(keys.inlet_fraction, keys.fluid_fraction)
-        self.cells = Scalar(fluid, kind, ScalarSides(inflow, keys.outlet_fraction))
+        self.cells = Scalar(fluid, kind, ScalarSides(keys.inflow, keys.outlet_fraction))
         self.received, self.scale, self._made = 0.0, 0.0, False
 
     @classmethod

@@ -9,7 +9,7 @@ from pydantic import Field
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
 from cfddem.case.feature_table import FeatureTable
-from cfddem.features.heat_keys import Heat
+from cfddem.features.heat_keys import Heat, given_or
 
 Fraction = Annotated[float, Field(ge=0, lt=1)]
 
@@ -31,6 +31,11 @@ class VapourTable(FeatureTable):
     effective_diffusivity: Literal["none", "zehner_schluender"] = Field(
         "none", description="diffusivity between particles: none, voidage times diffusivity; or the law"
     )
+
+    @property
+    def inflow(self) -> float:
+        """Mass fraction in the fluid that enters [-]."""
+        return given_or(self.inlet_fraction, self.fluid_fraction)
 
     def refuse(self, case: Any) -> None:
         """Refuse a vapour in a fluid without a temperature in its cells."""
