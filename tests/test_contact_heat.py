@@ -151,6 +151,18 @@ def test_a_softened_contact_conducts_as_the_real_one_under_the_same_force() -> N
     assert conductance(1e-5, 1e7) == pytest.approx(conductance(1e-7, None), rel=1e-6)
 
 
+def test_contacts_across_a_periodic_side_conduct_as_any_other() -> None:
+    def warmed(x: float, **changes: Any) -> float:
+        places = [(x, 0.005, 0.005), ((x + RADII - 1e-7) % 0.045, 0.005, 0.005)]
+        simulation = Simulation(case_of(0.0, 1.0, 10.0, bed__positions=places, **changes))
+        simulation.until(5.0)
+        return float(simulation.particles.temperature[0])
+
+    within = warmed(0.005)
+    assert within > COLD + 1.0
+    assert warmed(0.043, column__sides="periodic") == pytest.approx(within, abs=1e-6)
+
+
 def at_the_floor(wall: dict[str, Any], **heat: Any) -> Case:
     """One sphere on the floor, pressed by its weight, and one that touches nothing."""
     given = {"wall": {"floor": wall}, "gap": "lens", "gas_conductivity": GAS, **heat}

@@ -123,7 +123,8 @@ def test_a_drop_in_cells_of_their_own_temperature_cools_them_and_comes_to_the_we
     simulation.until(6.0)
     assert simulation.particles.temperature[0] - ZERO == pytest.approx(21.756, abs=0.1)
     now = row(simulation)
-    assert now["fluid_temperature"] < 303.15 and now["heat_imbalance"] < 1e-10
+    # 0.06 m3 of air hold 23 kJ above absolute zero, of which the drop takes some joules: round-off is 1e-10 of these
+    assert now["fluid_temperature"] < 303.15 and now["heat_imbalance"] < 1e-9
     gained = simulation.particles.mass[0] * 4180.0 * (simulation.particles.temperature[0] - 303.15)
     assert now["heat_received"] == pytest.approx(now["latent_heat_taken"] + gained, rel=0.02)  # the drop has shrunk
 

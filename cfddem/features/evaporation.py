@@ -7,6 +7,9 @@ r"""Evaporation of the liquid of particles, and of drops, into humid air of one 
 is then colder by :math:`L \dot m (1 - e^{-x}) / b`, with the conductance b and x = b h / (m c): exact. The rate is that
 of the new temperature, so that a step that is far too long ends at the wet-bulb temperature. Where every cell of the
 fluid has a temperature, the latent heat of a step cools the particle, and the cells warm it in the next.
+
+With `[vapour]` the cells take the vapour, implicitly: the rate falls as they fill. What a cell takes from a surface is
+what the particle loses, with its latent heat.
 """
 
 from __future__ import annotations
@@ -21,8 +24,8 @@ from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.evaporation_loops import Air, Surfaces, evaporate
 from cfddem.features.heat import HeatExchange
-from cfddem.features.heat import fluid_temperature as temperature_of_gas
 from cfddem.features.liquid import LiquidOnParticles
+from cfddem.features.vapour import Vapour
 from closures.evaporation import vapour_fraction
 
 SMALLEST = 1e-6
@@ -42,8 +45,9 @@ class EvaporationOfLiquid(CaseFeature):
         keys = Evaporation.of(case)
         assert keys
         self.keys, self.fluid, self.communicator = keys, case.required_fluid, simulation.communicator
-        self.partial, self.diffusivity = keys.partial_pressure(case), keys.diffusivity_in(case)
-        self.fraction = vapour_fraction(self.partial, keys.pressure)
+        self.diffusivity = keys.diffusivity_in(case)
+        self.fraction = vapour_fraction(keys.partial_pressure(case), keys.pressure)
+        self.gains = Vapour.is_in(case)
         self.drops = np.array([name in keys.drops for name in case.material])
         self.mass, self.heat = 0.0, 0.0
 
@@ -60,23 +64,28 @@ class EvaporationOfLiquid(CaseFeature):
     def before(self, simulation: Any, step: float) -> None:
         """Evaporate over the step [s], after the exchange of heat with the gas."""
         particles, heat, keys = simulation.owned, simulation.feature(HeatExchange), self.keys
-        gas, is_drop = temperature_of_gas(simulation), self.drops[particles.material]
-        diameter = 2.0 * particles.radius
-        density = self.fluid.density
+        is_drop, diameter, flow = self.drops[particles.material], 2.0 * particles.radius, simulation.terms.flow
         on_films = particles.liquid if "liquid" in particles else np.zeros(len(diameter))
         smallest = particles.density * (4.0 / 3.0 * math.pi * SMALLEST**3)
-        drops = np.maximum(particles.mass - smallest, 0.0)
+        drops, begin = np.maximum(particles.mass - smallest, 0.0), particles.temperature.copy()
+        vapour = simulation.feature(Vapour) if self.gains else None
         surfaces = Surfaces(
             temperature=particles.temperature.copy(),
             diameter=diameter,
-            sherwood=heat.law.numbers(simulation.terms.flow, particles.viscosity / (density * self.diffusivity)),
+            sherwood=heat.law.numbers(flow, particles.viscosity / (self.fluid.density * self.diffusivity)),
+            gas=heat.around,
+            fraction=vapour.around(simulation) if vapour else np.full(len(diameter), self.fraction),
             film=np.where(is_drop, np.inf, on_films),
-            conductance=np.zeros(len(diameter)) if heat.cells else heat.conductance(simulation.terms),
-            capacity=heat.capacity(particles),
+            response=heat.response,
             mass=np.where(is_drop, drops, on_films * keys.liquid_density),
             heat=np.zeros(len(diameter)),
+            saturated=np.zeros(len(diameter)),
         )
-        evaporate(surfaces, self._air(gas, density), step)
+        there = surfaces.mass.copy()
+        air = Air(keys.pressure, self.fluid.density, self.diffusivity, keys.rate == "stefan", keys.full_thickness)
+        evaporate(surfaces, air, step)
+        if vapour:
+            _give(simulation, vapour, surfaces, begin, there, step)
         lost = surfaces.mass
         particles.temperature[...] = surfaces.temperature
         self._remove(particles, lost, is_drop)
@@ -85,19 +94,6 @@ class EvaporationOfLiquid(CaseFeature):
         if "liquid" in particles:
             volume = np.where(is_drop, 0.0, lost / keys.liquid_density)
             simulation.feature(LiquidOnParticles).evaporated += float(self.communicator.sum(volume))
-
-    def _air(self, temperature: float, density: float) -> Air:
-        """The gas at a temperature [K] and density [kg/m3]."""
-        return Air(
-            temperature=temperature,
-            pressure=self.keys.pressure,
-            partial=self.partial,
-            fraction=self.fraction,
-            density=density,
-            diffusivity=self.diffusivity,
-            stefan=self.keys.rate == "stefan",
-            full_thickness=self.keys.full_thickness,
-        )
 
     def _remove(self, particles: Any, lost: np.ndarray, is_drop: np.ndarray) -> None:
         """Take the mass [kg] from films, and from drops, which shrink."""
@@ -117,6 +113,25 @@ class EvaporationOfLiquid(CaseFeature):
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.mass, self.heat = float(state["mass"]), float(state["heat"])
+
+
+def _give(
+    simulation: Any, vapour: Vapour, surfaces: Surfaces, begin: np.ndarray, there: np.ndarray, step: float
+) -> None:
+    """Give the vapour to the cells, which take it implicitly; surfaces then have what the cells took.
+
+    begin  temperature of the surfaces before [K]
+    there  liquid that can evaporate [kg]
+    """
+    difference = surfaces.saturated - surfaces.fraction
+    differs = np.abs(difference) > 1e-12
+    conductance = np.where(differs, surfaces.mass / step / np.where(differs, difference, 1.0), 0.0)
+    most = there / (step * np.maximum(surfaces.saturated, 1e-300))  # no more than there is, also into dry air
+    conductance = np.maximum(np.minimum(conductance, most), 0.0)
+    latent = surfaces.heat / np.where(surfaces.mass == 0.0, 1.0, surfaces.mass)
+    surfaces.mass[...] = -vapour.exchange(simulation, conductance, surfaces.saturated, step)
+    surfaces.heat[...] = latent * surfaces.mass
+    surfaces.temperature[...] = begin - surfaces.response * surfaces.heat / step
 
 
 def evaporated_mass(simulation: Any) -> float:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable
 from cfddem.features.heat_keys import Heat
+from cfddem.features.vapour_keys import VapourTable
 from closures.evaporation import (
     saturation_pressure,
     vapour_diffusivity,
@@ -52,14 +53,6 @@ class Evaporation(FeatureTable):
         (), description="materials whose particles are drops of water, which shrink; others carry their [liquid]"
     )
 
-    @model_validator(mode="after")
-    def _one_humidity(self) -> Evaporation:
-        if (self.vapour_fraction is None) == (self.relative_humidity is None):
-            found = "found none" if self.vapour_fraction is None else "found both"
-            remedy = f"or relative_humidity, and only one of them; {found}"
-            raise InputError("vapour_fraction", self.vapour_fraction, "given", remedy)
-        return self
-
     def refuse(self, case: Any) -> None:
         """Refuse vapour without heat, nothing that evaporates, and air above saturation."""
         heat = Heat.of(case)
@@ -68,36 +61,55 @@ class Evaporation(FeatureTable):
         if heat.fluid_total_capacity:
             remedy = "the gas of [evaporation] has one state, and gains no vapour"
             raise InputError("heat.fluid_total_capacity", heat.fluid_total_capacity, "left out", remedy)
-        if not COLDEST <= heat.fluid_temperature <= HOTTEST:
+        self._refuse_humidity(case)
+        if not COLDEST <= heat.gas_temperature <= HOTTEST:
             limit = f"{COLDEST:g} to {HOTTEST:g} K with [evaporation]"
-            raise InputError("heat.fluid_temperature", heat.fluid_temperature, limit, "the laws are those of water")
+            raise InputError("heat.fluid_temperature", heat.gas_temperature, limit, "the laws are those of water")
         for name in self.drops:
             if name not in case.material:
                 raise InputError("evaporation.drops", name, nearest(name, list(case.material)))
         if not self.drops and not case.liquid:
             remedy = "or name the materials of drops in evaporation.drops"
             raise InputError("evaporation", None, "left out without [liquid]", remedy)
-        saturated = saturation_pressure(heat.fluid_temperature)
-        humidity = self.partial_pressure(case) / saturated
-        if humidity > SATURATED:
-            key = "vapour_fraction" if self.relative_humidity is None else "relative_humidity"
+        saturated = saturation_pressure(heat.gas_temperature)
+        if self.partial_pressure(case) > SATURATED * saturated:
+            vapour = VapourTable.of(case)
+            key = "evaporation.vapour_fraction" if self.relative_humidity is None else "evaporation.relative_humidity"
+            value = self.vapour_fraction if self.relative_humidity is None else self.relative_humidity
+            if vapour:
+                key, value = "vapour.inlet_fraction", vapour.inflow
             most = vapour_fraction(min(saturated, self.pressure), self.pressure)
-            remedy = f"the mass fraction of saturation at {heat.fluid_temperature:g} K is {most:.4g}"
-            raise InputError(f"evaporation.{key}", getattr(self, key), "at most saturated", remedy)
+            remedy = f"the mass fraction of saturation at {heat.gas_temperature:g} K is {most:.4g}"
+            raise InputError(key, value, "at most saturated", remedy)
+
+    def _refuse_humidity(self, case: Any) -> None:
+        """Refuse two humidities, or none; with `[vapour]` the humidity is that of the cells."""
+        given = [key for key in ("vapour_fraction", "relative_humidity") if getattr(self, key) is not None]
+        if VapourTable.of(case):
+            for key in given:
+                remedy = "[vapour] has the fraction in the cells"
+                raise InputError(f"evaporation.{key}", getattr(self, key), "left out with [vapour]", remedy)
+        elif len(given) != 1:
+            remedy = f"or relative_humidity, and only one of them; found {'both' if given else 'none'}"
+            raise InputError("evaporation.vapour_fraction", self.vapour_fraction, "given", remedy)
 
     def partial_pressure(self, case: Any) -> float:
         """Pressure of the vapour in the gas [Pa]."""
         heat = Heat.of(case)
         assert heat
+        if vapour := VapourTable.of(case):
+            return vapour_pressure(vapour.inflow, self.pressure)
         if self.relative_humidity is not None:
-            return self.relative_humidity * saturation_pressure(heat.fluid_temperature)
+            return self.relative_humidity * saturation_pressure(heat.gas_temperature)
         return vapour_pressure(self.vapour_fraction or 0.0, self.pressure)
 
     def diffusivity_in(self, case: Any) -> float:
         """Diffusivity of the vapour [m2/s]."""
         heat = Heat.of(case)
         assert heat
-        return self.diffusivity or vapour_diffusivity(heat.fluid_temperature, self.pressure)
+        if vapour := VapourTable.of(case):
+            return vapour.diffusivity
+        return self.diffusivity or vapour_diffusivity(heat.gas_temperature, self.pressure)
 
     def wet_bulb(self, case: Any) -> float:
         """Temperature of a wet particle at the reference speed of the case [K]."""
@@ -109,7 +121,7 @@ class Evaporation(FeatureTable):
         sherwood = ranz_marshall(reynolds, fluid.viscosity / (fluid.density * diffusivity))
         ratio = sherwood * fluid.density * diffusivity / (nusselt * heat.conductivity)
         fraction = vapour_fraction(self.partial_pressure(case), self.pressure)
-        return wet_bulb_temperature(heat.fluid_temperature, fraction, self.pressure, ratio)
+        return wet_bulb_temperature(heat.gas_temperature, fraction, self.pressure, ratio)
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Tell the wet-bulb temperature."""

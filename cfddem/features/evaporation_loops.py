@@ -14,6 +14,7 @@ from closures.evaporation import (
     saturation_pressure,
     stefan_drive,
     vapour_fraction,
+    vapour_pressure,
     wet_share,
 )
 
@@ -27,20 +28,19 @@ class Surfaces(NamedTuple):
     temperature: np.ndarray  # after the exchange of heat with the gas alone; written [K]
     diameter: np.ndarray  # [m]
     sherwood: np.ndarray  # [-]
+    gas: np.ndarray  # temperature of the gas around [K]
+    fraction: np.ndarray  # mass fraction of the vapour in the gas around [-]
     film: np.ndarray  # volume of liquid on the surface; infinite for a drop [m3]
-    conductance: np.ndarray  # between surface and a gas of one temperature; 0 for a gas of cells [W/K]
-    capacity: np.ndarray  # heat capacity [J/K]
+    response: np.ndarray  # cooling by a loss of 1 W over the step [K/W]
     mass: np.ndarray  # of liquid that is there; what evaporates is written, negative for vapour that condenses [kg]
     heat: np.ndarray  # latent heat of what evaporates; written [J]
+    saturated: np.ndarray  # mass fraction of the vapour at the surface; written [-]
 
 
 class Air(NamedTuple):
     """State of the gas, and how a film covers a surface."""
 
-    temperature: float  # [K]
     pressure: float  # [Pa]
-    partial: float  # pressure of the vapour [Pa]
-    fraction: float  # mass fraction of the vapour [-]
     density: float  # [kg/m3]
     diffusivity: float  # of the vapour [m2/s]
     stefan: bool  # the vapour flows by itself
@@ -48,12 +48,18 @@ class Air(NamedTuple):
 
 
 @inline
-def drive(temperature, air):
-    """Driving force at the temperature of a surface [-]."""
-    saturation = min(saturation_pressure(temperature), 0.999 * air.pressure)
+def saturated(temperature, air):
+    """Pressure of the vapour at a surface [Pa]."""
+    return min(saturation_pressure(temperature), 0.999 * air.pressure)
+
+
+@inline
+def drive(temperature, gas, fraction, air):
+    """Driving force at the temperature of a surface [-], in a gas of a temperature and a mass fraction."""
+    saturation = saturated(temperature, air)
     if air.stefan:
-        return stefan_drive(vapour_fraction(saturation, air.pressure), air.fraction)
-    return dilute_drive(saturation, air.partial, air.temperature, air.density)
+        return stefan_drive(vapour_fraction(saturation, air.pressure), fraction)
+    return dilute_drive(saturation, vapour_pressure(fraction, air.pressure), gas, air.density)
 
 
 @serial
@@ -69,20 +75,18 @@ def evaporate(surfaces, air, step):
         if there <= 0.0 or share <= 0.0:
             continue
         transport = share * math.pi * diameter * surfaces.sherwood[i] * air.density * air.diffusivity
-        slowness = step / surfaces.capacity[i]  # cooling by a loss of 1 W over the step [K/W]
-        if surfaces.conductance[i] > 0.0:
-            slowness = -math.expm1(-slowness * surfaces.conductance[i]) / surfaces.conductance[i]
+        slowness, gas, fraction = surfaces.response[i], surfaces.gas[i], surfaces.fraction[i]
         scale = slowness * transport
         low = begin
-        at_low = scale * latent_heat(begin) * drive(begin, air)  # of T - T' + s L m
+        at_low = scale * latent_heat(begin) * drive(begin, gas, fraction, air)  # of T - T' + s L m
         high = max(begin - at_low, 200.0)
-        at_high = high - begin + scale * latent_heat(high) * drive(high, air)
+        at_high = high - begin + scale * latent_heat(high) * drive(high, gas, fraction, air)
         middle = begin
         for _ in range(100):
             if abs(high - low) <= CLOSEST or at_low == at_high:
                 break
             middle = high - at_high * (high - low) / (at_high - at_low)  # regula falsi, as in Illinois
-            value = middle - begin + scale * latent_heat(middle) * drive(middle, air)
+            value = middle - begin + scale * latent_heat(middle) * drive(middle, gas, fraction, air)
             if abs(value) <= CLOSEST:
                 break
             if value * at_high <= 0.0:
@@ -90,9 +94,10 @@ def evaporate(surfaces, air, step):
             else:
                 at_low *= 0.5
             high, at_high = middle, value
-        mass = step * transport * drive(middle, air)
+        mass = step * transport * drive(middle, gas, fraction, air)
         if mass > there:
             mass = there
             middle = begin - slowness * latent_heat(begin) * mass / step
         surfaces.mass[i], surfaces.temperature[i] = mass, middle
         surfaces.heat[i] = mass * latent_heat(middle)
+        surfaces.saturated[i] = vapour_fraction(saturated(middle, air), air.pressure)

@@ -15,6 +15,7 @@ from cfddem.features.heat import HeatExchange
 from cfddem.features.liquid import LiquidOnParticles
 from cfddem.features.moving_walls import MovingWalls
 from cfddem.features.spray import SprayZone
+from cfddem.features.vapour import Vapour
 
 FEATURES: tuple[type[CaseFeature], ...] = (
     MovingWalls,
@@ -25,5 +26,6 @@ FEATURES: tuple[type[CaseFeature], ...] = (
     HeatExchange,
     HeatExchangeOfContacts,
     EvaporationOfLiquid,
+    Vapour,
 )
 """In the order in which they act, before the particles move and after."""

@@ -44,6 +44,9 @@ class HeatExchange(CaseFeature):
     scale              heat exchanged, without sign [J]
     other              change of the heat in the particles between exchanges: by feeds, outlets and a user [J]
     last               heat in the particles after the last exchange, from their state [J]
+    around             temperature of the fluid around every particle in the last exchange (N,) [K]
+    response           by how much a sink of 1 W, over the step of the last exchange, cools every particle (N,) [K/W];
+                       less than the step over its capacity where the fluid gives heat within the step
     """
 
     name = "heat"
@@ -67,6 +70,7 @@ class HeatExchange(CaseFeature):
             self.transfer = Transfer(kernel, "temperature", RECEIVED, self.capacity)
         self.start = self.stored(simulation.owned)
         self.scale, self.other, self.last = 0.0, 0.0, self.start
+        self.around, self.response = np.full(simulation.owned.count, self.fluid_temperature), np.zeros(0)
 
     @classmethod
     def is_in(cls, case: Case) -> bool:
@@ -131,6 +135,7 @@ class HeatExchange(CaseFeature):
             received = self._from_uniform(particles, capacity, self.conductance(terms), step)
         else:
             received = self._from_cells(self.cells, particles, terms, step)
+            self.response = step / capacity
         self.given += float(total(received))
         self.scale += float(total(np.abs(received)))
         particles.temperature += received / capacity
@@ -142,6 +147,10 @@ class HeatExchange(CaseFeature):
         if bath := self.keys.fluid_total_capacity:
             brought = float(total(exchanged * (particles.temperature - self.fluid_temperature)))
             self.fluid_temperature += brought / (bath + float(total(exchanged)))
+        self.around, self.response = (
+            np.full(particles.count, self.fluid_temperature),
+            exchanged / capacity / conductance,
+        )
         return np.asarray(exchanged * (self.fluid_temperature - particles.temperature))
 
     def _from_cells(self, cells: Scalar, particles: Any, terms: Any, step: float) -> np.ndarray:
@@ -153,7 +162,9 @@ class HeatExchange(CaseFeature):
         sent = self.transfer.prepare(particles, terms.cell_map, self.conductance(terms), step)
         seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])[..., None]
         self.fluid_temperature = cells.mean
-        return step * self.transfer.apply(particles, terms.cell_map, sent, np.ones_like(seen), seen)[:, 0]
+        rate = self.transfer.apply(particles, terms.cell_map, sent, np.ones_like(seen), seen)[:, 0]
+        self.around = particles.temperature + rate / sent.implicit
+        return np.asarray(step * rate)
 
     def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
         """The temperature of the fluid in the cells of all ranks."""

@@ -125,6 +125,11 @@ class Heat(FeatureTable):
             return not self.fluid_total_capacity and case.laws.drag != "none"
         return self.fluid == "cells"
 
+    @property
+    def gas_temperature(self) -> float:
+        """Temperature of the fluid that enters [K]."""
+        return given_or(self.inlet_temperature, self.fluid_temperature)
+
     def names_of_walls(self, case: Any) -> list[str]:
         """Names that walls of the column can have in the keys of this table."""
         column = case.column
@@ -154,7 +159,7 @@ class Heat(FeatureTable):
                     walls.setdefault(each, wall)
                 else:
                     walls[each] = wall
-        return ScalarSides(given_or(self.inlet_temperature, self.fluid_temperature), self.outlet_temperature, walls)
+        return ScalarSides(self.gas_temperature, self.outlet_temperature, walls)
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle has no single temperature."""

@@ -145,9 +145,9 @@ def _among_few(particles: Particles, cutoff_ratio: float, skin: float, box: np.n
     touch = particles.radius[i] + particles.radius[j]
     near = touch + cutoff_ratio * particles.radius[i] * particles.radius[j] / touch + skin
     apart = (particles.position[i] - particles.position[j])[:, None, :] + shifts(box)[None, :, :]
+    shifted = shifts(np.ones(3)) != 0.0
     within = np.einsum("pid,pid->pi", apart, apart) < near[:, None] ** 2
-    if np.isinf(box).all():  # local: three lengths
-        within[:, :HOME] = within[:, HOME + 1 :] = False
+    within &= ~(shifted & np.isinf(box)).any(axis=1)  # local: axes; there is one image along an open one
     pair, image = np.nonzero(within)
     return [(i[pair].astype(np.uint32), j[pair].astype(np.uint32), image.astype(np.uint8))]
 

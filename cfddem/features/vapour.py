@@ -1,0 +1,154 @@
+r"""One vapour in the fluid, as a mass fraction in every cell, see :mod:`cfddem.fluid.scalar`.
+
+What evaporates adds to it through :meth:`Vapour.exchange`: every particle has a surface of the mass fraction Y and a
+conductance :math:`b = \rho D\,Sh\,A/d` and receives :math:`b\,(Y_f - Y)` from the cells around; a negative number
+evaporates. Density and heat capacity of the fluid stay as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cfddem.case.schema import Case
+from cfddem.coupling.exchange import ExchangeLaw
+from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.features.vapour_keys import VapourTable
+from cfddem.fluid.fields import CellField
+from cfddem.fluid.scalar import Scalar, ScalarKind
+from cfddem.fluid.scalar_conditions import ScalarSides
+
+OF_FLUID = CellField("vapour", "1", "mass fraction of the vapour in the fluid")
+
+
+class Vapour(CaseFeature):
+    """The vapour in the fluid of a case.
+
+    cells     its mass fraction in every cell
+    received  mass of vapour that particles have received so far; below zero where they evaporate [kg]
+    """
+
+    name = "vapour"
+
+    def __init__(self, case: Case, simulation: Any) -> None:
+        keys, law, fluid = VapourTable.of(case), case.laws.heat_law, simulation.required_fluid
+        assert keys is not None and law is not None
+        self.keys, self.law, self.communicator = keys, ExchangeLaw(law), simulation.communicator
+        self.conductivity = fluid.density * keys.diffusivity
+        kind = ScalarKind(
+            OF_FLUID.name, OF_FLUID.unit, OF_FLUID.meaning, keys.fluid_fraction, fluid.density, self.conductivity,
+            keys.effective_diffusivity,
+        )  # fmt: skip
+        self.cells = Scalar(fluid, kind, ScalarSides(keys.inflow, keys.outlet_fraction))
+        self.received, self.scale, self._made = 0.0, 0.0, False
+
+    @classmethod
+    def is_in(cls, case: Case) -> bool:
+        """Whether the case has the table."""
+        return VapourTable.of(case) is not None
+
+    @classmethod
+    def cell_fields_of(cls, case: Case) -> tuple[CellField, ...]:
+        """The mass fraction."""
+        return (OF_FLUID,)
+
+    @classmethod
+    def measures(cls, case: Case) -> tuple[Measured, ...]:
+        """Mass fractions and masses of the vapour."""
+        of_outlet = (Measured("1", "measure", outlet_vapour),) if case.column.ends == "flow" else ()
+        return (
+            Measured("1", "recorded", mean_vapour),
+            *of_outlet,
+            Measured("kg", "recorded", vapour_in),
+            Measured("kg", "recorded", vapour_out),
+            Measured("kg", "recorded", vapour_from_particles),
+            Measured("1", "imbalance", vapour_imbalance),
+        )
+
+    def conductance(self, terms: Any) -> np.ndarray:
+        """Conductance of the whole surface of every particle, by the law of heat transfer as Sherwood number (N,)
+        [kg/s]."""
+        particles = terms.particles
+        numbers = self.law.numbers(terms.flow, particles.viscosity / self.conductivity)
+        return np.asarray(2.0 * math.pi * particles.radius * self.conductivity * numbers)
+
+    def around(self, simulation: Any) -> np.ndarray:
+        """Mass fraction in the cells around every particle now (N,) [-]."""
+        kernel = simulation.required_coupling.kernel
+        gathered = kernel.gather(simulation.terms.cell_map.stencil, kernel.smooth(self.cells.value[None]))
+        return np.asarray(gathered[:, 0])
+
+    def exchange(self, simulation: Any, conductance: np.ndarray, surface: np.ndarray, step: float) -> np.ndarray:
+        """Make the step of the vapour with particles that exchange with it; at most once in a step.
+
+        conductance  of every particle, of its wet surface (N,) [kg/s]
+        surface      mass fraction at this surface (N,) [-]
+        step         [s]
+        returns      mass that every particle receives from the cells (N,) [kg], the opposite of what they give
+        """
+        kernel, cell_map = simulation.required_coupling.kernel, simulation.terms.cell_map
+        sent = np.stack([conductance, conductance * surface], axis=1)
+        coefficient, product = kernel.smooth(kernel.deposit(cell_map, sent)) / kernel.grid.cell_volume
+        seen = self.cells.step(coefficient, product)
+        around = kernel.gather(cell_map.stencil, kernel.smooth(np.stack([np.ones_like(seen), seen])))
+        received = np.asarray(step * conductance * (around[:, 1] - around[:, 0] * surface))
+        self.received += float(self.communicator.sum(received))
+        self.scale += float(self.communicator.sum(np.abs(received)))
+        self._made = True
+        return received
+
+    def after(self, simulation: Any) -> None:
+        """Make the step of the vapour if nothing has exchanged with it."""
+        if not self._made and self.cells.fluid.last_step > 0.0:
+            self.cells.step()
+        self._made = False
+
+    def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
+        """The mass fraction in the cells of all ranks."""
+        return {OF_FLUID.name: self.cells.grid.joined(self.cells.value)}
+
+    def checkpoint(self) -> dict[str, Any]:
+        """The mass fraction and the balance."""
+        return {"received": self.received, "scale": self.scale, "cells": self.cells.checkpoint()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self.received, self.scale = float(state["received"]), float(state["scale"])
+        self.cells.restore(state["cells"])
+
+
+def mean_vapour(simulation: Any) -> float:
+    """Mean mass fraction of the vapour in the fluid."""
+    return float(simulation.feature(Vapour).cells.mean)
+
+
+def outlet_vapour(simulation: Any) -> float:
+    """Mean mass fraction of the vapour in the fluid that leaves."""
+    return float(simulation.feature(Vapour).cells.leaving)
+
+
+def vapour_in(simulation: Any) -> float:
+    """Vapour that the fluid has brought in, above its mass fraction at the start."""
+    return float(simulation.feature(Vapour).cells.sums["inflow"])
+
+
+def vapour_out(simulation: Any) -> float:
+    """Vapour that the fluid has carried out, above its mass fraction at the start."""
+    return float(simulation.feature(Vapour).cells.sums["outflow"])
+
+
+def vapour_from_particles(simulation: Any) -> float:
+    """Vapour that the particles have given to the fluid."""
+    return -float(simulation.feature(Vapour).received)
+
+
+def vapour_imbalance(simulation: Any) -> float:
+    """Change of the vapour in the fluid that nothing gave, over what was given."""
+    vapour = simulation.feature(Vapour)
+    sums, scale = vapour.cells.sums, vapour.scale
+    given = sums["inflow"] - sums["outflow"] + sums["displaced"] - vapour.received
+    scale += abs(sums["inflow"]) + abs(sums["outflow"])
+    return abs(vapour.cells.content - given) / scale if scale > 0.0 else 0.0

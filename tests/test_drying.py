@@ -1,0 +1,92 @@
+"""Water that evaporates into the cells of the fluid, which take the vapour and give the heat."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from test_heat_in_fluid import case_of, lattice
+
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.features.evaporation_keys import Evaporation
+from cfddem.features.vapour import Vapour, outlet_vapour, vapour_imbalance
+from cfddem.run.history import row
+from cfddem.run.simulation import Simulation
+from closures.evaporation import latent_heat, saturation_pressure, vapour_fraction
+
+SPEED = 1.0
+
+
+def wet_bed(layers: int, **changes: Any) -> Case:
+    """Drops of 2 mm on a lattice in air of 320 K, which enters with a little vapour."""
+    return case_of(
+        material__glass__density=998.0, bed__positions=lattice(4e-3, (2, 2, layers)), bed__inlet_velocity=SPEED,
+        heat={
+            "particle_temperature": 298.0, "fluid_temperature": 320.0, "conductivity": 0.027,
+            "fluid_heat_capacity": 1007.0, "heat_capacity": {"glass": 420.0},
+        },
+        vapour={"fluid_fraction": 0.005, "diffusivity": 2.8e-5}, evaporation={"drops": ["glass"]},
+        laws__kernel_width=0.0, **changes,
+    )  # fmt: skip
+
+
+def test_a_wet_bed_dries_at_the_rate_of_the_air_that_leaves_and_at_the_wet_bulb() -> None:
+    """The first layer is at the wet bulb of the air that enters, and no drop leaves its balance."""
+    simulation = Simulation(wet_bed(10))
+    simulation.until(3.0)
+    then = row(simulation)
+    simulation.until(3.5)
+    now = row(simulation)
+    rate = (now["evaporated_mass"] - then["evaporated_mass"]) / 0.5
+    leaves = 1.2 * SPEED * 0.008**2 * (outlet_vapour(simulation) - 0.005)
+    cooled = 1.2 * SPEED * 0.008**2 * 1007.0 * (320.0 - now["outlet_temperature"])
+    particles, keys = simulation.particles, Evaporation.of(simulation.case)
+    assert keys is not None
+    first = particles.temperature[particles.position[:, 2] < 3e-3].mean()
+    latent = latent_heat(float(particles.temperature.mean()))
+    slip = simulation.terms.flow.reynolds.mean()  # type: ignore[union-attr]
+    print(
+        f"rate {rate:.5g}, by the air {leaves:.5g} kg/s; heat {cooled:.5g}, latent {latent * rate:.5g} W; Re {slip:.0f}"
+    )
+    print(f"first layer {first:.3f} K, wet bulb at the reference speed {keys.wet_bulb(simulation.case):.3f} K")
+    assert leaves == pytest.approx(rate, rel=0.01) and cooled == pytest.approx(latent * rate, rel=0.01)
+    assert first == pytest.approx(keys.wet_bulb(simulation.case), abs=0.3)
+    assert now["heat_imbalance"] < 1e-10 and vapour_imbalance(simulation) < 1e-10
+    assert now["vapour_from_particles"] == pytest.approx(now["evaporated_mass"], rel=1e-10)
+
+
+def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
+    """The drops shrink, so that air flows in through the open end; it is counted."""
+    case = wet_bed(
+        4, column={"width": 0.008, "height": 0.016, "cell": 0.004, "sides": "periodic"}, run__fluid_step=2e-3
+    )
+    simulation = Simulation(case.with_(**{"bed.inlet_velocity": 0.0}))
+    vapour, water = simulation.feature(Vapour), float(simulation.particles.mass.sum())
+    for _ in range(1000):
+        simulation.step()
+    sums, mass = vapour.cells.sums, float(simulation.particles.mass.sum())
+    assert mass + vapour.cells.content + sums["outflow"] - sums["inflow"] == pytest.approx(water, rel=1e-13)
+    surface = vapour_fraction(saturation_pressure(float(simulation.particles.temperature.mean())), 101325.0)
+    print(f"vapour {vapour.cells.value.mean():.6f}, saturated {surface:.6f}")
+    assert vapour.cells.value == pytest.approx(surface, rel=5e-3)
+    assert vapour_imbalance(simulation) < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"vapour__inlet_fraction": 0.5}, "vapour.inlet_fraction = 0.5: must be at most saturated.*0.0"),
+        ({"evaporation__relative_humidity": 0.5}, "evaporation.relative_humidity.*left out with .vapour."),
+        ({"vapour": None}, "evaporation.vapour_fraction.*found none"),
+    ],
+)
+def test_air_that_cannot_be_is_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message) as failure:
+        wet_bed(2).with_(**{name.replace("__", "."): value for name, value in changes.items()})
+    assert len(str(failure.value).splitlines()) == 1
