@@ -25,7 +25,6 @@ from closures.drag import ergun
 from closures.numbers import archimedes
 from scenarios.beds.defluidisation.study import Layers, in_layers, onsets
 from scenarios.beds.gas_bed import mueller, standard_bed, van_wachem
-from scenarios.beds.liquid_bed.surface import settled
 from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_box
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.beds.spouted_bed import bed as spout
@@ -255,18 +254,6 @@ def test_bubbles_that_do_not_grow_fail() -> None:
     assert growing(BubbleProfile(number, same, error))[-1].verdict == "FAILS"
     # a bed without bubbles shows nothing
     assert growing(BubbleProfile(np.zeros(4), np.full(4, np.nan), error))[-1].verdict == "FAILS"
-
-
-def test_the_kernel_makes_the_surface_of_a_liquid_bed_dense() -> None:
-    """By drag and weight alone: a nearly packed layer over a gap, which counts half as much in a bed twice as high."""
-    wide, high, none = settled(1.5), settled(1.5, height=42.0), settled(0.4, cell=0.2)
-    top = float(wide.height[wide.solid_fraction > 0.3].max())
-    assert wide.solid_fraction[(wide.height > top - 2.0) & (wide.height < top - 0.5)].min() > 0.55
-    assert wide.solid_fraction[(wide.height > top - 5.0) & (wide.height < top - 3.0)].min() < 0.25
-    assert wide.solid_fraction[(wide.height > 3.0) & (wide.height < 12.0)].mean() == pytest.approx(0.384, abs=0.01)
-    assert 0.616 - wide.voidage == pytest.approx(0.02, abs=0.004)
-    assert 0.616 - high.voidage == pytest.approx(0.5 * (0.616 - wide.voidage), abs=0.003)
-    assert 0.616 - none.voidage < 0.01
 
 
 def test_frequencies_of_a_flat_bed_are_compared_within_their_errors() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cfddem.backend.errors import InputError
+from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.coupling.forces.lift import lift_force
 from cfddem.coupling.forces.torque import turn_with_fluid
@@ -354,3 +355,29 @@ def test_drag_and_film_take_the_viscosity_of_the_fluid_where_they_are() -> None:
     assert falling[0] / falling[2] == pytest.approx(0.25, rel=0.01)
     resistance = {int(particles.id[edges.first[k]]) // 2: edges.resistance[k] for k in range(edges.between_particles)}
     assert resistance[0] / resistance[1] == pytest.approx(4.0, rel=0.01)
+
+
+@pytest.mark.parametrize("density", [1.2, 1000.0])
+def test_crowded_particles_that_move_to_and_fro_are_not_mapped_ahead_too_far(density: float) -> None:
+    """v' = v - L (v + 2 w k v) - 4 r w k v, of drag and of the pressure that moves the fluid between them, decays."""
+    simulation = stirred(suspension(**{"fluid.density": density}))
+    particles, coupling, step = simulation.particles, simulation.required_coupling, 1e-3
+    ratio = density * particles.volume * particles.inverse_mass
+    for response, crowding in itertools.product((1.0, 100.0, 1e4), (0.01, 0.5, 1.5, 2.0)):
+        particles.response_rate[:], particles.crowding[:] = response, crowding
+        ahead, rate = coupling._foresight(particles, step), step * response
+        drag = np.minimum(rate * (1.0 + crowding) / (1.0 + rate), 2.0)
+        after = 1.0 - drag * (1.0 + 2.0 * ahead * crowding) - 4.0 * ratio * ahead * crowding
+        assert (after >= -1.0 - 1e-12).all() and (ahead >= 0.0).all() and (ahead <= 1.0).all()
+    particles.response_rate[:], particles.crowding[:] = 1.0, 0.01
+    assert coupling._foresight(particles, step) == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("surface", ["smeared", "sharp"])
+def test_a_sediment_under_its_suspension_stays_at_rest(surface: str) -> None:
+    """The sedimentation of the gallery for half of its time, in which a sediment of 0.6 forms on the floor."""
+    simulation = Simulation(gallery()["sedimentation"].with_(**{"laws.surface": surface}))
+    for time in 0.02 * np.arange(1, 11):
+        simulation.until(time)
+        assert np.abs(simulation.particles.velocity).max() < 0.06  # a sphere alone falls with 0.073 m/s

@@ -42,6 +42,11 @@ MAPPED = Field(
 
 RESPONSE = Field("response_rate", "1/s", role="memory", meaning="rate at which a particle took up the fluid's velocity")
 
+CROWDING = Field("crowding", "1", role="memory", meaning="solids over fluid around a particle in the last fluid step")
+
+STABLE = 0.7
+"""Largest share of the foresight above which motions to and fro from step to step grow."""
+
 
 class Coupling:
     """All forces between a fluid and its particles.
@@ -72,7 +77,7 @@ class Coupling:
             kernel, "velocity", ("drag_impulse", "N s"), inertia, lambda particles: particles.force
         )
         self._mean_step = 0.0
-        own = (MAPPED, RESPONSE, *self.flow.fields)
+        own = (MAPPED, RESPONSE, CROWDING, *self.flow.fields)
         for field in own:
             particles.declare(field)
         declared = [*(field.name for field in own), *self.momentum.declare(particles)]
@@ -102,7 +107,7 @@ class Coupling:
         cell_map = self.kernel.map_particles(self._mapped_position(particles, step), particles.radius)
         terms = self._terms(particles, cell_map, step)
         self.forces.act(terms)
-        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen, terms.sent)
+        terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen)
         if terms.on_fluid:
             terms.source = self._source(cell_map, total(terms.on_fluid, terms.unseen))
         return terms
@@ -117,6 +122,7 @@ class Coupling:
         self.flow.remember(particles, terms.flow)
         particles.mapped_position = terms.cell_map.position
         particles.response_rate = terms.resistance / terms.inertia
+        particles.crowding = (1.0 - terms.flow.voidage) / terms.flow.voidage
 
     def solid_fraction(self, particles: Particles) -> Array:
         """Solid fraction of the cells by the places from which the last voidage was computed (nz, ny, nx) [-]."""
@@ -144,31 +150,48 @@ class Coupling:
         # forces act over the step: they see the mean of the solid fractions at its beginning and its end
         first = self.momentum.last_step == 0.0
         mean = solid if first else 0.5 * (solid + (1.0 - self.fluid.voidage))
-        terms.flow = self.flow.sample(particles, cell_map, solid, mean)
+        terms.flow, terms.seen = self.flow.sample(particles, cell_map, solid, mean), self.flow.seen
         return terms
 
     def _mapped_position(self, particles: Particles, step: float) -> Array:
         r"""Positions from which the voidage at the end of the step is computed (N, 3) [m].
 
-        .. math:: x + \left(h - (1-w)\,\bar h\right) v,\qquad w = 1/(1 + \bar h^2/\tau^2)
+        .. math:: x + \left(h - (1-w)\,\bar h\right) v
 
-        with the time :math:`\tau` in which the fluid takes a particle along, and a running mean :math:`\bar h` of the
-        step, which follows h slowly. Over a step the voidage moves from where the particles were mapped in the step
-        before to where they are mapped now. Heavy particles (w = 1) keep their velocity: they displace the fluid while
-        they move. With x the fluid would follow a step later, and feed waves. Light particles follow the fluid within
-        the step. To predict their motion from their velocity would be unstable above a solid fraction of 1/3; they are
-        mapped where they are, and shifted where h changes, so that they displace the fluid at their rate. Each step
-        makes up for what the last one has missed by the acceleration of a particle; a shorter one for a part of it, as
-        its square, or this would be a shock of pressure.
+        with the foresight w (`_foresight`) and a running mean :math:`\bar h` of the step, which follows h slowly. Over
+        a step the voidage moves from where the particles were mapped in the step before to where they are mapped now.
+        Heavy particles (w = 1) keep their velocity: they displace the fluid while they move. With x the fluid would
+        follow a step later, and feed waves. Light particles follow the fluid within the step, and crowded ones push it.
+        To predict their motion would be unstable; they are mapped where they are, and shifted where h changes, so that
+        they displace the fluid at their rate. Each step makes up for what the last one has missed by the acceleration
+        of a particle; a shorter one for a part of it, as its square, or this would be a shock of pressure.
         """
         mean, last = self._mean_step or step, self.momentum.last_step
-        light = (1.0 - 1.0 / (1.0 + (mean * particles.response_rate) ** 2))[:, None]
+        light = (1.0 - self._foresight(particles, mean))[:, None]
         ahead = (step - light * mean) * particles.velocity
         if last > step * (1.0 + SAME_STEP):
             missed = self.kernel.nearest(particles.mapped_position - particles.position)
             ahead += (1.0 - (step / last) ** 2) * (missed + light * mean * particles.velocity)
         self._mean_step = mean + STEP_RELAXATION * (step - mean)
         return self.kernel.wrapped(particles.position + ahead)
+
+    def _foresight(self, particles: Particles, step: float) -> Array:
+        r"""Part w of their motion over the coming step by which particles are mapped ahead (N,) [-].
+
+        .. math:: w = \min\left(\frac{1}{1+\lambda^2},\;
+                  s\,\frac{2-\Lambda}{k\,(2\Lambda + 4 r)}\right),\qquad
+                  \Lambda = \frac{\lambda\,(1 + k)}{1+\lambda},\quad k = \varphi/\varepsilon
+
+        with :math:`\lambda` the step over the time in which the fluid takes a particle along, and r the mass of the
+        displaced fluid over that of the particle. The second part is s times the largest w at which particles that
+        move to and fro from step to step do so less and less: the fluid between them moves by the opposite of their
+        volume flux, which is mapped ahead, and drag and pressure act back on them.
+        """
+        response, crowding = step * particles.response_rate, particles.crowding
+        drag = np.minimum(response * (1.0 + crowding) / (1.0 + response), 2.0)
+        displaced = self.fluid.density * particles.volume * particles.inverse_mass
+        largest = STABLE * (2.0 - drag) / np.maximum(crowding * (2.0 * drag + 4.0 * displaced), 1e-12)
+        return np.asarray(np.minimum(1.0 / (1.0 + response**2), largest))
 
     def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""

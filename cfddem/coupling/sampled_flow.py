@@ -10,6 +10,7 @@ import numpy as np
 
 from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
+from cfddem.coupling.seen_solids import SeenSolids
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
@@ -54,6 +55,7 @@ class FlowSampler:
     kernel  gathers the fields of the fluid
     own     what every particle adds itself, which is taken away
     sizes   whether the Sauter mean is sampled; the diameter ratio is 1 otherwise
+    seen    means that particles see, where surfaces of beds are sharp
 
     fields  of the particles that it remembers from step to step
     """
@@ -64,6 +66,7 @@ class FlowSampler:
         self, fluid: FluidSolver, kernel: FilterKernel, own: Sampled = nothing_of_its_own, sizes: bool = False
     ):
         self.fluid, self.kernel, self.own, self.sizes = fluid, kernel, own, sizes
+        self.seen: SeenSolids | None = None
 
     @classmethod
     def of_forces(cls, fluid: FluidSolver, kernel: FilterKernel, forces: Iterable[FluidForce]) -> FlowSampler:

@@ -51,19 +51,34 @@ class SeenSolids:
 
     def __init__(self, kernel: FilterKernel) -> None:
         self.cells, self._weighted = cells_of(kernel), kernel.smoothing > 0.0
+        self._map: ParticleCellMap | None = None  # of the particles in the last call of `around`
+        self._weights, self._sums = np.zeros((2, 0))
 
     def around(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction around every particle, its own part included (N,) [-]."""
         cells = self.cells
         if not self._weighted:
+            self._map, self._weights = cell_map, cell_map.volume
+            self._sums = self._summed(cell_map.volume[:, None])[:, 0]
             return cells.gather(cell_map.stencil, cells.solid_fraction(cell_map)[None])[:, 0]
-        own_map = cells.map_particles(cell_map.position, cell_map.radius)
-        gathered = cells.gather_with_slope(own_map.stencil, cells.solid_fraction(own_map))
+        self._map = cells.map_particles(cell_map.position, cell_map.radius)
+        gathered = cells.gather_with_slope(self._map.stencil, cells.solid_fraction(self._map))
         weighted = np.empty((len(gathered), 2))
         _weigh(gathered, cell_map.volume, cells.smoothing / SHARPNESS, weighted)
-        sums = cells.gather(own_map.stencil, cells.smooth(cells.deposit(own_map, weighted)))
+        sums = self._summed(weighted)
+        self._weights, self._sums = weighted[:, 1], sums[:, 1]
         mean: Array = sums[:, 0] / sums[:, 1]
         return mean
+
+    def averaged(self, values: Array) -> Array:
+        """The same mean of values of the particles that `around` was called with (N, m)."""
+        mean: Array = self._summed(self._weights[:, None] * values) / self._sums[:, None]
+        return mean
+
+    def _summed(self, weighted: Array) -> Array:
+        """Sums over the particles around every particle (N, m)."""
+        assert self._map is not None
+        return self.cells.gather(self._map.stencil, self.cells.smooth(self.cells.deposit(self._map, weighted)))
 
 
 def cells_of(kernel: FilterKernel) -> FilterKernel:

@@ -79,8 +79,7 @@ class SelfDisturbance(FluidForce):
         """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""
         if self.fluid.viscous:
             on_slip = total({line: terms.force(line) for line in terms.conductances}, terms.force("drag"))
-            drag = terms.conductance("drag") - terms.withheld
-            screening = drag * terms.flow.others / (self.fluid.density * terms.flow.voidage)
+            screening = terms.conductance("drag") * terms.flow.others / (self.fluid.density * terms.flow.voidage)
             self.advance(
                 terms.particles, terms.cell_map, terms.flow.slip, on_slip, screening, self.fluid.density, terms.step
             )

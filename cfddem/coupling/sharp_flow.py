@@ -47,6 +47,7 @@ class SharpFlowSampler(FlowSampler):
         self, particles: Particles, cell_map: ParticleCellMap, solid: Array, mean: Array | None = None
     ) -> SampledFlow:
         """See `FlowSampler.sample`."""
+        assert self.seen is not None
         around = self.seen.around(cell_map)
         gathered = self._means(particles, cell_map, solid if mean is None else mean)
         own, last = self.own(particles, cell_map), particles[SEEN.name]

@@ -6,6 +6,7 @@ import numpy as np
 
 from cfddem.coupling.kernel import ParticleCellMap
 from cfddem.coupling.sampled_flow import SampledFlow
+from cfddem.coupling.seen_solids import SeenSolids
 from cfddem.coupling.transfer import ImplicitCoefficients
 from cfddem.fluid.grid import Array
 from cfddem.particles.state import Particles
@@ -38,7 +39,6 @@ class ForceTerms:
     push        a force on the particles (N, 3) [N]
     pull        a force on the fluid around them (N, 3) [N]
     between     a force on the particles (N, 3) [N], and its opposite on the fluid
-    withhold    a conductance (N,) [kg/s], part of the resistance of which the fluid receives nothing in this step
     """
 
     flow: SampledFlow
@@ -50,7 +50,6 @@ class ForceTerms:
         self.explicit: dict[str, Array] = {}  # explicit force of each line on the particles
         self.on_fluid: dict[str, Array] = {}
         self.implicit_force: dict[str, Array] = {}  # of the resistance of each line on the particles
-        self.withheld: Array = np.zeros(particles.count)  # [kg/s]
         self.added: Array = np.zeros(particles.count)  # change of the added mass at the start of the step (N,) [kg]
         self.spin_work = 0.0  # kinetic energy that torques of the fluid have given to the particles [J]
 
@@ -75,10 +74,6 @@ class ForceTerms:
         self.push(line, force)
         self.pull(line, -force)
 
-    def withhold(self, conductance: Array) -> None:
-        """Withhold a part of the resistance from the fluid."""
-        self.withheld = self.withheld + conductance
-
     def conductance(self, line: str) -> Array:
         """Conductance b N of a line so far (N,) [kg/s]; zero for a line without resistance."""
         return self.conductances[line] if line in self.conductances else np.zeros(self.particles.count)
@@ -86,20 +81,7 @@ class ForceTerms:
     @property
     def resistance(self) -> Array:
         """Conductance b N of all lines (N,) [kg/s]."""
-        return total(self.conductances, np.zeros(len(self.withheld)))
-
-    @property
-    def sent(self) -> Array:
-        """Share of the force of all resistance that the fluid receives in this step (N,) [-]."""
-        share: Array = 1.0 - self.withheld / np.maximum(self.resistance, 1e-300)
-        return share
-
-    @property
-    def unsent(self) -> Array:
-        """Force of the resistance of which the fluid receives nothing in this step (N, 3) [N]."""
-        received = sum(self.implicit_force.values(), np.zeros((len(self.withheld), 3)))
-        force: Array = (1.0 - self.sent)[:, None] * received
-        return force
+        return total(self.conductances, np.zeros(self.particles.count))
 
     @property
     def inertia(self) -> Array:
@@ -151,6 +133,7 @@ class CouplingTerms(ForceTerms):
     """
 
     implicit: ImplicitCoefficients
+    seen: SeenSolids | None = None  # means that particles see, where surfaces are sharp
     source: Array | None = None  # explicit force on the fluid (nz, ny, nx, 3) [N/m3]
 
     def __init__(

@@ -46,7 +46,7 @@ class ImplicitCoefficients(NamedTuple):
     conductance: Array  # b (N,)
     implicit: Array  # b* (N,)
     target: Array  # v* (N, m)
-    cell_conductance: Array  # sum of b*, of the share that is sent, per volume (nz, ny, nx)
+    cell_conductance: Array  # sum of b* per volume (nz, ny, nx)
     cell_product: Array  # sum of b* v* likewise (nz, ny, nx, m)
 
 
@@ -90,21 +90,17 @@ class Transfer:
         conductance: Array,
         step: float,
         disturbance: Array | None = None,
-        sent: Array | None = None,
     ) -> ImplicitCoefficients:
         """Coefficients of the coming step [s].
 
         conductance  b (N,)
         disturbance  part of the fluid's value that the particle causes itself, not part of u (N, m); zero if None
-        sent         share of what a particle receives that the fluid gives (N,); all if None
         """
         kernel, value = self.kernel, _columns(particles[self.value])
         disturbance = _or_zero(disturbance, value)
         implicit, target, carried = implicit_coefficients(
             conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step
         )
-        if sent is not None:
-            carried *= sent[:, None]
         cells = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
         return ImplicitCoefficients(step, conductance, implicit, target, cells[0], np.moveaxis(cells[1:], 0, -1))
 

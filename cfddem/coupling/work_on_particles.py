@@ -130,11 +130,11 @@ class CouplingWork:
         for line, velocity in terms.fluctuations.items():
             share = terms.conductance(line) / np.maximum(terms.resistance, 1e-300)
             fluctuating = share[:, None] * conductance * velocity
-        none, unsent = np.zeros_like(received), terms.unsent
+        none = np.zeros_like(received)
         return ImplicitWork(
-            work(terms.implicit_force["drag"] - unsent), fluctuating, work(fluctuating),
+            work(terms.implicit_force["drag"]), fluctuating, work(fluctuating),
             work(terms.implicit_force.get("history", none)), work(terms.explicit.get("history", none)),
-            work(unsent + terms.explicit.get("drag", none)),
+            work(terms.explicit.get("drag", none)),
             self._external_work(terms),
         )  # fmt: skip
 

@@ -234,11 +234,8 @@ class Scalar:
         faces, total, into = self._faces, self.fluid.communicator.sum, self._flux_of_sides() * self._faces.places[:, 3]
         brought = flows * faces.area * self.kind.capacity
         flowing, leaves = ~faces.wall, ~faces.wall & (into < 0.0)
-        came = [
-            brought[flowing & ~leaves].sum(),
-            brought[leaves].sum(),
-            brought[faces.wall].sum(),
-        ]  # local: summed next
+        through = (flowing & ~leaves, leaves, faces.wall)
+        came = [brought[some].sum() for some in through]  # local: summed next
         volume = -(into * faces.area)[leaves].sum() * self.fluid.last_step  # local: summed next
         inflow, outflow, walls, left = total([*came, volume], axis=())
         self.sums["inflow"] += float(inflow)

@@ -60,13 +60,11 @@ class Agitation(FluidForce):
 
     def act(self, terms: CouplingTerms) -> None:
         """The fluctuation acts through the drag, the rest as a force."""
-        # with sharp surfaces drag has its total form, and the laws are measured with that of model A
-        whole = terms.conductance("drag")
-        share = (1.0 - terms.withheld / np.maximum(whole, 1e-300)) / terms.flow.narrowing
-        drag = whole * share
+        share = 1.0 / np.asarray(terms.flow.narrowing)  # a fluctuation is one between the particles, not of the cells
+        drag = terms.conductance("drag") * share
         around = Neighbourhood(terms.cell_map, terms.flow, self._mean_slip, drag, terms.solid)
         made = self.terms(terms.particles, around, terms.step)
-        terms.fluctuate("drag", share[:, None] * made.velocity)
+        terms.fluctuate("drag", share.reshape(-1, 1) * made.velocity)
         if self.pushes:
             terms.between("agitation", made.force)
 

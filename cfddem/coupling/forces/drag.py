@@ -1,15 +1,16 @@
 r"""Drag of every particle, by the drag law of the run; with sharp surfaces also the pressure that goes with it.
 
-**Drag in its total form.** The law gives :math:`b = 3\pi\eta d\,\varepsilon F`. Model A adds to :math:`b(u-v)` the
-pressure gradient on the volume of the particle, and most of this gradient is the drag of the particles themselves.
-Where it changes, at the surface of a bed, the cells smear it over both sides. So a particle takes that of its own drag,
+The law gives :math:`b = 3\pi\eta d\,\varepsilon F`. Model A adds to :math:`b(u-v)` the pressure gradient on the volume
+of the particle, and most of this gradient is the drag of the particles themselves. Where it changes, at the surface of
+a bed, the cells smear it over both sides. There a particle takes that of the drag which it sees,
 
-.. math:: \frac{b}{\varepsilon}(u-v) - V\left(\nabla p' + \overline{f/\varepsilon}\right),\qquad
-          f = \overline{\varepsilon_i D_i}/V_c
+.. math:: b(u-v) + V\left(\frac{\varphi_i}{\varepsilon_i}\,r_i - \nabla p' - \overline{f/\varepsilon}\right),\qquad
+          f = \overline{b(u-v)}/V_c
 
-with D the first term. What the drag around has added to the pressure gradient is taken out of it again. In an even
-suspension this is model A, and the fluid receives the opposite of b (u - v). With smeared surfaces the force is
-:math:`b(u-v) - V\nabla p'`, in model B the first term.
+with r the drag over the volume of a particle, as a mean over the particles around each one
+(:mod:`cfddem.coupling.seen_solids`). What the drag around has added to the pressure gradient of the cells is taken out
+of it. In an even suspension the two are equal, and this is model A, as with smeared surfaces; in model B the force is
+:math:`b(u-v)/\varepsilon`.
 """
 
 from __future__ import annotations
@@ -45,9 +46,8 @@ class Drag(FluidForce):
 
     law    drag law, or its function
     model  "A" or "B" of the fluid
-    sharp  the kernel of the run, for sharp surfaces of beds in model A; None for smeared ones. Of drag in its total
-           form the fluid then receives b (u - v) in the step, and what is left a step later; in an even suspension
-           nothing is left
+    sharp  the kernel of the run, for sharp surfaces of beds in model A; None for smeared ones. The fluid then receives
+           b (u - v) in the step, and what the pressure differs by a step later; in an even suspension this is nothing
 
     outside  how often the law was evaluated outside its range
     """
@@ -57,7 +57,7 @@ class Drag(FluidForce):
     def __init__(self, law: Law | Callable[..., float], model: str = "A", sharp: FilterKernel | None = None) -> None:
         law = law if isinstance(law, Law) else law_of(law)
         self.law_name, self._kernel = law.name, sharp
-        self.sharp, self._total = sharp is not None, model == "B" or sharp is not None
+        self.sharp, self._total = sharp is not None, model == "B"
         self.fields = (OWED,) if self.sharp else ()
         self._alone = np.zeros(0)  # conductance of the drag law alone
         self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
@@ -66,29 +66,28 @@ class Drag(FluidForce):
         self._ranges = tuple(law.ranges.get(name, (0.0, math.inf)) for name in DRAG_ARGUMENTS)
 
     def act(self, terms: ForceTerms) -> None:
-        """Resist the slip; withhold the share of the particle's own pressure gradient from the fluid, and give it what
-        the last step has left."""
+        """Resist the slip, and give the fluid what the last step has left."""
         conductance = self.conductance(terms.particles, terms.flow)
         terms.resist("drag", conductance)
         if self._kernel is not None:
             self._alone = conductance * terms.flow.narrowing
-            terms.withhold((1.0 - terms.flow.voidage) * self._alone)
             terms.pull("drag", -terms.particles[OWED.name] / terms.step)
 
     def respond(self, terms: Any) -> None:
-        """Take the drag around out of the pressure gradient of the cells, which contains it in this step."""
+        """Put the pressure of the drag that a particle sees in the place of that of the drag in the cells around."""
         if self._kernel is None:
             return
-        kernel, flow = self._kernel, terms.flow
+        kernel, flow, volume = self._kernel, terms.flow, terms.cell_map.volume[:, None]
         slip = terms.implicit_force["drag"] / np.maximum(terms.conductance("drag"), 1e-300)[:, None]
         if "drag" in terms.fluctuations:
             slip = slip - terms.fluctuations["drag"]
-        of_model_a = (flow.voidage * self._alone)[:, None] * slip
-        density = kernel.smooth(kernel.deposit(terms.cell_map, of_model_a)) / kernel.grid.cell_volume
-        gradient = kernel.gather(terms.cell_map.stencil, kernel.smooth(density / (1.0 - terms.solid)))
-        around = -(terms.cell_map.volume * flow.company)[:, None] * gradient
-        terms.push("drag", around)
-        terms.particles[OWED.name][:] = terms.step * (terms.unsent + around)
+        drag = self._alone[:, None] * slip
+        density = kernel.smooth(kernel.deposit(terms.cell_map, drag)) / kernel.grid.cell_volume
+        in_cells = kernel.gather(terms.cell_map.stencil, kernel.smooth(density / (1.0 - terms.solid)))
+        seen = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen.averaged(drag / volume)
+        rest = volume * (seen - flow.company[:, None] * in_cells)
+        terms.push("drag", rest)
+        terms.particles[OWED.name][:] = terms.step * rest
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`; total form: over eps."""

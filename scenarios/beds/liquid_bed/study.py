@@ -49,8 +49,9 @@ class FluidisedBed:
 
 
 def glass(velocity: float) -> Case:
-    """The case of the gallery at another velocity [m/s], in a column high enough."""
-    return Case.from_toml(gallery_files()["liquid-bed"], {"bed.inlet_velocity": velocity, "column.height": 0.04})
+    """The case of the gallery at another velocity [m/s], in a column high enough, with a smeared surface."""
+    changes = {"bed.inlet_velocity": velocity, "column.height": 0.04, "laws.surface": "smeared"}
+    return Case.from_toml(gallery_files()["liquid-bed"], changes)
 
 
 def coarse_glass(velocity: float) -> Case:

@@ -20,7 +20,7 @@ from cfddem.analysis.measures import cells_of, granular_temperature
 from cfddem.case.schema import Case
 from cfddem.particles.initial.packing import random_packing
 from cfddem.plotting.curves import BLUE, GREEN, ORANGE, SKY, label, legend, panels, save
-from cfddem.preflight.bed_waves import grid_damping, uniform_bed, with_agitation
+from cfddem.preflight.bed_waves import uniform_bed, with_agitation
 from cfddem.run.simulation import Simulation
 from closures.stability import UniformBed
 from scenarios.validation.table import Progress, Row, write_histories
@@ -33,14 +33,14 @@ ROOM = 1.07
 WAVES = 2
 """Wavelengths in the box."""
 
-START, FIT, END = 0.02, 0.03, 0.12
-"""Amplitudes over the mean solid fraction: at the start, and where the growth is fitted."""
+START, SMALL, END = 0.02, 0.045, 0.12
+"""Amplitudes over the mean solid fraction: at the start, up to which a wave is linear, and at the end.
 
-SEEDS = (1, 2, 3)
+The growth of larger waves is weaker: it is reported, and not compared with a linear theory.
+"""
+
+SEEDS = (1, 2, 3, 4, 5)
 """Seeds of the packings in a validation."""
-
-FINE = 0.005
-"""Cells up to this height do not damp the waves measurably [m]."""
 
 ROWS = 400
 """Readings of the amplitude in a run."""
@@ -76,6 +76,7 @@ positions = [[0.0, 0.0, 0.0]]
 drag = "wen_yu"
 lubrication = "none"
 self_disturbance_correction = false
+surface = "sharp"
 
 [run]
 until = 1.0
@@ -87,7 +88,8 @@ reference_speed = 0.1
 class Measured:
     """A wave as the simulation shows it."""
 
-    growth: float  # [1/s]
+    growth: float  # while the amplitude is small [1/s]
+    later: float  # growth from there to the end; NaN if it does not get there [1/s]
     speed: float  # upward, against the mean of the particles [m/s]
     granular_temperature: float  # mean over the run, of particles about the mean of their layer [m2/s2]
     amplitude: np.ndarray  # of every reading, over the mean solid fraction
@@ -158,13 +160,16 @@ def _random_motion(case: Case, count: int) -> np.ndarray:
 
 
 def _fitted(time: np.ndarray, component: np.ndarray, number: float, temperature: float) -> Measured:
-    """Growth and speed of the wave where its amplitude is large against noise and small against one."""
+    """Growth of the wave while it is small, growth after that, and its speed."""
     amplitude = np.abs(component)
-    last = int(np.argmax(amplitude > END)) if (amplitude > END).any() else len(time)
-    inside = slice(int(np.argmax(amplitude[:last] > FIT)) if (amplitude[:last] > FIT).any() else 0, last)
-    growth = np.polyfit(time[inside], np.log(amplitude[inside]), 1)[0]
-    turning = np.polyfit(time[inside], np.unwrap(np.angle(component[inside])), 1)[0]
-    return Measured(float(growth), float(-turning / number), temperature, amplitude, time)
+    small, last = (int(np.argmax(above)) if (above := amplitude > size).any() else len(time) for size in (SMALL, END))
+
+    def growth(begin: int, end: int) -> float:
+        inside = slice(begin, end)
+        return float(np.polyfit(time[inside], np.log(amplitude[inside]), 1)[0]) if end - begin > 2 else math.nan
+
+    turning = np.polyfit(time[:last], np.unwrap(np.angle(component[:last])), 1)[0]
+    return Measured(growth(0, small), growth(small, last), float(-turning / number), temperature, amplitude, time)
 
 
 CASES: tuple[tuple[float, float, str, dict[str, Any]], ...] = (
@@ -197,15 +202,14 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 
 def _rows(name: str, case: Case, wavelength: float, waves: list[Measured]) -> list[Row]:
-    """Rows of one comparison: with agitation the wave must not grow; coarse cells must damp it as expected."""
+    """Rows of one comparison: with agitation the wave must not grow."""
     growth, speed, temperature = (
         float(np.mean([getattr(each, part) for each in waves])) for part in ("growth", "speed", "granular_temperature")
     )
     spread = float(np.std([each.growth for each in waves], ddof=1) / math.sqrt(len(waves)))
     note = f"mean of {len(waves)} seeds, standard error {spread:.2g}"
     bed = theory(case)
-    expected, cell = bed.wave(wavelength), case.column.cell
-    assert isinstance(cell, float)
+    expected, later = bed.wave(wavelength), float(np.mean([each.later for each in waves]))
     if case.agitation != "none":
         agitated = with_agitation(bed, case)
         estimate = agitated.granular_temperature
@@ -214,12 +218,10 @@ def _rows(name: str, case: Case, wavelength: float, waves: list[Measured]) -> li
             Row(f"growth, {name}", growth, agitated.wave(wavelength).growth, None, "1/s", "theory with agitation"),
             Row(f"granular temperature, {name}", temperature, estimate, None, "m2/s2", "estimate"),
         ]
-    if cell > FINE:
-        damped = expected.growth - grid_damping(expected.speed, wavelength, cell)
-        return [Row(f"growth, {name}", growth, damped, 0.1 * expected.growth, "1/s", note)]
     return [
-        Row(f"growth, {name}", growth, expected.growth, 0.1 * expected.growth, "1/s", note),
-        Row(f"speed, {name}", speed, expected.speed, None, "m/s"),
+        Row(f"growth, {name}", growth, expected.growth, 0.15 * expected.growth, "1/s", note),
+        Row(f"growth above an amplitude of {SMALL:g}, {name}", later, expected.growth, None, "1/s", "not linear"),
+        Row(f"speed, {name}", speed, expected.speed, 0.05 * expected.speed, "m/s"),
     ]
 
 
