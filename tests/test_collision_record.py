@@ -129,6 +129,7 @@ def test_a_record_without_films_has_no_map() -> None:
         regime_map({"stokes": np.array([np.inf])})
 
 
+@pytest.mark.slow
 def test_a_report_shows_the_map_where_collisions_were_recorded(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     Run.begin(Case.from_text(TINY.replace("until = 0.024", "until = 0.06")), folder).go()

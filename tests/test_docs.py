@@ -303,6 +303,7 @@ def test_docstrings_are_converted_to_markdown() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_site_builds_without_warnings(tmp_path: Path) -> None:
     """`mkdocs build --strict`, where the extra `docs` is installed."""
     pytest.importorskip("mkdocs")

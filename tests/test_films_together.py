@@ -441,6 +441,7 @@ def test_films_and_what_a_report_says_of_them_are_the_same_on_any_number_of_rank
     assert_same_bits(joined([there for there, *_ in found]), joined([whole]))
 
 
+@pytest.mark.slow
 def test_one_and_two_threads_give_the_same_bits_and_a_resumed_run_goes_on_with_them() -> None:
     """A network over 12 steps: on two threads, and from a checkpoint after 5."""
     before, states = use_threads(None), []

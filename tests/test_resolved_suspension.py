@@ -97,6 +97,7 @@ def test_a_run_goes_on_from_its_file_to_the_same_bits(one_thread, tmp_path: Path
         assert np.array_equal(values, resumed.series.arrays()[name]), name
 
 
+@pytest.mark.slow
 def test_a_point_of_the_matrix_is_measured_and_continues(one_thread, tmp_path: Path):
     told: list[str] = []
     first = matrix.run(SMALL, tmp_path, told.append, settle=1.0, until=2.0)

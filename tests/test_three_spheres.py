@@ -27,7 +27,11 @@ def failed(rows: list[Row]) -> list[object]:
     return [row.as_dict() for row in rows if row.verdict == "FAILS"]
 
 
-@pytest.mark.parametrize("part", [study.printed, study.thresholds, study.two_spheres], ids=lambda part: part.__name__)
+@pytest.mark.parametrize(
+    "part",
+    [pytest.param(study.printed, marks=pytest.mark.slow), study.thresholds, study.two_spheres],
+    ids=lambda part: part.__name__,
+)
 def test_published_numbers_hold(part, tmp_path) -> None:
     """Within 0.5 % of Davis (2023), and 1e-4 of the analytic law of Davis & Sitison (2020)."""
     assert failed(part(tmp_path, {})) == []
