@@ -1,4 +1,4 @@
-"""Temperature of particles in a fluid of one temperature; the how-to page docs/how-to/scalar-feature.md shows the keys.
+"""Temperature of particles in a fluid of one temperature; the how-to page docs/how-to/heat.md shows the keys.
 
 The cooling sphere is the convection test of MFIX, legacy_tests/dem-tests/convection, of J. Musser.
 """
@@ -21,7 +21,7 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 
-PAGE = Path(__file__).parents[1] / "docs/how-to/scalar-feature.md"
+PAGE = Path(__file__).parents[1] / "docs/how-to/heat.md"
 CALORIE = 4.1868
 
 SPHERE = {
