@@ -45,7 +45,7 @@ RESPONSE = Field("response_rate", "1/s", role="memory", meaning="rate at which a
 CROWDING = Field("crowding", "1", role="memory", meaning="solids over fluid around a particle in the last fluid step")
 
 STABLE = 0.7
-"""Largest share of the foresight above which motions to and fro from step to step grow."""
+"""Largest foresight, over that from which on motions to and fro from step to step grow."""
 
 
 class Coupling:

@@ -57,7 +57,7 @@ class Drag(FluidForce):
     def __init__(self, law: Law | Callable[..., float], model: str = "A", sharp: FilterKernel | None = None) -> None:
         law = law if isinstance(law, Law) else law_of(law)
         self.law_name, self._kernel = law.name, sharp
-        self.sharp, self._total = sharp is not None, model == "B"
+        self.sharp, self._model_b = sharp is not None, model == "B"
         self.fields = (OWED,) if self.sharp else ()
         self._alone = np.zeros(0)  # conductance of the drag law alone
         self.needs_sizes = "diameter_ratio" in signature(law.function).parameters
@@ -90,15 +90,15 @@ class Drag(FluidForce):
         terms.particles[OWED.name][:] = terms.step * rest
 
     def conductance(self, particles: Particles, flow: SampledFlow) -> Array:
-        r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`; total form: over eps."""
+        r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
         conductance = np.empty(particles.count)
         outside, wrong = self._loop(
             particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges,
-            self._total, conductance,
+            self._model_b, conductance,
         )  # fmt: skip
         self.outside += int(outside)
         if wrong:
-            share = 1.0 if self._total else flow.voidage
+            share = 1.0 if self._model_b else flow.voidage
             self._require_drag(flow, conductance / (6.0 * math.pi * particles.viscosity * particles.radius * share))
         return conductance
 
@@ -113,9 +113,9 @@ class Drag(FluidForce):
 
 
 @threaded
-def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, total, conductance):
-    """Drag over slip of every particle, in its `total` form or that of model A; returns how many flows are outside the
-    range of the law, and how many numbers are negative or not finite."""
+def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, model_b, conductance):
+    """Drag over slip of every particle; returns how many flows are outside the range of the law, and how many numbers
+    are negative or not finite."""
     slowest, fastest = numbers
     densest, loosest = voidages
     smallest, largest = ratios
@@ -129,5 +129,5 @@ def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages
         wrong += 0 if factor >= 0.0 and factor < math.inf else 1
     # In the same loop the compiler would evaluate all branches of a law.
     for n in prange(len(reynolds)):
-        conductance[n] *= 6.0 * math.pi * viscosity[n] * radius[n] * (1.0 if total else voidage[n])
+        conductance[n] *= 6.0 * math.pi * viscosity[n] * radius[n] * (1.0 if model_b else voidage[n])
     return outside, wrong
