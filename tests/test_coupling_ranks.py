@@ -189,8 +189,8 @@ def test_a_particle_beyond_the_ghosts_is_reported() -> None:
 
     def program(communicator: Communicator) -> None:
         reach = Reach(Block(grid, Division(0, (0, 6, 12)), communicator), (False, False, False))
-        reach.placed(np.array([[0.6 + 0.24 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
+        reach.refuse_beyond(np.array([[0.6 + 0.24 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
         with pytest.raises(RunFailed, match=r"2\.6 cells beyond"):
-            reach.placed(np.array([[0.6 + 0.26 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
+            reach.refuse_beyond(np.array([[0.6 + 0.26 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
 
     on_ranks(2, program)

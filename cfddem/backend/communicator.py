@@ -3,10 +3,10 @@
 A run on a cluster divides cells and particles among ranks. A rank then knows only a part of every array, so a sum, an
 extreme value or a decision over the whole array must go through a communicator. `Communicator` is that of a run in one
 process. A parallel communicator (:class:`cfddem.backend.mpi.Ranks`) replaces `_combine`, `broadcast` and `exchange`,
-and `swap` for speed.
+and `_add`, `_largest` and `swap` for speed.
 
-Each method first reduces the array of this rank with NumPy, in NumPy's order, and then combines the ranks in the order
-of their numbers. All ranks get the same bits. All ranks must make the same calls in the same order.
+Sums are sums of whole numbers (:mod:`cfddem.backend.exact_sums`): they have the bits of one process on any number of
+ranks, however an array is divided among them. All ranks must make the same calls in the same order.
 
 A line that reduces an array of this rank alone, on purpose, says so with a comment `# local: reason`.
 `tests/test_communicator.py` forbids other reductions without a communicator in the code of the solver.
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cfddem.backend.errors import CfddemError, failure_elsewhere
+from cfddem.backend.exact_sums import put_together, split, unit_of
 
 Value = TypeVar("Value")
 Axis = int | tuple[int, ...] | None
@@ -41,43 +42,58 @@ class Communicator:
     size: int = 1
 
     def sum(self, values: ArrayLike, axis: Axis = None) -> Any:
-        """Sum over all elements, or over some axes, of the arrays of all ranks.
+        """Sum over all elements, or over some axes, of the arrays of all ranks; NaN where an element is not finite.
 
         axis     axes to sum over; all if None; () adds the arrays of the ranks element by element. The axes that
                  stay must be equally long on all ranks
         returns  a number, or an array of the axes that stay
         """
-        return _plain(self._combine(np.sum(values, axis=axis), np.add))
+        array = np.asarray(values)
+        if array.dtype.kind in "biu":
+            return _plain(self._add(np.asarray(array.sum(axis=axis, dtype=np.int64))))
+        array = array.astype(float, copy=False)
+        axes = tuple(range(array.ndim)) if axis is None else axis
+        largest = self._largest(np.abs(array).max(axis=axes, initial=0.0, keepdims=True))
+        finite, unit = np.isfinite(largest), unit_of(largest)
+        parts = self._add(split(array if finite.all() else np.where(finite, array, 0.0), unit, axes))
+        kept = parts.shape[1:]
+        return _plain(np.where(finite.reshape(kept), put_together(parts, unit.reshape(kept)), np.nan))
 
     def largest(self, values: ArrayLike, axis: Axis = None, *, default: float = -np.inf) -> Any:
         """Largest element of the arrays of all ranks; NaN if any element is NaN.
 
         default  contribution of a rank without elements
         """
-        return _plain(self._combine(_extreme(np.maximum, values, axis, default), np.maximum))
+        array = np.asarray(values)
+        if array.size:
+            found = array.max(axis=axis)
+        else:
+            found = np.full(array.sum(axis=axis).shape, default)
+        whole = self._largest(found.astype(float))
+        return _plain(whole if found.dtype.kind == "f" else whole.astype(found.dtype))
 
     def smallest(self, values: ArrayLike, axis: Axis = None, *, default: float = np.inf) -> Any:
         """Smallest element of the arrays of all ranks; NaN if any element is NaN.
 
         default  contribution of a rank without elements
         """
-        return _plain(self._combine(_extreme(np.minimum, values, axis, default), np.minimum))
+        return _plain(-np.asarray(self.largest(-np.asarray(values), axis, default=-default)))
 
     def any(self, condition: ArrayLike) -> bool:
         """Whether a condition holds for any element on any rank; False without elements."""
-        return bool(self._combine(bool(np.any(condition)), np.logical_or))
+        return bool(self._add(np.asarray(np.count_nonzero(condition))) > 0)
 
     def all(self, condition: ArrayLike) -> bool:
         """Whether a condition holds for all elements on all ranks; True without elements."""
-        return bool(self._combine(bool(np.all(condition)), np.logical_and))
+        return not self.any(np.logical_not(condition))
 
     def count(self, condition: ArrayLike) -> int:
         """Number of elements on all ranks for which a condition holds."""
-        return int(self._combine(int(np.count_nonzero(condition)), np.add))
+        return int(self._add(np.asarray(np.count_nonzero(condition))))
 
     def mean(self, values: ArrayLike) -> float:
         """Mean of the elements on all ranks; NaN without elements."""
-        total, count = self.sum(values), self._combine(np.size(values), np.add)
+        total, count = self.sum(values), int(self._add(np.asarray(np.size(values))))
         return float(total / count) if count else float("nan")
 
     def joined(self, rows: np.ndarray) -> np.ndarray:
@@ -133,22 +149,17 @@ class Communicator:
         for rank, into in incoming.items():
             into[...] = given[rank]
 
+    def _add(self, whole_numbers: np.ndarray) -> np.ndarray:
+        """Sum of the integer arrays of all ranks, element by element."""
+        return np.asarray(self._combine(whole_numbers, np.add))
+
+    def _largest(self, values: np.ndarray) -> np.ndarray:
+        """Largest of the float arrays of all ranks, element by element; NaN where one is NaN."""
+        return np.asarray(self._combine(values, np.maximum))
+
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         """Combine the values of all ranks, in the order of the ranks; the value of this rank if it is the only one."""
         return local
-
-
-def _extreme(extreme: np.ufunc, values: ArrayLike, axis: Axis, default: float) -> Any:
-    """The extreme of an array along some axes; `default` where these axes hold no element.
-
-    extreme  np.maximum or np.minimum
-    """
-    array = np.asarray(values)
-    if array.size:
-        return extreme.reduce(array, axis=axis)
-    if axis is None:
-        return default
-    return extreme.reduce(array.astype(float), axis=axis, initial=default)
 
 
 def _not_none(first: Any, second: Any) -> Any:

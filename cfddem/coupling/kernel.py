@@ -26,6 +26,7 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
 from cfddem.coupling.reach import Reach
 from cfddem.fluid.grid import Array, Grid
@@ -97,10 +98,10 @@ class FilterKernel:
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
         self.reach = Reach(grid, periodic, parts)
-        self._origin, self._inverse = self.reach.origin, 1.0 / np.array(grid.spacing)
+        self._axes = self.reach.axes()
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
         self._buffers: dict[int, Array] = {}
-        self._cells, (_, ny, nx) = self.reach.shape[::-1], self.reach.shape
+        _, ny, nx = self.reach.shape
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
         self._corners = np.array(corners, np.uint32)
         self._homes = self.reach.homes()
@@ -123,7 +124,8 @@ class FilterKernel:
         """Map of particles at positions (N, 3) [m] with radii (N,) [m]."""
         slabs = max(self.reach.shape[0] // SLAB, 1)
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
-        loops.sort_into_slabs(position, self._origin[2], self._inverse[2], SLAB, order, start)
+        low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
+        loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
         return ParticleCellMap(
             position.copy(), radius, sphere_volume(radius), order, start, self.stencil(position, radius)
         )
@@ -144,20 +146,32 @@ class FilterKernel:
         """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
         shape = len(position), len(self._offsets)
         stencil = Stencil(np.empty(shape, np.uint32), np.empty((*shape, 3)))
-        position = self.reach.placed(position, radius if len(self._offsets) > 1 else None)
-        loops.stencils(
-            position, radius, self._offsets, self._linear, self._origin, self._inverse, self._cells, *stencil
-        )
+        self.reach.refuse_beyond(position, radius if len(self._offsets) > 1 else None)
+        loops.stencils(position, radius, self._offsets, self._linear, self._axes, *stencil)
         return stencil
 
     def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
-        """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx)."""
+        """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx).
+
+        Whole numbers are summed, so that the bits depend neither on threads nor on ranks; NaN where a value is NaN.
+        """
         values, homes, shape = np.ascontiguousarray(values), self._homes, self.reach.shape
-        deposits = np.zeros((len(homes.of_layered), values.shape[1]))
-        loops.deposit(cell_map.order, cell_map.start, values, *cell_map.stencil, self._corners, deposits)
-        fields = np.empty((values.shape[1], *shape))
+        unit = self._unit(cell_map, values)
+        deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
+        loops.deposit(cell_map.order, cell_map.start, values, unit, *cell_map.stencil, self._corners, deposits)
+        fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
-        return self.reach.collected(fields)
+        collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
+        return collected
+
+    def _unit(self, cell_map: ParticleCellMap, values: Array) -> Array:
+        """Whole numbers in 1 of each of the values (m,), so many that no sum in a cell is too large; NaN for NaN."""
+        largest = np.zeros((2, values.shape[1]))
+        loops.largest_deposits(values, cell_map.volume, self.grid.cell_volume, largest)
+        of_one, of_crowd = self.communicator.largest(largest, axis=())
+        number = self.communicator.sum([len(values)])
+        unit: Array = np.where(np.isnan(of_one), np.nan, unit_of(np.minimum(number * of_one, of_crowd), 62))
+        return unit
 
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
@@ -168,7 +182,7 @@ class FilterKernel:
     def gather_with_slope(self, stencil: Stencil, field: Array) -> Array:
         """As `gather`, of one field (nz, ny, nx), and the derivatives of this value along x, y, z (N, 4)."""
         values = np.empty((len(stencil.first), 4))
-        loops.gather_with_slope(*stencil, self._corners, self._layered(field[None]), self._inverse, values)
+        loops.gather_with_slope(*stencil, self._corners, self._layered(field[None]), self._axes.inverse, values)
         return values
 
     def gather_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, fields: Array) -> Array:
@@ -227,7 +241,7 @@ class FilterKernel:
             raise InputError("solid_flux", None, "computed in a run of one process")
         moved = new.position - old.position
         moved -= self.periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
-        farthest = self.communicator.largest(np.abs(moved * self._inverse), default=0.0)
+        farthest = self.communicator.largest(np.abs(moved * self._axes.inverse), default=0.0)
         if farthest >= 1.0:
             raise InputError(
                 "distance moved by the fastest particle", farthest, "below one cell", "take a smaller fluid step"
@@ -237,8 +251,8 @@ class FilterKernel:
         flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
         volume = new.volume
         loops.carry_all(
-            old.position, moved, new.radius, volume, self._offsets, self._linear, self._origin, self._inverse,
-            self.periodic, *flux,
+            old.position, moved, new.radius, volume, self._offsets, self._linear, self._axes.origin,
+            self._axes.inverse, self.periodic, *flux,
         )  # fmt: skip
         change = self.halo.padded(self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None]))
         other, passed = np.empty_like(change), np.zeros_like(change)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cfddem.backend.compile import inline, prange, serial, threaded
+from cfddem.fluid.grid import Array
 
 CORNERS = 8
 """Cells on which a particle deposits, or a piece of it. They are counted along x first, then y, then z."""
@@ -19,31 +22,50 @@ def cell_and_share(coordinate, linear):
     return start, linear * (coordinate - 0.5 * linear - start)
 
 
+class Axes(NamedTuple):
+    """The cells that the particles of a rank reach, along x, y, z.
+
+    Coordinates count the cells of the whole grid, so that weights have the same bits on every rank.
+    """
+
+    origin: Array  # lowest corner of the whole grid (3,) [m]
+    inverse: Array  # cells in a metre (3,) [1/m]
+    cells: NDArray[np.int64]  # of this rank, with ghosts (3,)
+    first: NDArray[np.int64]  # number of the first of them in the whole grid (3,)
+    period: NDArray[np.int64]  # cells of the whole grid where it repeats beyond the ghosts, 0 elsewhere (3,)
+
+
 @inline
-def _within_layers(coordinate, linear, cells):
-    """The same; of cells with a layer on both sides, where farther particles are put, the first one below the last."""
-    start, share = cell_and_share(coordinate, linear)
+def _within_layers(place, linear, axes, d):
+    """As `cell_and_share`, from a place [m] along axis d, of the cells of a rank; `linear` as there.
+
+    The cells have a layer on both sides, where farther particles are put, the first one below the last.
+    """
+    start, share = cell_and_share((place - axes.origin[d]) * axes.inverse[d], linear)
+    cells, period = axes.cells[d], axes.period[d]
+    start -= axes.first[d]
+    if period > 0:
+        low = (cells - period) // 2
+        start = low + (start - low) % period
     if start >= cells:
         return cells - 1, 1.0
     return (start, share) if start >= -1 else (-1, 0.0)
 
 
 @threaded
-def stencils(position, radius, offsets, linear, origin, inverse, cells, first, shares):
+def stencils(position, radius, offsets, linear, axes, first, shares):
     """First cell of every piece of every particle, and its shares in the next cell along x, y, z (N, pieces, 3).
 
-    cells  along x, y, z, to which a layer around all of them is added
+    axes   to whose cells a layer around all of them is added
     first  flat index of the cell among these (N, pieces)
     """
+    row, column = axes.cells[0] + 2, axes.cells[1] + 2
     for n in prange(len(position)):
         for s in range(len(offsets)):
-            x = (position[n, 0] + radius[n] * offsets[s, 0] - origin[0]) * inverse[0]
-            y = (position[n, 1] + radius[n] * offsets[s, 1] - origin[1]) * inverse[1]
-            z = (position[n, 2] + radius[n] * offsets[s, 2] - origin[2]) * inverse[2]
-            i, a = _within_layers(x, linear, cells[0])
-            j, b = _within_layers(y, linear, cells[1])
-            k, c = _within_layers(z, linear, cells[2])
-            first[n, s] = ((k + 1) * (cells[1] + 2) + j + 1) * (cells[0] + 2) + i + 1
+            i, a = _within_layers(position[n, 0] + radius[n] * offsets[s, 0], linear, axes, 0)
+            j, b = _within_layers(position[n, 1] + radius[n] * offsets[s, 1], linear, axes, 1)
+            k, c = _within_layers(position[n, 2] + radius[n] * offsets[s, 2], linear, axes, 2)
+            first[n, s] = ((k + 1) * column + j + 1) * row + i + 1
             shares[n, s, 0], shares[n, s, 1], shares[n, s, 2] = a, b, c
 
 
@@ -109,9 +131,25 @@ def _mean(weights, cells, fields, m):
     )  # fmt: skip
 
 
+@serial
+def largest_deposits(values, volume, cell_volume, largest):
+    """Largest of each of the values (N, m), and how large the sums in a cell can be (2, m); NaN if a value is.
+
+    The particles that deposit on a cell fill little more than the volume of the cells around it.
+    """
+    for n in range(len(values)):
+        crowd = 64.0 * cell_volume / volume[n] + 8.0 if volume[n] > 0.0 else math.inf
+        for m in range(values.shape[1]):
+            size = abs(values[n, m])
+            if size > largest[0, m] or size != size:
+                largest[0, m] = size
+            if size > 0.0:
+                largest[1, m] = max(largest[1, m], crowd * size)
+
+
 @threaded
-def deposit(order, start, values, first, shares, corners, fields):
-    """Add values (N, m) to fields (cells, m): even slabs together, then odd ones.
+def deposit(order, start, values, unit, first, shares, corners, fields):
+    """Add values (N, m), in whole numbers of 1/unit (m,), to fields (cells, m): even slabs together, then odd ones.
 
     corners  distance of the cells from the first in flat arrays; unsigned, since no index counts from the end
     """
@@ -120,26 +158,26 @@ def deposit(order, start, values, first, shares, corners, fields):
         for half in prange((slabs - phase + 1) // 2):
             slab = phase + 2 * half
             for place in range(start[slab], start[slab + 1]):
-                _deposit_one(order[place], values, first, shares, corners, fields)
+                _deposit_one(order[place], values, unit, first, shares, corners, fields)
 
 
 @serial
-def _deposit_one(n, values, first, shares, corners, fields):
+def _deposit_one(n, values, unit, first, shares, corners, fields):
     """Add the values of one particle to its cells."""
     for s in range(first.shape[1]):
         cell, a, b, c = first[n, s], shares[n, s, 0], shares[n, s, 1], shares[n, s, 2]
         for m in range(values.shape[1]):
-            part = values[n, m] / first.shape[1]
+            part = values[n, m] * unit[m] / first.shape[1]
             for corner in range(CORNERS):
-                fields[cell + corners[corner], m] += _weight(corner, a, b, c) * part
+                fields[cell + corners[corner], m] += np.int64(np.rint(_weight(corner, a, b, c) * part))
 
 
 @threaded
 def collect(order, begins, deposits, fields):
-    """Sums over the deposits (n, m) that each cell receives, in order: fields (m, cells)."""
+    """Sums over the deposits (n, m) that each cell receives: fields (m, cells)."""
     for cell in prange(len(begins) - 1):
         for m in range(fields.shape[0]):
-            total = 0.0
+            total = 0
             for place in range(begins[cell], begins[cell + 1]):
                 total += deposits[order[place], m]
             fields[m, cell] = total

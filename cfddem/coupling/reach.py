@@ -6,12 +6,14 @@ In a run of one process these are the cells of the grid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from cfddem.backend.errors import RunFailed
+from cfddem.coupling.kernel_loops import Axes
 from cfddem.fluid.block import THINNEST
 from cfddem.fluid.grid import Array, Grid
 
@@ -23,8 +25,7 @@ next neighbour list, and is mapped where it was two fluid steps ago, or where it
 class Homes(NamedTuple):
     """Cells that receive what is deposited on the cells and on a layer around them; flat indices.
 
-    A cell receives its own, then those of solid cells to which it is the nearest open one, and of ghosts that take
-    its value. This is the order of the sum, on any number of ranks.
+    A cell receives its own, those of solid cells to which it is the nearest open one, and of ghosts that take its value.
     """
 
     of_layered: np.ndarray  # (n,) home of each of the cells and of the layer
@@ -39,7 +40,7 @@ class Reach:
     periodic  whether x, y, z are periodic
     parts     into how many the cells of the fluid are divided along x, y, z
 
-    Attributes: `shape` (nz, ny, nx), ghosts included; `origin`, lowest corner of these cells [m].
+    Attributes: `shape` (nz, ny, nx), ghosts included.
     """
 
     def __init__(self, grid: Grid, periodic: Sequence[bool] | np.ndarray, parts: Sequence[int] = (1, 1, 1)) -> None:
@@ -49,15 +50,13 @@ class Reach:
             self._ghosts[each.axis] = LAYERS * parts[each.axis]
         nx, ny, nz = (int(n) for n in np.array(grid.cells) + 2 * self._ghosts)
         self.shape = (nz, ny, nx)
-        self.origin = np.array(grid.origin) - self._ghosts * np.array(grid.spacing)
 
     def homes(self) -> Homes:
         """Homes of the cells and of the layer around them."""
         homes = self._home_of_each()
         layered = np.arange(homes.size).reshape([n + 2 for n in self.shape])
         own = layered[1:-1, 1:-1, 1:-1].ravel()
-        strays = layered.ravel() != own[homes]
-        order = np.lexsort((strays, homes))
+        order = np.argsort(homes, kind="stable")
         return Homes(homes, order, np.searchsorted(homes[order], np.arange(own.size + 1)))
 
     def _home_of_each(self) -> np.ndarray:
@@ -83,20 +82,28 @@ class Reach:
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
         return np.ravel_multi_index(tuple(inside), self.shape).ravel()
 
-    def placed(self, position: Array, radius: Array | None = None) -> Array:
-        """Positions (N, 3) [m] as periodic images that lie nearest to the cells of the rank.
+    def axes(self) -> Axes:
+        """These cells along x, y, z."""
+        whole, period = self.grid.whole, np.zeros(3, np.int64)
+        for each in self.borders:
+            period[each.axis] = whole.cells[each.axis] * self.periodic[each.axis]
+        first = np.array(self.grid.first, np.int64) - self._ghosts
+        cells = np.array(self.shape[::-1], np.int64)
+        return Axes(np.array(whole.origin), 1.0 / np.array(whole.spacing), cells, first, period)
 
-        radius  of particles that reach beyond their centres (N,) [m]
-        errors  RunFailed for a particle beyond the ghosts
+    def refuse_beyond(self, position: Array, radius: Array | None = None) -> None:
+        """Raise `RunFailed` for a particle beyond the ghosts.
+
+        position  (N, 3) [m]
+        radius    of particles that reach beyond their centres (N,) [m]
         """
         for each in self.borders:
             axis, grid = each.axis, self.grid
-            begin, h = grid.origin[axis], grid.spacing[axis]
+            begin, h, place = grid.origin[axis], grid.spacing[axis], position[:, axis]
             end, around = begin + grid.cells[axis] * h, 0.0 if radius is None else radius
             if self.periodic[axis]:
-                length, position = grid.whole.size[axis], position.copy()
-                position[:, axis] -= length * np.rint((position[:, axis] - 0.5 * (begin + end)) / length)
-            place = position[:, axis]
+                length = grid.whole.size[axis]
+                place = place - length * np.rint((place - 0.5 * (begin + end)) / length)
             below = 0.0 if each.below is None else np.max(begin - place + around, initial=0.0)  # local: own particles
             above = 0.0 if each.above is None else np.max(place - end + around, initial=0.0)  # local: own particles
             farthest = max(float(below), float(above))
@@ -106,12 +113,11 @@ class Reach:
                     f"a particle reaches {farthest / h:.3g} cells beyond the cells of its rank, must be at most "
                     f"{layers - 0.5}; take larger cells, or a smaller run.fluid_step"
                 )
-        return position
 
-    def collected(self, fields: Array) -> Array:
+    def collected(self, fields: NDArray[np.int64]) -> NDArray[np.int64]:
         """Fields (m, nz, ny, nx) of the rank's cells: what was deposited on them, also by other ranks.
 
-        fields  on the cells of this rank and its ghosts; ghosts are added to the cells that they stand for
+        fields  int64, on the cells of this rank and its ghosts; ghosts are added to the cells that they stand for
         """
         for each in self.borders:
             each.add(fields, int(self._ghosts[each.axis]))
@@ -128,7 +134,7 @@ class Reach:
             each.fill(made, layers, layers)
         return made
 
-    def _inner(self, fields: Array) -> Array:
+    def _inner(self, fields: NDArray[Any]) -> NDArray[Any]:
         """View of fields without ghosts."""
         x, y, z = (slice(int(ghosts), int(ghosts) + n) for ghosts, n in zip(self._ghosts, self.grid.cells))
         return fields[:, z, y, x]

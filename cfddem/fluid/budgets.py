@@ -211,20 +211,16 @@ def _drag(fluid: FluidSolver, d: int) -> tuple[Array, Array]:
 
 def _at_sides(fluid: FluidSolver) -> tuple[float, float, float]:
     """Work of the pressure at inlets and outlets, kinetic energy brought in, work of the inlets on drag [J]."""
-    pressed = brought = held = 0.0
+    of_sides = [[np.zeros(0)] * 3]
     for side in fluid.boundaries.sides:
         inlet, outlet = np.isin(side.owner, side.inlets), _inner(side.outlet)
-        if inlet.any() or outlet.any():  # local: this part of the side
-            through, carried, against = _at_side(fluid, side, inlet, outlet)
-            pressed += through
-            brought += carried
-            held += against
-    total = fluid.communicator.sum([pressed, brought, held], axis=())
-    return float(total[0]), float(total[1]), float(total[2])
+        of_sides.append([*_at_side(fluid, side, inlet, outlet)])
+    pressed, brought, held = (float(fluid.communicator.sum(np.concatenate(faces))) for faces in zip(*of_sides))
+    return pressed, brought, held
 
 
-def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarray) -> tuple[float, float, float]:
-    """The three numbers of `_at_sides` for one side, of this rank."""
+def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarray) -> tuple[Array, Array, Array]:
+    """The three numbers of `_at_sides` for each face of one side, of this rank."""
     fields, h, d = fluid.fields, fluid.last_step, side.axis
     cells = fluid.grid.cells[d]
     at_face, inside = (LOW + cells, LOW + cells - 1) if side.high else (LOW, LOW)
@@ -237,18 +233,18 @@ def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarr
     voidage = layer(on_faces(fields.centred_voidage, d), at_face)
     flow = side.inward * voidage * mean * h * fluid.grid.face_area(d)  # volume that came in [m3]
     pressure = np.where(inlet, layer(fields.pressure, inside), _inner(side.pressure))
-    pressed = float((flow * pressure)[inlet | outlet].sum())  # local: summed over the ranks by the caller
+    pressed = (flow * pressure)[inlet | outlet]
 
     carries = inlet | outlet & (flow < 0.0)  # what flows back through an outlet comes from rest
     across = sum(layer(fields.velocity[e], inside) ** 2 for e in range(3) if e != d)
     energy = 0.5 * fluid.density * flow * (mean**2 + np.where(outlet, across, 0.0))
-    brought = float(energy[carries].sum())  # local: summed over the ranks by the caller
+    brought = energy[carries]
 
     drag, momentum = layer(fields.drag, inside), layer(fields.drag_momentum[d], inside)
     theta = implicitness.py_func(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
     acting = theta * new + (1.0 - theta) * old
     work = 0.5 * h * fluid.grid.cell_volume * (drag * acting - momentum) * acting
-    return pressed, brought, float(work[inlet].sum())  # local: summed over the ranks by the caller
+    return pressed, brought, work[inlet]
 
 
 def _inner(plane: np.ndarray) -> np.ndarray:

@@ -116,11 +116,11 @@ class Borders:
         sent, got = dict[int, np.ndarray](), dict[int, np.ndarray]()
         below, above, size = self.below, self.above, down.size
         if below is not None:
-            sent[below], got[below] = np.ascontiguousarray(down, float).reshape(-1), np.empty(up.size)
+            sent[below], got[below] = np.ascontiguousarray(down).reshape(-1), np.empty(up.size, up.dtype)
         if above is not None and above != below:
-            sent[above], got[above] = np.ascontiguousarray(up, float).reshape(-1), np.empty(size)
+            sent[above], got[above] = np.ascontiguousarray(up).reshape(-1), np.empty(size, up.dtype)
         elif above is not None:  # on both sides: first what lies above the receiver, then what lies below it
-            sent[above], got[above] = np.concatenate([sent[above], up.ravel()]), np.empty(size + up.size)
+            sent[above], got[above] = np.concatenate([sent[above], up.ravel()]), np.empty(size + up.size, up.dtype)
         self.communicator.swap(sent, got)
         return (
             None if below is None else got[below][-up.size :].reshape(up.shape),

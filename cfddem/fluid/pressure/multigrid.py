@@ -14,7 +14,7 @@ coefficients are sums of the fine ones, halved across the merged direction, whic
 transfer. Gauss-Seidel sweeps by colours run forward before the coarse correction and backward after it, so that the
 preconditioner is symmetric.
 
-Sums are taken plane by plane and then over the planes in order: the bits do not depend on the thread count.
+Scalar products are sums of whole numbers: their bits depend neither on the threads nor on the ranks.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import Threaded
 from cfddem.backend.errors import RunFailed
+from cfddem.backend.exact_sums import largest_products, put_together, split_products, unit_of
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.pressure.multigrid_loops import (
     apply,
@@ -68,7 +69,7 @@ class Level:
     def __post_init__(self) -> None:
         self.ax, self.ay, self.az, self.anchor = (np.zeros(self.shape) for _ in range(4))
         self.diagonal, self.inverse, self.x, self.b, self.image = (np.zeros(self.shape) for _ in range(5))
-        self.sums, self.rows = np.zeros(self.shape[0]), np.zeros(self.shape[::2])  # of each plane a sum, and a row
+        self.rows = np.zeros((2, *self.shape[::2]))  # of each plane two
         self.shift = np.zeros(3, np.int64)  # cell k lies in the coarse cell (k + shift) // factor
         self.small = self.x.size < SMALL
 
@@ -102,7 +103,7 @@ class Level:
 
     def relax(self, colour: int, halves: int, backward: bool) -> None:
         """Make so many halves of sweeps, beginning with a colour."""
-        system = self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows
+        system = self.x, self.b, self.ax, self.ay, self.az, self.inverse, self.rows[0]
         self.loop(smooth)(*system, colour, halves, backward)
 
     def take_residual(self) -> None:
@@ -112,11 +113,11 @@ class Level:
     def restrict_to(self, coarse: Level) -> None:
         """Write the right-hand side of the coarser grid."""
         self.take_residual()
-        self.loop(restrict)(self.image, self.factors, self.shift, self.rows, coarse.b)
+        self.loop(restrict)(self.image, self.factors, self.shift, self.rows[0], coarse.b)
 
     def correct_by(self, coarse: Level) -> None:
         """Add the correction of the coarser grid."""
-        self.loop(prolong)(coarse.x, self.factors, self.shift, self.rows, self.x)
+        self.loop(prolong)(coarse.x, self.factors, self.shift, self.rows[0], self.x)
 
 
 class PressureEquation:
@@ -148,6 +149,8 @@ class PressureEquation:
         self.closed_regions = closed_regions
         self.most_iterations = most_iterations
         self.residual, self.direction = np.zeros(self.finest.shape), np.zeros(self.finest.shape)
+        planes = self.finest.shape[0]
+        self._largest, self._parts = np.zeros(planes), np.zeros((planes, 2), np.int64)
 
     def _all_levels(self, grid: Grid) -> list[Level]:
         return [Level(*each, self._outlets) for each in hierarchy(grid)]
@@ -186,12 +189,13 @@ class PressureEquation:
                 )
             np.copyto(finest.b, self.residual)
             self._cycle(0)
-            before, product = product, self.communicator.sum(np.einsum("kji,kji->k", finest.x, self.residual))
+            before, product = product, self._product(finest.x, self.residual)
             self.direction *= product / before
             self.direction += finest.x
-            length = product / self._apply_to_direction()
-            finest.loop(descend)(length, self.direction, finest.image, x, self.residual, finest.sums)
-            left = self.communicator.largest(finest.sums)
+            self._apply_to_direction()
+            length = product / self._product(self.direction, finest.image)
+            finest.loop(descend)(length, self.direction, finest.image, x, self.residual, self._largest)
+            left = self.communicator.largest(self._largest)
             iterations += 1
         self._remove_means(x)
         return self._own(x), iterations
@@ -200,15 +204,21 @@ class PressureEquation:
         """View of the cells of the grid in an array of the finest level."""
         return values
 
-    def _apply_to_direction(self) -> float:
-        """Write the image L d of the search direction d; returns d.L d."""
-        self._apply(self.finest)
-        return float(self.communicator.sum(self.finest.sums))
+    def _apply_to_direction(self) -> None:
+        """Write the image L d of the search direction d."""
+        level = self.finest
+        level.loop(apply)(self.direction, level.ax, level.ay, level.az, level.diagonal, level.image)
 
-    def _apply(self, level: Level) -> None:
-        """Write the image of the search direction, and its product with the direction in each plane."""
-        system = level.ax, level.ay, level.az, level.diagonal
-        level.loop(apply)(self.direction, *system, level.image, level.rows, level.sums)
+    def _product(self, a: Array, b: Array) -> float:
+        """Sum of a b over the cells of all ranks."""
+        finest = self.finest
+        finest.loop(largest_products)(a, b, finest.rows, self._largest)
+        largest = self.communicator.largest(self._largest)
+        if not math.isfinite(largest):
+            return math.nan
+        unit = float(unit_of(largest))
+        finest.loop(split_products)(a, b, unit, finest.rows, self._parts)
+        return float(put_together(self.communicator.sum(self._parts, axis=0), unit))
 
     def _cycle(self, depth: int) -> None:
         """One V-cycle: sweep forward, correct from the coarser grid, sweep backward."""

@@ -188,25 +188,11 @@ def prolong(coarse_x, factors, shift, rows, x):
 
 
 @threaded
-def apply(x, ax, ay, az, diagonal, out, rows, sums):
-    """out = L x; sums[k] is the part of x.Lx in plane k, summed first over y and then over x; rows are overwritten."""
+def apply(x, ax, ay, az, diagonal, out):
+    """out = L x."""
     for k in prange(x.shape[0]):
-        products = rows[k]
-        products[:] = 0.0
         for j in range(x.shape[1]):
             _apply_row(k, j, x, ax, ay, az, diagonal, out[k, j])
-            _add_products(x[k, j], out[k, j], products)
-        total = 0.0
-        for i in range(products.size):
-            total += products[i]
-        sums[k] = total
-
-
-@vector_inline
-def _add_products(a, b, row):
-    """row += a b"""
-    for i in range(row.size):
-        row[i] += a[i] * b[i]
 
 
 @threaded

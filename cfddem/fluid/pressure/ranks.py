@@ -191,13 +191,11 @@ class SharedPressureEquation(PressureEquation):
         assert isinstance(finest, SharedLevel)
         return finest.own(values)
 
-    def _apply_to_direction(self) -> float:
+    def _apply_to_direction(self) -> None:
         """See `PressureEquation._apply_to_direction`; the ghosts of the direction are current."""
-        finest = self.finest
-        assert isinstance(finest, SharedLevel)
-        self._apply(finest)
-        finest.without_ghosts(finest.image)
-        return float(self.communicator.sum(np.einsum("kji,kji->k", self.direction, finest.image)))
+        super()._apply_to_direction()
+        assert isinstance(self.finest, SharedLevel)
+        self.finest.without_ghosts(self.finest.image)
 
     def _cycle(self, depth: int) -> None:
         """See `PressureEquation._cycle`; the coarsest level of which ranks have parts is solved as a whole."""

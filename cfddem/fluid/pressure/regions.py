@@ -57,9 +57,7 @@ class ClosedRegions(NamedTuple):
 
     def sums(self, values: Array) -> Array:
         """Sum of a cell field (nz, ny, nx) over each region; the first sum is that of the cells outside of all."""
-        regions, weights = self.number.ravel(), values.ravel()
-        total: Array = self.communicator.sum(np.bincount(regions, weights, minlength=len(self.size)), axis=())
-        return total
+        return np.array([self.communicator.sum(values[self.number == region]) for region in range(len(self.size))])
 
     def remove_means(self, values: Array) -> None:
         """Subtract from a cell field its mean over each region, in place."""
