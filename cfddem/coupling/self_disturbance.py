@@ -65,7 +65,7 @@ class SelfDisturbance(FluidForce):
         self._in_cells = OwnSolids(kernel, 2 if sharp else 1, walls)
         self._seen = OwnSolids(cells_of(kernel), 1, walls) if sharp else None
         self._walls = WallsOfGrid(kernel, fluid.boundaries) if beside_walls else None
-        self._cell = np.array(grid.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
+        self._cell = np.array(grid.whole.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
         self._tables = tables(kernel)
 
     def own(self, particles: Particles, cell_map: ParticleCellMap) -> Own:

@@ -79,7 +79,7 @@ class OwnSolids:
     def __init__(self, kernel: FilterKernel, passes: int, boundaries: Boundaries | None) -> None:
         lattice = spacing_of(kernel), tuple(kernel.strength), passes * kernel.sweeps
         self._cell = (
-            np.array(kernel.grid.origin),
+            np.array(kernel.grid.whole.origin),
             1.0 / np.array(kernel.grid.spacing),
             float(kernel.mapping == "linear"),
         )

@@ -11,6 +11,7 @@ their component first: `(3, nz + 5, ny + 5, nx + 5)`. Component d of a velocity 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.backend.compile import prange, threaded
+from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.fluid.cell_counts import cell_counts
 
@@ -233,24 +234,32 @@ def outside_cone(
     return region
 
 
+@inline
+def _layer_and_share(coordinate, lowest, layers):
+    """Layer of a padded array below a coordinate, and the share of the next one; `lowest` is the number of the first."""
+    inside = min(max(coordinate, float(lowest)), lowest + (layers - 1.001))
+    below = math.floor(inside)
+    return below - lowest, inside - below
+
+
 @threaded
-def sample(fields, place, points, origin, inverse_spacing, values):
+def sample(fields, place, points, origin, first, inverse_spacing, values):
     """Tri-linear values of padded fields at points.
 
     fields  (m, nz+5, ny+5, nx+5), ghosts filled; place (m, 3) where in its cell each field sits;
     points (N, 3) [m], taken at the edge of the ghosts where they lie outside; values (N, m) is written.
+    origin  lowest corner of the whole grid (3,) [m]; coordinates count its cells, with the same bits on every rank
+    first   number of the first cell of this rank (3,)
     """
     nz, ny, nx = fields.shape[1:]
     for n in prange(points.shape[0]):
-        x = (points[n, 0] - origin[0]) * inverse_spacing[0] + LOW
-        y = (points[n, 1] - origin[1]) * inverse_spacing[1] + LOW
-        z = (points[n, 2] - origin[2]) * inverse_spacing[2] + LOW
+        x = (points[n, 0] - origin[0]) * inverse_spacing[0]
+        y = (points[n, 1] - origin[1]) * inverse_spacing[1]
+        z = (points[n, 2] - origin[2]) * inverse_spacing[2]
         for m in range(fields.shape[0]):
-            a = min(max(x - place[m, 0], 0.0), nx - 1.001)
-            b = min(max(y - place[m, 1], 0.0), ny - 1.001)
-            c = min(max(z - place[m, 2], 0.0), nz - 1.001)
-            i, j, k = int(a), int(b), int(c)
-            a, b, c = a - i, b - j, c - k
+            i, a = _layer_and_share(x - place[m, 0], first[0] - LOW, nx)
+            j, b = _layer_and_share(y - place[m, 1], first[1] - LOW, ny)
+            k, c = _layer_and_share(z - place[m, 2], first[2] - LOW, nz)
             f = fields[m]
             low = (1 - b) * ((1 - a) * f[k, j, i] + a * f[k, j, i + 1])
             low += b * ((1 - a) * f[k, j + 1, i] + a * f[k, j + 1, i + 1])

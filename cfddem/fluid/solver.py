@@ -506,5 +506,6 @@ class FluidSolver:
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError("points", points.shape, "of shape (N, 3)")
         values = np.empty((len(points), len(fields)))
-        sample(fields, place, points, np.array(self.grid.origin), self.inverse_spacing, values)
+        origin, first = np.array(self.grid.whole.origin), np.array(self.grid.first)
+        sample(fields, place, points, origin, first, self.inverse_spacing, values)
         return values

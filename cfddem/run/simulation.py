@@ -209,8 +209,9 @@ class Simulation:
         return self.particles.without_ghosts()
 
     def whole(self, name: str) -> np.ndarray:
-        """A field of the particles of all ranks, for measures that need every particle."""
-        return self.communicator.joined(self.owned[name])
+        """A field of the particles of all ranks, in the order of their ids, for measures that need every particle."""
+        order = np.argsort(self.communicator.joined(self.owned.id))
+        return self.communicator.joined(self.owned[name])[order]
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """The fields of the particles that a snapshot contains; those of all ranks on rank 0, no rows on the others."""
