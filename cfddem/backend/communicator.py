@@ -54,7 +54,8 @@ class Communicator:
         array = array.astype(float, copy=False)
         axes = tuple(range(array.ndim)) if axis is None else axis
         largest = self._largest(np.abs(array).max(axis=axes, initial=0.0, keepdims=True))
-        finite, unit = np.isfinite(largest), unit_of(largest)
+        finite = np.isfinite(largest)
+        unit = np.array([unit_of(size) for size in largest.flat]).reshape(largest.shape)
         parts = self._add(split(array if finite.all() else np.where(finite, array, 0.0), unit, axes))
         kept = parts.shape[1:]
         return _plain(np.where(finite.reshape(kept), put_together(parts, unit.reshape(kept)), np.nan))
@@ -64,12 +65,12 @@ class Communicator:
 
         default  contribution of a rank without elements
         """
-        array = np.asarray(values)
-        if array.size:
-            found = array.max(axis=axis)
-        else:
+        found = array = np.asarray(values)
+        if not array.size:
             found = np.full(array.sum(axis=axis).shape, default)
-        whole = self._largest(found.astype(float))
+        elif axis != ():
+            found = np.maximum.reduce(array, axis=tuple(range(array.ndim)) if axis is None else axis)
+        whole = self._largest(np.asarray(found, float))
         return _plain(whole if found.dtype.kind == "f" else whole.astype(found.dtype))
 
     def smallest(self, values: ArrayLike, axis: Axis = None, *, default: float = np.inf) -> Any:

@@ -10,6 +10,7 @@ is lost of a term is at most 2^-61 of the largest one.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -23,11 +24,11 @@ DIGITS = 30
 FINE = 2.0**DIGITS
 
 
-def unit_of(largest: Any, digits: int = DIGITS) -> Any:
+def unit_of(largest: float, digits: int = DIGITS) -> float:
     """Power of two U with U times the largest term of at most 2^digits; 1 where that is zero or not finite."""
-    usable = np.isfinite(largest) & (np.asarray(largest) > 0.0)
-    _, exponent = np.frexp(np.where(usable, largest, 0.75))
-    return np.where(usable, np.ldexp(1.0, np.minimum(digits - exponent, 1000)), 1.0)
+    if not 0.0 < largest < math.inf:
+        return 1.0
+    return math.ldexp(1.0, min(digits - math.frexp(largest)[1], 1000))
 
 
 def split(values: NDArray[np.float64], unit: Any, axis: Any) -> NDArray[np.int64]:

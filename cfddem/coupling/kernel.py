@@ -63,6 +63,7 @@ class ParticleCellMap(NamedTuple):
     order: np.ndarray  # rows of the particles, sorted by slab
     start: np.ndarray  # (slabs + 1,) first place of each slab in `order`
     stencil: Stencil
+    number: int  # of particles on all ranks
 
 
 class FilterKernel:
@@ -126,8 +127,9 @@ class FilterKernel:
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
         loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
+        number = int(self.communicator.sum([len(position)]))
         return ParticleCellMap(
-            position.copy(), radius, sphere_volume(radius), order, start, self.stencil(position, radius)
+            position.copy(), radius, sphere_volume(radius), order, start, self.stencil(position, radius), number
         )
 
     def wrapped(self, position: Array) -> Array:
@@ -169,9 +171,8 @@ class FilterKernel:
         largest = np.zeros((2, values.shape[1]))
         loops.largest_deposits(values, cell_map.volume, self.grid.cell_volume, largest)
         of_one, of_crowd = self.communicator.largest(largest, axis=())
-        number = self.communicator.sum([len(values)])
-        unit: Array = np.where(np.isnan(of_one), np.nan, unit_of(np.minimum(number * of_one, of_crowd), 62))
-        return unit
+        most = np.minimum(cell_map.number * of_one, of_crowd)
+        return np.array([math.nan if math.isnan(limit) else unit_of(limit, 62) for limit in most.tolist()])
 
     def gather(self, stencil: Stencil, fields: Array) -> Array:
         """Weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `deposit`."""
