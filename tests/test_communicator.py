@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import ast
 import math
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from in_process_ranks import on_ranks
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, RunFailed
@@ -103,41 +110,64 @@ def test_the_scan_finds_reductions_and_accepts_the_communicator_and_marks(tmp_pa
 # ---------------------------------------------------------------- values
 
 
-class WithOther(Communicator):
-    """One rank of two: `other` is what the second one contributes to the calls, in their order."""
-
-    size = 2
-
-    def __init__(self, *other: Any) -> None:
-        self.other = iter(other)
-
-    def _combine(self, local: Any, operation: Any) -> Any:
-        return operation(local, next(self.other))
-
-
 @pytest.mark.parametrize("values", [np.random.default_rng(1).normal(size=(7, 5, 9)), np.arange(12).reshape(3, 4)])
-def test_serial_reductions_have_the_bits_of_numpy(values):
+def test_serial_reductions_are_those_of_numpy(values):
     one = Communicator()
     assert (one.rank, one.size) == (0, 1)
-    assert one.sum(values) == values.sum()
+    assert one.sum(values) == pytest.approx(math.fsum(values.flat), rel=1e-15)
     assert one.largest(values) == values.max()
     assert one.smallest(values) == values.min()
-    assert one.mean(values) == values.mean()
+    assert one.mean(values) == pytest.approx(values.mean(), rel=1e-14)
     assert one.count(values > 1) == np.count_nonzero(values > 1)
-    assert np.array_equal(one.sum(values, axis=0), values.sum(axis=0))
+    assert one.sum(values, axis=0) == pytest.approx(values.sum(axis=0), rel=1e-14)
     assert np.array_equal(one.largest(values, axis=(0, 1)), values.max(axis=(0, 1)))
     assert np.array_equal(one.sum(values, axis=()), values)
 
 
+@pytest.mark.parametrize("ranks", [2, 3, 5, 8])
+def test_a_sum_has_the_bits_of_one_process_however_the_array_is_divided(ranks):
+    """Terms of very different size, in another order on every number of ranks; sums in turn by NumPy differ."""
+    random = np.random.default_rng(ranks)
+    values = random.normal(size=(4001, 3)) * 10.0 ** random.uniform(-12.0, 12.0, size=(4001, 1))
+    parts = np.split(values[random.permutation(len(values))], np.sort(random.integers(0, len(values), ranks - 1)))
+    alone = Communicator().sum(values), Communicator().sum(values, axis=0)
+    exact = math.fsum(values.flat)
+    assert alone[0] == pytest.approx(exact, abs=len(values) * 2.0**-61 * np.abs(values).max() + 1e-15 * abs(exact))
+
+    def program(communicator):
+        mine = parts[communicator.rank]
+        return communicator.sum(mine), communicator.sum(mine, axis=0), communicator.mean(mine)
+
+    for total, columns, mean in on_ranks(ranks, program):
+        assert total == alone[0]
+        assert np.array_equal(columns, alone[1])
+        assert mean == Communicator().mean(values)
+    assert sum(float(part.sum()) for part in parts) != float(values.sum())  # otherwise this shows nothing
+
+
+@given(
+    st.lists(st.floats(-1e300, 1e300, allow_subnormal=True), min_size=1, max_size=40),
+    st.randoms(use_true_random=False),
+)
+def test_an_exact_sum_is_that_of_any_order(values, random):
+    one, shuffled = Communicator(), list(values)
+    random.shuffle(shuffled)
+    assert one.sum(values) == one.sum(shuffled)
+    limit = 2.0**-55 * max(map(abs, values))
+    assert abs(one.sum(values) - math.fsum(values)) <= limit + 2.0**-52 * abs(math.fsum(values)) + 1e-300
+
+
 def test_rows_of_all_ranks_are_joined_in_their_order():
-    mine, other = np.arange(6.0).reshape(3, 2), np.full((1, 2), 7.0)
-    assert np.array_equal(Communicator().joined(mine), mine)
-    assert np.array_equal(WithOther(other).joined(mine), np.concatenate([mine, other]))
+    rows = [np.arange(6.0).reshape(3, 2), np.full((1, 2), 7.0)]
+    assert np.array_equal(Communicator().joined(rows[0]), rows[0])
+    joined = on_ranks(2, lambda communicator: communicator.joined(rows[communicator.rank]))[0]
+    assert np.array_equal(joined, np.concatenate(rows))
 
 
 def test_results_are_plain_numbers():
     one = Communicator()
     assert type(one.sum(np.ones(3))) is float
+    assert type(one.sum(np.ones(3, int))) is int
     assert type(one.largest(np.arange(3))) is int
     assert type(one.any(np.array([True]))) is bool
 
@@ -147,9 +177,14 @@ def test_nan_survives_extremes_and_sums():
     assert math.isnan(one.largest(values))
     assert math.isnan(one.smallest(values))
     assert math.isnan(one.sum(values))
-    assert math.isnan(WithOther(math.nan).largest([1.0]))
-    assert math.isnan(WithOther(1.0).largest([math.nan]))
-    assert math.isnan(WithOther(1.0).smallest([math.nan]))
+    assert np.array_equal(one.sum(np.array([values, values]).T, axis=1), [2.0, np.nan, -4.0], equal_nan=True)
+
+    def program(communicator):
+        mine = [1.0 if communicator.rank else math.nan]
+        return communicator.largest(mine), communicator.smallest(mine), communicator.sum(mine)
+
+    for found in on_ranks(2, program):
+        assert all(map(math.isnan, found))
 
 
 def test_a_rank_without_rows_changes_nothing():
@@ -165,16 +200,25 @@ def test_a_rank_without_rows_changes_nothing():
 
 
 def test_a_parallel_communicator_combines_the_values_of_its_ranks():
-    assert WithOther(4.0).sum([1.0, 2.0]) == 7.0
-    assert WithOther(4.0).largest([1.0, 2.0]) == 4.0
-    assert WithOther(-4.0).smallest([1.0, 2.0]) == -4.0
-    assert WithOther(True).any([False])
-    assert not WithOther(False).all([True])
-    assert WithOther(5).count([True, False]) == 6
-    assert WithOther(5.0, 1).mean([1.0]) == 3.0
-    assert WithOther("second").first(None) == "second"
-    assert WithOther("second").first("first") == "first"
-    assert np.array_equal(WithOther(np.array([1, 2])).sum(np.array([10, 20]), axis=()), [11, 22])
+    def program(communicator):
+        other = communicator.rank == 1
+        return {
+            "sum": communicator.sum([4.0] if other else [1.0, 2.0]),
+            "largest": communicator.largest([4.0] if other else [1.0, 2.0]),
+            "smallest": communicator.smallest([-4.0] if other else [1.0, 2.0]),
+            "any": communicator.any([other]),
+            "all": communicator.all([not other]),
+            "count": communicator.count([True] * 5 if other else [True, False]),
+            "mean": communicator.mean([5.0] if other else [1.0]),
+            "first": communicator.first("second" if other else None),
+            "added": communicator.sum(np.array([1, 2] if other else [10, 20]), axis=()).tolist(),
+        }
+
+    wanted = {
+        "sum": 7.0, "largest": 4.0, "smallest": -4.0, "any": True, "all": False, "count": 6, "mean": 3.0,
+        "first": "second", "added": [11, 22],
+    }  # fmt: skip
+    assert on_ranks(2, program) == [wanted, wanted]
 
 
 # ---------------------------------------------------------------- the fluid asks it
@@ -209,7 +253,7 @@ def test_nan_on_another_rank_stops_the_fluid_on_this_one():
     other = Beside()
     fluid = channel(other)
     fluid.step(1e-3)
-    other.change = lambda value, operation: value * math.nan if operation is np.add else value
+    other.change = lambda value, operation: value * math.nan if operation is np.maximum else value
     with pytest.raises(RunFailed, match="not finite"):
         fluid.step(1e-3)
 

@@ -235,14 +235,13 @@ class Scalar:
         brought = flows * faces.area * self.kind.capacity
         flowing, leaves = ~faces.wall, ~faces.wall & (into < 0.0)
         through = (flowing & ~leaves, leaves, faces.wall)
-        came = [brought[some].sum() for some in through]  # local: summed next
-        volume = -(into * faces.area)[leaves].sum() * self.fluid.last_step  # local: summed next
-        inflow, outflow, walls, left = total([*came, volume], axis=())
-        self.sums["inflow"] += float(inflow)
-        self.sums["outflow"] -= float(outflow)
-        self.sums["walls"] += float(walls)
+        inflow, outflow, walls = (float(total(brought[some])) for some in through)
+        left = -float(total((into * faces.area)[leaves])) * self.fluid.last_step
+        self.sums["inflow"] += inflow
+        self.sums["outflow"] -= outflow
+        self.sums["walls"] += walls
         if left > 0.0:
-            self.leaving = self.kind.start - float(outflow / (left * self.kind.capacity))
+            self.leaving = self.kind.start - outflow / (left * self.kind.capacity)
 
     def _rate_of_walls(self) -> Array:
         """Rate of each cell by the coefficients of its walls (nz, ny, nx) [1/s]."""

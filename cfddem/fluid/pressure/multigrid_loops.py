@@ -80,8 +80,7 @@ def _relax_plane(k, colour, backward, x, b, ax, ay, az, inverse, new):
             i = nx - 1 if (count_end == 1) != backward else 0
             if (i & 1) == parity:
                 left, right = neighbours(i, nx)
-                sides = west[i] * here[left] + west[right] * here[right]
-                here[i] = (new[i] + sides) * invert[i]
+                here[i] = (new[i] + west[i] * here[left] + west[right] * here[right]) * invert[i]
         for i in range(1, nx - 1):
             here[i] = new[i] if (i & 1) == parity else here[i]
 

@@ -2,8 +2,9 @@
 
 Arrays of a rank have a layer of ghosts below and above its cells along the divided axis. Ghosts are filled after each
 colour of a sweep, so that sweeps, residuals and transfers are those of one process, and with them the number of
-iterations. Coarse cells belong to the rank of their first fine cell. From the first small level down every rank
-computes the whole level: waiting for messages would take longer than the work.
+iterations and all bits. Coarse cells belong to the rank of their first fine cell. From the first small level down every
+rank computes the whole level: waiting for messages would take longer than the work. So it does from the first level with
+an odd number of periodic layers, of which the last and the first have one colour.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ def pressure_equation(
     others    as of `PressureEquation`
     """
     if isinstance(grid, Block) and communicator.size > 1:
-        return SharedPressureEquation(grid, grid.borders(periodic)[0], closed_regions, communicator, outlets)
+        borders = grid.borders(periodic)[0]
+        repeats = bool(periodic[borders.axis])
+        return SharedPressureEquation(grid, borders, repeats, closed_regions, communicator, outlets)
     return PressureEquation(grid, closed_regions, communicator, outlets=outlets)
 
 
@@ -134,6 +137,7 @@ class SharedPressureEquation(PressureEquation):
 
     grid     cells of this rank
     borders  with the cells of other ranks
+    repeats  whether the divided axis is periodic
     other arguments as of `PressureEquation`
     """
 
@@ -141,11 +145,12 @@ class SharedPressureEquation(PressureEquation):
         self,
         grid: Block,
         borders: Borders,
+        repeats: bool,
         closed_regions: ClosedRegions | None,
         communicator: Communicator,
         outlets: NDArray[np.bool_],
     ) -> None:
-        self._borders = borders
+        self._borders, self._repeats = borders, repeats
         self._given = tuple(np.zeros(grid.shape) for _ in range(4))
         super().__init__(grid, closed_regions, communicator, outlets=outlets)
 
@@ -158,7 +163,8 @@ class SharedPressureEquation(PressureEquation):
                 shared.append(SharedLevel(shape, factors, self._outlets, starts, self._borders))
                 starts = shared[-1].next_starts
             too_thin = (np.diff(starts) < 1).any()  # local: all ranks know all starts
-            if whole or math.prod(shape) <= SMALL or too_thin:
+            seam = self._repeats and shape[2 - self._borders.axis] % 2 == 1
+            if whole or math.prod(shape) <= SMALL or too_thin or seam:
                 whole.append(Level(shape, factors, self._outlets))
         if not whole:
             whole.append(Level(*hierarchy(grid.whole)[-1], self._outlets))
