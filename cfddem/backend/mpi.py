@@ -1,7 +1,7 @@
 """The communicator of a run on several processes, over MPI (mpi4py).
 
-Imported only by a run of several processes. MPI adds whole numbers and finds largest ones, of which no order changes the
-bits; all else is gathered from all ranks and combined in the order of the ranks.
+Imported only by a run of several processes. MPI adds whole numbers and finds largest ones, with the same bits in any
+order. All else is gathered from all ranks and combined in their order.
 
 mpi4py suffices for all that ranks exchange, and pip installs it with an MPI of its own. In a step a rank sends a few
 contiguous arrays to its neighbours, which costs as little by plain messages as by PetscSF.

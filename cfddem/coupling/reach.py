@@ -25,7 +25,8 @@ next neighbour list, and is mapped where it was two fluid steps ago, or where it
 class Homes(NamedTuple):
     """Cells that receive what is deposited on the cells and on a layer around them; flat indices.
 
-    A cell receives its own, those of solid cells to which it is the nearest open one, and of ghosts that take its value.
+    A cell receives its own, those of solid cells to which it is the nearest open one, and those of ghosts that take its
+    value.
     """
 
     of_layered: np.ndarray  # (n,) home of each of the cells and of the layer

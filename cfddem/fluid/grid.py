@@ -236,7 +236,7 @@ def outside_cone(
 
 @inline
 def _layer_and_share(coordinate, lowest, layers):
-    """Layer of a padded array below a coordinate, and the share of the next one; `lowest` is the number of the first."""
+    """Layer of a padded array below a coordinate, and share of the next one; `lowest` is the number of the first."""
     inside = min(max(coordinate, float(lowest)), lowest + (layers - 1.001))
     below = math.floor(inside)
     return below - lowest, inside - below

@@ -505,7 +505,6 @@ class FluidSolver:
         points = np.ascontiguousarray(points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError("points", points.shape, "of shape (N, 3)")
-        values = np.empty((len(points), len(fields)))
-        origin, first = np.array(self.grid.whole.origin), np.array(self.grid.first)
-        sample(fields, place, points, origin, first, self.inverse_spacing, values)
+        values, origin = np.empty((len(points), len(fields))), np.array(self.grid.whole.origin)
+        sample(fields, place, points, origin, np.array(self.grid.first), self.inverse_spacing, values)
         return values

@@ -2,9 +2,9 @@
 
 Arrays of a rank have a layer of ghosts below and above its cells along the divided axis. Ghosts are filled after each
 colour of a sweep, so that sweeps, residuals and transfers are those of one process, and with them the number of
-iterations and all bits. Coarse cells belong to the rank of their first fine cell. From the first small level down every
-rank computes the whole level: waiting for messages would take longer than the work. So it does from the first level with
-an odd number of periodic layers, of which the last and the first have one colour.
+iterations and all bits. Coarse cells belong to the rank of their first fine cell. From the first small level down,
+every rank computes the whole level: waiting for messages would take longer than the work. So it does from the first
+level with an odd number of periodic layers, of which the last and the first have one colour.
 """
 
 from __future__ import annotations
