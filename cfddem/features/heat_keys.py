@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
@@ -15,12 +15,24 @@ from cfddem.case.feature_table import FeatureTable
 from cfddem.fluid.scalar_conditions import SOLID, ExchangeWall, FluxWall, HeldWall, ScalarSides, Wall
 from closures.heat_transfer import ranz_marshall
 
-Temperature = Annotated[float, Field(ge=0)]
+
+def _above_absolute_zero(value: float) -> float:
+    """Refuse a temperature in degrees below zero."""
+    if value < 0.0:
+        raise InputError("", value, "at least 0 K, absolute zero", "temperatures are in K: 0 degrees C are 273.15 K")
+    return value
+
+
+Temperature = Annotated[float, AfterValidator(_above_absolute_zero)]
+"""A temperature above absolute zero [K]."""
 
 CELL_KEYS = (
     "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux",
 )  # fmt: skip
 """Keys that need a temperature in every cell."""
+
+GROUP = "heat and drying"
+"""Group of the numbers of the pre-run check."""
 
 LARGEST_BIOT = 0.1
 """Biot number up to which a sphere has one temperature [-]."""
@@ -36,8 +48,8 @@ class Heat(FeatureTable):
     table: ClassVar[str] = "heat"
     meaning: ClassVar[str] = "heat between particles of one temperature each and the fluid, cell by cell"
 
-    particle_temperature: float = Field(ge=0, description="temperature of new particles, above absolute zero [K]")
-    fluid_temperature: float = Field(ge=0, description="temperature of the fluid, at the start if it changes [K]")
+    particle_temperature: Temperature = Field(description="temperature of new particles [K]")
+    fluid_temperature: Temperature = Field(description="temperature of the fluid, at the start if it changes [K]")
     fluid: Literal["auto", "cells", "uniform"] = Field(
         "auto",
         description="temperature of the fluid: in all its cells, or a uniform one; auto: cells, but uniform without "
@@ -161,24 +173,67 @@ class Heat(FeatureTable):
                     walls[each] = wall
         return ScalarSides(self.gas_temperature, self.outlet_temperature, walls)
 
-    def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+        """Numbers of the largest particles in the flow of the bed, and times of heating."""
+        fluid, largest = case.fluid, max(case.species.values(), key=lambda each: each.diameter)
+        reynolds, prandtl = reynolds_of(case, bed), fluid.viscosity * self.fluid_heat_capacity / self.conductivity
+        nusselt = self.nusselt(case, bed)
+        yield GROUP, "Pr", prandtl, "", "Prandtl number"
+        yield GROUP, "Pe", reynolds * prandtl, "", "Peclet number of a particle, Re Pr"
+        yield GROUP, "Nu", nusselt, "", f"Nusselt number at Re = {reynolds:.3g}"
+        biots = [nusselt * self.conductivity / (6.0 * each) for each in self.solid_conductivity.values()]
+        missing = "h d / (6 k); the limit is 0.1" if biots else "give heat.solid_conductivity"
+        yield GROUP, "Bi", max(biots, default=math.nan), "", f"Biot number: {missing}"
+        solid = case.material_of(largest).density * self.heat_capacity[case.material_name_of(largest)]
+        time = solid * largest.diameter**2 / (6.0 * nusselt * self.conductivity)
+        yield GROUP, "heating time of a particle", time, "s", "m c / (h A), of the largest species"
+        if bed.inflow > 0.0 and self.in_cells(case):
+            held = sum(
+                case.volumes[name] * case.material_of(each).density * self.heat_capacity[case.material_name_of(each)]
+                for name, each in case.species.items()
+            )
+            time = held / (bed.inflow * fluid.density * self.fluid_heat_capacity)
+            yield GROUP, "heating time of the bed", time, "s", "heat capacity over that of the inflow per time"
+
+    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle has no single temperature."""
-        fluid = case.fluid
-        prandtl = fluid.viscosity * self.fluid_heat_capacity / self.conductivity
-        for species in case.species.values():
-            name = case.material_name_of(species)
-            if name in self.solid_conductivity and fluid.viscosity > 0.0:
-                reynolds = fluid.density * case.reference_speed * species.diameter / fluid.viscosity
-                nusselt = ranz_marshall(reynolds, prandtl)
-                biot = nusselt * self.conductivity / (6.0 * self.solid_conductivity[name])
-                if biot > LARGEST_BIOT:
-                    reason = f"the Biot number h d / (6 k) is {biot:.2g} at Re = {reynolds:.3g}; the limit is 0.1"
-                    remedy = "temperatures differ within a particle; use smaller particles, or take care"
-                    yield "warning", f"heat.solid_conductivity.{name}", reason, remedy
+        return self.issues_of_biot(case, bed, "heat.solid_conductivity", self.solid_conductivity)
+
+    def issues_of_biot(
+        self, case: Any, bed: Any, key: str, of_solid: Mapping[str, float]
+    ) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Warn where a particle has no single temperature, by the conductivities of a key."""
+        for name in sorted({case.material_name_of(each) for each in case.species.values()} & of_solid.keys()):
+            biot = self.nusselt(case, bed) * self.conductivity / (6.0 * of_solid[name])
+            if biot > LARGEST_BIOT:
+                reason = f"the Biot number h d / (6 k) is {biot:.2g} at Re = {reynolds_of(case, bed):.3g}"
+                remedy = "temperatures differ within a particle; use smaller particles, or take care"
+                yield "warning", f"{key}.{name}", f"{reason}; the limit is {LARGEST_BIOT:g}", remedy
+
+    def nusselt(self, case: Any, bed: Any) -> float:
+        """Nusselt number of the largest particles in the flow of the bed."""
+        return transfer_number(case, bed, case.fluid.viscosity * self.fluid_heat_capacity / self.conductivity)
 
     def capacities(self, case: Any) -> np.ndarray:
         """Specific heat capacity by number of material, NaN where none is given [J/kg/K]."""
         return np.array([self.heat_capacity.get(name, np.nan) for name in case.material])
+
+
+def reynolds_of(case: Any, bed: Any) -> float:
+    """Reynolds number of the largest particles, superficial; at the reference speed where nothing flows in."""
+    if bed.inlet > 0.0:
+        return float(bed.reynolds)
+    largest = max(each.diameter for each in case.species.values())
+    return float(case.fluid.density * case.reference_speed * largest / case.fluid.viscosity)
+
+
+def transfer_number(case: Any, bed: Any, prandtl: float) -> float:
+    """Nusselt number in the flow of the bed by the law of the case; Sherwood number for a Schmidt number."""
+    reynolds, voidage = reynolds_of(case, bed), min(max(bed.voidage, 0.1), 1.0)
+    if not (law := case.laws.heat_law):
+        return ranz_marshall(reynolds, prandtl, voidage)
+    values = {"reynolds": reynolds, "prandtl": prandtl, "voidage": voidage}
+    return float(law.function(**{name: values[name] for name in law.arguments}))
 
 
 def given_or(value: float | None, default: float) -> float:

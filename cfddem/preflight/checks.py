@@ -72,6 +72,7 @@ def find_issues(
         *check_stiffness(case, bed, collision, cost),
         *check_data(case),
         *(Issue(*each) for table in case.feature_tables for each in table.issues(case)),
+        *(Issue(*each) for table in case.feature_tables for each in table.issues_of_bed(case, bed)),
     ]
     if case.fluid is not None:
         found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
