@@ -73,8 +73,13 @@ class Heat(FeatureTable):
     )
     wall_coefficient: dict[str, Positive] = Field(
         {},
-        description="coefficient between a wall of wall_temperature and the fluid in the cell beside it; default: "
-        "conduction from the wall to the centre of the cell [W/m2/K]",
+        description="coefficient between a wall_temperature and the fluid, see wall_coefficient_to; default: the "
+        "surface of the wall has this temperature [W/m2/K]",
+    )
+    wall_coefficient_to: Literal["surface", "cell"] = Field(
+        "surface",
+        description="where wall_coefficient ends: surface, of the wall, from where the fluid conducts to the centre "
+        "of its cell; or cell, a coefficient of heat transfer that has this resistance in it",
     )
     wall_flux: dict[str, float] = Field({}, description="heat flux from walls into the fluid, by name [W/m2]")
     effective_conductivity: Literal["none", "zehner_schluender"] = Field(
@@ -153,7 +158,7 @@ class Heat(FeatureTable):
     def sides_of(self, case: Any) -> ScalarSides:
         """Conditions of the temperature on the sides of the column."""
         round_wall = math.pi / 4.0 if case.column.shape == "cylinder" else 1.0
-        walls: dict[str, Wall] = {}
+        walls, to_cell = dict[str, Wall](), self.wall_coefficient_to == "cell"
         for name in (*self.wall_temperature, *self.wall_flux):
             named = [name]
             if name == AROUND:
@@ -164,7 +169,7 @@ class Heat(FeatureTable):
                 if name in self.wall_flux:
                     wall: Wall = FluxWall(self.wall_flux[name], area)
                 elif name in self.wall_coefficient:
-                    wall = ExchangeWall(self.wall_coefficient[name], self.wall_temperature[name], area)
+                    wall = ExchangeWall(self.wall_coefficient[name], self.wall_temperature[name], area, to_cell)
                 else:
                     wall = HeldWall(self.wall_temperature[name], area)
                 if name == AROUND:
