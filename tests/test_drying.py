@@ -78,6 +78,34 @@ def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
     assert vapour_imbalance(simulation) < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
 
 
+@pytest.mark.slow  # its law set is compiled for no other plain test
+def test_films_give_their_water_to_the_air_from_the_inlet_on_and_then_warm_up() -> None:
+    """All water of the films is in the vapour of the cells and of the air that left; the first layer is dry first."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 1e-6}
+    simulation = Simulation(
+        wet_bed(10).with_(
+            **{"material.glass.density": 2500.0, "heat.heat_capacity": {"glass": 40.0}},
+            **{"evaporation.drops": [], "liquid": film},
+        )
+    )
+    particles, first = simulation.particles, simulation.particles.position[:, 2] < 3e-3
+    water, begin = 998.0 * float(particles.liquid.sum()), float(particles.temperature[0])
+    simulation.until(0.4)
+    middle, early = row(simulation), particles.liquid[first].mean() / particles.liquid[~first].mean()
+    keys, cold = Evaporation.of(simulation.case), float(particles.temperature[first].mean())
+    assert keys is not None
+    print(f"{middle['evaporated_mass'] / water:.2%} of the water, first film over others {early:.2f}, at {cold:.2f} K")
+    assert 0.2 < middle["evaporated_mass"] / water < 0.8 and early < 0.9
+    assert cold == pytest.approx(keys.wet_bulb(simulation.case), abs=0.5) and cold < begin
+    simulation.until(2.5)
+    now, vapour = row(simulation), simulation.feature(Vapour)
+    assert particles.liquid.max() == 0.0 and now["evaporated_mass"] == pytest.approx(water, rel=1e-12)
+    sums = vapour.cells.sums
+    assert vapour.cells.content + sums["outflow"] - sums["inflow"] == pytest.approx(water, rel=1e-9)
+    assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
+    assert particles.temperature[first] == pytest.approx(320.0, abs=0.3)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
