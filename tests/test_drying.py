@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -15,6 +16,7 @@ from test_heat_in_fluid import case_of, lattice
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.features.evaporation_keys import Evaporation
+from cfddem.features.heat import HeatExchange
 from cfddem.features.vapour import Vapour, outlet_vapour, vapour_imbalance
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
@@ -104,6 +106,35 @@ def test_films_give_their_water_to_the_air_from_the_inlet_on_and_then_warm_up() 
     assert vapour.cells.content + sums["outflow"] - sums["inflow"] == pytest.approx(water, rel=1e-9)
     assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
     assert particles.temperature[first] == pytest.approx(320.0, abs=0.3)
+
+
+@pytest.mark.slow  # as the test above
+def test_drops_of_a_spray_bring_their_heat_and_all_budgets_close() -> None:
+    """Cold drops on warm beads in warm air: heat of the air in, latent heat out, heat of the drops in, the rest is
+    stored. A bead that receives more than one drop is between its temperature and that of the drops."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 1e-6}
+    spray = {"rate": 2e-9, "drop_volume": 5e-13, "zone": "box", "corner": (0, 0, 0.02), "size": (8e-3, 8e-3, 0.02)}
+    case = wet_bed(10).with_(
+        **{"material.glass.density": 2500.0, "evaporation.drops": [], "liquid": film, "spray": spray},
+        **{"heat.spray_temperature": 280.0},
+    )
+    simulation = Simulation(case)
+    simulation.until(0.3)
+    middle = Simulation.restored(case, simulation.checkpoint())
+    simulation.until(0.6)
+    middle.until(0.6)
+    now, heat = row(simulation), simulation.feature(HeatExchange)
+    assert list(row(middle)) == list(now)
+    assert np.array_equal(list(row(middle).values()), list(now.values()), equal_nan=True)
+    landed = now["liquid_sprayed"]
+    colder = 298.0 - 280.0
+    print(f"{landed / 5e-13:.0f} drops brought {now['heat_from_spray']:.4g} J, latent {now['latent_heat_taken']:.4g} J")
+    assert landed == pytest.approx(2e-9 * 0.6, rel=1e-3) and now["liquid_missed"] == 0.0
+    assert now["heat_from_spray"] == pytest.approx(-landed * 4.17e6 * colder, rel=0.35)
+    gained = now["heat_in"] - now["heat_out"] + now["heat_from_walls"] - now["latent_heat_taken"]
+    scale = heat.scale + now["latent_heat_taken"]
+    assert now["heat_stored"] == pytest.approx(gained + now["heat_from_spray"], abs=1e-11 * scale)
+    assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,7 @@ def test_a_solid_that_conducts_badly_is_warned_of_and_one_of_unknown_conductivit
         ({"contact_heat": {"wall": {"floor": {"temperature": -3.0}}}}, r"wall.floor.temperature.*absolute zero"),
         ({"heat__heat_capacity": {"glass": -1.0}}, r"heat.heat_capacity.glass.*above 0; .*J/kg/K"),
         ({"heat__fluid_heat_capacity": -1.0}, r"heat.fluid_heat_capacity.*above 0; .*J/kg/K"),
+        ({"heat__spray_temperature": 290.0, "spray": None}, r"heat.spray_temperature.*left out without \[spray\]; add"),
         ({"heat": None}, r"(evaporation|vapour): must be left out without \[heat\]; add"),
         ({"heat": None, "evaporation": None}, r"vapour: must be left out without \[heat\]; add"),
         ({"vapour__inlet_fraction": 0.5}, r"vapour.inlet_fraction.*at most saturated; .*at 350 K is 0.30"),

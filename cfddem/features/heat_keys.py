@@ -82,6 +82,13 @@ class Heat(FeatureTable):
         "of its cell; or cell, a coefficient of heat transfer that has this resistance in it",
     )
     wall_flux: dict[str, float] = Field({}, description="heat flux from walls into the fluid, by name [W/m2]")
+    spray_temperature: Temperature | None = Field(
+        None,
+        description="temperature of the drops of [spray] as they land; default: that of the particle they meet [K]",
+    )
+    spray_heat_capacity: Positive = Field(
+        4.17e6, description="heat capacity of the sprayed liquid per volume; default: water [J/m3/K]"
+    )
     effective_conductivity: Literal["none", "zehner_schluender"] = Field(
         "none", description="conductivity of the fluid between particles: none, voidage times conductivity; or the law"
     )
@@ -109,6 +116,9 @@ class Heat(FeatureTable):
                     f"heat.heat_capacity.{name}", None, "given: particles are of this material", "[J/kg/K]"
                 )
 
+        if self.spray_temperature and not case.spray:
+            remedy = "add the table [spray], or leave it out"
+            raise InputError("heat.spray_temperature", self.spray_temperature, "left out without [spray]", remedy)
         if self.in_cells(case):
             self._refuse_walls(case)
         else:
