@@ -11,8 +11,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from test_heat_in_fluid import case_of, lattice
+from in_process_ranks import on_ranks
+from test_heat_in_fluid import SEEDS, case_of, lattice
 
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.features.evaporation_keys import Evaporation
@@ -78,6 +80,49 @@ def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
     print(f"vapour {vapour.cells.value.mean():.6f}, saturated {surface:.6f}")
     assert vapour.cells.value == pytest.approx(surface, rel=5e-3)
     assert vapour_imbalance(simulation) < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
+
+
+MOVING = SEEDS.with_(**{
+    "heat.particle_temperature": 310.0, "heat.fluid_temperature": 340.0, "evaporation": {"drops": ["seed"]},
+    "vapour": {"fluid_fraction": 0.005, "diffusivity": 2.8e-5},
+})  # fmt: skip
+"""A bed of seeds that move, which dry as drops do."""
+
+
+def dried(simulation: Simulation, steps: int) -> dict[str, np.ndarray]:
+    """Particles by id, cells and history after some steps."""
+    for _ in range(steps):
+        simulation.step()
+    order, parts = np.argsort(simulation.whole("id")), (simulation.feature(HeatExchange), simulation.feature(Vapour))
+    cells = {name: values for each in parts for name, values in each.cells_for_snapshot().items()}
+    particles = {
+        f"{name} of particles": simulation.whole(name)[order] for name in ("temperature", "radius", "position")
+    }
+    return {**particles, **cells, "history": np.array(list(row(simulation).values()))}
+
+
+def test_a_drying_bed_has_the_same_bits_on_two_threads_and_when_it_goes_on() -> None:
+    before = use_threads(1)
+    expected, stopped = dried(Simulation(MOVING), 20), Simulation(MOVING)
+    dried(stopped, 10)
+    resumed = dried(Simulation.restored(MOVING, stopped.checkpoint()), 10)
+    use_threads(2)
+    threaded = dried(Simulation(MOVING), 20)
+    use_threads(before)
+    assert np.ptp(expected["vapour"]) > 1e-3 and expected["radius of particles"].max() < 0.6e-3
+    for found in (resumed, threaded):
+        for name, values in expected.items():
+            assert np.array_equal(values, found[name], equal_nan=True), name
+
+
+def test_two_processes_dry_a_bed_as_one_to_round_off() -> None:
+    """As their flow, whose sums over the cells at the border have another order."""
+    alone = dried(Simulation(MOVING), 20)
+    for shared in on_ranks(2, lambda ranks: dried(Simulation(MOVING, communicator=ranks), 20)):
+        assert shared["temperature of particles"] == pytest.approx(alone["temperature of particles"], abs=1e-9)
+        assert shared["radius of particles"] == pytest.approx(alone["radius of particles"], rel=1e-12)
+        assert shared["temperature"] == pytest.approx(alone["temperature"], abs=1e-9)
+        assert shared["vapour"] == pytest.approx(alone["vapour"], abs=1e-13)
 
 
 @pytest.mark.slow  # its law set is compiled for no other plain test
