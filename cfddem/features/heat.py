@@ -28,6 +28,7 @@ from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
+from cfddem.fluid.solver import FluidSolver
 
 RECEIVED = ("heat_from_fluid", "J")
 """Name and unit of the field with the heat that a particle received in the last step."""
@@ -69,6 +70,8 @@ class HeatExchange(CaseFeature):
             )  # fmt: skip
             self.cells = Scalar(fluid, kind, keys.sides_of(case))
             self.transfer = Transfer(kernel, "temperature", RECEIVED, self.capacity)
+            if keys.buoyancy != "none":
+                fluid.body_forces.append(lambda: self.buoyancy(fluid))
         self.start = self.stored(simulation.owned)
         self.scale, self.other, self.last, self.sprayed = 0.0, 0.0, self.start, 0.0
         self.around, self.response = np.full(simulation.owned.count, self.fluid_temperature), np.zeros(0)
@@ -121,6 +124,13 @@ class HeatExchange(CaseFeature):
         """Heat in all particles, above the temperature of new ones [J]."""
         above = particles.temperature - self.keys.particle_temperature
         return float(self.communicator.sum(self.capacity(particles) * above))
+
+    def buoyancy(self, fluid: FluidSolver) -> np.ndarray:
+        """Weight that warm fluid lacks, per volume of the cell (nz, ny, nx, 3) [N/m3]."""
+        assert self.cells is not None
+        keys, above = self.keys, self.cells.value - self.keys.fluid_temperature
+        lighter = fluid.density * keys.expansion_coefficient * above * fluid.voidage * fluid.open_cells
+        return np.asarray(-lighter[..., None] * fluid.gravity)
 
     def mix_in(self, particles: Any, volume: np.ndarray) -> None:
         """Bring every particle to the common temperature of it and of the drops that land on it, volume (N,) [m3].

@@ -27,12 +27,16 @@ Temperature = Annotated[float, AfterValidator(_above_absolute_zero)]
 """A temperature above absolute zero [K]."""
 
 CELL_KEYS = (
-    "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux",
+    "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux", "expansion",
 )  # fmt: skip
 """Keys that need a temperature in every cell."""
 
 GROUP = "heat and drying"
 """Group of the numbers of the pre-run check."""
+
+BOUSSINESQ = 0.1
+"""Difference of density over the density up to which the approximation holds (Gray & Giorgini, Int. J. Heat Mass
+Transfer 19 (1976) 545-551) [-]."""
 
 LARGEST_BIOT = 0.1
 """Biot number up to which a sphere has one temperature [-]."""
@@ -82,6 +86,14 @@ class Heat(FeatureTable):
         "of its cell; or cell, a coefficient of heat transfer that has this resistance in it",
     )
     wall_flux: dict[str, float] = Field({}, description="heat flux from walls into the fluid, by name [W/m2]")
+    buoyancy: Literal["none", "boussinesq"] = Field(
+        "none",
+        description="weight of the fluid by its temperature: none, or boussinesq, in the weight alone and linear; for "
+        "differences of density of up to 10 %",
+    )
+    expansion: Positive | None = Field(
+        None, description="thermal expansion of the fluid, of boussinesq; default: 1/fluid_temperature, of a gas [1/K]"
+    )
     spray_temperature: Temperature | None = Field(
         None,
         description="temperature of the drops of [spray] as they land; default: that of the particle they meet [K]",
@@ -121,11 +133,30 @@ class Heat(FeatureTable):
             raise InputError("heat.spray_temperature", self.spray_temperature, "left out without [spray]", remedy)
         if self.in_cells(case):
             self._refuse_walls(case)
+            self._refuse_buoyancy(case)
         else:
+            if self.buoyancy != "none":
+                remedy = 'fluid = "cells"; leave fluid_total_capacity out'
+                raise InputError("heat.buoyancy", self.buoyancy, "none where the fluid has one temperature", remedy)
             for key in CELL_KEYS:
                 if getattr(self, key):
                     remedy = 'fluid = "cells"; leave fluid_total_capacity out'
                     raise InputError(f"heat.{key}", None, "left out where the fluid has one temperature", remedy)
+
+    def _refuse_buoyancy(self, case: Any) -> None:
+        """Refuse a weight by temperature that is unknown, and an expansion that nothing uses."""
+        if self.buoyancy == "none" and self.expansion:
+            raise InputError(
+                "heat.expansion", self.expansion, "left out without buoyancy", 'set buoyancy = "boussinesq"'
+            )
+        if self.buoyancy != "none" and not self.expansion and (case.in_liquid or not self.fluid_temperature):
+            remedy = "the default 1/fluid_temperature is that of a gas; water of 20 degrees C has 2.1e-4 [1/K]"
+            raise InputError("heat.expansion", None, 'given with buoyancy = "boussinesq"', remedy)
+
+    @property
+    def expansion_coefficient(self) -> float:
+        """Thermal expansion of the fluid [1/K]."""
+        return self.expansion or 1.0 / self.fluid_temperature
 
     def _refuse_walls(self, case: Any) -> None:
         """Refuse names that are no walls of the column, and walls with too much or too little."""
@@ -209,6 +240,16 @@ class Heat(FeatureTable):
             )
             time = held / (bed.inflow * fluid.density * self.fluid_heat_capacity)
             yield GROUP, "heating time of the bed", time, "s", "heat capacity over that of the inflow per time"
+
+    def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Warn where the density differs too much for the approximation of Boussinesq."""
+        others = (self.gas_temperature, self.particle_temperature, *self.wall_temperature.values())
+        largest = max(abs(each - self.fluid_temperature) for each in others)
+        if self.buoyancy != "none" and self.expansion_coefficient * largest > BOUSSINESQ:
+            share = 100.0 * self.expansion_coefficient * largest
+            reason = f"temperatures differ by {largest:.3g} K and densities by {share:.2g} %; it holds up to 10 %"
+            remedy = "gas that is warmed does not expand here: take velocities at the temperature of the bed"
+            yield "warning", "heat.buoyancy", reason, remedy
 
     def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle has no single temperature."""
