@@ -78,8 +78,7 @@ class FluidSolver:
     Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
     area of a face normal to x, y, z [m2]; `open_cells` (nz, ny, nx), 1 where a cell is open, 0 where it is solid;
     `time`, `last_step`, length of the step just made [s]; `followers`, called before the voidage changes without a
-    flow, by (nz, ny, nx); `body_forces`, which give a force per volume of the cell, (nz, ny, nx, 3) [N/m3], in every
-    step. Methods return plain arrays in the index order of `cfddem.fluid.grid`.
+    flow, by (nz, ny, nx); `body_forces`, more sources. Methods return plain arrays in the order of `cfddem.fluid.grid`.
     """
 
     def __init__(
@@ -197,15 +196,12 @@ class FluidSolver:
         else:
             given = checked_field("drag_coefficient", coefficient, shape, self.communicator, negative=False)
             self._set_cells(fields.drag, given)
-        for name, field, target in (
-            ("drag_momentum", momentum, fields.drag_momentum),
-            ("source", source, fields.source),
-        ):
+        for name, field in (("drag_momentum", momentum), ("source", source)):
             if field is None:
-                target.fill(0.0)
+                getattr(fields, name).fill(0.0)
             else:
                 given = checked_field(name, field, (*shape, 3), self.communicator)
-                self._set_cells(target, np.moveaxis(given, -1, 0))
+                self._set_cells(getattr(fields, name), np.moveaxis(given, -1, 0))
 
     def _set_cells(self, padded: Array, cells: Array) -> None:
         """Write the cells of a padded field, and fill its ghosts."""
