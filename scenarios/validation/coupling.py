@@ -96,6 +96,10 @@ def remembered(curves: Curves) -> list[Row]:
     points = [(float(at), history_force.difference(*pair), 0.0) for at, *pair in zip(steps, found, exact)]
     title = "history force, slip that turns at constant speed, 1e5 steps: deviation from the convolution"
     rows = [worst(title, points, 2e-3, note="steps of 2 % of t_c")]
+    impulses = history_force.around_impact()
+    deviations = [abs(each.package - each.quadrature) for each in impulses]
+    title = "history force around an impact at St 152: impulse over that of the fall, deviation from quadrature"
+    rows.append(Row(title, max(deviations), 0.0, 1e-4, note=f"of {sum(each.quadrature for each in impulses):.4f}"))
     motions = {
         "0.5 mm glass from rest in water": {0.0: history_force.from_rest()},
         "slip that oscillates by 0.8 of its mean": {x: history_force.oscillating(x) for x in (0.1, 1.0, 10.0)},
