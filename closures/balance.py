@@ -228,6 +228,23 @@ def inversion_velocity(
     return _root(excess, low, high) if excess(low) * excess(high) < 0.0 else float("nan")
 
 
+def voidage_of_slip(velocity_ratio: float, slip: Callable[[float], float]) -> float:
+    r"""Voidage to which a flow expands a bed whose slip velocity is known.
+
+    .. math:: U/u_t = \varepsilon V(\varepsilon)
+
+    velocity_ratio  U/u_t, superficial over terminal velocity, >= 0 [-]
+    slip            V(voidage), slip velocity over u_t; must increase with the voidage
+    returns         eps [-]; 1 above the terminal velocity
+
+    >>> round(voidage_of_slip(0.6**3, lambda voidage: voidage**2), 12)
+    0.6
+    """
+    if velocity_ratio >= slip(1.0):
+        return 1.0
+    return _root(lambda voidage: voidage * slip(voidage) - velocity_ratio, 0.0, 1.0)
+
+
 def _excess(reynolds: float, voidage: float, drag: Drag, archimedes: float) -> float:
     """Drag beyond the buoyant weight, in units of Ar."""
     return 18.0 * reynolds * drag(reynolds, voidage) / voidage - archimedes

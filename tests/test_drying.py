@@ -6,15 +6,19 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from test_heat_in_fluid import case_of, lattice
+from in_process_ranks import on_ranks
+from test_heat_in_fluid import SEEDS, case_of, lattice
 
+from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.features.evaporation_keys import Evaporation
+from cfddem.features.heat import HeatExchange
 from cfddem.features.vapour import Vapour, outlet_vapour, vapour_imbalance
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
@@ -76,6 +80,106 @@ def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
     print(f"vapour {vapour.cells.value.mean():.6f}, saturated {surface:.6f}")
     assert vapour.cells.value == pytest.approx(surface, rel=5e-3)
     assert vapour_imbalance(simulation) < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
+
+
+MOVING = SEEDS.with_(**{
+    "heat.particle_temperature": 310.0, "heat.fluid_temperature": 340.0, "evaporation": {"drops": ["seed"]},
+    "vapour": {"fluid_fraction": 0.005, "diffusivity": 2.8e-5},
+})  # fmt: skip
+"""A bed of seeds that move, which dry as drops do."""
+
+
+def dried(simulation: Simulation, steps: int) -> dict[str, np.ndarray]:
+    """Particles by id, cells and history after some steps."""
+    for _ in range(steps):
+        simulation.step()
+    order, parts = np.argsort(simulation.whole("id")), (simulation.feature(HeatExchange), simulation.feature(Vapour))
+    cells = {name: values for each in parts for name, values in each.cells_for_snapshot().items()}
+    particles = {
+        f"{name} of particles": simulation.whole(name)[order] for name in ("temperature", "radius", "position")
+    }
+    return {**particles, **cells, "history": np.array(list(row(simulation).values()))}
+
+
+def test_a_drying_bed_has_the_same_bits_on_two_threads_and_when_it_goes_on() -> None:
+    before = use_threads(1)
+    expected, stopped = dried(Simulation(MOVING), 20), Simulation(MOVING)
+    dried(stopped, 10)
+    resumed = dried(Simulation.restored(MOVING, stopped.checkpoint()), 10)
+    use_threads(2)
+    threaded = dried(Simulation(MOVING), 20)
+    use_threads(before)
+    assert np.ptp(expected["vapour"]) > 1e-3 and expected["radius of particles"].max() < 0.6e-3
+    for found in (resumed, threaded):
+        for name, values in expected.items():
+            assert np.array_equal(values, found[name], equal_nan=True), name
+
+
+def test_two_processes_dry_a_bed_as_one_to_round_off() -> None:
+    """As their flow, whose sums over the cells at the border have another order."""
+    alone = dried(Simulation(MOVING), 20)
+    for shared in on_ranks(2, lambda ranks: dried(Simulation(MOVING, communicator=ranks), 20)):
+        assert shared["temperature of particles"] == pytest.approx(alone["temperature of particles"], abs=1e-9)
+        assert shared["radius of particles"] == pytest.approx(alone["radius of particles"], rel=1e-12)
+        assert shared["temperature"] == pytest.approx(alone["temperature"], abs=1e-9)
+        assert shared["vapour"] == pytest.approx(alone["vapour"], abs=1e-13)
+
+
+@pytest.mark.slow  # its law set is compiled for no other plain test
+def test_films_give_their_water_to_the_air_from_the_inlet_on_and_then_warm_up() -> None:
+    """All water of the films is in the vapour of the cells and of the air that left; the first layer is dry first."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 1e-6}
+    simulation = Simulation(
+        wet_bed(10).with_(
+            **{"material.glass.density": 2500.0, "heat.heat_capacity": {"glass": 40.0}},
+            **{"evaporation.drops": [], "liquid": film},
+        )
+    )
+    particles, first = simulation.particles, simulation.particles.position[:, 2] < 3e-3
+    water, begin = 998.0 * float(particles.liquid.sum()), float(particles.temperature[0])
+    simulation.until(0.4)
+    middle, early = row(simulation), particles.liquid[first].mean() / particles.liquid[~first].mean()
+    keys, cold = Evaporation.of(simulation.case), float(particles.temperature[first].mean())
+    assert keys is not None
+    print(f"{middle['evaporated_mass'] / water:.2%} of the water, first film over others {early:.2f}, at {cold:.2f} K")
+    assert 0.2 < middle["evaporated_mass"] / water < 0.8 and early < 0.9
+    assert cold == pytest.approx(keys.wet_bulb(simulation.case), abs=0.5) and cold < begin
+    simulation.until(2.5)
+    now, vapour = row(simulation), simulation.feature(Vapour)
+    assert particles.liquid.max() == 0.0 and now["evaporated_mass"] == pytest.approx(water, rel=1e-12)
+    sums = vapour.cells.sums
+    assert vapour.cells.content + sums["outflow"] - sums["inflow"] == pytest.approx(water, rel=1e-9)
+    assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
+    assert particles.temperature[first] == pytest.approx(320.0, abs=0.3)
+
+
+@pytest.mark.slow  # as the test above
+def test_drops_of_a_spray_bring_their_heat_and_all_budgets_close() -> None:
+    """Cold drops on warm beads in warm air: heat of the air in, latent heat out, heat of the drops in, the rest is
+    stored. A bead that receives more than one drop is between its temperature and that of the drops."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 1e-6}
+    spray = {"rate": 2e-9, "drop_volume": 5e-13, "zone": "box", "corner": (0, 0, 0.02), "size": (8e-3, 8e-3, 0.02)}
+    case = wet_bed(10).with_(
+        **{"material.glass.density": 2500.0, "evaporation.drops": [], "liquid": film, "spray": spray},
+        **{"heat.spray_temperature": 280.0},
+    )
+    simulation = Simulation(case)
+    simulation.until(0.3)
+    middle = Simulation.restored(case, simulation.checkpoint())
+    simulation.until(0.6)
+    middle.until(0.6)
+    now, heat = row(simulation), simulation.feature(HeatExchange)
+    assert list(row(middle)) == list(now)
+    assert np.array_equal(list(row(middle).values()), list(now.values()), equal_nan=True)
+    landed = now["liquid_sprayed"]
+    colder = 298.0 - 280.0
+    print(f"{landed / 5e-13:.0f} drops brought {now['heat_from_spray']:.4g} J, latent {now['latent_heat_taken']:.4g} J")
+    assert landed == pytest.approx(2e-9 * 0.6, rel=1e-3) and now["liquid_missed"] == 0.0
+    assert now["heat_from_spray"] == pytest.approx(-landed * 4.17e6 * colder, rel=0.35)
+    gained = now["heat_in"] - now["heat_out"] + now["heat_from_walls"] - now["latent_heat_taken"]
+    scale = heat.scale + now["latent_heat_taken"]
+    assert now["heat_stored"] == pytest.approx(gained + now["heat_from_spray"], abs=1e-11 * scale)
+    assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
 
 
 @pytest.mark.parametrize(

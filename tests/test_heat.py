@@ -122,7 +122,7 @@ def test_a_fluid_without_viscosity_is_refused() -> None:
 def test_check_warns_of_a_large_biot_number() -> None:
     def keys(conductivity: float) -> list[str]:
         case = case_of(heat=SPHERE | {"solid_conductivity": {"metal": conductivity}})
-        return [each[1] for table in case.feature_tables for each in table.issues(case)]
+        return [each.key for each in preflight(case).issues if "Biot" in each.reason]
 
     biot = 17.81 * SPHERE["conductivity"] / 6.0  # type: ignore[operator]
     assert keys(9.0 * biot) == ["heat.solid_conductivity.metal"] and keys(11.0 * biot) == []

@@ -211,11 +211,29 @@ def test_conduction_between_two_walls_is_linear_and_what_they_give_is_stored() -
     assert heat.sums["walls"] == pytest.approx(heat.content, rel=1e-12)
 
 
-def test_walls_with_a_flux_and_with_a_coefficient_balance() -> None:
-    """In the end the flux in leaves through the wall with a coefficient: T of its cell is 300 K + q/h."""
-    heat = at_rest({"x_low": FluxWall(6.0), "x_high": ExchangeWall(2.0, 300.0)}, 4000.0, 20.0)
+@pytest.mark.parametrize("to_cell", [False, True])
+def test_walls_with_a_flux_and_with_a_coefficient_balance(to_cell: bool) -> None:
+    """In the end the flux in leaves through the wall with a coefficient, whose surface, or cell, is at 300 K + q/h."""
+    heat = at_rest({"x_low": FluxWall(6.0), "x_high": ExchangeWall(2.0, 300.0, 1.0, to_cell)}, 4000.0, 20.0)
     slope = 6.0 / CONDUCTIVITY * 0.01
-    assert heat.value[0, 0] == pytest.approx(303.0 + slope * (7.0 - np.arange(8)), abs=1e-5)
+    beyond = 7.0 if to_cell else 7.5
+    assert heat.value[0, 0] == pytest.approx(303.0 + slope * (beyond - np.arange(8)), abs=1e-4)
+
+
+@pytest.mark.parametrize("cells", [2, 8])
+def test_a_wall_with_a_coefficient_passes_the_heat_of_its_resistance_in_series_on_any_cells(cells: int) -> None:
+    """Between 380 K outside of a coefficient of 2 W/m2/K and a surface of 300 K: q = 80 K / (1/h + L/k)."""
+    closed = {"y_low": FreeSlip(), "y_high": FreeSlip(), "z_low": FreeSlip(), "z_high": FreeSlip()}
+    fluid = fluid_of((cells, 1, 1), closed, size=0.08 / cells)
+    heat = scalar(fluid, ScalarSides(300.0, walls={"x_low": ExchangeWall(2.0, 380.0), "x_high": HeldWall(300.0)}))
+    flux = 80.0 / (1.0 / 2.0 + 0.08 / CONDUCTIVITY)
+    at = (np.arange(cells) + 0.5) * 0.08 / cells
+    heat.value[0, 0] = 300.0 + flux / CONDUCTIVITY * (0.08 - at)
+    before = heat.value.copy()
+    for _ in range(10):
+        fluid.step(20.0)
+        heat.step()
+    assert heat.value == pytest.approx(before, abs=1e-9)
 
 
 def test_voidage_lowers_the_conductivity_by_the_choice_of_the_user() -> None:

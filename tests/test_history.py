@@ -17,7 +17,16 @@ from cfddem.features.energy import EnergyLedger
 from cfddem.run.simulation import Simulation
 from closures import history as laws
 from scenarios.beds.settling import study as settling
-from scenarios.validation.history_force import Memory, Motion, convolved, difference, modelled, oscillating, turning
+from scenarios.validation.history_force import (
+    Memory,
+    Motion,
+    around_impact,
+    convolved,
+    difference,
+    modelled,
+    oscillating,
+    turning,
+)
 from scenarios.validation.table import numbers
 
 WATER, VISCOSITY, GLASS, DIAMETER = 1000.0, 1e-3, 2500.0, 1e-4
@@ -269,3 +278,13 @@ def test_same_bits_on_one_and_two_threads_and_after_a_restart() -> None:
     for each in (simulation, again):
         each.step()
     assert np.array_equal(simulation.particles.velocity, again.particles.velocity)
+
+
+def test_the_history_force_around_an_impact_is_that_of_the_convolution() -> None:
+    """Before, during and after the contact of a sphere with a wall, where the slip changes its sign within 10 us."""
+    before, during, *after = around_impact()
+    assert before.package == pytest.approx(before.quadrature, abs=3e-5)
+    assert 0.005 < during.package == pytest.approx(during.quadrature, rel=5e-3)
+    assert sum(each.package for each in after) > 0.03
+    for each in after:
+        assert each.package == pytest.approx(each.quadrature, rel=2e-3)

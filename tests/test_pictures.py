@@ -20,10 +20,10 @@ from cfddem.io.quantities import TIME, Quantity, of_fields
 from cfddem.io.reading import newest_run, open_run
 from cfddem.io.writer import RunFolder
 from cfddem.particles.state import PARTICLE_FIELDS
-from cfddem.plotting import rendering
+from cfddem.plotting import colours, rendering
 from cfddem.plotting.colours import SINGLE, scattered
 from cfddem.plotting.curves import history
-from cfddem.plotting.pictures import BUBBLE, Stage, _bubbles, movie, picture
+from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, movie, picture
 from cfddem.plotting.scene import Look, Scene, scene, window
 from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
 from scenarios.beds.liquid_bed.movie import side_by_side
@@ -144,6 +144,52 @@ def test_a_film_as_mp4(renders, bed, tmp_path):
     assert len(frames) == 3 and frames[0].shape[1] <= 800 and np.std(frames[0]) > 10.0  # type: ignore[attr-defined]
 
 
+@pytest.fixture(scope="module")
+def drying(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A snapshot of two beads in a fluid with temperature and vapour; one bead is warm, the other is wet."""
+    fields = {
+        "temperature": Quantity("K", "temperature"), "liquid": Quantity("m3", "film"),
+        "liquid_carried": Quantity("m3", "liquid"),
+    }  # fmt: skip
+    cells = {"temperature": Quantity("K", "temperature"), "vapour": Quantity("1", "mass fraction")}
+    quantities = {
+        **QUANTITIES, "particles": QUANTITIES["particles"] | fields, "fluid": QUANTITIES["fluid"] | cells,
+    }  # fmt: skip
+    run = RunFolder.create(tmp_path_factory.mktemp("runs") / "drying", "", {}, GRID, quantities)
+    shape = (20, 4, 10)
+    fluid = {
+        "voidage": np.ones(shape), "velocity": np.zeros((*shape, 3)), "vapour": np.full(shape, 0.01),
+        "temperature": 330.0 - np.broadcast_to(np.arange(20.0)[:, None, None], shape),
+    }  # fmt: skip
+    beads = {
+        "id": np.arange(2), "position": np.array([[0.02, 0.02, 0.05], [0.07, 0.02, 0.05]]), "radius": np.full(2, 5e-3),
+        "velocity": np.zeros((2, 3)), "temperature": np.array([320.0, 300.0]), "liquid": np.zeros(2),
+        "liquid_carried": np.array([0.0, 1e-9]),
+    }  # fmt: skip
+    run.write_snapshot(0.0, 0, fluid, beads)
+    run.finish("finished")
+    return run.folder
+
+
+def test_spheres_are_coloured_by_temperature_and_by_moisture_beside_the_same_of_the_fluid(renders, drying):
+    run = open_run(drying)
+    assert colours.choices(run)[:4] == ["speed", "liquid", "temperature", "moisture"]
+    for colour, beside, label, limits in (
+        ("temperature", "temperature", "temperature  [K]", (300.0, 320.0)),
+        ("moisture", "vapour", "moisture, liquid over solid volume  [-]", (0.0, 1e-9 / (np.pi / 6.0 * 1e-6))),
+    ):
+        stage = Stage.of(run, [0], (), colour, None)
+        assert stage.panels == ("spheres", "voidage", beside)
+        assert stage.limits["spheres"] == pytest.approx(limits, rel=3e-3)
+        labels = {each.get_ylabel() for each in stage.figure(0).axes}
+        assert {label, SCALARS[beside]} <= labels
+    assert Stage.of(run, [0], ("temperature",), "speed", None).limits["temperature"] == (311.0, 330.0)
+    first = Scene(run, off_screen=True)
+    for layer in ("temperature", "vapour"):
+        first.show(Look(0, "moisture", layer))
+    first.plotter.close()
+
+
 def test_axes_colour_bars_and_title_are_labelled(renders, bed):
     stage = Stage.of(open_run(bed), [2], (), "speed", None)
     figure = stage.figure(2)
@@ -231,6 +277,10 @@ def test_wrong_options_give_one_line(renders, bed, tmp_path):
         picture(bed, tmp_path / "a.png", show=("bubles",))
     with pytest.raises(InputError, match="did you mean 'radius'"):
         picture(bed, tmp_path / "a.png", colour="radus")
+    with pytest.raises(
+        InputError, match=r"show = 'vapour': must be a recorded field of the fluid; this run has velocity, voidage"
+    ):
+        picture(bed, tmp_path / "a.png", show=("vapour",))
     with pytest.raises(InputError, match=r"ends in \.png"):
         picture(bed, tmp_path / "a.jpg")
     with pytest.raises(InputError, match=r"ends in \.gif or \.mp4"):

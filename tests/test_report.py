@@ -57,14 +57,16 @@ def test_iterations_and_damping_number_of_films_are_those_of_the_window(tmp_path
 
 
 def test_a_sentence_says_where_the_voidages_lie_among_the_published_ones(tmp_path: Path) -> None:
+    case = Case.from_text(BED)
     laws = [comparison(f"voidage by {law}", 0.6, expected, "1") for law, expected in (("one", 0.59), ("other", 0.62))]
     spread = "the published voidages differ by 0.030, 0.590 to 0.620"
-    assert expansion_note(laws, {}) == f"{spread}; that of the run lies within"
-    assert expansion_note(laws[:1], {}).endswith("that of the run lies 0.010 above them")
+    note = expansion_note(case, laws, {})
+    assert note.startswith(f"{spread}; that of the run lies within. ") and "Outside of their ranges: " in note
+    assert "that of the run lies 0.010 above them. " in expansion_note(case, laws[:1], {})
     height = report(made_up(tmp_path / "other")).measures["bed_height"]
-    both = expansion_note(laws, {"bed_voidage_from_pressure": replace(height, mean=0.63)})
+    both = expansion_note(case, laws, {"bed_voidage_from_pressure": replace(height, mean=0.63)})
     assert "Compare the bed voidage, from the height" in both and "from the pressure, 0.030 higher" in both
-    assert expansion_note([], {}) == ""
+    assert expansion_note(case, [], {}) == ""
     assert any("published voidages differ" in line for line in lines(report(made_up(tmp_path / "run"))))
 
 

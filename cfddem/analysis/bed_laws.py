@@ -9,18 +9,15 @@ from cfddem.analysis.measures import OF_THE_BED
 from cfddem.analysis.report_values import LawComparison, Measure, comparison
 from cfddem.case.particle_properties import particle_properties
 from cfddem.case.schema import Case
+from cfddem.preflight.expansion import Expansions, expansions, is_compared, spread_in_words
 from cfddem.preflight.mixture import bed_drag
 from closures import bed as laws_of_beds
-from closures import numbers
 from closures.balance import pressure_gradient
 from closures.drag import ergun
 from closures.registry import REGISTRY
 
 FROM_HEIGHT, FROM_PRESSURE = "bed_voidage", "bed_voidage_from_pressure"
 """Measures of the voidage. Published laws were fitted to bed heights, so that the first is compared with them."""
-
-FREE_SIDES = ("free_slip", "periodic")
-"""Sides that do not retard the flow: no wall correction applies."""
 
 
 def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[LawComparison]:
@@ -46,9 +43,10 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
     if "wall_load" in measures:
         carried = drop + measures["wall_load"].mean
         rows.append(comparison("pressure drop and wall load by the weight", carried, weight, "Pa"))
-    if case.fluid.is_liquid and abs(case.laws.gravity[2]) > 0.0 and not case.bed.species:
-        for law, voidage in expansion_laws(case).items():
-            rows.append(comparison(f"voidage by {law}", measures[FROM_HEIGHT].mean, voidage, "1"))
+    if is_compared(case):
+        voidage = measures[FROM_HEIGHT].mean
+        for each in expansions(case).held:
+            rows.append(comparison(f"voidage by {each.law}", voidage, each.voidage, "1", each.outside))
     return rows
 
 
@@ -65,12 +63,12 @@ def _of_a_fixed_bed(case: Case, measures: Mapping[str, Measure], drop: float) ->
     yield comparison("pressure drop by Ergun", drop, length * laws_of_beds.ergun_gradient(*flow), "Pa", outside)
 
 
-def expansion_note(laws: list[LawComparison], measures: Mapping[str, Measure]) -> str:
+def expansion_note(case: Case, laws: list[LawComparison], measures: Mapping[str, Measure]) -> str:
     """Where the voidage of a run lies in the range of the published ones, and which of its two voidages to compare.
 
     laws      rows of the comparison
     measures  of the report
-    returns   one sentence; empty if no voidage is compared
+    returns   a few sentences; empty if no voidage is compared
     """
     rows = [each for each in laws if each.law.startswith("voidage by ")]
     if not rows:
@@ -80,6 +78,8 @@ def expansion_note(laws: list[LawComparison], measures: Mapping[str, Measure]) -
     off = max(low - computed, computed - high)
     where = f"{off:.3f} {'below' if computed < low else 'above'} them" if off > 0.0 else "within"
     note = f"the published voidages differ by {high - low:.3f}, {low:.3f} to {high:.3f}; that of the run lies {where}"
+    found = expansions(case)
+    note += "".join(f". {each[0].upper()}{each[1:]}" for each in (spread_in_words(found), _beyond(found)) if each)
     if FROM_PRESSURE in measures:
         other = measures[FROM_PRESSURE].mean - computed
         note += (
@@ -89,37 +89,16 @@ def expansion_note(laws: list[LawComparison], measures: Mapping[str, Measure]) -
     return note
 
 
+def _beyond(found: Expansions) -> str:
+    """Laws that are not compared because they do not hold for a bed, in words; empty if there are none."""
+    others = [each for each in found.every if each not in found.held]
+    given = ", ".join(f"{each.law} {each.voidage:.3f} ({each.outside})" for each in others)
+    return f"outside of their ranges: {given}" if others else ""
+
+
 def expansion_laws(case: Case) -> dict[str, float]:
-    """Voidage of a liquid-fluidised bed by each published expansion law [-]."""
-    assert isinstance(case.bed.inlet_velocity, float)
-    return {
-        name: laws_of_beds.expanded_voidage(case.bed.inlet_velocity, limit, exponent)
-        for name, (exponent, limit) in expansion_exponents(case).items()
-    }
-
-
-def expansion_exponents(case: Case) -> dict[str, tuple[float, float]]:
-    """Exponent n [-] and velocity at voidage 1 [m/s] of each published expansion law, with wall corrections."""
-    assert case.fluid is not None
-    density, viscosity, diameter = case.fluid.density, case.fluid.viscosity, case.bed.diameter
-    archimedes = numbers.archimedes(diameter, case.solid_density, density, viscosity, abs(case.laws.gravity[2]))
-    if archimedes <= 0.0:
-        return {}
-    reynolds = laws_of_beds.terminal_reynolds_brown_lawler(archimedes)
-    terminal = reynolds * viscosity / (density * diameter)
-    wall = 0.0 if case.column.sides in FREE_SIDES else diameter / min(case.column.size[:2])
-    laws = {
-        "Richardson-Zaki": (
-            laws_of_beds.exponent_richardson_zaki(reynolds, wall),
-            laws_of_beds.wall_factor_richardson_zaki(wall),
-        ),
-        "Garside": (laws_of_beds.exponent_garside(reynolds), laws_of_beds.wall_factor_richardson_zaki(wall)),
-        "Khan-Richardson": (
-            laws_of_beds.exponent_khan_richardson(archimedes, wall),
-            laws_of_beds.wall_factor_khan_richardson(wall),
-        ),
-    }
-    return {name: (exponent, factor * terminal) for name, (exponent, factor) in laws.items()}
+    """Voidage of a liquid-fluidised bed by each published expansion law that holds for it [-]."""
+    return {each.law: each.voidage for each in expansions(case).held}
 
 
 def buoyant_weight(case: Case) -> float:

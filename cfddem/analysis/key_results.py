@@ -18,6 +18,7 @@ from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
 from cfddem.io.reading import RunData
 from cfddem.preflight.bed_estimate import BedEstimate, estimate_bed
+from cfddem.preflight.expansion import SCATTER, expansions, spread_in_words
 from cfddem.preflight.issue import percent
 
 AGREES = 2.0
@@ -57,7 +58,12 @@ def key_results(
     measures, laws  of :func:`cfddem.analysis.report.report`
     defluidised     a wet bed has come to rest although it is blown
     """
-    found = [*_speed(laws), *_height(case, measures, laws), *_voidage(measures, laws), *_drop(case, measures, laws)]
+    found = [
+        *_speed(laws),
+        *_height(case, measures, laws),
+        *_voidage(case, measures, laws),
+        *_drop(case, measures, laws),
+    ]
     found += _particles(run)
     regime, reason, holds = _classified(run, case, measures)
     if defluidised:
@@ -142,7 +148,7 @@ def _published(laws: Sequence[LawComparison]) -> list[float]:
     return [row.expected for row in laws if row.law.startswith("voidage by ")]
 
 
-def _voidage(measures: Mapping[str, Measure], laws: Sequence[LawComparison]) -> Iterator[KeyResult]:
+def _voidage(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawComparison]) -> Iterator[KeyResult]:
     """The voidage to believe: that from the bed height, which published laws were fitted to."""
     if FROM_HEIGHT not in measures:
         return
@@ -155,6 +161,9 @@ def _voidage(measures: Mapping[str, Measure], laws: Sequence[LawComparison]) -> 
         off = max(low - mean, mean - high)
         where = "within" if off <= 0.0 else f"{off:.3f} {'below' if mean < low else 'above'}"
         verdict = f"{where} the published laws, {low:.3f} to {high:.3f}"
+        scatter = spread_in_words(expansions(case))
+        if scatter and not holds and off <= SCATTER[1]:
+            holds, verdict = None, f"{verdict}; {scatter}"
     if FROM_PRESSURE in measures and _usable(voidage):
         verdict += f"; use this value, from the height; the pressure gives {measures[FROM_PRESSURE].mean:.3f}"
     yield _mean("bed voidage", voidage, verdict.removeprefix("; "), holds)

@@ -59,6 +59,14 @@ class FeatureTable(Checked):
         """Severity, key, reason and remedy of each issue that `check` tells."""
         return iter(())
 
+    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+        """Group, name, value, unit and note of each number that `check` tells; bed is its estimate of the bed."""
+        return iter(())
+
+    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Issues as of `issues`, which need the estimate of the bed."""
+        return iter(())
+
 
 def feature_tables() -> list[type[FeatureTable]]:
     """All tables that features own, by the names of their files."""

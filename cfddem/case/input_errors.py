@@ -141,7 +141,7 @@ def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError
     first = reports[0]
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
-        whole = field if key and str(key[-1]) == cause.field else dotted((*key, cause.field))
+        whole = field if key and cause.field in ("", str(key[-1])) else dotted((*key, cause.field))
         return InputError(whole, shown(cause.value), cause.limit, cause.remedy)
     if cause is not None:
         name, _, limit = str(cause).partition(": must be ")
@@ -156,9 +156,10 @@ def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError
             field, shown(first["input"]), nearest(last, owner.model_fields), _right_table(last, owner, model)
         )
     limits = dict.fromkeys(filter(None, (_limit(each) for each in reports)))
-    about = owner.model_fields[last].description if last in owner.model_fields else None
+    named = next((str(part) for part in reversed(key[-2:]) if part in owner.model_fields), last)  # or values by name
+    about = owner.model_fields[named].description if named in owner.model_fields else None
     value = None if limits.keys() == {"given"} else shown(first["input"])
-    return InputError(field, value, " or ".join(limits) or first["msg"], f"{last}: {about}" if about else "")
+    return InputError(field, value, " or ".join(limits) or first["msg"], f"{named}: {about}" if about else "")
 
 
 _LIMITS = {

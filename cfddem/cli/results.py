@@ -95,12 +95,17 @@ def view(
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="PNG file; default: NAME.png")] = None,
     snapshot: Annotated[int, Parameter(help="number of the snapshot; 0 is the first, -1 the last")] = -1,
     show: Annotated[
-        list[str] | None, Parameter(help="spheres, voidage, bubbles or streamlines; may be repeated", negative="")
+        list[str] | None,
+        Parameter(
+            help="spheres, voidage, bubbles, streamlines, or temperature or vapour of the fluid; may be repeated",
+            negative="",
+        ),
     ] = None,
     colour: Annotated[
         str,
         Parameter(
-            help="quantity that colours the spheres: speed, collisions, or a recorded field (liquid, agglomerate)"
+            help="quantity that colours the spheres: speed, collisions, moisture, or a recorded field (temperature, "
+            "liquid, agglomerate)"
         ),
     ] = "speed",
     movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .gif, or .mp4 with cfddem[movie]")] = None,

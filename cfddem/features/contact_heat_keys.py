@@ -13,7 +13,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable
 from cfddem.case.materials import Checked
-from cfddem.features.heat_keys import Heat
+from cfddem.features.heat_keys import Heat, Temperature
 from closures.contact_heat import jump_distance
 
 ROUGH = ("microhardness", "slope", "surface_roughness")
@@ -23,7 +23,7 @@ ROUGH = ("microhardness", "slope", "surface_roughness")
 class WallHeat(Checked):
     """What a wall does to the particles that touch it."""
 
-    temperature: Positive | None = Field(None, description="temperature of the wall, above absolute zero [K]")
+    temperature: Temperature | None = Field(None, description="temperature of the wall [K]")
     power: float | None = Field(
         None, description="heat into the wall, which passes all of it on; flux times area, instead of a temperature [W]"
     )
@@ -109,7 +109,7 @@ class ContactHeat(FeatureTable):
     emissivity: dict[str, NonNegative] = Field(
         {}, description="emissivity of the particles by material, for radiation with the surroundings [-]"
     )
-    surroundings_temperature: Positive | None = Field(None, description="temperature of what particles see [K]")
+    surroundings_temperature: Temperature | None = Field(None, description="temperature of what particles see [K]")
     surroundings: Literal["uniform", "local"] = Field(
         "uniform",
         description="what particles see: that temperature, or, local, a mean of it and of the particles in the same "
@@ -194,6 +194,12 @@ class ContactHeat(FeatureTable):
         if self.radius == "overlap_circle" and any(each.contact_modulus for each in case.material.values()):
             reason = "contacts are softened by contact_modulus, and the circle of intersection grows with it"
             yield "warning", "contact_heat.radius", reason, 'take radius = "hertz", which uses youngs_modulus'
+
+    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Warn where a particle in a fluid has no single temperature."""
+        if heat := Heat.of(case):
+            others = {name: each for name, each in self.conductivity.items() if name not in heat.solid_conductivity}
+            yield from heat.issues_of_biot(case, bed, "contact_heat.conductivity", others)
 
     def by_material(self, case: Any, table: str, other: float = np.nan) -> np.ndarray:
         """Values of a table by number of material; `other` where none is given."""

@@ -106,26 +106,29 @@ class Spray:
         """Volume that has landed on particles [m3]."""
         return self.landed * self.drop_volume
 
-    def __call__(self, particles: Particles, time: float) -> None:
+    def __call__(self, particles: Particles, time: float) -> np.ndarray:
         """Release the drops that are due.
 
         particles  those of this rank, without ghosts
         time       now [s]
+        returns    row of the particle on which each drop landed on this rank (drops,)
         """
         sprayed = self.rate * max(min(time, self.end) - self.begin, 0.0)
         due = int(sprayed / self.drop_volume * (1.0 + 1e-12)) - self.released
         if due <= 0:
-            return
+            return np.zeros(0, np.int64)
         rows = np.flatnonzero(self.zone(particles.position))
         smallest, winner = np.full(due, math.inf), np.full(due, -1)
         draw(self.seed, self.released, particles.id[rows], particles.radius[rows], smallest, winner)
         first = np.asarray(self.communicator.smallest(smallest[None, :], axis=0))
         landed = np.isfinite(first)
         mine = landed & (smallest == first)
-        np.add.at(particles.liquid, rows[winner[mine]], self.drop_volume)
+        reached = rows[winner[mine]]
+        np.add.at(particles.liquid, reached, self.drop_volume)
         hits = int(np.count_nonzero(landed))  # local: the same on all ranks
         self.landed += hits
         self.missed += due - hits
+        return reached
 
     def checkpoint(self) -> dict[str, Any]:
         """Drops so far."""

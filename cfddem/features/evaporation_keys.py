@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.bed import NonNegative, Positive
 from cfddem.case.feature_table import FeatureTable
-from cfddem.features.heat_keys import Heat
+from cfddem.features.heat_keys import GROUP, Heat, transfer_number
 from cfddem.features.vapour_keys import VapourTable
 from closures.evaporation import (
     saturation_pressure,
@@ -24,8 +26,28 @@ from closures.heat_transfer import ranz_marshall
 SATURATED = 1.01
 """Relative humidity up to which air counts as saturated [-]."""
 
+NEARLY_ALL, HALF = 0.8, 0.5
+"""Share of the water that the air can carry above which a spray gets a note; share of the way to saturation above which
+a gas of one humidity gets a warning [-]."""
+
 COLDEST, HOTTEST = 253.0, 640.0
 """Temperatures of the gas between which the laws of water can be used [K]."""
+
+
+class Water(NamedTuple):
+    """Estimates of the water of a case; NaN where a number has no meaning.
+
+    Air that takes up water without other heat comes to the temperature of adiabatic saturation, close to the wet bulb.
+    It can carry what it holds there, less what it brings.
+    """
+
+    schmidt: float  # Schmidt number [-]
+    saturation: float  # temperature of air that has taken up all it can [K]
+    carried: float  # most water that the air can take up per time [kg/s]
+    reached: float  # share of it that the air takes up where all particles are wet [-]
+    sprayed: float  # water that the spray brings per time [kg/s]
+    at_start: float  # mass of the water at the start [kg]
+    rate: float  # at which all particles, wet, lose water [kg/s]
 
 
 class Evaporation(FeatureTable):
@@ -81,6 +103,18 @@ class Evaporation(FeatureTable):
             most = vapour_fraction(min(saturated, self.pressure), self.pressure)
             remedy = f"the mass fraction of saturation at {heat.gas_temperature:g} K is {most:.4g}"
             raise InputError(key, value, "at most saturated", remedy)
+        self._refuse_start(case)
+
+    def _refuse_start(self, case: Any) -> None:
+        """Refuse air that is above saturation at the start."""
+        heat, vapour = Heat.of(case), VapourTable.of(case)
+        if not heat or not vapour or not COLDEST <= heat.fluid_temperature <= HOTTEST:
+            return
+        saturated = min(saturation_pressure(heat.fluid_temperature), self.pressure)
+        if vapour_pressure(vapour.fluid_fraction, self.pressure) > SATURATED * saturated:
+            most = vapour_fraction(saturated, self.pressure)
+            remedy = f"the mass fraction of saturation at {heat.fluid_temperature:g} K is {most:.4g}"
+            raise InputError("vapour.fluid_fraction", vapour.fluid_fraction, "at most saturated", remedy)
 
     def _refuse_humidity(self, case: Any) -> None:
         """Refuse two humidities, or none; with `[vapour]` the humidity is that of the cells."""
@@ -127,3 +161,75 @@ class Evaporation(FeatureTable):
         """Tell the wet-bulb temperature."""
         reason = f"the wet-bulb temperature is {self.wet_bulb(case):.2f} K at {case.reference_speed:g} m/s"
         yield "note", "evaporation", reason, "wet particles come to it while they dry at a constant rate"
+
+    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+        """The wet bulb, the water that the air can carry, that of the spray, and the time of drying."""
+        heat, water, flow = Heat.of(case), self.water(case, bed), bed.inflow * case.fluid.density
+        assert heat
+        prandtl = case.fluid.viscosity * heat.fluid_heat_capacity / heat.conductivity
+        yield GROUP, "Le", water.schmidt / prandtl, "", "Lewis number of the vapour, Sc / Pr"
+        yield GROUP, "wet bulb", self.wet_bulb(case), "K", f"at {case.reference_speed:g} m/s"
+        if flow > 0.0:
+            yield GROUP, "water that the air can carry", water.carried, "kg/s", f"saturated at {water.saturation:.1f} K"
+            yield GROUP, "part of it when all is wet", water.reached, "", "by the surface of the particles"
+        if case.spray:
+            yield GROUP, "water sprayed", water.sprayed, "kg/s", ""
+        if case.spray and flow > 0.0:
+            yield GROUP, "water sprayed / carried", water.sprayed / water.carried, "", "above 1 the bed grows wet"
+        if water.at_start > 0.0 and water.rate > 0.0:
+            yield GROUP, "drying time", water.at_start / water.rate, "s", "of the liquid at the start, all wet"
+
+    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Check a spray against what the air can carry, and that the air notices what evaporates."""
+        water, vapour = self.water(case, bed), VapourTable.of(case)
+        sprayed, most = water.sprayed, water.carried
+        if bed.inflow > 0.0 and sprayed > NEARLY_ALL * most:
+            wet = sprayed > most
+            reason = f"{sprayed:.2g} kg/s of water; the air can carry {most:.2g} kg/s, saturated at "
+            reason += f"{water.saturation:.1f} K" + (": the bed grows wet" if wet else "")
+            less = f"spray below {NEARLY_ALL * most / self.liquid_density:.2g} m3/s"
+            remedy = f"{less}, or use more, hotter or drier air"
+            yield "warning" if wet else "note", "spray.rate", reason, remedy
+        if not vapour and bed.inflow > 0.0 and water.reached > HALF and not case.bed.positions:
+            reason = "the gas keeps its humidity, but wet particles would bring it "
+            reason += f"{100.0 * water.reached:.0f} % of the way to saturation"
+            yield "warning", "evaporation", reason, "add [vapour], so that the cells take what evaporates"
+
+    def water(self, case: Any, bed: Any) -> Water:
+        """Estimates of the water of a case."""
+        heat, fluid, flow = Heat.of(case), case.fluid, bed.inflow * case.fluid.density
+        assert heat
+        schmidt = fluid.viscosity / (fluid.density * self.diffusivity_in(case))
+        brought = vapour_fraction(self.partial_pressure(case), self.pressure)
+        saturation = wet_bulb_temperature(heat.gas_temperature, brought, self.pressure, 1.0 / heat.fluid_heat_capacity)
+        lengths = sum(case.counts[name] * math.pi * each.diameter for name, each in case.species.items())
+        surface = lengths * transfer_number(case, bed, schmidt) * fluid.viscosity / schmidt
+        carried = flow * self._drive(saturation, brought)
+        reached = -math.expm1(-surface / flow) if flow > 0.0 else math.nan
+        in_cells = flow > 0.0 and bool(VapourTable.of(case))
+        return Water(
+            schmidt=schmidt,
+            saturation=saturation,
+            carried=carried,
+            reached=reached,
+            sprayed=case.spray.rate * self.liquid_density if case.spray else 0.0,
+            at_start=self._at_start(case),
+            rate=carried * reached if in_cells else surface * self._drive(self.wet_bulb(case), brought),
+        )
+
+    def _drive(self, temperature: float, brought: float) -> float:
+        """Vapour that air takes up until it is saturated, over its mass [-]."""
+        held = vapour_fraction(min(saturation_pressure(temperature), 0.999 * self.pressure), self.pressure)
+        return (held - brought) / (1.0 - held)
+
+    def _at_start(self, case: Any) -> float:
+        """Mass of water at the start, in drops and films [kg]."""
+        total = 0.0
+        for name, each in case.species.items():
+            if case.material_name_of(each) in self.drops:
+                total += case.volumes[name] * case.material_of(each).density
+            elif case.liquid:
+                radius = np.array([0.5 * each.mean_power(3) ** (1.0 / 3.0)])
+                film = float(case.liquid.volume_on(radius)[0]) * case.liquid.share_of_wet_particles
+                total += case.counts[name] * film * self.liquid_density
+        return float(total)

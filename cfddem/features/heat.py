@@ -28,6 +28,7 @@ from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
+from cfddem.fluid.solver import FluidSolver
 
 RECEIVED = ("heat_from_fluid", "J")
 """Name and unit of the field with the heat that a particle received in the last step."""
@@ -42,6 +43,7 @@ class HeatExchange(CaseFeature):
     fluid_temperature  of all the fluid now, or its mean over the cells [K]
     given              heat given to the particles by the fluid [J]
     scale              heat exchanged, without sign [J]
+    sprayed            heat that drops of the spray have brought [J]
     other              change of the heat in the particles between exchanges: by feeds, outlets and a user [J]
     last               heat in the particles after the last exchange, from their state [J]
     around             temperature of the fluid around every particle in the last exchange (N,) [K]
@@ -68,8 +70,10 @@ class HeatExchange(CaseFeature):
             )  # fmt: skip
             self.cells = Scalar(fluid, kind, keys.sides_of(case))
             self.transfer = Transfer(kernel, "temperature", RECEIVED, self.capacity)
+            if keys.buoyancy != "none":
+                fluid.body_forces.append(lambda: self.buoyancy(fluid))
         self.start = self.stored(simulation.owned)
-        self.scale, self.other, self.last = 0.0, 0.0, self.start
+        self.scale, self.other, self.last, self.sprayed = 0.0, 0.0, self.start, 0.0
         self.around, self.response = np.full(simulation.owned.count, self.fluid_temperature), np.zeros(0)
 
     @classmethod
@@ -107,6 +111,7 @@ class HeatExchange(CaseFeature):
             Measured("K", "recorded", fluid_temperature),
             Measured("J", "recorded", heat_received),
             *(of_cells if keys is not None and keys.in_cells(case) else ()),
+            *([Measured("J", "recorded", heat_from_spray)] if keys and keys.spray_temperature else []),
             Measured("1", "imbalance", heat_imbalance),
             Measured("1", "recorded", heat_out_of_range_count),
         )
@@ -119,6 +124,23 @@ class HeatExchange(CaseFeature):
         """Heat in all particles, above the temperature of new ones [J]."""
         above = particles.temperature - self.keys.particle_temperature
         return float(self.communicator.sum(self.capacity(particles) * above))
+
+    def buoyancy(self, fluid: FluidSolver) -> np.ndarray:
+        """Weight that warm fluid lacks, per volume of the cell (nz, ny, nx, 3) [N/m3]."""
+        assert self.cells is not None
+        keys, above = self.keys, self.cells.value - self.keys.fluid_temperature
+        lighter = fluid.density * keys.expansion_coefficient * above * fluid.voidage * fluid.open_cells
+        return np.asarray(-lighter[..., None] * fluid.gravity)
+
+    def mix_in(self, particles: Any, volume: np.ndarray) -> None:
+        """Bring every particle to the common temperature of it and of the drops that land on it, volume (N,) [m3].
+
+        Films have no heat capacity of their own: from then on the liquid counts as having that of the particle.
+        """
+        capacity, brought = self.capacity(particles), volume * self.keys.spray_heat_capacity
+        common = brought / (capacity + brought) * ((self.keys.spray_temperature or 0.0) - particles.temperature)
+        particles.temperature += common
+        self.sprayed += float(self.communicator.sum(capacity * common))
 
     def conductance(self, terms: Any) -> np.ndarray:
         """Conductance between every particle and the fluid (N,) [W/K]."""
@@ -178,13 +200,13 @@ class HeatExchange(CaseFeature):
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         for name in _KEPT:
-            setattr(self, name, float(state[name]))
+            setattr(self, name, float(state.get(name, 0.0)))  # a checkpoint may be older than a sum
         self.law.outside = int(state["outside"]) if self.communicator.rank == 0 else 0
         if self.cells is not None:
             self.cells.restore(state["cells"])
 
 
-_KEPT = ("fluid_temperature", "given", "scale", "start", "other", "last")
+_KEPT = ("fluid_temperature", "given", "scale", "start", "other", "last", "sprayed")
 
 
 def _cells(simulation: Any) -> Scalar:
@@ -229,6 +251,11 @@ def heat_out(simulation: Any) -> float:
 def heat_from_walls(simulation: Any) -> float:
     """Heat that the fluid has received from walls."""
     return _cells(simulation).sums["walls"]
+
+
+def heat_from_spray(simulation: Any) -> float:
+    """Heat that drops of the spray have brought to the particles, negative where they are colder."""
+    return float(simulation.feature(HeatExchange).sprayed)
 
 
 def heat_stored(simulation: Any) -> float:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
@@ -15,12 +15,28 @@ from cfddem.case.feature_table import FeatureTable
 from cfddem.fluid.scalar_conditions import SOLID, ExchangeWall, FluxWall, HeldWall, ScalarSides, Wall
 from closures.heat_transfer import ranz_marshall
 
-Temperature = Annotated[float, Field(ge=0)]
+
+def _above_absolute_zero(value: float) -> float:
+    """Refuse a temperature in degrees below zero."""
+    if value < 0.0:
+        raise InputError("", value, "at least 0 K, absolute zero", "temperatures are in K: 0 degrees C are 273.15 K")
+    return value
+
+
+Temperature = Annotated[float, AfterValidator(_above_absolute_zero)]
+"""A temperature above absolute zero [K]."""
 
 CELL_KEYS = (
-    "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux",
+    "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux", "expansion",
 )  # fmt: skip
 """Keys that need a temperature in every cell."""
+
+GROUP = "heat and drying"
+"""Group of the numbers of the pre-run check."""
+
+BOUSSINESQ = 0.1
+"""Difference of density over the density up to which the approximation holds (Gray & Giorgini, Int. J. Heat Mass
+Transfer 19 (1976) 545-551) [-]."""
 
 LARGEST_BIOT = 0.1
 """Biot number up to which a sphere has one temperature [-]."""
@@ -36,8 +52,8 @@ class Heat(FeatureTable):
     table: ClassVar[str] = "heat"
     meaning: ClassVar[str] = "heat between particles of one temperature each and the fluid, cell by cell"
 
-    particle_temperature: float = Field(ge=0, description="temperature of new particles, above absolute zero [K]")
-    fluid_temperature: float = Field(ge=0, description="temperature of the fluid, at the start if it changes [K]")
+    particle_temperature: Temperature = Field(description="temperature of new particles [K]")
+    fluid_temperature: Temperature = Field(description="temperature of the fluid, at the start if it changes [K]")
     fluid: Literal["auto", "cells", "uniform"] = Field(
         "auto",
         description="temperature of the fluid: in all its cells, or a uniform one; auto: cells, but uniform without "
@@ -61,10 +77,30 @@ class Heat(FeatureTable):
     )
     wall_coefficient: dict[str, Positive] = Field(
         {},
-        description="coefficient between a wall of wall_temperature and the fluid in the cell beside it; default: "
-        "conduction from the wall to the centre of the cell [W/m2/K]",
+        description="coefficient between a wall_temperature and the fluid, see wall_coefficient_to; default: the "
+        "surface of the wall has this temperature [W/m2/K]",
+    )
+    wall_coefficient_to: Literal["surface", "cell"] = Field(
+        "surface",
+        description="where wall_coefficient ends: surface, of the wall, from where the fluid conducts to the centre "
+        "of its cell; or cell, a coefficient of heat transfer that has this resistance in it",
     )
     wall_flux: dict[str, float] = Field({}, description="heat flux from walls into the fluid, by name [W/m2]")
+    buoyancy: Literal["none", "boussinesq"] = Field(
+        "none",
+        description="weight of the fluid by its temperature: none, or boussinesq, in the weight alone and linear; for "
+        "differences of density of up to 10 %",
+    )
+    expansion: Positive | None = Field(
+        None, description="thermal expansion of the fluid, of boussinesq; default: 1/fluid_temperature, of a gas [1/K]"
+    )
+    spray_temperature: Temperature | None = Field(
+        None,
+        description="temperature of the drops of [spray] as they land; default: that of the particle they meet [K]",
+    )
+    spray_heat_capacity: Positive = Field(
+        4.17e6, description="heat capacity of the sprayed liquid per volume; default: water [J/m3/K]"
+    )
     effective_conductivity: Literal["none", "zehner_schluender"] = Field(
         "none", description="conductivity of the fluid between particles: none, voidage times conductivity; or the law"
     )
@@ -92,13 +128,35 @@ class Heat(FeatureTable):
                     f"heat.heat_capacity.{name}", None, "given: particles are of this material", "[J/kg/K]"
                 )
 
+        if self.spray_temperature and not case.spray:
+            remedy = "add the table [spray], or leave it out"
+            raise InputError("heat.spray_temperature", self.spray_temperature, "left out without [spray]", remedy)
         if self.in_cells(case):
             self._refuse_walls(case)
+            self._refuse_buoyancy(case)
         else:
+            if self.buoyancy != "none":
+                remedy = 'fluid = "cells"; leave fluid_total_capacity out'
+                raise InputError("heat.buoyancy", self.buoyancy, "none where the fluid has one temperature", remedy)
             for key in CELL_KEYS:
                 if getattr(self, key):
                     remedy = 'fluid = "cells"; leave fluid_total_capacity out'
                     raise InputError(f"heat.{key}", None, "left out where the fluid has one temperature", remedy)
+
+    def _refuse_buoyancy(self, case: Any) -> None:
+        """Refuse a weight by temperature that is unknown, and an expansion that nothing uses."""
+        if self.buoyancy == "none" and self.expansion:
+            raise InputError(
+                "heat.expansion", self.expansion, "left out without buoyancy", 'set buoyancy = "boussinesq"'
+            )
+        if self.buoyancy != "none" and not self.expansion and (case.in_liquid or not self.fluid_temperature):
+            remedy = "the default 1/fluid_temperature is that of a gas; water of 20 degrees C has 2.1e-4 [1/K]"
+            raise InputError("heat.expansion", None, 'given with buoyancy = "boussinesq"', remedy)
+
+    @property
+    def expansion_coefficient(self) -> float:
+        """Thermal expansion of the fluid [1/K]."""
+        return self.expansion or 1.0 / self.fluid_temperature
 
     def _refuse_walls(self, case: Any) -> None:
         """Refuse names that are no walls of the column, and walls with too much or too little."""
@@ -141,7 +199,7 @@ class Heat(FeatureTable):
     def sides_of(self, case: Any) -> ScalarSides:
         """Conditions of the temperature on the sides of the column."""
         round_wall = math.pi / 4.0 if case.column.shape == "cylinder" else 1.0
-        walls: dict[str, Wall] = {}
+        walls, to_cell = dict[str, Wall](), self.wall_coefficient_to == "cell"
         for name in (*self.wall_temperature, *self.wall_flux):
             named = [name]
             if name == AROUND:
@@ -152,7 +210,7 @@ class Heat(FeatureTable):
                 if name in self.wall_flux:
                     wall: Wall = FluxWall(self.wall_flux[name], area)
                 elif name in self.wall_coefficient:
-                    wall = ExchangeWall(self.wall_coefficient[name], self.wall_temperature[name], area)
+                    wall = ExchangeWall(self.wall_coefficient[name], self.wall_temperature[name], area, to_cell)
                 else:
                     wall = HeldWall(self.wall_temperature[name], area)
                 if name == AROUND:
@@ -161,24 +219,77 @@ class Heat(FeatureTable):
                     walls[each] = wall
         return ScalarSides(self.gas_temperature, self.outlet_temperature, walls)
 
+    def numbers(self, case: Any, bed: Any) -> Iterator[tuple[str, str, float, str, str]]:
+        """Numbers of the largest particles in the flow of the bed, and times of heating."""
+        fluid, largest = case.fluid, max(case.species.values(), key=lambda each: each.diameter)
+        reynolds, prandtl = reynolds_of(case, bed), fluid.viscosity * self.fluid_heat_capacity / self.conductivity
+        nusselt = self.nusselt(case, bed)
+        yield GROUP, "Pr", prandtl, "", "Prandtl number"
+        yield GROUP, "Pe", reynolds * prandtl, "", "Peclet number of a particle, Re Pr"
+        yield GROUP, "Nu", nusselt, "", f"Nusselt number at Re = {reynolds:.3g}"
+        biots = [nusselt * self.conductivity / (6.0 * each) for each in self.solid_conductivity.values()]
+        missing = "h d / (6 k); the limit is 0.1" if biots else "give heat.solid_conductivity"
+        yield GROUP, "Bi", max(biots, default=math.nan), "", f"Biot number: {missing}"
+        solid = case.material_of(largest).density * self.heat_capacity[case.material_name_of(largest)]
+        time = solid * largest.diameter**2 / (6.0 * nusselt * self.conductivity)
+        yield GROUP, "heating time of a particle", time, "s", "m c / (h A), of the largest species"
+        if bed.inflow > 0.0 and self.in_cells(case):
+            held = sum(
+                case.volumes[name] * case.material_of(each).density * self.heat_capacity[case.material_name_of(each)]
+                for name, each in case.species.items()
+            )
+            time = held / (bed.inflow * fluid.density * self.fluid_heat_capacity)
+            yield GROUP, "heating time of the bed", time, "s", "heat capacity over that of the inflow per time"
+
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Warn where the density differs too much for the approximation of Boussinesq."""
+        others = (self.gas_temperature, self.particle_temperature, *self.wall_temperature.values())
+        largest = max(abs(each - self.fluid_temperature) for each in others)
+        if self.buoyancy != "none" and self.expansion_coefficient * largest > BOUSSINESQ:
+            share = 100.0 * self.expansion_coefficient * largest
+            reason = f"temperatures differ by {largest:.3g} K and densities by {share:.2g} %; it holds up to 10 %"
+            remedy = "gas that is warmed does not expand here: take velocities at the temperature of the bed"
+            yield "warning", "heat.buoyancy", reason, remedy
+
+    def issues_of_bed(self, case: Any, bed: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where a particle has no single temperature."""
-        fluid = case.fluid
-        prandtl = fluid.viscosity * self.fluid_heat_capacity / self.conductivity
-        for species in case.species.values():
-            name = case.material_name_of(species)
-            if name in self.solid_conductivity and fluid.viscosity > 0.0:
-                reynolds = fluid.density * case.reference_speed * species.diameter / fluid.viscosity
-                nusselt = ranz_marshall(reynolds, prandtl)
-                biot = nusselt * self.conductivity / (6.0 * self.solid_conductivity[name])
-                if biot > LARGEST_BIOT:
-                    reason = f"the Biot number h d / (6 k) is {biot:.2g} at Re = {reynolds:.3g}; the limit is 0.1"
-                    remedy = "temperatures differ within a particle; use smaller particles, or take care"
-                    yield "warning", f"heat.solid_conductivity.{name}", reason, remedy
+        return self.issues_of_biot(case, bed, "heat.solid_conductivity", self.solid_conductivity)
+
+    def issues_of_biot(
+        self, case: Any, bed: Any, key: str, of_solid: Mapping[str, float]
+    ) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
+        """Warn where a particle has no single temperature, by the conductivities of a key."""
+        for name in sorted({case.material_name_of(each) for each in case.species.values()} & of_solid.keys()):
+            biot = self.nusselt(case, bed) * self.conductivity / (6.0 * of_solid[name])
+            if biot > LARGEST_BIOT:
+                reason = f"the Biot number h d / (6 k) is {biot:.2g} at Re = {reynolds_of(case, bed):.3g}"
+                remedy = "temperatures differ within a particle; use smaller particles, or take care"
+                yield "warning", f"{key}.{name}", f"{reason}; the limit is {LARGEST_BIOT:g}", remedy
+
+    def nusselt(self, case: Any, bed: Any) -> float:
+        """Nusselt number of the largest particles in the flow of the bed."""
+        return transfer_number(case, bed, case.fluid.viscosity * self.fluid_heat_capacity / self.conductivity)
 
     def capacities(self, case: Any) -> np.ndarray:
         """Specific heat capacity by number of material, NaN where none is given [J/kg/K]."""
         return np.array([self.heat_capacity.get(name, np.nan) for name in case.material])
+
+
+def reynolds_of(case: Any, bed: Any) -> float:
+    """Reynolds number of the largest particles, superficial; at the reference speed where nothing flows in."""
+    if bed.inlet > 0.0:
+        return float(bed.reynolds)
+    largest = max(each.diameter for each in case.species.values())
+    return float(case.fluid.density * case.reference_speed * largest / case.fluid.viscosity)
+
+
+def transfer_number(case: Any, bed: Any, prandtl: float) -> float:
+    """Nusselt number in the flow of the bed by the law of the case; Sherwood number for a Schmidt number."""
+    reynolds, voidage = reynolds_of(case, bed), min(max(bed.voidage, 0.1), 1.0)
+    if not (law := case.laws.heat_law):
+        return ranz_marshall(reynolds, prandtl, voidage)
+    values = {"reynolds": reynolds, "prandtl": prandtl, "voidage": voidage}
+    return float(law.function(**{name: values[name] for name in law.arguments}))
 
 
 def given_or(value: float | None, default: float) -> float:

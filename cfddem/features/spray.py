@@ -16,6 +16,8 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.drops import Spray, box, cone
+from cfddem.features.heat import HeatExchange
+from cfddem.features.heat_keys import Heat
 from cfddem.features.liquid import LiquidOnParticles
 from cfddem.particles.state import Particles
 
@@ -44,6 +46,8 @@ class SprayZone(CaseFeature):
         else:
             zone = box(first, second - first)
         end = math.inf if given.end is None else given.end
+        heat = Heat.of(case)
+        self.warms = bool(heat and heat.spray_temperature)
         self.spray = Spray(
             given.rate, given.drop_volume, zone, case.bed.seed, given.begin, end, communicator=simulation.communicator
         )
@@ -67,7 +71,10 @@ class SprayZone(CaseFeature):
     def after(self, simulation: Any) -> None:
         """Release the drops that are due, and note which particles are in the zone."""
         owned = simulation.owned
-        self.spray(owned, simulation.time)
+        reached = self.spray(owned, simulation.time)
+        if self.warms:
+            volume = self.spray.drop_volume * np.bincount(reached, minlength=owned.count)
+            simulation.feature(HeatExchange).mix_in(owned, volume)
         simulation.feature(LiquidOnParticles).brought = self.spray.volume
         note_visits(owned, self.spray.zone(owned.position), simulation.time)
 

@@ -244,9 +244,9 @@ class Scalar:
             self.leaving = self.kind.start - outflow / (left * self.kind.capacity)
 
     def _rate_of_walls(self) -> Array:
-        """Rate of each cell by the coefficients of its walls (nz, ny, nx) [1/s]."""
+        """Rate of each cell by coefficients of its walls, beyond conduction (nz, ny, nx) [1/s]."""
         rate, faces = np.zeros(self.grid.padded_shape), self._faces
-        coefficient = np.where(np.isinf(faces.rules[:, 1]), 0.0, faces.rules[:, 1]) * faces.rules[:, 4]
+        coefficient = np.where(faces.rules[:, 5] > 0.0, 0.0, faces.rules[:, 1]) * faces.rules[:, 4]
         np.add.at(rate.reshape(-1), faces.places[:, 2], coefficient * self.fluid.inverse_spacing[faces.places[:, 0]])
         return np.array(self.grid.inner(rate))
 

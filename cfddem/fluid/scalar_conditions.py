@@ -34,11 +34,15 @@ class FluxWall:
 
 @dataclass(frozen=True)
 class ExchangeWall:
-    """A wall with a coefficient between a value outside and the cell beside it: [W/m2/K] of heat, [kg/m2/s]."""
+    """A wall with a coefficient between a value outside and the fluid: [W/m2/K] of heat, [kg/m2/s] of a species.
+
+    to_cell  whether it is that to the centre of the cell; else to the surface, from where the fluid conducts
+    """
 
     coefficient: float
     value: float
     area: float = 1.0
+    to_cell: bool = False
 
 
 Wall = HeldWall | FluxWall | ExchangeWall

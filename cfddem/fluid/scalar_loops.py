@@ -86,17 +86,18 @@ def through_sides(value, flux, diffusivity, places, rules, inverse, through):
     """Set what is carried through the faces of sides and solid cells.
 
     places   (m, 4) axis, flat index of the face, of its cell, and +1 where the way into the cell is along the axis
-    rules    (m, 5) value that an inflow brings, NaN for that of the cell; coefficient [m/s], infinite for a given value
-             on the face; value outside; given flux; share of the area
+    rules    (m, 6) value that an inflow brings, NaN for that of the cell; coefficient [m/s], infinite for a given value
+             on the face; value outside; given flux; share of the area; 1 where it is in series with the half cell
     through  (3, size), per area along the axis
     """
     for n in range(len(places)):
         axis, face, cell, inward = places[n]
-        brought, coefficient, outside, given, share = rules[n]
+        brought, coefficient, outside, given, share, in_series = rules[n]
         own, f = value[cell], flux[axis, face]
         enters = f * inward > 0.0 and not math.isnan(brought)
-        if math.isinf(coefficient):
-            coefficient = 2.0 * diffusivity[cell] * inverse[axis]
+        if in_series != 0.0:
+            half = 2.0 * diffusivity[cell] * inverse[axis]
+            coefficient = half if math.isinf(coefficient) else coefficient * half / (coefficient + half)
         through[axis, face] = f * (brought if enters else own)
         if coefficient != 0.0 or given != 0.0:
             through[axis, face] += inward * share * (coefficient * (outside - own) + given)

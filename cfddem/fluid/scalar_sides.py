@@ -16,7 +16,7 @@ class SideFaces(NamedTuple):
     """Faces of sides and solid cells; see `cfddem.fluid.scalar_loops.through_sides`."""
 
     places: np.ndarray  # (m, 4)
-    rules: Array  # (m, 5)
+    rules: Array  # (m, 6)
     area: Array  # (m,) [m2]
     wall: np.ndarray  # (m,) whether it is a wall
 
@@ -28,7 +28,7 @@ class SideFaces(NamedTuple):
         is_open: Any = boundaries.halo.padded(grid.open, outside=0.0) > 0.0
         solid: Any = boundaries.halo.padded(~grid.open, outside=0.0) > 0.0
         flat: Any = np.arange(is_open.size).reshape(shape)
-        places, rules, wall = [np.zeros((0, 4), np.int64)], [np.zeros((0, 5))], [np.zeros(0, bool)]
+        places, rules, wall = [np.zeros((0, 4), np.int64)], [np.zeros((0, 6))], [np.zeros(0, bool)]
 
         def add(axis: int, high: bool, cells: np.ndarray, rule: np.ndarray, is_wall: np.ndarray) -> None:
             face = cells + steps[axis] * high
@@ -42,10 +42,10 @@ class SideFaces(NamedTuple):
             own = side.layer(grid.inner(is_open), -1 if side.high else 0)
             cells = np.moveaxis(flat, 2 - side.axis, 0)[layer][LOW : LOW + own.shape[0], LOW : LOW + own.shape[1]]
             inlet, outlet = np.isin(side.owner, side.inlets), side.outlet[LOW:, LOW:][: own.shape[0], : own.shape[1]]
-            rule = np.zeros((*own.shape, 5))
+            rule = np.zeros((*own.shape, 6))
             rule[:] = _rule(sides.walls.get(side.name, FluxWall()), capacity)
-            rule[inlet] = sides.inflow, 0.0, 0.0, 0.0, 1.0
-            rule[outlet] = math.nan if sides.backflow is None else sides.backflow, 0.0, 0.0, 0.0, 1.0
+            rule[inlet] = sides.inflow, 0.0, 0.0, 0.0, 1.0, 0.0
+            rule[outlet] = math.nan if sides.backflow is None else sides.backflow, 0.0, 0.0, 0.0, 1.0, 0.0
             add(side.axis, side.high, cells[own], rule[own], ~(inlet | outlet)[own])
         if sides.walls.get(SOLID) is not None and grid.whole.solid is not None:
             rule = _rule(sides.walls[SOLID], capacity)
@@ -62,7 +62,8 @@ class SideFaces(NamedTuple):
 def _rule(wall: Wall, capacity: float) -> np.ndarray:
     """Numbers of a wall, see `SideFaces.rules`."""
     if isinstance(wall, HeldWall):
-        return np.array([math.nan, math.inf, wall.value, 0.0, wall.area])
+        return np.array([math.nan, math.inf, wall.value, 0.0, wall.area, 1.0])
     if isinstance(wall, FluxWall):
-        return np.array([math.nan, 0.0, 0.0, wall.flux / capacity, wall.area])
-    return np.array([math.nan, wall.coefficient / capacity, wall.value, 0.0, wall.area])
+        return np.array([math.nan, 0.0, 0.0, wall.flux / capacity, wall.area, 0.0])
+    in_series = float(not wall.to_cell)
+    return np.array([math.nan, wall.coefficient / capacity, wall.value, 0.0, wall.area, in_series])

@@ -78,7 +78,7 @@ class FluidSolver:
     Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
     area of a face normal to x, y, z [m2]; `open_cells` (nz, ny, nx), 1 where a cell is open, 0 where it is solid;
     `time`, `last_step`, length of the step just made [s]; `followers`, called before the voidage changes without a
-    flow, by (nz, ny, nx). Methods return plain arrays in the index order of `cfddem.fluid.grid`.
+    flow, by (nz, ny, nx); `body_forces`, more sources. Methods return plain arrays in the order of `cfddem.fluid.grid`.
     """
 
     def __init__(
@@ -112,6 +112,7 @@ class FluidSolver:
         self.tolerance, self.passes = float(tolerance), int(passes)
         self.time, self.last_step = 0.0, 0.0
         self.followers: list[Callable[[Array], None]] = []
+        self.body_forces: list[Callable[[], Array]] = []
         self.fields, self.faces = CellFields(grid, FLUID_FIELDS), sides.faces()
         self.model_b, self._central = float(model == "B"), float(convection == "central")
         self.inverse_spacing = 1.0 / np.array(grid.spacing)
@@ -188,20 +189,19 @@ class FluidSolver:
     def _take_exchange(self, coefficient: Array | None, momentum: Array | None, source: Array | None) -> None:
         """Check and copy what the particles do to the fluid in this step."""
         fields, shape = self.fields, self.grid.shape
+        for force in self.body_forces:
+            source = force() if source is None else source + force()
         if coefficient is None:
             fields.drag.fill(0.0)
         else:
             given = checked_field("drag_coefficient", coefficient, shape, self.communicator, negative=False)
             self._set_cells(fields.drag, given)
-        for name, field, target in (
-            ("drag_momentum", momentum, fields.drag_momentum),
-            ("source", source, fields.source),
-        ):
+        for name, field in (("drag_momentum", momentum), ("source", source)):
             if field is None:
-                target.fill(0.0)
+                getattr(fields, name).fill(0.0)
             else:
                 given = checked_field(name, field, (*shape, 3), self.communicator)
-                self._set_cells(target, np.moveaxis(given, -1, 0))
+                self._set_cells(getattr(fields, name), np.moveaxis(given, -1, 0))
 
     def _set_cells(self, padded: Array, cells: Array) -> None:
         """Write the cells of a padded field, and fill its ghosts."""

@@ -19,8 +19,20 @@ AGGLOMERATE = "agglomerate"
 COLLISIONS = "collisions"
 """Number of recorded collisions of each particle that ended since the previous snapshot."""
 
+TEMPERATURE = "temperature"
+"""Its colours lie between the lowest and the highest one."""
+
+MOISTURE = "moisture"
+"""Liquid of each particle, with its part of the liquid of its bridges, over the volume of the particle."""
+
+LIQUIDS = ("liquid_carried", "liquid")
+"""Fields from which the moisture follows, the best first."""
+
 SINGLE = 0.04
 """Part of the colours that is for single particles."""
+
+_MAPS = {TEMPERATURE: ("inferno", 0.18, 0.92), MOISTURE: ("YlGnBu", 0.08, 1.0), "vapour": ("YlGnBu", 0.0, 0.9)}
+"""Colour map of quantities of spheres and cells, and which part of it; of others viridis."""
 
 _PLACES = ("id", "position")
 
@@ -29,7 +41,8 @@ def choices(run: RunData) -> list[str]:
     """Quantities of a run that can colour its spheres, the most useful first."""
     known = set(run.particle_fields)
     found = [SPEED] if "velocity" in known else []
-    found += [name for name in ("liquid", AGGLOMERATE) if name in known]
+    found += [name for name in ("liquid", AGGLOMERATE, TEMPERATURE) if name in known]
+    found += [MOISTURE] if known & set(LIQUIDS) else []
     found += [COLLISIONS] if run.collisions_of(-1) else []
     return found + sorted(known - {"velocity", *_PLACES, *found})
 
@@ -37,7 +50,7 @@ def choices(run: RunData) -> list[str]:
 def values(run: RunData, snapshot: int, colour: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """The particles of a snapshot, and the value of each one's colour.
 
-    colour  speed, collisions, or a recorded field; of a vector its magnitude
+    colour  speed, collisions, moisture, or a recorded field; of a vector its magnitude
     errors  InputError for an unknown field
     """
     particles = run.particles(snapshot)
@@ -46,6 +59,8 @@ def values(run: RunData, snapshot: int, colour: str) -> tuple[dict[str, np.ndarr
     name = "velocity" if colour == SPEED else colour
     if name == COLLISIONS and name not in particles and (recorded := run.collisions_of(snapshot)):
         return particles, _collision_counts(particles["id"], recorded)
+    if name == MOISTURE and name not in particles and (liquid := next((n for n in LIQUIDS if n in particles), "")):
+        return particles, particles[liquid] / (4.0 / 3.0 * np.pi * particles["radius"] ** 3)
     if name not in particles:
         remedy = "run.record_collisions = true records the collisions" if name == COLLISIONS else ""
         raise InputError("colour", colour, nearest(colour, [SPEED, *sorted(particles)]), remedy)
@@ -60,6 +75,9 @@ def limits(found: np.ndarray, colour: str) -> tuple[float, float]:
     if colour == AGGLOMERATE:
         return 0.0, 1.0
     high = float(np.quantile(found, 0.998)) if found.size else 1.0
+    if colour == TEMPERATURE and found.size:
+        low = float(np.quantile(found, 0.002))
+        return low, high if high - low > 1e-3 else low + 1.0
     low = 0.0 if found.size == 0 or found.min() >= 0.0 else float(found.min())
     return low, high if high > low else low + 1.0
 
@@ -70,13 +88,18 @@ def label(run: RunData, colour: str) -> str:
         return "agglomerate; grey: single spheres"
     if colour == COLLISIONS and colour not in run.particle_fields:
         return "collisions since previous snapshot  [-]"
+    if colour == MOISTURE and colour not in run.particle_fields:
+        return "moisture, liquid over solid volume  [-]"
     name = "velocity" if colour == SPEED else colour
     return f"{colour.replace('_', ' ')}  [{shown_unit(run.quantities['particles'][name].unit)}]"
 
 
 def colour_map(colour: str) -> Any:
     """Colour map of the spheres."""
-    return _many_colours() if colour == AGGLOMERATE else part_of("viridis", 0.12, 1.0)
+    if colour == AGGLOMERATE:
+        return _many_colours()
+    name, begin, end = _MAPS.get(colour, ("viridis", 0.12, 1.0))
+    return part_of(name, begin, end)
 
 
 def scattered(names: np.ndarray) -> np.ndarray:

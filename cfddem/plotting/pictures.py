@@ -42,8 +42,8 @@ def picture(
     folder    of a run
     output    PNG; NAME.png in the current folder if not given
     snapshot  0 the first, -1 the last
-    show      panels: spheres, voidage, bubbles, streamlines
-    colour    of the spheres: speed, or a recorded field; of a vector its magnitude
+    show      panels: spheres, voidage, bubbles, streamlines, temperature and vapour of the fluid
+    colour    of the spheres: speed, moisture, or a recorded field; of a vector its magnitude
     cut       leave out the spheres in front of the middle plane; None does so in deep beds
     returns   the file
     errors    RunFailed with the remedy if this machine cannot render
@@ -132,7 +132,13 @@ SHARP = 200
 SOLID = "#9a9a9a"
 """Colour of solid cells."""
 
-PANELS = ("spheres", "voidage", "bubbles", "streamlines")
+SCALARS = {"temperature": "temperature of the fluid  [K]", "vapour": "mass fraction of vapour  [-]"}
+"""Panels of a field of the fluid, and the labels of their colours."""
+
+PANELS = ("spheres", "voidage", "bubbles", "streamlines", *SCALARS)
+
+BESIDE = {"temperature": "temperature", "moisture": "vapour"}
+"""Field of the fluid that is drawn beside spheres of a colour."""
 
 _WIDTH, _HEIGHT, _NARROWEST = 8.0, 6.0, 0.9  # of the page, of a panel, of a panel [inch]
 _BESIDE, _AROUND, _TITLE = 1.86, 1.12, 0.42  # labels and colour bar; labels and panel title; title of the page [inch]
@@ -162,10 +168,14 @@ class Stage:
         errors     InputError for an unknown panel or field; RunFailed if this machine cannot render
         """
         recorded = {"spheres": run.particle_fields, "voidage": "voidage" in run.fluid_fields}
+        recorded |= {each: each in run.fluid_fields for each in [BESIDE.get(colour, "")]}
         panels = tuple(show) or tuple(name for name, there in recorded.items() if there)
         for name in panels:
             if name not in PANELS:
                 raise InputError("show", name, nearest(name, PANELS))
+            if name in SCALARS and name not in run.fluid_fields:
+                fields = ", ".join(run.fluid_fields)
+                raise InputError("show", name, f"a recorded field of the fluid; this run has {fields or 'none'}")
         if "spheres" in panels or "bubbles" in panels:
             rendering.require_rendering()
         bounds = with_walls(bounds_of(run, snapshots), run) if run.grid is None else bounds_of(run, snapshots)
@@ -181,6 +191,10 @@ class Stage:
         if "voidage" in panels:
             lowest = min(float(run.fluid("voidage", each).min()) for each in snapshots)
             limits["voidage"] = (min(np.floor(20.0 * lowest) / 20.0, 0.95), 1.0)
+        for name in set(panels) & set(SCALARS):
+            found = np.concatenate([run.fluid(name, each).ravel() for each in snapshots])
+            low, high = float(np.nanmin(found)), float(np.nanmax(found))
+            limits[name] = (low, high if high > low else low + 1.0)
         if "streamlines" in panels:
             fastest = max(float(colours.magnitude(run.fluid("velocity", each)).max()) for each in snapshots)
             limits["streamlines"] = (0.0, fastest or 1.0)
@@ -203,7 +217,10 @@ class Stage:
         page = columns * max(width + _BESIDE, 3.4), rows * (width * tall + _AROUND) + _TITLE
         figure, axes = blank(rows, columns, width=page[0], height=page[1], layout="compressed")
         for name, panel in zip(self.panels, axes):
-            getattr(self, f"_{name}")(panel, snapshot, (round(width * SHARP), round(width * tall * SHARP)))
+            if name in SCALARS:
+                self._scalar(panel, snapshot, name)
+            else:
+                getattr(self, f"_{name}")(panel, snapshot, (round(width * SHARP), round(width * tall * SHARP)))
             self._finish(panel, width, tall)
         for unused in axes[len(self.panels) :]:
             unused.remove()
@@ -268,6 +285,11 @@ class Stage:
             across, up = velocity[..., 1 - self.depth], velocity[..., 2]
             axes.streamplot(*self._centres, across, up, color=BLUE, linewidth=0.7, arrowsize=0.7, density=1.1)
         axes.set_title(f"fluid\nat {where}", loc="left")
+
+    def _scalar(self, axes: Axes, snapshot: int, name: str) -> None:
+        values, where = self._slice(self.run.fluid(name, snapshot))
+        self._cells(axes, values, colours.colour_map(name), self.limits[name], SCALARS[name])
+        axes.set_title(f"{name}\nat {where}", loc="left")
 
     def _cells(self, axes: Axes, values: np.ndarray, shades: Any, limits: tuple[float, float], label: str) -> None:
         """Draw a slice of cells with its colour bar."""

@@ -35,7 +35,7 @@ from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData, open_run
-from cfddem.plotting import rendering
+from cfddem.plotting import colours, rendering
 from cfddem.plotting.case_drawing import case_drawing
 from cfddem.plotting.curves import (
     BLUE,
@@ -220,8 +220,9 @@ def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, s
     height = means.get("bed_height")
     if compared := compared_with_measured(run, case, begin):
         yield "measured", measured_figure(compared), "Measured points with their standard errors, and the run."
-    if (picture := _picture(run)) is not None:
-        yield "bed", picture, f"The last snapshot, at {run.times[-1]:.4g} s."
+    for name, colour, about in _pictures(run):
+        if (picture := _picture(run, colour)) is not None:
+            yield name, picture, f"The last snapshot, at {run.times[-1]:.4g} s{about}."
     yield "series", _series(run, case, begin, end), "Grey: averaging window. Orange: means."
     if (found := _profiles(run, case, begin)) is not None:
         caption = f"Means over {found.snapshots} snapshots; shaded: standard deviation of the voidage in time; dashed: "
@@ -257,18 +258,28 @@ def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, s
     yield "case", case_drawing(case, height), "The case before it runs, seen along y; dashed: bed height of the run."
 
 
-def _picture(run: RunData) -> Any:
-    """Spheres and voidage of the last snapshot; None if there is nothing to draw, or this machine cannot render."""
+def _pictures(run: RunData) -> Iterator[tuple[str, str, str]]:
+    """Name, colour of the spheres, and end of the caption of every picture of a run."""
+    yield "bed", colours.SPEED, ""
+    if colours.TEMPERATURE in run.particle_fields:
+        yield "temperature", colours.TEMPERATURE, ", by temperature"
+        if "vapour" in run.fluid_fields and colours.MOISTURE in colours.choices(run):
+            yield "moisture", colours.MOISTURE, ", by moisture"
+
+
+def _picture(run: RunData, colour: str) -> Any:
+    """Spheres and cells of the last snapshot; None if there is nothing to draw, or this machine cannot render."""
     if not len(run.times) or rendering.why_not() is not None:
         return None
     try:
-        return Stage.of(run, [-1], (), "speed", None).figure(-1)
+        return Stage.of(run, [-1], (), colour, None).figure(-1)
     except CfddemError:
         return None
 
 
 def _series(run: RunData, case: Case, begin: float, end: float) -> Any:
-    """Bed height, pressure drop over the buoyant weight, and granular temperature in time, with their means."""
+    """Bed height, pressure drop over the buoyant weight, granular temperature, and temperatures in time, with their
+    means."""
     history, weight = run.history, weight_over_floor(case)
     curves = [("bed height\n[m]", history["bed_height"])]
     if "pressure_drop" in history:
@@ -276,6 +287,13 @@ def _series(run: RunData, case: Case, begin: float, end: float) -> Any:
         curves.append((named, history["pressure_drop"] / (weight or 1.0)))
     if "granular_temperature" in history:
         curves.append(("granular\ntemperature  [m2/s2]", history["granular_temperature"]))
+    for column, named in (
+        ("mean_temperature", "temperature of\nparticles  [K]"),
+        ("outlet_temperature", "temperature at\nthe outlet  [K]"),
+        ("outlet_vapour", "vapour at\nthe outlet  [-]"),
+    ):  # fmt: skip
+        if column in history:
+            curves.append((named, history[column]))
     inside = history["time"] >= begin
     curves = [each for each in curves if np.isfinite(each[1][inside]).any()]
     figure, axes = blank(len(curves), 1, width=8.0, height=0.6 + 1.8 * len(curves), sharex=True)

@@ -153,7 +153,7 @@ class Scene:
         unit = self.run.quantities["fluid"]["velocity" if look.layer == "speed" else look.layer].unit
         label = f"{look.layer}{'' if look.layer == 'voidage' else ' of the fluid'}  [{shown_unit(unit)}]"
         self.plotter.add_mesh(
-            plane, scalars="values", cmap=_SHADES.get(look.layer) or colours.part_of("YlGnBu", 0.0, 0.9),
+            plane, scalars="values", cmap=_shades_of(look.layer),
             clim=self._limits_of(FLUID, look.layer), name="drawn", lighting=False, render=False,
             nan_color=SOLID, **self._bar(FLUID, label),
         )  # fmt: skip
@@ -201,6 +201,13 @@ class Scene:
                 "position_x": 0.84, "position_y": 0.25, "width": 0.1, "height": 0.5, "fmt": "%.3g",
             }
         }  # fmt: skip
+
+
+def _shades_of(layer: str) -> Any:
+    """Colour map of a layer of cells."""
+    if layer == colours.TEMPERATURE:
+        return colours.colour_map(layer)
+    return _SHADES.get(layer) or colours.part_of("YlGnBu", 0.0, 0.9)
 
 
 def _limits_of_fluid(values: np.ndarray, name: str) -> tuple[float, float]:

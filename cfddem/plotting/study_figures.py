@@ -94,12 +94,16 @@ def _draw_measured(panel: Any, measured: Sequence[Points]) -> None:
         legend(panel)
 
 
+LAW_STYLES: tuple[Any, ...] = ("--", ":", "-.", (0, (1, 3)), (0, (8, 2)), (0, (8, 2, 1, 2)))
+"""Dashes of the curves of published laws."""
+
+
 def _draw_laws(panel: Any, x: Sequence[Any], points: Sequence[Point]) -> None:
     """Draw the voidages by published laws that all points have."""
     laws = [name for name in points[0].measures if name.startswith("voidage by ")]
-    for name, style in zip(laws, ("--", ":", "-.")):
+    for name, style in zip(laws, LAW_STYLES):
         if all(name in each.measures for each in points):
-            panel.plot(x, [each.measures[name][0] for each in points], style, color="0.4", label=name[11:])
+            panel.plot(x, [each.measures[name][0] for each in points], ls=style, color="0.4", label=name[11:])
     if laws:
         legend(panel)
 

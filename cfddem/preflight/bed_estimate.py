@@ -34,6 +34,7 @@ class BedEstimate:
     pressure_drop: float  # [Pa]
     drag_factor: float  # F at this voidage
     poured_height: float  # of the bed at rest [m]
+    inflow: float  # volume of fluid that enters per time [m3/s]
 
 
 def estimate_bed(case: Case) -> BedEstimate:
@@ -64,11 +65,15 @@ def _estimate(case: Case, floor: float, vessel: Vessel | None) -> BedEstimate:
     gravity, fluid = math.hypot(*case.laws.gravity), case.fluid
     if fluid is None:
         weight = solids * density * gravity / floor
-        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, nan, packed, poured, nan, nan, poured)
+        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, nan, packed, poured, nan, nan, poured, 0.0)
     weight = solids * abs(density - fluid.density) * gravity / floor
-    inlet = mean_inlet_velocity(case) * (1.0 if vessel is None else vessel.floor / floor)
+    opening = floor if vessel is None else vessel.floor
+    inflow = mean_inlet_velocity(case) * opening
+    inlet = inflow / floor
     if fluid.viscosity == 0.0:
-        return BedEstimate(count, solids, weight, nan, inlet, nan, nan, nan, nan, packed, poured, nan, nan, poured)
+        return BedEstimate(
+            count, solids, weight, nan, inlet, nan, nan, nan, nan, packed, poured, nan, nan, poured, inflow
+        )
     number = abs(numbers.archimedes(diameter, density, fluid.density, fluid.viscosity, gravity))
     scale = fluid.viscosity / (fluid.density * diameter)
     drag = bed_drag(case)
@@ -95,7 +100,7 @@ def _estimate(case: Case, floor: float, vessel: Vessel | None) -> BedEstimate:
     factor = drag(reynolds, voidage) if fits else nan
     return BedEstimate(
         count, solids, weight, number, inlet, reynolds, onset, terminal, _terminal_by_law(case, gravity),
-        voidage, height, drop, factor, poured,
+        voidage, height, drop, factor, poured, inflow,
     )  # fmt: skip
 
 

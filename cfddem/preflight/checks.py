@@ -11,6 +11,7 @@ from cfddem.preflight.bed_waves import check_waves
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.cost_estimate import CostEstimate, available_memory, estimate_cost
 from cfddem.preflight.data_checks import check_data
+from cfddem.preflight.expansion import check_expansion
 from cfddem.preflight.flow_checks import check_cells, check_drag, check_flow, check_kernel, check_wall_drag
 from cfddem.preflight.geometry_checks import bed_key, check_bed_size, check_particle_size, check_positions
 from cfddem.preflight.issue import ORDER, Issue, Severity, percent, plain, rounded_up
@@ -72,10 +73,12 @@ def find_issues(
         *check_stiffness(case, bed, collision, cost),
         *check_data(case),
         *(Issue(*each) for table in case.feature_tables for each in table.issues(case)),
+        *(Issue(*each) for table in case.feature_tables for each in table.issues_of_bed(case, bed)),
     ]
     if case.fluid is not None:
         found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
         found += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
+        found += check_expansion(case, bed)
     found.sort(key=lambda each: ORDER.index(each.severity))
     return [*check_length(case, refused=any(each.severity == "error" for each in found)), *found]
 

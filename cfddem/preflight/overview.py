@@ -54,6 +54,7 @@ def overview(
         *_species(case, bed),
         *_collisions_and_film(case, collision, steps.particle),
         *_bridges(wet),
+        *(Row(*each) for table in case.feature_tables for each in table.numbers(case, bed)),
         *_equipment(case, bed),
         *_time_scales(case, bed, steps),
         *_expected(case, bed),

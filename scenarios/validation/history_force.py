@@ -154,8 +154,58 @@ def rebounding(steps: int = 3000) -> Motion:
     times = np.linspace(path.time[0], path.time[-1], steps + 1)
     slips = np.zeros((steps + 1, 3))
     slips[:, 0] = -np.interp(times, path.time, path.history["velocity"][:, 0, 0])
-    diameter = 2.0 * bouncing_sphere.RADIUS
-    return Motion(slips, float(times[1]), diameter, bouncing_sphere.FLUID_DENSITY, bouncing_sphere.VISCOSITY)
+    fall = bouncing_sphere.SLOW
+    return Motion(slips, float(times[1]), 2.0 * fall.radius, fall.fluid_density, fall.viscosity)
+
+
+class Impulse(NamedTuple):
+    """Impulse of the history force in a time around an impact, over that of the sphere as it falls."""
+
+    begin: float  # after contact [s]
+    end: float
+    package: float
+    quadrature: float
+
+
+AROUND = (-1e-3, -2e-5, 2e-5, 1e-4, 5e-4)
+"""Times after contact between which impulses are compared: before, during and after the contact [s]."""
+
+
+def around_impact() -> list[Impulse]:
+    """Impulses of the history force around the impact at St = 152, by the package and by quadrature."""
+    fall = bouncing_sphere.FAST
+    path = bouncing_sphere.collision(AROUND[-1], ("drag", "added_mass", "history"), fall)
+    times, slips = path.time, -path.history["velocity"][:, 0, 0]
+    forces = (path.history["force_history"][1:, 0], in_elapsed_time(times, slips, fall))
+    after, lasting = times[1:] - bouncing_sphere.contact_time(path), np.diff(times)
+    scale = fall.steel().density * 4.0 / 3.0 * math.pi * fall.radius**3 * fall.speed
+    return [
+        Impulse(begin, end, *((each * lasting)[(after > begin) & (after <= end)].sum() / scale for each in forces))
+        for begin, end in pairwise(AROUND)
+    ]
+
+
+def in_elapsed_time(times: Array, slips: Array, fall: bouncing_sphere.Fall) -> Array:
+    r"""Mean history force of every step by quadrature, with time counted as the package counts it (n,) [N].
+
+    .. math:: F = 3\pi\eta d\,A(t)\int g\Bigl(\int_\tau^t\frac{ds}{t_c}\Bigr)\,dw(\tau)
+
+    times  ends of steps of any length (n + 1,) [s]
+    slips  along one direction at these times, linear between them (n + 1,) [m/s]
+    """
+    diameter, lasting, change = 2.0 * fall.radius, np.diff(times), np.diff(slips)
+    scale = np.array([decay_time(max(abs(slip), 1e-9), diameter, fall.kinematic_viscosity) for slip in slips[:-1]])
+    elapsed = np.append(0.0, np.cumsum(lasting / scale))
+    places, weights = np.polynomial.legendre.leggauss(12)
+    forces = np.zeros(len(change))
+    for n, (begin, end) in enumerate(pairwise(elapsed)):
+        for place, weight in zip(0.5 * (places + 1.0), 0.5 * weights):
+            # the square of a place has most points where the step itself begins to act
+            own = _integral((end - begin) * place**2) * 2.0 * place * change[n] / (end - begin)
+            memory = _integral(begin + (end - begin) * place - elapsed[: n + 1])
+            forces[n] += weight * (own - (np.diff(memory) / np.diff(elapsed[: n + 1])) @ change[:n])
+    amplitude = np.array([basset(each, 0.0, diameter, fall.kinematic_viscosity) for each in scale])
+    return 3.0 * math.pi * fall.viscosity * diameter * amplitude * forces
 
 
 def oscillating(frequency: float, amplitude: float = 0.8, steps: int = 3000) -> Motion:

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.bed_laws import buoyant_weight, expansion_exponents, expansion_laws
+from cfddem.analysis.bed_laws import buoyant_weight, expansion_laws
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.expansion import expansion_exponents
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
 

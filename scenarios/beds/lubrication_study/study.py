@@ -16,13 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.analysis.bed_laws import expansion_exponents
 from cfddem.analysis.measures import profile
 from cfddem.analysis.regimes import regime_map
 from cfddem.analysis.report import window_of
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run
+from cfddem.preflight.expansion import expansion_exponents
 from scenarios.validation.kept_runs import finished
 from scenarios.validation.table import Progress
 

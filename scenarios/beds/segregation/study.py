@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.analysis.bed_laws import expansion_exponents
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
 from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.expansion import expansion_exponents
 from cfddem.preflight.mixture import net_downward_forces
 from cfddem.run.history import MEAN_HEIGHT
 from closures.balance import inversion_velocity

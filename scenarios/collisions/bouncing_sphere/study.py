@@ -1,4 +1,4 @@
-"""A steel sphere falls onto a wall in silicone oil and bounces: the measured trajectory at St = 27.
+"""A steel sphere falls onto a wall in silicone oil and bounces: the measured motions at St = 27 and St = 152.
 
 What you'll learn: how to follow a collision with a wall in a fluid at rest, beyond the film.
 
@@ -13,6 +13,7 @@ and the fluid around it: drag, added mass, history force, and the extra drag bes
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,55 +21,104 @@ from cfddem.case.materials import Material
 from closures.added_mass import near_wall
 from scenarios.collisions.immersed_pair.study import Collision, collide
 
-RADIUS, SPEED = 3e-3, 0.518
-FLUID_DENSITY, DENSITY_RATIO, KINEMATIC_VISCOSITY = 965.0, 8.083, 1.036e-4
-VISCOSITY = FLUID_DENSITY * KINEMATIC_VISCOSITY
-STEEL = Material(
-    density=DENSITY_RATIO * FLUID_DENSITY, youngs_modulus=190e9, poisson=0.27, restitution=0.97, friction=0.11,
-    roughness=1e-4 * RADIUS,
-)  # fmt: skip
 GRAVITY = 9.81
-APPROACH = 0.0115
-"""Time from the edge of the film to contact, at most [s]."""
 
 ALL = ("drag", "added_mass", "history", "wall_drag")
 """Forces of the fluid around the sphere."""
 
+ROUGHNESS = 1e-4
+"""Height of the asperities of the spheres over their radius, as later work quotes it."""
 
-def collision(until: float = 0.045, surroundings: Sequence[str] = ALL) -> Collision:
+
+class Fall(NamedTuple):
+    """A sphere of steel that falls in oil."""
+
+    radius: float  # [m]
+    speed: float  # of the fall [m/s]
+    fluid_density: float  # [kg/m3]
+    density_ratio: float  # of sphere and oil
+    kinematic_viscosity: float  # of the oil [m2/s]
+    approach: float  # time from the edge of the film to contact, at most [s]
+    windows: tuple[tuple[float, float], ...] = ()  # times after contact between which the mean speed was measured [s]
+    measured: tuple[float, ...] = ()  # these speeds, over that of the fall
+
+    @property
+    def viscosity(self) -> float:
+        """Dynamic viscosity of the oil [Pa s]."""
+        return self.fluid_density * self.kinematic_viscosity
+
+    def steel(self, roughness: float = ROUGHNESS) -> Material:
+        """The sphere; its roughness is over its radius."""
+        return Material(
+            density=self.density_ratio * self.fluid_density, youngs_modulus=190e9, poisson=0.27, restitution=0.97,
+            friction=0.11, roughness=roughness * self.radius,
+        )  # fmt: skip
+
+
+SLOW = Fall(
+    3e-3, 0.518, 965.0, 8.083, 1.036e-4, 0.0115,
+    ((0.63e-3, 2.69e-3), (2.69e-3, 4.75e-3), (4.75e-3, 6.82e-3), (6.82e-3, 10.94e-3)), (0.429, 0.339, 0.287, 0.189),
+)  # fmt: skip
+"""St = 27, Re = 30."""
+
+FAST = Fall(
+    1.5e-3, 0.585, 935.0, 8.342, 0.01 / 935.0, 0.003,
+    ((0.4e-3, 2.4e-3), (2.4e-3, 4.4e-3), (4.4e-3, 6.4e-3), (6.4e-3, 8.4e-3)), (0.810, 0.724, 0.625, 0.559),
+)  # fmt: skip
+"""St = 152, Re = 164."""
+
+
+def collision(
+    until: float = 0.045, surroundings: Sequence[str] = ALL, fall: Fall = SLOW, roughness: float = ROUGHNESS
+) -> Collision:
     """The sphere arrives with its measured speed at the edge of the film; its path with all forces.
 
     until         end, counted from contact [s]
     surroundings  those of the forces `ALL` that act
+    fall          `SLOW`, St = 27, or `FAST`, St = 152
+    roughness     of the sphere, over its radius [-]
     """
     return collide(
-        STEEL,
-        diameter=2.0 * RADIUS,
+        fall.steel(roughness),
+        diameter=2.0 * fall.radius,
         against="wall",
-        velocity=SPEED,
-        viscosity=VISCOSITY,
+        velocity=fall.speed,
+        viscosity=fall.viscosity,
         surroundings=surroundings,
-        fluid_density=FLUID_DENSITY,
+        fluid_density=fall.fluid_density,
         gravity=GRAVITY,
-        until=APPROACH + until,
+        until=fall.approach + until,
     )
 
 
-def bounce(until: float = 0.045, surroundings: Sequence[str] = ALL) -> tuple[np.ndarray, np.ndarray]:
+def bounce(
+    until: float = 0.045, surroundings: Sequence[str] = ALL, fall: Fall = SLOW, roughness: float = ROUGHNESS
+) -> tuple[np.ndarray, np.ndarray]:
     """Let the sphere bounce; returns time since contact [s] and gap between sphere and wall [m].
 
-    until, surroundings  as of :func:`collision`
+    until, surroundings, fall, roughness  as of :func:`collision`
     """
-    path = collision(until, surroundings)
-    touch = path.time[int(np.argmax(path.gap < STEEL.roughness))]
-    return path.time - touch, path.gap
+    path = collision(until, surroundings, fall, roughness)
+    return path.time - contact_time(path), path.gap
 
 
-def shares_of_loss(path: Collision) -> dict[str, float]:
+def contact_time(path: Collision) -> float:
+    """Time at which the sphere comes as close to the wall as its film lets it [s]."""
+    return float(path.time[int(np.argmax(path.gap < path.minimum_gap))])
+
+
+def mean_speeds(time: np.ndarray, gap: np.ndarray, fall: Fall) -> list[float]:
+    """Mean speeds in the times in which they were measured, over the speed of the fall [-]."""
+    return [speed_after_contact(time, gap, *window) / fall.speed for window in fall.windows]
+
+
+def shares_of_loss(path: Collision, fall: Fall = SLOW) -> dict[str, float]:
     """Share of each force in the energy that the sphere has lost at its apex after the bounce.
 
     The energy at the edge of the film is that of its motion and of its weight over the apex, with the displaced fluid
     that moves with it. What no force of the fluid takes is taken by the film and the contact.
+
+    fall  of which the path is
     """
     contact = int(path.gap.argmin())
     apex = contact + int(path.gap[contact:].argmax())
@@ -78,10 +128,10 @@ def shares_of_loss(path: Collision) -> dict[str, float]:
     def taken(name: str) -> float:
         return -float((path.history[f"force_{name}"][1 : apex + 1, 0] * middle * lasting).sum())
 
-    volume = 4.0 / 3.0 * np.pi * RADIUS**3
-    mass, displaced = STEEL.density * volume, FLUID_DENSITY * volume
-    added = near_wall(path.gap[0] + RADIUS, RADIUS) * displaced if "force_weight" in path.history else 0.0
-    whole = 0.5 * (mass + added) * SPEED**2 - taken("weight")
+    volume = 4.0 / 3.0 * np.pi * fall.radius**3
+    mass, displaced = fall.density_ratio * fall.fluid_density * volume, fall.fluid_density * volume
+    added = near_wall(path.gap[0] + fall.radius, fall.radius) * displaced if "force_weight" in path.history else 0.0
+    whole = 0.5 * (mass + added) * fall.speed**2 - taken("weight")
     shares = {name: taken(name) / whole for name in ("drag", "history")}
     return shares | {"film and contact": 1.0 - sum(shares.values())}
 

@@ -18,8 +18,16 @@ from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
 from closures.contact import hertz_largest_overlap, hertz_stiffness
 from closures.restitution import critical_stokes, immersed, legendre, stop_gap
-from scenarios.collisions.bouncing_sphere.study import SPEED as FALL_SPEED
-from scenarios.collisions.bouncing_sphere.study import bounce, collision, shares_of_loss, speed_after_contact
+from scenarios.collisions.bouncing_sphere.study import (
+    FAST,
+    ROUGHNESS,
+    SLOW,
+    bounce,
+    collision,
+    mean_speeds,
+    shares_of_loss,
+    speed_after_contact,
+)
 from scenarios.collisions.immersed_pair import checks, figures
 from scenarios.collisions.immersed_pair.checks import CUTOFF, DRY, SPEED, WATER
 from scenarios.collisions.immersed_pair.measured import compare_points
@@ -225,9 +233,25 @@ def gondret(curves: Curves) -> list[Row]:
             1e3 * measured["t"][measured["gap"].argmax()],
             unit="ms",
         ),
-        Row("Gondret, St 27: speed after 1.7 ms / U", model_speed / FALL_SPEED, measured_speed / FALL_SPEED),
+        Row("Gondret, St 27: speed after 1.7 ms / U", model_speed / SLOW.speed, measured_speed / SLOW.speed),
         Row("Gondret, St 27: e at h_co; 0.43 to 0.49", immersed(27.0, DRY, 3e-3, 3e-7), 0.46),
     ]
+
+
+def speeds_after_contact(curves: Curves) -> list[Row]:
+    """Gondret's spheres: mean speeds after contact, with and without history force, and with rougher spheres."""
+    rows = []
+    for stokes, fall in ((27, SLOW), (152, FAST)):
+        for words, name, rougher in (
+            ("drag and added mass", "and_drag_and_added_mass", 1.0),
+            ("and history force", "and_history_force", 1.0),
+            ("and ten times the roughness", "and_history_force", 10.0),
+        ):
+            path = bounce(fall.windows[-1][1], SURROUNDINGS[name], fall, rougher * ROUGHNESS)
+            for (begin, end), found, known in zip(fall.windows, mean_speeds(*path, fall), fall.measured):
+                title = f"Gondret, St {stokes}, {words}: speed from {1e3 * begin:.1f} to {1e3 * end:.1f} ms / U"
+                rows.append(Row(title, found, known))
+    return rows
 
 
 SURROUNDINGS: dict[str, tuple[str, ...]] = {
@@ -244,6 +268,7 @@ PARTS: tuple[Callable[[Curves], list[Row]], ...] = (
     roughness,
     oblique,
     gondret,
+    speeds_after_contact,
     checks.walls,
     checks.readings,
     checks.film_zone,

@@ -50,7 +50,7 @@ BEDS = {**STUDIES, "coarse glass": Study(coarse_glass, (0.06,), 1.0, 2.0)}
 """The beds; coarse glass, at Re_m = 96, is between the resolved runs of the fit and those above it."""
 
 PUBLISHED = {0.009: 0.635, 0.012: 0.703}
-"""Velocity [m/s] and mean of the published voidages of alginate beads, where the law acts."""
+"""Velocity [m/s] and mean of the voidages of alginate beads by three power laws, where the law of agitation acts."""
 
 ALUMINA = (0.12, 0.157033, 0.20)
 """Velocities of the beds of alumina [m/s]."""
