@@ -156,9 +156,11 @@ def test_any_number_of_ranks_has_the_bits_of_one(name: str) -> None:
 
     alone = program(SERIAL)
     assert np.abs(alone["drag_impulse"]).max() > 0.0
+    counted = alone.pop("energy")  # by each rank in turn
     for ranks in (2, 3, 4, 6, 8):
         for found in on_ranks(ranks, program):
             assert not differing(found, alone), ranks
+            assert found["energy"] == pytest.approx(counted, rel=1e-12)
 
 
 def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
