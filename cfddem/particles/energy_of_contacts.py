@@ -14,8 +14,10 @@ from cfddem.particles.interactions.contact import friction_coefficient
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.shear_film import two
 from cfddem.particles.interactions.slots import (
-    BRIDGE,
+    BRIDGE_RESISTS,
+    DRIFTING,
     FILM,
+    JOINT,
     RECORD,
     RESCALED,
     ROLLING,
@@ -62,7 +64,7 @@ class Count(NamedTuple):
     power: np.ndarray  # (n,) going into the tangential spring [W]
     held: np.ndarray  # (n,) energy of the normal spring [J]
     yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
-    push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with bridges [N]
+    push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with films or bridges [N]
     twist: np.ndarray  # (n, 3) its moment over the radius, the same on both bodies [N]
     totals: np.ndarray  # (2, CHUNKS, channels + 2); the second half is of pairs that another rank adds [J]
 
@@ -195,7 +197,7 @@ def _weak_shear_works(k, system, step):
 def _outrun(k, system, count, step):
     """Work of the springs of edge k in the first half kick, at the speed that impulses took before the bodies moved.
 
-    The springs give it, and the impulses of bridges take it again: none of it is stored.
+    The springs give it, and the impulses of films and bridges take it again: none of it is stored.
     """
     particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
@@ -204,7 +206,40 @@ def _outrun(k, system, count, step):
     if k < edges.between_particles:
         other, also = taken_by_impulses(j, particles, count, step)
         slowed, turned = minus(slowed, other), plus(turned, times(particles.radius[j], also))
-    return 0.5 * step * (dot(at(count.push, k), slowed) + dot(at(count.twist, k), turned))
+    return _spring_work(k, slowed, turned, count, 0.5 * step)
+
+
+@inline
+def _taken_by_weak(k, system, count, step):
+    """The same in the second half kick, at the speed that weak films have given after the bodies moved."""
+    particles, edges = system.particles, system.edges
+    i, j = edges.first[k], edges.second[k]
+    gain, turned = at(particles.film_gain, i), times(particles.radius[i], at(particles.film_spin_gain, i))
+    if k < edges.between_particles:
+        gain = minus(gain, at(particles.film_gain, j))
+        turned = plus(turned, times(particles.radius[j], at(particles.film_spin_gain, j)))
+    return _spring_work(k, gain, turned, count, 0.5 * step)
+
+
+@inline
+def _spring_work(k, velocity, turning, count, duration):
+    """Work of the springs of edge k.
+
+    velocity, turning  relative velocity of the bodies, and sum of their spins times radius [m/s]
+    """
+    return duration * (dot(at(count.push, k), velocity) + dot(at(count.twist, k), turning))
+
+
+@inline
+def _take_again(k, work, memory, totals):
+    """Count work of the springs of edge k that impulses have taken again as that of its film or bridge."""
+    if DRIFTING and not (BRIDGE_RESISTS and memory.bridge_film[k] > 0.0):
+        totals[FILMS] -= work
+        note_loss(k, memory, FILMS, -work)
+        return
+    totals[BY_IMPULSES] += work
+    if BRIDGE_RESISTS and memory.bridge_film[k] > 0.0:
+        note_bridge_loss(k, memory, -work)
 
 
 @inline
@@ -256,11 +291,8 @@ def _slides(row, minimum_gap, pressed, tangent):
 def _contact_works(k, system, count, step, duration, totals):
     """Count what the contact of edge k has done, and keep what its springs hold; nothing if the solids do not touch."""
     edges, memory, p = system.edges, system.memory, system.parameters
-    if BRIDGE and step > 0.0:
-        outrun = _outrun(k, system, count, step)
-        totals[BY_IMPULSES] += outrun
-        if memory.bridge_film[k] > 0.0:
-            note_bridge_loss(k, memory, -outrun)
+    if JOINT and step > 0.0:
+        _take_again(k, _outrun(k, system, count, step), memory, totals)
     separation, distance, gap = geometry(k, system)
     minimum_gap = memory.minimum_gap[k]
     if not gap < minimum_gap:
@@ -309,9 +341,11 @@ def _contact_works(k, system, count, step, duration, totals):
     count.power[k] = rate
     count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
     count.yielded[k] = yielded
-    if BRIDGE:
+    if JOINT:
         put(count.push, k, minus(times(elastic, normal), times(tangential, spring)))
         put(count.twist, k, times(tangential * stretch, cross(normal, spring)))
+        if DRIFTING and step > 0.0:
+            _take_again(k, _taken_by_weak(k, system, count, step), memory, totals)
 
 
 @threaded

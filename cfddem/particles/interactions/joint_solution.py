@@ -1,6 +1,6 @@
-"""The impulses of all films over a step, solved together.
+"""The impulses of all films and bridges over a step, solved together.
 
-Films of a body act on each other through its motion. Their impulses J follow from one system of equations,
+Films and bridges of a body act on each other through its motion. Their impulses J follow from one system of equations,
 
     (C^-1/dt + G M^-1 G^T) J = -G v + C^-1/dt J_d,        v' = v + M^-1 G^T J
 

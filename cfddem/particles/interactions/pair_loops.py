@@ -16,7 +16,7 @@ from cfddem.backend.compile import inline, kept_whole, prange, vector_part
 from cfddem.backend.law_set import specialise, written
 from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
+from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge
 from cfddem.particles.interactions.contact import contact, contact_state
 from cfddem.particles.interactions.film import renew_film
 from cfddem.particles.interactions.kinematics import sphere_kinematics
@@ -114,7 +114,6 @@ LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force),
     "update_films": PairLoop(pair_film, needed_by="FILM"),
     "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
-    "bridge_impulses": PairLoop(pair_bridge_impulse, particles=WetParticles, needed_by="BRIDGE"),
 }
 """Slot -> loop over pairs."""
 
