@@ -11,6 +11,7 @@ from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.particles.impulse_motion import drifted, mean_motion, motion_of_weak, taken_by_impulses
 from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
+from cfddem.particles.interactions.joint_films import normal_of
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.shear_film import two
 from cfddem.particles.interactions.slots import (
@@ -44,7 +45,7 @@ CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffeni
 stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
 BY_IMPULSES, BY_SHEAR = len(CHANNELS), len(CHANNELS) + 1
-"""Places after the channels: work of springs at speeds that the impulses of bridges have taken again, and energy lost
+"""Places after the channels: work of springs and gravity that the impulses of bridges have taken again, and energy lost
 to weak films that resist sliding."""
 
 ALMOST = 1.0 - 1e-9
@@ -137,7 +138,15 @@ def count_motion(particles, count, gravity, free, step, before, after):
                 velocity = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
                 put(count.drifted, i, times(step, velocity))
                 if i < particles.owned:
-                    totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, velocity)
+                    weight = times(1.0 / particles.inverse_mass[i], gravity)
+                    totals[FALL] += step * dot(weight, velocity)
+                    if JOINT:
+                        taken, _ = taken_by_impulses(i, particles, count, step)
+                        if DRIFTING:
+                            taken = plus(taken, at(particles.film_gain, i))
+                        taken = (free[0] * taken[0], free[1] * taken[1], free[2] * taken[2])
+                        work = 0.5 * step * dot(weight, taken)  # of gravity in the half kicks; impulses take it again
+                        totals[FILMS if DRIFTING else BY_IMPULSES] += -work if DRIFTING else work
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
 
@@ -164,7 +173,7 @@ def _film_works(k, system, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
     edges, memory, particles = system.edges, system.memory, system.particles
     i, j = edges.first[k], edges.second[k]
-    normal, solved = at(memory.film_normal, k), at(memory.impulse, k)
+    normal, solved = normal_of(k, system), at(memory.impulse, k)
     weak = times(dot(at(memory.film_push, k), normal), normal)
     velocity, _ = mean_motion(i, particles, count, step)
     later, _ = motion_of_weak(i, particles, step)
@@ -182,7 +191,7 @@ def _weak_shear_works(k, system, step):
     """The same of the resistance to sliding of a weak film."""
     edges, memory, particles, walls = system.edges, system.memory, system.particles, system.walls
     i, j = edges.first[k], edges.second[k]
-    push = across(at(memory.film_push, k), at(memory.film_normal, k))
+    push = across(at(memory.film_push, k), normal_of(k, system))
     first, second = two(memory.shear_couples, k)
     velocity, spin = motion_of_weak(i, particles, step)
     gained = dot(push, velocity) + dot(first, spin)

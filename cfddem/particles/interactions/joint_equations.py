@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from cfddem.backend.compile import inline, part, prange
-from cfddem.particles.interactions.bridge_loops import kept_separation
 from cfddem.particles.interactions.film import record_approach
 from cfddem.particles.interactions.film_law import at_gap, at_least
 from cfddem.particles.interactions.joint_bridges import across_of, begin_bridge, mean_along, push_of_last_step
@@ -61,19 +60,6 @@ _1, _2, _4 = np.uint64(1), np.uint64(2), np.uint64(4)
 
 
 @inline
-def place_of(k, system):
-    """Normal and gap of edge k."""
-    memory = system.memory
-    if DRIFTING:
-        return at(memory.film_normal, k), memory.film_gap[k]
-    if k < system.edges.between_particles:
-        separation, distance, radii = kept_separation(k, system)
-        return times(1.0 / distance, separation), distance - radii
-    separation, distance, gap = geometry(k, system)
-    return times(1.0 / distance, separation), gap
-
-
-@inline
 def has_film(k, memory):
     """Whether edge k has a film that is solved with the others."""
     if DRIFTING and BRIDGE_RESISTS:
@@ -86,7 +72,8 @@ def prepare_film(e, system, step):
     """What the equations need of the film and the bridge of row e, and their impulse of the last step."""
     edges, memory, radius = system.edges, system.memory, system.particles.radius
     k = memory.joint_edge[e]
-    normal, gap = place_of(k, system)
+    separation, distance, gap = geometry(k, system)
+    normal = times(1.0 / distance, separation)
     velocity = relative_velocity(k, system)
     passing, speed = 0.0, dot(velocity, normal)
     if k < edges.between_particles:

@@ -19,7 +19,7 @@ from cfddem.particles.interactions.kinematics import (
 )
 from cfddem.particles.interactions.shear_film import put_impulses
 from cfddem.particles.interactions.slots import BRIDGE_RESISTS, DRIFTING, SHEAR, FilmState
-from cfddem.particles.pair_graph import places_of
+from cfddem.particles.pair_graph import geometry, places_of
 from cfddem.particles.vectors import NOTHING, across, at, dot, put, times
 
 FIELDS = (
@@ -118,6 +118,13 @@ def passing_rate(normal, distance, velocity, free, step):
 
 
 @inline
+def normal_of(k, system):
+    """Direction from the second body of edge k to the first, as `renew_film` has it."""
+    separation, distance, _ = geometry(k, system)
+    return times(1.0 / distance, separation)
+
+
+@inline
 def film_at(k, gap, system):
     """The film of edge k."""
     reduced_radius, _ = pair_mass_and_radius(k, system)
@@ -130,7 +137,7 @@ def note_approach(k, system):
     """Remember the speed of approach of edge k, the fastest since its film began."""
     memory = system.memory
     film = film_at(k, memory.film_gap[k], system)
-    speed, row = dot(relative_velocity(k, system), at(memory.film_normal, k)), pair_row(k, system)
+    speed, row = dot(relative_velocity(k, system), normal_of(k, system)), pair_row(k, system)
     record_approach(k, memory, speed, film.gap, film.viscosity, film.reduced_radius, row)
 
 
@@ -151,7 +158,7 @@ def enter(k, row, system):
             stay_apart(k, system)
         elif not memory.film_solved[k]:
             memory.film_solved[k] = True
-            put(memory.impulse, k, times(memory.film_owed[k], at(memory.film_normal, k)))
+            put(memory.impulse, k, times(memory.film_owed[k], normal_of(k, system)))
     memory.joint_edge[row] = k
     memory.joint_row[k] = row
 
@@ -216,11 +223,14 @@ def list_due(place, end, system):
 def mark_due(k, system, step):
     """Solve the film of edge k with the others if it is not weak at this step."""
     memory = system.memory
-    leaps, gap = False, memory.film_gap[k]
-    if memory.film_unmoved[k] and memory.film_rate[k] > 0.0:
-        speed = dot(relative_velocity(k, system), at(memory.film_normal, k))
+    if memory.film_due[k] or memory.resistance[k] == 0.0:
+        return
+    leaps, gap, (_, weight) = False, memory.film_gap[k], pair_mass_and_radius(k, system)
+    rate = memory.resistance[k] * weight * min(max(gap, 0.0) / memory.minimum_gap[k], 1.0)
+    if memory.film_unmoved[k] and weight > 0.0:
+        speed = dot(relative_velocity(k, system), normal_of(k, system))
         leaps = gap > memory.minimum_gap[k] and abs(step * speed) > LEAP * gap
-    if not memory.film_due[k] and (leaps or step * memory.film_rate[k] >= WEAK):
+    if leaps or step * rate >= WEAK:
         memory.film_due[k], memory.film_owed[k] = True, 0.0
 
 

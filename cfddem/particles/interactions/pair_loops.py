@@ -89,16 +89,12 @@ def pair_film(n, system, step):
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     size = (reduced_radius, particles.inverse_mass[i] + particles.inverse_mass[j])
-    renew_film(k, (separation, distance, gap), viscosity, size, 1.0, system, row, step)
+    normal = renew_film(k, (separation, distance, gap), viscosity, size, 1.0, system, row, step)
     if SHEAR:
-        asymmetry, arms, normal = (
-            (radius[i] - radius[j]) / radii,
-            pair_arms(i, j, radius, gap),
-            at(memory.film_normal, k),
-        )
+        asymmetry, arms = (radius[i] - radius[j]) / radii, pair_arms(i, j, radius, gap)
         velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
         slip, roll = slip_and_roll(velocity, at(particles.spin, i), at(particles.spin, j), normal, arms)
-        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, (slip, roll, arms), memory, step)
+        renew_shear(k, normal, (viscosity, reduced_radius, asymmetry, 1.0), (slip, roll, arms), memory, step)
 
 
 class PairLoop(NamedTuple):

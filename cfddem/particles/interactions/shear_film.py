@@ -127,14 +127,16 @@ def built_in_sliding(scale, gap, viscosity, reduced_radius, minimum_gap, asymmet
 
 
 @inline
-def renew_shear(k, viscosity, reduced_radius, asymmetry, share, motion, memory, step):
+def renew_shear(k, normal, film, motion, memory, step):
     """Resistance to sliding of the film of edge k, whose normal resistance is known, and what it does by itself.
 
-    share   part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    normal  direction from the second body to the first
+    film    viscosity, R*, asymmetry, and the part that belongs to this edge: below 1 where triangles of a mesh share it
     motion  slip and roll, see `slip_and_roll`, and the lever arms of slip
     step    since the last positions; 0 if these are the same [s]
     """
-    gap, minimum_gap, normal = memory.film_gap[k], memory.minimum_gap[k], at(memory.film_normal, k)
+    gap, minimum_gap = memory.film_gap[k], memory.minimum_gap[k]
+    viscosity, reduced_radius, asymmetry, share = film
     lever = min(max(gap, 0.0) / minimum_gap, 1.0)
     before = memory.shear_resistance[k]
     resistance = film_sliding(share * lever, max(gap, minimum_gap), viscosity, reduced_radius, minimum_gap, asymmetry)
