@@ -15,7 +15,7 @@ _0, _1, _2 = np.uint64(0), np.uint64(1), np.uint64(2)
 
 @inline
 def gather_forces(i, system, near):
-    """Sum what the edges of particle i do to it, with weight and outside force, and list those that are solved together.
+    """Sum what the edges of particle i do to it, with weight and outside force; list those that are solved together.
 
     near  number of leading pairs that may touch
     """

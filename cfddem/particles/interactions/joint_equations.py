@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.backend.compile import inline, part, prange
+from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.film import record_approach
 from cfddem.particles.interactions.film_law import at_gap, at_least
 from cfddem.particles.interactions.joint_bridges import across_of, begin_bridge, mean_along, push_of_last_step
@@ -79,7 +79,7 @@ def prepare_film(e, system, step):
     if k < edges.between_particles:
         distance = radius[edges.first[k]] + radius[edges.second[k]] + gap
         passing = passing_rate(normal, distance, velocity, system.parameters.free, step)
-    memory.joint_passing[e] = passing
+    memory.joint_before[e] = speed + passing
     reduced_radius, weight = pair_mass_and_radius(k, system)
     memory.joint_least[e] = (_NONE if DRIFTING else _NO_BRIDGE) / (step * weight)
     memory.joint_first[e] = edges.first[k]
@@ -305,10 +305,10 @@ def own(e, system):
 
 @inline
 def film_residual(e, system, step, renew):
-    """Resistance of film e, if it is to be found anew, its residual, and its terms of four sums."""
+    """Resistance of film e, if it is to be found anew, its residual and first direction; returns terms of four sums."""
     particles, memory = system.particles, system.memory
-    before, slip, roll = rates_of(e, particles.velocity, particles.spin, True, system)
-    before += memory.joint_passing[e]
+    _, slip, roll = rates_of(e, particles.velocity, particles.spin, True, system)
+    before = memory.joint_before[e]
     given, slipped, rolled = rates_of(e, particles.film_change, particles.film_turn, False, system)
     if renew:
         memory.joint_speed[e], memory.joint_shift[e] = before + given, 0.0
@@ -318,7 +318,7 @@ def film_residual(e, system, step, renew):
     wanted = compliance * memory.joint_debt[e] - before
     residual = wanted - given - compliance * impulse
     inverse = 1.0 / (compliance + memory.joint_weight[e])
-    memory.joint_residual[e] = residual
+    memory.joint_residual[e], memory.joint_direction[e] = residual, inverse * residual
     left, whole = inverse * residual * residual, inverse * wanted * wanted
     by_wanted, by_residual = impulse * wanted, impulse * residual
     if SLIDES:
@@ -328,23 +328,48 @@ def film_residual(e, system, step, renew):
         s, q = minus(NOTHING, plus(plus(slip, slipped), s)), minus(NOTHING, plus(plus(roll, rolled), q))
         put_slip_and_roll(memory.joint_shear_residual, e, s, q)
         a, b = by_blocks(inverses, s, q, normal)
+        put_slip_and_roll(memory.joint_shear_direction, e, a, b)
         left += dot(a, s) + dot(b, q)
         a, b = by_blocks(inverses, slip, roll, normal)
         whole += dot(a, slip) + dot(b, roll)
         by_wanted -= dot(push, slip) + dot(couple, roll)
         by_residual += dot(push, s) + dot(couple, q)
     mine = 1.0 if own(e, system) else 0.0
+    made = (mine * left, mine * whole, mine * by_wanted, mine * by_residual)
     terms, rows = memory.joint_terms, len(system.edges.first)
-    terms[e], terms[rows + e] = mine * left, mine * whole
-    terms[2 * rows + e], terms[3 * rows + e] = mine * by_wanted, mine * by_residual
+    terms[e], terms[rows + e], terms[2 * rows + e], terms[3 * rows + e] = made
+    return made
+
+
+@inline
+def greater(top, term):
+    """The larger of a number and the absolute value of another; NaN if one of them is NaN."""
+    size = abs(term)
+    return size if size > top or size != size else top
+
+
+@inline
+def greatest(tops):
+    """The largest of some numbers; NaN if one of them is NaN."""
+    largest = 0.0
+    for top in tops:
+        largest = greater(largest, top)
+    return largest
 
 
 @part
 def find_residual(system, count, step, renew):
-    """Resistances, if they are to be found anew, residuals, and the terms of four sums.
+    """Resistances, if they are to be found anew, residuals, and the terms of four sums; returns the largest of each.
 
     The sums are: the square of the residual, and of what it would be without impulses, both in the preconditioner; and
     impulses times the right-hand side, and times the residual.
     """
-    for e in prange(count):
-        film_residual(e, system, step, renew)
+    tops = np.zeros((4, CHUNKS))
+    for chunk in prange(CHUNKS):
+        left, whole, by_wanted, by_residual = 0.0, 0.0, 0.0, 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            made = film_residual(e, system, step, renew)
+            left, whole = greater(left, made[0]), greater(whole, made[1])
+            by_wanted, by_residual = greater(by_wanted, made[2]), greater(by_residual, made[3])
+        tops[0, chunk], tops[1, chunk], tops[2, chunk], tops[3, chunk] = left, whole, by_wanted, by_residual
+    return greatest(tops[0]), greatest(tops[1]), greatest(tops[2]), greatest(tops[3])

@@ -42,7 +42,7 @@ JOINT_FIELDS = (
     ),
     Field("joint_normal", "1", 3, "scratch", meaning="direction from the second body to the first"),
     Field("joint_weight", "1/kg", role="scratch", meaning="sum of the inverse masses"),
-    Field("joint_passing", "m/s", role="scratch", meaning="rate at which bodies that pass each other part"),
+    Field("joint_before", "m/s", role="scratch", meaning="rate of the gap before all impulses, with that of passing"),
     Field("joint_gap", "m", role="scratch", meaning="gap at the beginning of the step"),
     Field("joint_speed", "m/s", role="scratch", meaning="rate of the gap for which the resistance holds"),
     Field("joint_shift", "m/s", role="scratch", meaning="change of that rate since"),

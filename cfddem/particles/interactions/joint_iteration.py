@@ -5,9 +5,11 @@ See `cfddem.particles.interactions.joint_solution`.
 
 from __future__ import annotations
 
-from cfddem.backend.compile import inline, part, prange
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.joint_bridges import keep_bridge
-from cfddem.particles.interactions.joint_equations import own, rates_of
+from cfddem.particles.interactions.joint_equations import greater, greatest, own, rates_of
 from cfddem.particles.interactions.shear_film import (
     by_blocks,
     couples,
@@ -25,14 +27,12 @@ def film_direction(e, system, share):
     """New direction of film e."""
     memory = system.memory
     steepest = memory.joint_residual[e] / (memory.joint_compliance[e] + memory.joint_weight[e])
-    memory.joint_direction[e] = steepest + share * memory.joint_direction[e] if share > 0.0 else steepest
+    memory.joint_direction[e] = steepest + share * memory.joint_direction[e]
     if SLIDES:
         s, q = slip_and_roll_of(memory.joint_shear_residual, e)
         s, q = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
-        if share > 0.0:
-            a, b = slip_and_roll_of(memory.joint_shear_direction, e)
-            s, q = plus(s, times(share, a)), plus(q, times(share, b))
-        put_slip_and_roll(memory.joint_shear_direction, e, s, q)
+        a, b = slip_and_roll_of(memory.joint_shear_direction, e)
+        put_slip_and_roll(memory.joint_shear_direction, e, plus(s, times(share, a)), plus(q, times(share, b)))
 
 
 @part
@@ -44,7 +44,7 @@ def find_direction(system, count, share):
 
 @inline
 def film_product(e, system):
-    """Matrix times direction of film e."""
+    """Matrix times direction of film e; returns its term of their product."""
     particles, memory = system.particles, system.memory
     product, slip, roll = rates_of(e, particles.film_along, particles.film_turn_along, False, system)
     direction = memory.joint_direction[e]
@@ -57,19 +57,26 @@ def film_product(e, system):
         s, q = plus(slip, s), plus(roll, q)
         put_slip_and_roll(memory.joint_shear_product, e, s, q)
         term += dot(push, s) + dot(couple, q)
-    memory.joint_terms[e] = term if own(e, system) else 0.0
+    term = term if own(e, system) else 0.0
+    memory.joint_terms[e] = term
+    return term
 
 
 @part
 def find_product(system, count):
-    """Matrix times direction, and the terms of its product with the direction."""
-    for e in prange(count):
-        film_product(e, system)
+    """Matrix times direction, and the terms of its product with the direction; returns the largest of these."""
+    tops = np.zeros(CHUNKS)
+    for chunk in prange(CHUNKS):
+        top = 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            top = greater(top, film_product(e, system))
+        tops[chunk] = top
+    return greatest(tops)
 
 
 @inline
 def film_follows(e, system, length, step):
-    """New impulse and residual of film e."""
+    """New impulse and residual of film e; returns its terms of two sums."""
     memory = system.memory
     direction, compliance = memory.joint_direction[e], memory.joint_compliance[e]
     memory.joint_impulse[e] += length * direction
@@ -100,25 +107,31 @@ def film_follows(e, system, length, step):
         a, b = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
         term += dot(a, s) + dot(b, q)
     mine = 1.0 if own(e, system) else 0.0
-    memory.joint_terms[e] = mine * term
-    memory.joint_terms[len(system.edges.first) + e] = mine * outdated
+    memory.joint_terms[e], memory.joint_terms[len(system.edges.first) + e] = mine * term, mine * outdated
+    return mine * term, mine * outdated
 
 
 @part
 def follow_direction(system, count, length, step):
     """New impulses at a length along the direction, and what they do to the particles; terms of two sums.
 
-    The sums are the squares of the residual, and of its part due to resistances that should be found anew.
+    The sums are the squares of the residual, and of its part due to resistances that should be found anew. Returns the
+    largest term of each.
     """
-    particles = system.particles
-    for e in prange(count):
-        film_follows(e, system, length, step)
+    particles, tops = system.particles, np.zeros((2, CHUNKS))
+    for chunk in prange(CHUNKS):
+        left, outdated = 0.0, 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            made = film_follows(e, system, length, step)
+            left, outdated = greater(left, made[0]), greater(outdated, made[1])
+        tops[0, chunk], tops[1, chunk] = left, outdated
     for i in prange(len(particles.radius)):
         change, along = at(particles.film_change, i), at(particles.film_along, i)
         put(particles.film_change, i, plus(change, times(length, along)))
         if SLIDES:
             turn, along = at(particles.film_turn, i), at(particles.film_turn_along, i)
             put(particles.film_turn, i, plus(turn, times(length, along)))
+    return greatest(tops[0]), greatest(tops[1])
 
 
 @inline
