@@ -260,7 +260,7 @@ class StepsWithGhosts:
         )
         self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["JOINT"] else None
         self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
-        self.inertia = self.bridges and choices["BRIDGE_INERTIA"]
+        self.inertia = choices["BRIDGE_INERTIA"]
         self.ghosts, self.communicator = ghosts, communicator
 
     def __call__(

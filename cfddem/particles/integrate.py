@@ -147,7 +147,7 @@ def sum_forces(system, step):
 def move(system, step, origin):
     """Reversals and drift, and the motion of walls; returns the square of the largest displacement."""
     walls = system.walls
-    if BRIDGE and BRIDGE_INERTIA:
+    if BRIDGE_INERTIA:
         reverse_films(system, step)
     largest = drift_particles(system, step, origin)
     if WALLS:

@@ -368,7 +368,7 @@ class NoBridges:
 
     def choices(self) -> dict[str, Any]:
         """What a run without liquid puts into the slots of the loops."""
-        return {"BRIDGE": False}
+        return dict.fromkeys(("BRIDGE", "BRIDGE_FILM", "BRIDGE_INERTIA", "BRIDGE_SLIDING"), False)
 
 
 NO_BRIDGES = NoBridges()

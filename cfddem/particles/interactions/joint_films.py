@@ -20,7 +20,7 @@ from cfddem.particles.interactions.kinematics import (
 from cfddem.particles.interactions.shear_film import put_impulses
 from cfddem.particles.interactions.slots import BRIDGE_RESISTS, DRIFTING, SHEAR, FilmState
 from cfddem.particles.pair_graph import geometry, places_of
-from cfddem.particles.vectors import NOTHING, across, at, dot, put, times
+from cfddem.particles.vectors import NOTHING, across, dot, put, times
 
 FIELDS = (
     *WEAK_FIELDS,
