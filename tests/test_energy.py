@@ -90,6 +90,15 @@ def test_a_box_of_colliding_spheres_accounts_for_its_energy(asked: dict) -> None
     assert (counted["rolling"] > 0.0) == ("laws" in asked and asked["laws"].rolling != "none")
 
 
+def test_what_stiff_films_take_again_of_springs_and_weight_is_in_the_account() -> None:
+    """Spheres pressed together in oil, X above 10: kicks of springs and weight are more than the bodies' way takes."""
+    run = box(viscosity=1.0, gravity=1000.0, lid=0.5)
+    remainder, counted = unexplained(run, 1500)
+    assert run.largest_film_rate * run.recommended_step(1.0) > 10.0
+    assert min(counted["film"], counted["friction"], counted["contact_damping"]) > 0.0
+    assert abs(remainder) < 1e-3
+
+
 def test_every_collision_says_what_it_lost_and_to_what() -> None:
     """Oblique, wet and rough: the sum over the row is the energy of motion that the pair has lost."""
     radius, speed = 1e-3, 0.5

@@ -146,7 +146,10 @@ class Direct:
     def __init__(self, run: ParticleSolver, step: float, sliding: bool, weak: bool = False) -> None:
         self.run, self.step, self.sliding = run, step, sliding
         spheres, edges = run.particles, run.edges
-        films = np.flatnonzero(edges.film_rate > 0.0 if weak else step * edges.film_rate >= WEAK)
+        inverse = spheres.inverse_mass[edges.first]
+        inverse[: edges.between_particles] += spheres.inverse_mass[edges.second[: edges.between_particles]]
+        rate = edges.resistance * inverse * (run.gap > 0.0)
+        films = np.flatnonzero(rate > 0.0 if weak else step * rate >= WEAK)
         self.first, self.second = edges.first[films].astype(int), edges.second[films].astype(int)
         self.pair = films < edges.between_particles
         n, count = len(films), spheres.count
@@ -155,7 +158,9 @@ class Direct:
         self.sliding_resistance = edges.shear_resistance[films].copy() if sliding else np.zeros(n)
         normal = np.zeros((n, 3))
         other, radius = np.where(self.pair, self.second, 0), spheres.radius
-        normal[self.pair] = edges.film_normal[films][self.pair]
+        between = spheres.position[self.first] - spheres.position[other]
+        between -= np.where(np.isfinite(run.box), run.box, 0.0) * np.round(between / run.box)
+        normal[self.pair] = (between / np.linalg.norm(between, axis=1)[:, None])[self.pair]
         apart = spheres.velocity[self.first] - spheres.velocity[other]
         along = (apart * normal).sum(axis=1)
         aside = ((apart - along[:, None] * normal) ** 2).sum(axis=1)

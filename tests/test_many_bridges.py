@@ -11,17 +11,16 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.features.drops import Spray, box
 from cfddem.particles import listing
-from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.interactions.joint_solution import film_kick
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles, particles_in
 
 
 def brake(run: ParticleSolver, span: float) -> None:
     """Give the particles the impulses of their bridges alone."""
-    specialise(find_bridge_impulses, run.choices)(run.system, span)
-    specialise(apply_bridge_impulses, run.choices)(run.system)
+    specialise(film_kick, run.choices)(run.system, span)
 
 
 @pytest.mark.parametrize("span", [1e-6, 1e-4, 1e-2])

@@ -54,12 +54,12 @@ def test_a_gallery_case_with_a_warning_explains_it() -> None:
         ].read_text()
 
 
-def test_the_largest_damping_number_of_films_is_that_of_two_beads_at_their_roughness() -> None:
-    """X = 6 pi eta R*^2 dt/(h m*); there is none without films."""
+def test_the_largest_damping_number_of_films_is_that_of_a_bead_at_the_floor_at_its_roughness() -> None:
+    """X = 6 pi eta R*^2 dt/(h m*) with R* = R and m* = m: twice that of two beads; there is none without films."""
     radius, density, viscosity, step = 1.5435e-3, 3585.9, 8.354e-4, 1e-6
     found, mass = made(run__particle_step=step), density * 4.0 / 3.0 * math.pi * radius**3
     gap = number(found, "minimum gap") / number(found, "minimum gap / roughness")
-    expected = 6.0 * math.pi * viscosity * (0.5 * radius) ** 2 / gap / (0.5 * mass) * step
+    expected = 6.0 * math.pi * viscosity * radius**2 / gap / mass * step
     assert number(found, "damping number X, largest") == pytest.approx(expected, rel=0.01)
     assert "damping number X, largest" not in {row.name for row in made(laws__lubrication="none").rows}
 

@@ -28,8 +28,8 @@ Checkpoints hold state and memory, not scratch."""
 Phase = Literal["start", "film", "film_change", "film_direction", "bridge", "motion", "liquid", "work"]
 """When ghost rows receive values.
 
-In order: at the start of an advance, before the solution of films and twice within, before the impulses of bridges,
-after the drift, before new bridges fill, and before work is counted.
+In order: at the start of an advance, before the solution of films and bridges and twice within, before films are
+reversed, after the drift, before new bridges fill, and before work is counted.
 """
 
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]

@@ -11,11 +11,14 @@ from cfddem.backend.compile import CHUNKS, inline, prange, threaded
 from cfddem.particles.impulse_motion import drifted, mean_motion, motion_of_weak, taken_by_impulses
 from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
+from cfddem.particles.interactions.joint_films import normal_of
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
 from cfddem.particles.interactions.shear_film import two
 from cfddem.particles.interactions.slots import (
-    BRIDGE,
+    BRIDGE_RESISTS,
+    DRIFTING,
     FILM,
+    JOINT,
     RECORD,
     RESCALED,
     ROLLING,
@@ -42,7 +45,7 @@ CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffeni
 stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
 BY_IMPULSES, BY_SHEAR = len(CHANNELS), len(CHANNELS) + 1
-"""Places after the channels: work of springs at speeds that the impulses of bridges have taken again, and energy lost
+"""Places after the channels: work of springs and gravity that the impulses of bridges have taken again, and energy lost
 to weak films that resist sliding."""
 
 ALMOST = 1.0 - 1e-9
@@ -62,7 +65,7 @@ class Count(NamedTuple):
     power: np.ndarray  # (n,) going into the tangential spring [W]
     held: np.ndarray  # (n,) energy of the normal spring [J]
     yielded: np.ndarray  # (n,) energy that the contact has lost to hysteresis [J]
-    push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with bridges [N]
+    push: np.ndarray  # (n, 3) force of the springs on the first body; of runs with films or bridges [N]
     twist: np.ndarray  # (n, 3) its moment over the radius, the same on both bodies [N]
     totals: np.ndarray  # (2, CHUNKS, channels + 2); the second half is of pairs that another rank adds [J]
 
@@ -135,7 +138,15 @@ def count_motion(particles, count, gravity, free, step, before, after):
                 velocity = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
                 put(count.drifted, i, times(step, velocity))
                 if i < particles.owned:
-                    totals[FALL] += step / particles.inverse_mass[i] * dot(gravity, velocity)
+                    weight = times(1.0 / particles.inverse_mass[i], gravity)
+                    totals[FALL] += step * dot(weight, velocity)
+                    if JOINT:
+                        taken, _ = taken_by_impulses(i, particles, count, step)
+                        if DRIFTING:
+                            taken = plus(taken, at(particles.film_gain, i))
+                        taken = (free[0] * taken[0], free[1] * taken[1], free[2] * taken[2])
+                        work = 0.5 * step * dot(weight, taken)  # of gravity in the half kicks; impulses take it again
+                        totals[FILMS if DRIFTING else BY_IMPULSES] += -work if DRIFTING else work
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
 
@@ -162,7 +173,7 @@ def _film_works(k, system, count, step):
     """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it."""
     edges, memory, particles = system.edges, system.memory, system.particles
     i, j = edges.first[k], edges.second[k]
-    normal, solved = at(memory.film_normal, k), at(memory.impulse, k)
+    normal, solved = normal_of(k, system), at(memory.impulse, k)
     weak = times(dot(at(memory.film_push, k), normal), normal)
     velocity, _ = mean_motion(i, particles, count, step)
     later, _ = motion_of_weak(i, particles, step)
@@ -180,7 +191,7 @@ def _weak_shear_works(k, system, step):
     """The same of the resistance to sliding of a weak film."""
     edges, memory, particles, walls = system.edges, system.memory, system.particles, system.walls
     i, j = edges.first[k], edges.second[k]
-    push = across(at(memory.film_push, k), at(memory.film_normal, k))
+    push = across(at(memory.film_push, k), normal_of(k, system))
     first, second = two(memory.shear_couples, k)
     velocity, spin = motion_of_weak(i, particles, step)
     gained = dot(push, velocity) + dot(first, spin)
@@ -195,7 +206,7 @@ def _weak_shear_works(k, system, step):
 def _outrun(k, system, count, step):
     """Work of the springs of edge k in the first half kick, at the speed that impulses took before the bodies moved.
 
-    The springs give it, and the impulses of bridges take it again: none of it is stored.
+    The springs give it, and the impulses of films and bridges take it again: none of it is stored.
     """
     particles, edges = system.particles, system.edges
     i, j = edges.first[k], edges.second[k]
@@ -204,7 +215,40 @@ def _outrun(k, system, count, step):
     if k < edges.between_particles:
         other, also = taken_by_impulses(j, particles, count, step)
         slowed, turned = minus(slowed, other), plus(turned, times(particles.radius[j], also))
-    return 0.5 * step * (dot(at(count.push, k), slowed) + dot(at(count.twist, k), turned))
+    return _spring_work(k, slowed, turned, count, 0.5 * step)
+
+
+@inline
+def _taken_by_weak(k, system, count, step):
+    """The same in the second half kick, at the speed that weak films have given after the bodies moved."""
+    particles, edges = system.particles, system.edges
+    i, j = edges.first[k], edges.second[k]
+    gain, turned = at(particles.film_gain, i), times(particles.radius[i], at(particles.film_spin_gain, i))
+    if k < edges.between_particles:
+        gain = minus(gain, at(particles.film_gain, j))
+        turned = plus(turned, times(particles.radius[j], at(particles.film_spin_gain, j)))
+    return _spring_work(k, gain, turned, count, 0.5 * step)
+
+
+@inline
+def _spring_work(k, velocity, turning, count, duration):
+    """Work of the springs of edge k.
+
+    velocity, turning  relative velocity of the bodies, and sum of their spins times radius [m/s]
+    """
+    return duration * (dot(at(count.push, k), velocity) + dot(at(count.twist, k), turning))
+
+
+@inline
+def _take_again(k, work, memory, totals):
+    """Count work of the springs of edge k that impulses have taken again as that of its film or bridge."""
+    if DRIFTING and not (BRIDGE_RESISTS and memory.bridge_film[k] > 0.0):
+        totals[FILMS] -= work
+        note_loss(k, memory, FILMS, -work)
+        return
+    totals[BY_IMPULSES] += work
+    if BRIDGE_RESISTS and memory.bridge_film[k] > 0.0:
+        note_bridge_loss(k, memory, -work)
 
 
 @inline
@@ -256,11 +300,8 @@ def _slides(row, minimum_gap, pressed, tangent):
 def _contact_works(k, system, count, step, duration, totals):
     """Count what the contact of edge k has done, and keep what its springs hold; nothing if the solids do not touch."""
     edges, memory, p = system.edges, system.memory, system.parameters
-    if BRIDGE and step > 0.0:
-        outrun = _outrun(k, system, count, step)
-        totals[BY_IMPULSES] += outrun
-        if memory.bridge_film[k] > 0.0:
-            note_bridge_loss(k, memory, -outrun)
+    if JOINT and step > 0.0:
+        _take_again(k, _outrun(k, system, count, step), memory, totals)
     separation, distance, gap = geometry(k, system)
     minimum_gap = memory.minimum_gap[k]
     if not gap < minimum_gap:
@@ -309,9 +350,11 @@ def _contact_works(k, system, count, step, duration, totals):
     count.power[k] = rate
     count.held[k] = portion(edges, k) * stored_energy(state, row, p, m, d)
     count.yielded[k] = yielded
-    if BRIDGE:
+    if JOINT:
         put(count.push, k, minus(times(elastic, normal), times(tangential, spring)))
         put(count.twist, k, times(tangential * stretch, cross(normal, spring)))
+        if DRIFTING and step > 0.0:
+            _take_again(k, _taken_by_weak(k, system, count, step), memory, totals)
 
 
 @threaded

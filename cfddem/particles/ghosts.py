@@ -258,8 +258,9 @@ class StepsWithGhosts:
         self.begin, self.start, self.move, self.find_bridge_changes, self.finish = (
             specialise(loop, choices, threads) for loop in loops
         )
-        self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["DRIFTING"] else None
+        self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["JOINT"] else None
         self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
+        self.inertia = choices["BRIDGE_INERTIA"]
         self.ghosts, self.communicator = ghosts, communicator
 
     def __call__(
@@ -275,7 +276,7 @@ class StepsWithGhosts:
             self.start(system.particles, step)
             if self.films is not None:
                 self.films(system, step)
-            if self.bridges:
+            if self.inertia:
                 self.ghosts.refresh("bridge")
             moved = self.move(system, step, origin)
             self.ghosts.refresh("motion")

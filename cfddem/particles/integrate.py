@@ -4,9 +4,9 @@ A step consists of these phases:
 
     kick                 half a step by the forces of the last step
     [halo: velocity, spin]
-    film impulses        of all films together that are not weak, see `joint_solution`
-    [halo: velocity, spin, rates of bridges]
-    bridge impulses      of every pair, then of every particle
+    impulses             of all films that are not weak and all bridges together, see `joint_solution`
+    [halo: velocity, spin]
+    reversals            impulses of the films of bridges that have inertia
     drift                new positions; walls move
     [halo: position, velocity, spin, thickness of the liquid]
     walls                geometry of every particle and wall
@@ -30,7 +30,7 @@ from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
 from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
-from cfddem.particles.interactions.bridge_impulse import apply_bridge_impulses, find_bridge_impulses
+from cfddem.particles.interactions.bridge_reversal import reverse_films
 from cfddem.particles.interactions.film import film_force, update_edge_film
 from cfddem.particles.interactions.joint_films import find_due
 from cfddem.particles.interactions.joint_solution import film_kick
@@ -39,8 +39,10 @@ from cfddem.particles.interactions.pair_loops import edge_contact
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BRIDGE,
+    BRIDGE_INERTIA,
     DRIFTING,
     FILM,
+    JOINT,
     RECORD,
     ROLLING,
     TRIANGLES,
@@ -143,11 +145,10 @@ def sum_forces(system, step):
 
 @serial
 def move(system, step, origin):
-    """Impulses and drift, and the motion of walls; returns the square of the largest displacement."""
+    """Reversals and drift, and the motion of walls; returns the square of the largest displacement."""
     walls = system.walls
-    if BRIDGE:
-        find_bridge_impulses(system, step)
-        apply_bridge_impulses(system)
+    if BRIDGE_INERTIA:
+        reverse_films(system, step)
     largest = drift_particles(system, step, origin)
     if WALLS:
         largest = larger(largest, advance_walls(walls, step) ** 2)
@@ -194,10 +195,10 @@ def record(system, time, log, noted):
 
 @serial
 def start_steps(system, step):
-    """What steps need before the first: liquid that has come from outside, and which films are solved together."""
+    """What steps need before the first: liquid from outside, and which films and bridges are solved together."""
     if BRIDGE:
         renew_thickness(system.particles)
-    if DRIFTING and step > 0.0:
+    if JOINT and step > 0.0:
         find_due(system, step)
 
 
@@ -217,7 +218,7 @@ def integrate(system, step, steps, origin, reach, time, log):
     while True:
         if steps > 0:
             kick_particles(particles, step)
-            if DRIFTING:
+            if JOINT:
                 film_kick(system, step)
             moved = move(system, step, origin)
             largest = larger(largest, moved)

@@ -6,7 +6,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.joint_films import list_due
-from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FILM, ROLLING, SHEAR
+from cfddem.particles.interactions.slots import BRIDGE, DRIFTING, FILM, JOINT, ROLLING, SHEAR
 from cfddem.particles.pair_graph import edge_role, places_of
 from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 
@@ -15,22 +15,22 @@ _0, _1, _2 = np.uint64(0), np.uint64(1), np.uint64(2)
 
 @inline
 def gather_forces(i, system, near):
-    """Sum what the edges of particle i do to it, with weight and outside force, and list its films that are not weak.
+    """Sum what the edges of particle i do to it, with weight and outside force; list those that are solved together.
 
     near  number of leading pairs that may touch
     """
     particles, edges, memory = system.particles, system.edges, system.memory
-    force, couple, moment, load = at(particles.applied, i), NOTHING, NOTHING, 0.0
+    force, couple, moment = at(particles.applied, i), NOTHING, NOTHING
     impulse, turn, end = NOTHING, NOTHING, edges.start[i]
     for place in places_of(i, edges):
         k, sign = edge_role(edges.incident[place])
-        if DRIFTING:
+        if JOINT:
             end = list_due(place, end, system)
+        if DRIFTING:
             impulse = plus(impulse, times(sign, at(memory.film_push, k)))
         if SHEAR:
             turn = plus(turn, at(memory.shear_couples, _2 * k + (_0 if sign > 0.0 else _1)))
         if BRIDGE:  # zero without a bridge, which costs less than to look
-            load += memory.bridge_resistance[k]
             force = plus(force, times(sign, at(memory.bridge_force, k)))
         if (FILM or BRIDGE) and near <= k < edges.between_particles:
             if BRIDGE or DRIFTING:
@@ -44,14 +44,12 @@ def gather_forces(i, system, near):
         force = plus(force, times(1.0 / particles.inverse_mass[i], system.parameters.gravity))
     put(particles.force, i, force)
     put(particles.torque, i, plus(times(particles.radius[i], couple), moment))
-    if DRIFTING:
+    if JOINT:
         particles.joint_end[i] = end
+    if DRIFTING:
         put(particles.film_gain, i, times(particles.inverse_mass[i], impulse))
         if SHEAR:
             put(particles.film_spin_gain, i, times(particles.inverse_inertia[i], turn))
-    if BRIDGE:
-        particles.bridge_rate[i] = particles.inverse_mass[i] * load
-        particles.bridge_turn_rate[i] = particles.radius[i] * particles.radius[i] * particles.inverse_inertia[i] * load
 
 
 @inline

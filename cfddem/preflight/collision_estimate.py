@@ -87,13 +87,33 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
 
 
 def _film_rate(case: Case, species: Species, viscosity: float) -> float:
-    """Resistance of the film of two of the smallest particles of a species at its smallest gap, over m* [1/s]."""
+    """Largest resistance of a film over m*, of the smallest particles of a species at the smallest gap [1/s].
+
+    Between two of them, and at a wall, where the reduced mass and radius are twice as large.
+    """
     mass, radius = reduced(case, species, species.smallest_diameter)
-    gap, law = float(pair_row(case, species)["roughness_gap"]), case.laws.pair_laws.get("lubrication")
-    # films of a run end at the gap R*
-    if law is None:
-        return lubrication.film_resistance(lubrication.film_strength(viscosity, radius), gap, gap, radius) / mass
-    return called_by_name(law.function, FILM_ARGUMENTS, (gap, viscosity, radius, gap, radius)) / mass
+    solid, law = case.material_of(species), case.laws.pair_laws.get("lubrication")
+    bodies = [(solid, mass, radius)]
+    if _has_walls(case):
+        wall = case.material[case.column.material] if case.column.material else solid
+        bodies.append((wall, 2.0 * mass, 2.0 * radius))
+    rates = []
+    for other, mass, radius in bodies:
+        gap = float(pair_table([solid, other])[0, 1]["roughness_gap"])
+        # films of a run end at the gap R*
+        if law is None:
+            resistance = lubrication.film_resistance(lubrication.film_strength(viscosity, radius), gap, gap, radius)
+        else:
+            resistance = called_by_name(law.function, FILM_ARGUMENTS, (gap, viscosity, radius, gap, radius))
+        rates.append(resistance / mass)
+    return max(rates)
+
+
+def _has_walls(case: Case) -> bool:
+    """Whether particles of a case can meet a wall."""
+    column = case.column
+    ends = {column.sides, column.front or column.sides, column.ends}
+    return ends != {"periodic"} or column.shape == "cylinder" or bool(case.wall)
 
 
 def _film_gap(case: Case, values: tuple[float, float, float, float, float]) -> float:

@@ -121,7 +121,7 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) 
             note = "if films used the contact modulus"
             yield Row(group, "minimum gap, softened", collision.softened_gap, "m", note)
     if collision.film_rate > 0.0:
-        note = "at the smallest gap and the particle step; films limit no step"
+        note = "of the smallest particles at the smallest gap; films limit no step"
         yield Row(group, "damping number X, largest", collision.film_rate * step, "", note)
     if case.laws.contact_law.takes("contact_modulus"):
         yield Row(group, "contact modulus / real", collision.softening)

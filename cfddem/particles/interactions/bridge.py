@@ -3,10 +3,10 @@
 Every particle carries liquid, the field `liquid`. A bridge joins two particles, or a particle and a wall, from where
 their films touch until it is stretched too far (:mod:`~cfddem.particles.interactions.bridge_changes`).
 
-The resistance of a bridge acts by impulses between the kick and the drift, as films do. Each body gives each of its
-bridges the part of its mass that the bridge has in the body's total resistance, and the pair so made is solved. Along
-the line of centres the resistance is integrated over the gap, so that impulses add up to the potential between the
-first gap and the last. Across it the solution is exact for a fixed gap. The pull is an ordinary force.
+The resistance of a bridge acts by impulses between the kick and the drift, which are solved together with those of all
+other bridges and films (:mod:`~cfddem.particles.interactions.joint_solution`). Along the line of centres the resistance
+is integrated over the gap, so that impulses add up to the potential between the first gap and the last. The pull is an
+ordinary force.
 """
 
 from __future__ import annotations
@@ -41,13 +41,6 @@ LIQUID = Field(
 PARTICLE_FIELDS = (
     LIQUID,
     Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
-    Field("bridge_rate", "1/s", halo=("bridge",), meaning="resistance of all bridges of the particle over its mass"),
-    Field(
-        "bridge_turn_rate",
-        "1/s",
-        halo=("bridge",),
-        meaning="resistance of all bridges times the square of the radius over the moment of inertia",
-    ),
     Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),
     Field("bridges_change", role="scratch", dtype=bool, meaning="bridges of the particle form or break in this step"),
     Field("bridges_formed", dtype=np.int64, meaning="bridges that have formed, counted by the lower id"),
@@ -59,26 +52,27 @@ FIELDS = (
     Field("bridge_film", "m", role="memory", meaning="thickness of both films when the bridge formed; 0 without one"),
     Field("bridge_volume", "m3", role="memory", meaning="volume of the liquid in the bridge"),
     Field("bridge_gap", "m", role="memory", meaning="minimum gap of the bridge"),
-    Field("bridge_accounted", "m", role="memory", meaning="gap up to which the impulse of the bridge has been given"),
     Field("bridge_resistance", "kg/s", role="memory", meaning="resistance of the bridge; 0 where it has none"),
     Field("bridge_separation", "m", 3, "memory", meaning="separation from the second particle to the first at present"),
     Field("bridge_distance", "m", role="memory", meaning="distance of the centres at present"),
     Field("closed_along", "kg/s", role="memory", meaning="resistance along the line of centres below h_min"),
     Field("closed_across", "kg/s", role="memory", meaning="resistance of the bridge to sliding below h_min"),
     Field("bridge_force", "N", 3, "memory", meaning="pull of the bridge on the first body"),
-    Field("bridge_impulse", "N s", 3, "scratch", meaning="impulse of the bridge in this step, on the first body"),
+    Field("bridge_impulse", "N s", 3, "memory", meaning="impulse of the bridge in the last step, on the first body"),
     Field("bridge_couple", "N s", 3, "scratch", meaning="angular impulse per radius, the same on both bodies"),
+    Field("bridge_solved", role="memory", dtype=bool, meaning="the bridge has resisted in the last step"),
+    Field("bridge_across", "kg", role="scratch", meaning="resistance of the bridge to sliding, times the step"),
+    Field("bridge_lever", role="scratch", meaning="arm of the bridge over the radius of the first body"),
     Field(
         "bridge_change", role="scratch", dtype=np.int8, meaning="1 where a bridge forms, -1 where one breaks, else 0"
     ),
-    Field(
-        "bridge_open", role="scratch", dtype=bool, meaning="the gap of the bridge exceeds h_min, now or in this step"
-    ),
+    Field("bridge_open", role="scratch", dtype=bool, meaning="the gap of the bridge exceeds h_min"),
 )
 """What pairs remember of their bridges."""
 
 INERTIA_FIELDS = (
     Field("bridge_impact_speed", "m/s", role="memory", meaning="speed at which the bodies have met; 0 once parted"),
+    Field("bridge_reversal", "N s", 3, "scratch", meaning="impulse that reverses the film with the bodies"),
 )
 """The same, of films with inertia."""
 

@@ -197,12 +197,15 @@ def of_same_wall(k, other, edges, walls):
 def _move_bridge(memory, k, to):
     """Let the bridge of edge k continue at another piece of the same wall."""
     memory.bridge_film[to], memory.bridge_volume[to] = memory.bridge_film[k], memory.bridge_volume[k]
-    memory.bridge_gap[to], memory.bridge_accounted[to] = memory.bridge_gap[k], memory.bridge_accounted[k]
+    memory.bridge_gap[to], memory.bridge_solved[to] = memory.bridge_gap[k], memory.bridge_solved[k]
     memory.closed_along[to], memory.closed_across[to] = memory.closed_along[k], memory.closed_across[k]
     if BRIDGE_INERTIA:
         memory.bridge_impact_speed[to] = memory.bridge_impact_speed[k]
     put(memory.bridge_impulse, to, at(memory.bridge_impulse, k))
     put(memory.bridge_couple, to, at(memory.bridge_couple, k))
+    put(memory.bridge_impulse, k, NOTHING)
+    put(memory.bridge_couple, k, NOTHING)
+    memory.bridge_solved[k] = False
     clear_bridge(k, memory)
 
 
@@ -255,7 +258,7 @@ def fill_bridges(system):
 def _fill(k, system):
     particles, edges, memory, p = system.particles, system.edges, system.memory, system.parameters
     i, j = edges.first[k], edges.second[k]
-    separation, distance, gap = geometry(k, system)
+    separation, distance, _ = geometry(k, system)
     volume = particles.liquid_supply[i] * drawn_share(particles.radius[i], _other_radius(k, i, particles, edges))
     film = particles.film_thickness[i]
     if k < edges.between_particles:
@@ -269,7 +272,6 @@ def _fill(k, system):
     glass = glass_transition(n.viscosity, approach, n.transition_pressure, reduced_radius, film)
     memory.bridge_volume[k], memory.bridge_film[k] = volume, film
     memory.bridge_gap[k] = max(glass, n.minimum_gap)
-    memory.bridge_accounted[k] = gap
     find_closed(k, reduced_radius, memory, p)
     if k < edges.between_particles:
         renew_bridge(k, system)

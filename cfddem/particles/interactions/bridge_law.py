@@ -275,6 +275,16 @@ class BridgeLaws:
         return (*FIELDS, *(INERTIA_FIELDS if self.film_density > 0.0 else ()))
 
     @property
+    def slides(self) -> bool:
+        """Whether bridges resist sliding."""
+        return self._law("tangential") is not None
+
+    @property
+    def resists(self) -> bool:
+        """Whether bridges resist any motion."""
+        return self.slides or self._law("film") is not None
+
+    @property
     def numbers(self) -> BridgeNumbers:
         """The numbers of all laws."""
         on_walls = self.contact_angle if self.wall_contact_angle is None else self.wall_contact_angle
@@ -339,6 +349,7 @@ class NoBridges:
     pulling           fields of pairs on which the pull depends
     collision_memory  what pairs remember of a recorded collision, beyond the memory without liquid
     collision_fields  columns of the record of collisions
+    resists, slides   there are no bridges that do
     """
 
     particle_fields: tuple[Field, ...] = ()
@@ -348,6 +359,7 @@ class NoBridges:
     collision_memory: tuple[Field, ...] = ()
     collision_fields = COLLISION_FIELDS
     wall_share = 0.0
+    resists = slides = False
     parameters: Mapping[str, float] = {}
     numbers = numbers({})
 
@@ -356,7 +368,7 @@ class NoBridges:
 
     def choices(self) -> dict[str, Any]:
         """What a run without liquid puts into the slots of the loops."""
-        return {"BRIDGE": False}
+        return dict.fromkeys(("BRIDGE", "BRIDGE_FILM", "BRIDGE_INERTIA", "BRIDGE_SLIDING"), False)
 
 
 NO_BRIDGES = NoBridges()

@@ -90,7 +90,7 @@ def resistance_integral(state, a, change, floor):
 
 
 @inline
-def _cut_resistance(state, gap, floor):
+def cut_resistance(state, gap, floor):
     """Resistance at a gap, cut below h_min."""
     return _resistance(state, max(gap, floor)) if CUT_CONSTANT or gap >= floor else 0.0
 
@@ -110,7 +110,7 @@ def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
     total = speed
     if accounted_gap != gap:
         total += inverse_mass * resistance_integral(state, gap, accounted_gap - gap, floor)
-    guess = total / (1.0 + step * inverse_mass * _cut_resistance(state, gap, floor))
+    guess = total / (1.0 + step * inverse_mass * cut_resistance(state, gap, floor))
     if abs(step * guess) < STILL * max(gap, floor) and (gap > floor) == (gap + step * guess > floor):
         return guess
     middle = gap + 0.5 * step * guess
@@ -123,12 +123,12 @@ def speed_after_bridge(speed, state, accounted_gap, step, inverse_mass):
         if abs(excess) <= allowed:
             return guess
         end = gap + step * guess
-        resistance = _cut_resistance(state, end, floor)
+        resistance = cut_resistance(state, end, floor)
         slope = 1.0 + step * inverse_mass * resistance
         following, low, high = next_guess(guess, excess, slope, low, high)
         change, new_end = following - guess, gap + step * following
         guess = following
-        bend = step * inverse_mass * abs(_cut_resistance(state, new_end, floor) - resistance)
+        bend = step * inverse_mass * abs(cut_resistance(state, new_end, floor) - resistance)
         jumps = not CUT_CONSTANT and (end >= floor) != (new_end >= floor)
         if change == 0.0 or (not jumps and abs(excess + slope * change) + bend * abs(change) <= allowed):
             return guess
@@ -152,9 +152,3 @@ def pull_energy(state):
             total += half * _WEIGHTS[n] * bridge_pull(at_gap(state, low + half * (1.0 + _NODES[n])))
         low = high
     return total
-
-
-@inline
-def clamp_speed(new_speed, speed):
-    """A bridge neither speeds a pair up nor turns its motion round."""
-    return min(max(new_speed, 0.0), speed) if speed > 0.0 else max(min(new_speed, 0.0), speed)

@@ -36,7 +36,7 @@ from cfddem.particles.interactions.slots import (
     user_minimum_gap,
 )
 from cfddem.particles.pair_graph import THICKEST, geometry
-from cfddem.particles.vectors import NOTHING, at, dot, put, times
+from cfddem.particles.vectors import NOTHING, dot, put, times
 from cfddem.particles.walls.nearest_point import portion
 from closures.minimum_gap import elastohydrodynamic, elastohydrodynamic_speed
 
@@ -44,7 +44,6 @@ FIELDS = (
     Field("resistance", "kg/s", role="memory", meaning="resistance of the film without lever; 0 out of its reach"),
     Field("approach_speed", "m/s", role="memory", meaning="largest approach speed since the film began"),
     Field("film_gap", "m", role="memory", initial=np.inf, meaning="gap at the present positions"),
-    Field("film_normal", "1", 3, "memory", meaning="direction from the second body to the first"),
 )
 
 WEAK = 1e-2
@@ -61,7 +60,6 @@ the mean to a thousandth."""
 WEAK_FIELDS = (
     Field("film_push", "N s", 3, "scratch", meaning="impulse of a film by itself in the last step, on the first body"),
     Field("film_owed", "N s", role="memory", meaning="impulse that a stiff film gives with the others"),
-    Field("film_rate", "1/s", role="memory", meaning="damping number of the film over the step"),
     Field("film_due", role="memory", dtype=bool, meaning="the film is solved with the others in the next step"),
     Field("film_solved", role="memory", dtype=bool, meaning="the film was solved with the others in the last step"),
     Field("film_unmoved", role="memory", dtype=bool, meaning="of a film whose change of the gap is not known yet"),
@@ -132,7 +130,7 @@ def act_alone(k, film, normal, resistance, weight, share, memory, step):
     due = step * rate >= WEAK if moved else memory.film_due[k]
     owes = due and step * above * weight > STIFF
     faster = within and gap > minimum_gap and begin - end > step * memory.approach_speed[k]
-    memory.film_rate[k], memory.film_due[k], memory.film_unmoved[k] = rate, due, not moved
+    memory.film_due[k], memory.film_unmoved[k] = due, not moved
     memory.faster[k] = faster if moved else memory.faster[k]
     if due and moved:
         memory.film_owed[k] = impulse if owes else 0.0
@@ -150,6 +148,7 @@ def renew_film(k, between, viscosity, size, share, system, row, step):
     share    part of the film that belongs to this edge: below 1 where triangles of a mesh share one
     row      of the pair table
     step     since the last positions; 0 if these are the same [s]
+    returns  direction from the second body to the first
     """
     memory, cutoff_ratio = system.memory, system.parameters.cutoff_ratio
     separation, distance, gap = between
@@ -165,7 +164,7 @@ def renew_film(k, between, viscosity, size, share, system, row, step):
         film = FilmState(gap, viscosity, reduced_radius, minimum_gap, cutoff_ratio * reduced_radius)
         act_alone(k, film, normal, share * resistance, weight, share, memory, step)
     memory.film_gap[k] = gap
-    put(memory.film_normal, k, normal)
+    return normal
 
 
 @inline
@@ -174,12 +173,12 @@ def update_edge_film(k, system, step):
     between = geometry(k, system)
     size, viscosity = pair_mass_and_radius(k, system), pair_viscosity(k, system)
     share, row, memory = portion(system.edges, k), pair_row(k, system), system.memory
-    renew_film(k, between, viscosity, size, share, system, row, step)
+    normal = renew_film(k, between, viscosity, size, share, system, row, step)
     if TRIANGLES and DRIFTING and memory.resistance[k] == 0.0:  # its last gap may be that of the triangle beside it
         put(memory.film_push, k, NOTHING)
     if SHEAR:
-        motion = motion_at_wall(k, at(memory.film_normal, k), system)
-        renew_shear(k, viscosity, size[0], -1.0, share, motion, memory, step)
+        motion = motion_at_wall(k, normal, system)
+        renew_shear(k, normal, (viscosity, size[0], -1.0, share), motion, memory, step)
 
 
 @inline

@@ -1,4 +1,4 @@
-"""The equations of films that are solved together: what they need of each film, and their residual.
+"""The equations of films and bridges that are solved together: what they need of each row, and their residual.
 
 See `cfddem.particles.interactions.joint_solution`.
 """
@@ -7,25 +7,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from cfddem.backend.compile import inline, part, prange
+from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.film import record_approach
 from cfddem.particles.interactions.film_law import at_gap, at_least
+from cfddem.particles.interactions.joint_bridges import across_of, begin_bridge, mean_along, push_of_last_step
 from cfddem.particles.interactions.joint_films import film_at, passing_rate
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row, relative_velocity
 from cfddem.particles.interactions.shear_film import (
     by_blocks,
     couples,
     edge_asymmetry,
+    four_of,
     impulses_of,
     pair_arms,
-    put_two,
+    put_slip_and_roll,
     sliding_ratios,
     slip_and_roll,
+    slip_and_roll_of,
     twist_strength,
-    two,
 )
 from cfddem.particles.interactions.slots import (
+    BRIDGE_RESISTS,
+    BRIDGE_SLIDING,
+    DRIFTING,
     SHEAR,
+    SLIDES,
     TWIST,
     FilmState,
     explicit_resistance,
@@ -33,7 +39,7 @@ from cfddem.particles.interactions.slots import (
     speed_after_film,
     speed_after_short_film,
 )
-from cfddem.particles.pair_graph import edge_role
+from cfddem.particles.pair_graph import edge_role, geometry
 from cfddem.particles.vectors import NOTHING, across, at, cross, dot, either, minus, plus, put, times
 from cfddem.particles.walls.nearest_point import SURFACE, portion, touched
 
@@ -44,8 +50,8 @@ _ROUNDING = 1e-7
 _LITTLE = 1e-15
 """Least resistance to sliding in the solution, over that of the normal film."""
 
-_NONE = 1e-6
-"""Least damping number of a film in the solution: solids that overlap have no film."""
+_NONE, _NO_BRIDGE = 1e-6, 1e-18
+"""Least damping number of a film in the solution: solids that overlap have no film. And that of a bridge."""
 
 _1, _2, _4 = np.uint64(1), np.uint64(2), np.uint64(4)
 
@@ -54,85 +60,144 @@ _1, _2, _4 = np.uint64(1), np.uint64(2), np.uint64(4)
 
 
 @inline
+def has_film(k, memory):
+    """Whether edge k has a film that is solved with the others."""
+    if DRIFTING and BRIDGE_RESISTS:
+        return memory.film_due[k]
+    return DRIFTING
+
+
+@inline
 def prepare_film(e, system, step):
-    """What the equations need of film e, and its impulse of the last step."""
+    """What the equations need of the film and the bridge of row e, and their impulse of the last step."""
     edges, memory, radius = system.edges, system.memory, system.particles.radius
     k = memory.joint_edge[e]
-    normal, gap, velocity = at(memory.film_normal, k), memory.film_gap[k], relative_velocity(k, system)
-    passing = 0.0
+    separation, distance, gap = geometry(k, system)
+    normal = times(1.0 / distance, separation)
+    velocity = relative_velocity(k, system)
+    passing, speed = 0.0, dot(velocity, normal)
     if k < edges.between_particles:
         distance = radius[edges.first[k]] + radius[edges.second[k]] + gap
         passing = passing_rate(normal, distance, velocity, system.parameters.free, step)
-    memory.joint_passing[e] = passing
-    _, weight = pair_mass_and_radius(k, system)
-    share = portion(edges, k)
-    memory.joint_least[e] = _NONE / (step * weight)
-    film = film_at(k, gap, system)
-    speed = dot(velocity, normal)
-    record_approach(k, memory, speed, gap, film.viscosity, film.reduced_radius, pair_row(k, system))
+    memory.joint_before[e] = speed + passing
+    reduced_radius, weight = pair_mass_and_radius(k, system)
+    memory.joint_least[e] = (_NONE if DRIFTING else _NO_BRIDGE) / (step * weight)
     memory.joint_first[e] = edges.first[k]
     memory.joint_second[e] = edges.second[k] if k < edges.between_particles else -1
-    memory.joint_share[e], memory.joint_viscosity[e] = share, film.viscosity
-    memory.joint_reduced_radius[e], memory.joint_minimum_gap[e] = film.reduced_radius, memory.minimum_gap[k]
-    memory.joint_debt[e] = memory.film_owed[k]
-    memory.joint_gap[e], memory.joint_weight[e] = gap, weight
+    memory.joint_gap[e], memory.joint_weight[e], memory.joint_reduced_radius[e] = gap, weight, reduced_radius
     put(memory.joint_normal, e, normal)
-    memory.joint_impulse[e] = dot(at(memory.impulse, k), normal)
-    if SHEAR:
-        prepare_sliding(e, k, film, weight, share, normal, system, step)
+    share, debt, impulse = 0.0, 0.0, 0.0
+    if DRIFTING and has_film(k, memory):
+        share, debt, impulse = prepare_own_film(e, k, speed, gap, normal, system)
+    memory.joint_share[e], memory.joint_debt[e] = share, debt
+    if BRIDGE_RESISTS:
+        impulse += begin_bridge(e, k, normal, impulse - debt, memory)
+    memory.joint_impulse[e] = impulse
+    if SLIDES:
+        prepare_sliding(e, k, (normal, gap, speed), share, system, step)
+
+
+@inline
+def prepare_own_film(e, k, speed, gap, normal, system):
+    """The same of the film alone: the part of it that belongs to edge k, what it owes, and its last impulse."""
+    memory = system.memory
+    film = film_at(k, gap, system)
+    record_approach(k, memory, speed, gap, film.viscosity, film.reduced_radius, pair_row(k, system))
+    memory.joint_viscosity[e], memory.joint_minimum_gap[e] = film.viscosity, memory.minimum_gap[k]
+    return portion(system.edges, k), memory.film_owed[k], dot(at(memory.impulse, k), normal)
 
 
 @part
 def prepare(system, count, step):
-    """What the equations need of each film, and its impulse of the last step."""
+    """What the equations need of each row, and its impulse of the last step."""
     for e in prange(count):
         prepare_film(e, system, step)
 
 
 @inline
-def prepare_sliding(e, k, film, weight, share, normal, system, step):
-    """The same for sliding, rolling and twisting."""
+def prepare_sliding(e, k, place, share, system, step):
+    """The same for sliding, rolling and twisting.
+
+    place  normal, gap, and rate of the gap
+    share  part of the film that belongs to the edge; 0 without one
+    """
     particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
-    asymmetry = edge_asymmetry(k, system)
+    normal, gap, speed = place
+    weight, turn_i, turn_j = memory.joint_weight[e], particles.inverse_inertia[i], 0.0
     if k < edges.between_particles:
-        arms, turn_j = pair_arms(i, j, particles.radius, film.gap), particles.inverse_inertia[j]
+        arms, turn_j = pair_arms(i, j, particles.radius, gap), particles.inverse_inertia[j]
+    elif SHEAR:
+        arms = (particles.radius[i], 0.0)
     else:
-        arms, turn_j = (particles.radius[i], 0.0), 0.0
-    turn_i = particles.inverse_inertia[i]
-    least = _LITTLE * memory.resistance[k]
-    resistance = max(memory.shear_resistance[k], least)
-    both, rolling = sliding_ratios(film.reduced_radius, asymmetry)
-    scale = 1.0 / (step * resistance * (rolling - both * both))
-    twist = twist_strength(
-        film.gap, film.minimum_gap, memory.shear_resistance[k], film.viscosity, film.reduced_radius, asymmetry, share
-    )
-    twist = 1.0 / (step * max(twist, least * film.reduced_radius * film.reduced_radius))
-    own, crossed, roll = scale * rolling, -scale * both, scale
-    row = _4 * np.uint64(e)
-    four = memory.joint_sliding
-    four[row], four[row + _1], four[row + _2], four[row + _2 + _1] = own, crossed, roll, twist
-    own += weight + arms[0] * arms[0] * turn_i + arms[1] * arms[1] * turn_j
-    crossed += arms[0] * turn_i - arms[1] * turn_j
-    roll += turn_i + turn_j
-    inverse = 1.0 / (own * roll - crossed * crossed)
-    four = memory.joint_inverse
-    four[row], four[row + _1], four[row + _2] = inverse * roll, -inverse * crossed, inverse * own
-    four[row + _2 + _1] = 1.0 / (twist + turn_i + turn_j)
+        arms = (particles.radius[i] + gap, 0.0)
+    by_bridge = 0.0
+    if BRIDGE_SLIDING:
+        by_bridge = across_of(k, gap, speed, system)
+        memory.bridge_across[k], memory.bridge_lever[k] = step * by_bridge, arms[0] / particles.radius[i]
     memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1] = arms
-    push, first, _ = impulses_of(k, memory.shear_impulse)
-    push = across(push, normal)
-    moment = minus(first, times(arms[0], cross(push, normal)))
-    put_two(memory.joint_shear_impulse, e, push, cross(normal, moment))
-    if TWIST:
-        put_two(memory.joint_shear_impulse, e, push, plus(cross(normal, moment), times(dot(moment, normal), normal)))
+    push, roll = NOTHING, NOTHING
+    if SHEAR:
+        own, crossed, roll_own, twist = sliding_compliances(e, k, gap, by_bridge, system, step)
+        put_four(memory.joint_sliding, e, (own, crossed, roll_own, twist))
+        own += weight + arms[0] * arms[0] * turn_i + arms[1] * arms[1] * turn_j
+        crossed += arms[0] * turn_i - arms[1] * turn_j
+        roll_own += turn_i + turn_j
+        inverse = 1.0 / (own * roll_own - crossed * crossed)
+        inverses = (inverse * roll_own, -inverse * crossed, inverse * own, 1.0 / (twist + turn_i + turn_j))
+        push, roll = last_sliding(k, normal, arms, memory)
+    else:
+        own = 1.0 / (step * max(by_bridge, _LITTLE * memory.bridge_resistance[k]))
+        put_four(memory.joint_sliding, e, (own, 0.0, 0.0, 0.0))
+        own += weight + arms[0] * arms[0] * turn_i + arms[1] * arms[1] * turn_j
+        inverses = (1.0 / own, 0.0, 0.0, 0.0)
+    put_four(memory.joint_inverse, e, inverses)
+    if BRIDGE_SLIDING:
+        push = plus(push, push_of_last_step(k, normal, memory))
+    put_slip_and_roll(memory.joint_shear_impulse, e, push, roll)
 
 
 @inline
-def four_of(array, e):
-    """The four numbers of a row."""
+def put_four(array, e, values):
+    """Write the four numbers of a row."""
     row = _4 * np.uint64(e)
-    return array[row], array[row + _1], array[row + _2], array[row + _2 + _1]
+    array[row], array[row + _1], array[row + _2], array[row + _2 + _1] = values
+
+
+@inline
+def last_sliding(k, normal, arms, memory):
+    """Impulses of the film of edge k against slip, and against roll and twist, in the last step."""
+    push, first, _ = impulses_of(k, memory.shear_impulse)
+    push = across(push, normal)
+    moment = minus(first, times(arms[0], cross(push, normal)))
+    roll = cross(normal, moment)
+    return push, plus(roll, times(dot(moment, normal), normal)) if TWIST else roll
+
+
+@inline
+def sliding_compliances(e, k, gap, by_bridge, system, step):
+    """Compliances of slip, of both, of roll and of twist of the film and the bridge of edge k.
+
+    by_bridge  resistance of the bridge to sliding [kg/s]
+    """
+    memory, share = system.memory, system.memory.joint_share[e]
+    film, asymmetry = film_at(k, gap, system), edge_asymmetry(k, system)
+    normal_resistance, of_film = memory.resistance[k], memory.shear_resistance[k]
+    if BRIDGE_RESISTS:
+        normal_resistance = max(normal_resistance, memory.bridge_resistance[k])
+        of_film = of_film if share > 0.0 else 0.0
+    least = _LITTLE * normal_resistance
+    resistance = max(of_film, least)
+    both, rolling = sliding_ratios(film.reduced_radius, asymmetry)
+    scale = 1.0 / (step * resistance * (rolling - both * both))
+    own, crossed, roll = scale * rolling, -scale * both, scale
+    if BRIDGE_SLIDING:
+        slip = resistance + by_bridge
+        scale = 1.0 / (step * (slip * rolling - resistance * both * both))
+        own, crossed, roll = scale * rolling, -scale * both, scale * slip / resistance
+    twist = twist_strength(film.gap, film.minimum_gap, of_film, film.viscosity, film.reduced_radius, asymmetry, share)
+    twist = 1.0 / (step * max(twist, least * film.reduced_radius * film.reduced_radius))
+    return own, crossed, roll, twist
 
 
 @inline
@@ -150,13 +215,13 @@ def rates_of(e, velocity, spin, with_walls, system):
     elif with_walls:
         difference = minus(difference, touched(edges, memory.joint_edge[e], SURFACE))
     slip, roll = NOTHING, NOTHING
-    if SHEAR:
+    if SLIDES:
         arms = (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1])
         first, second = at(spin, i), NOTHING
         if between:
             second = at(spin, j)
         slip, roll = slip_and_roll(difference, first, second, normal, arms)
-        if with_walls and not between:
+        if SHEAR and with_walls and not between:
             wall = system.walls.wall[edges.second[memory.joint_edge[e]]]
             about = minus(first, at(system.walls.spin, wall))
             _, roll = slip_and_roll(NOTHING, about, NOTHING, normal, arms)
@@ -169,7 +234,7 @@ def spread(system, direction):
     particles, edges, memory = system.particles, system.edges, system.memory
     impulse = memory.joint_direction if direction else memory.joint_impulse
     change = particles.film_along if direction else particles.film_change
-    if SHEAR:
+    if SLIDES:
         shear_impulse = memory.joint_shear_direction if direction else memory.joint_shear_impulse
         turn = particles.film_turn_along if direction else particles.film_turn
     for i in prange(particles.owned):
@@ -179,21 +244,40 @@ def spread(system, direction):
             e = memory.joint_row[k]
             normal = at(memory.joint_normal, e)
             total = plus(total, times(sign * impulse[e], normal))
-            if SHEAR:
-                push, roll = two(shear_impulse, e)
+            if SLIDES:
+                push, roll = slip_and_roll_of(shear_impulse, e)
                 first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
                 total = plus(total, times(sign, push))
                 couple = plus(couple, either(sign > 0.0, first, second))
         put(change, i, times(particles.inverse_mass[i], total))
-        if SHEAR:
+        if SLIDES:
             put(turn, i, times(particles.inverse_inertia[i], couple))
 
 
 @inline
-def mean_resistance(speed, e, system, step):
-    """Resistance of the normal film e over its way in this step.
+def mean_resistance(rate, speed, e, system, step):
+    """Resistance of row e along the line of centres, over its way in this step.
 
-    speed  of the pair with all films, as found so far [m/s]
+    rate   of the gap before all impulses [m/s]
+    speed  rate of the gap with all impulses, as found so far [m/s]
+    """
+    memory = system.memory
+    if not BRIDGE_RESISTS:
+        return film_mean(speed, memory.joint_impulse[e] - memory.joint_debt[e], e, system, step)
+    by_bridge = memory.joint_bridge[e] * (memory.joint_impulse[e] - memory.joint_debt[e])
+    bridge, film = mean_along(e, rate, speed, by_bridge, system, step), 0.0
+    if DRIFTING and memory.joint_share[e] > 0.0:
+        film = film_mean(speed, memory.joint_impulse[e] - memory.joint_debt[e] - by_bridge, e, system, step)
+        memory.joint_bridge[e] = bridge / (bridge + film) if bridge > 0.0 else 0.0
+    return bridge + film
+
+
+@inline
+def film_mean(speed, impulse, e, system, step):
+    """Resistance of the normal film of row e over its way in this step.
+
+    speed    of the pair with all impulses, as found so far [m/s]
+    impulse  of the film, as found so far, without what it owes [N s]
     """
     memory = system.memory
     gap, weight, share = memory.joint_gap[e], memory.joint_weight[e], memory.joint_share[e]
@@ -202,7 +286,7 @@ def mean_resistance(speed, e, system, step):
     film = FilmState(gap, memory.joint_viscosity[e], radius, memory.joint_minimum_gap[e], cutoff_gap)
     if abs(step * speed) < SLIGHT * gap:
         return share * explicit_resistance(at_gap(film, gap + 0.5 * step * speed))
-    free = speed - weight * (memory.joint_impulse[e] - memory.joint_debt[e])
+    free = speed - weight * impulse
     inverse_mass = weight * share
     strength = inverse_mass * film_resistance(at_least(film)) * max(gap, film.minimum_gap)
     after = speed_after_short_film(free, film, gap, step, strength, inverse_mass)
@@ -221,46 +305,71 @@ def own(e, system):
 
 @inline
 def film_residual(e, system, step, renew):
-    """Resistance of film e, if it is to be found anew, its residual, and its terms of four sums."""
+    """Resistance of film e, if it is to be found anew, its residual and first direction; returns terms of four sums."""
     particles, memory = system.particles, system.memory
-    before, slip, roll = rates_of(e, particles.velocity, particles.spin, True, system)
-    before += memory.joint_passing[e]
+    _, slip, roll = rates_of(e, particles.velocity, particles.spin, True, system)
+    before = memory.joint_before[e]
     given, slipped, rolled = rates_of(e, particles.film_change, particles.film_turn, False, system)
     if renew:
         memory.joint_speed[e], memory.joint_shift[e] = before + given, 0.0
-        resistance = mean_resistance(before + given, e, system, step)
+        resistance = mean_resistance(before, before + given, e, system, step)
         memory.joint_compliance[e] = 1.0 / (step * max(resistance, memory.joint_least[e]))
     compliance, impulse = memory.joint_compliance[e], memory.joint_impulse[e]
     wanted = compliance * memory.joint_debt[e] - before
     residual = wanted - given - compliance * impulse
     inverse = 1.0 / (compliance + memory.joint_weight[e])
-    memory.joint_residual[e] = residual
+    memory.joint_residual[e], memory.joint_direction[e] = residual, inverse * residual
     left, whole = inverse * residual * residual, inverse * wanted * wanted
     by_wanted, by_residual = impulse * wanted, impulse * residual
-    if SHEAR:
+    if SLIDES:
         normal, inverses = at(memory.joint_normal, e), four_of(memory.joint_inverse, e)
-        push, couple = two(memory.joint_shear_impulse, e)
+        push, couple = slip_and_roll_of(memory.joint_shear_impulse, e)
         s, q = by_blocks(four_of(memory.joint_sliding, e), push, couple, normal)
         s, q = minus(NOTHING, plus(plus(slip, slipped), s)), minus(NOTHING, plus(plus(roll, rolled), q))
-        put_two(memory.joint_shear_residual, e, s, q)
+        put_slip_and_roll(memory.joint_shear_residual, e, s, q)
         a, b = by_blocks(inverses, s, q, normal)
+        put_slip_and_roll(memory.joint_shear_direction, e, a, b)
         left += dot(a, s) + dot(b, q)
         a, b = by_blocks(inverses, slip, roll, normal)
         whole += dot(a, slip) + dot(b, roll)
         by_wanted -= dot(push, slip) + dot(couple, roll)
         by_residual += dot(push, s) + dot(couple, q)
     mine = 1.0 if own(e, system) else 0.0
+    made = (mine * left, mine * whole, mine * by_wanted, mine * by_residual)
     terms, rows = memory.joint_terms, len(system.edges.first)
-    terms[e], terms[rows + e] = mine * left, mine * whole
-    terms[2 * rows + e], terms[3 * rows + e] = mine * by_wanted, mine * by_residual
+    terms[e], terms[rows + e], terms[2 * rows + e], terms[3 * rows + e] = made
+    return made
+
+
+@inline
+def greater(top, term):
+    """The larger of a number and the absolute value of another; NaN if one of them is NaN."""
+    size = abs(term)
+    return size if size > top or size != size else top
+
+
+@inline
+def greatest(tops):
+    """The largest of some numbers; NaN if one of them is NaN."""
+    largest = 0.0
+    for top in tops:
+        largest = greater(largest, top)
+    return largest
 
 
 @part
 def find_residual(system, count, step, renew):
-    """Resistances, if they are to be found anew, residuals, and the terms of four sums.
+    """Resistances, if they are to be found anew, residuals, and the terms of four sums; returns the largest of each.
 
     The sums are: the square of the residual, and of what it would be without impulses, both in the preconditioner; and
     impulses times the right-hand side, and times the residual.
     """
-    for e in prange(count):
-        film_residual(e, system, step, renew)
+    tops = np.zeros((4, CHUNKS))
+    for chunk in prange(CHUNKS):
+        left, whole, by_wanted, by_residual = 0.0, 0.0, 0.0, 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            made = film_residual(e, system, step, renew)
+            left, whole = greater(left, made[0]), greater(whole, made[1])
+            by_wanted, by_residual = greater(by_wanted, made[2]), greater(by_residual, made[3])
+        tops[0, chunk], tops[1, chunk], tops[2, chunk], tops[3, chunk] = left, whole, by_wanted, by_residual
+    return greatest(tops[0]), greatest(tops[1]), greatest(tops[2]), greatest(tops[3])

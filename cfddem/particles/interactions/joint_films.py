@@ -1,7 +1,7 @@
-"""Films whose impulses act over a step: their fields, and the list of those that are solved together.
+"""Films and bridges whose impulses act over a step: their fields, and the list of those that are solved together.
 
-Weak films act by themselves (`cfddem.particles.interactions.film`); all others are solved together
-(`cfddem.particles.interactions.joint_solution`).
+Weak films act by themselves (`cfddem.particles.interactions.film`). All other films, and all bridges that resist, are
+solved together (`cfddem.particles.interactions.joint_solution`), a film and a bridge of one pair as one.
 """
 
 from __future__ import annotations
@@ -18,18 +18,22 @@ from cfddem.particles.interactions.kinematics import (
     relative_velocity,
 )
 from cfddem.particles.interactions.shear_film import put_impulses
-from cfddem.particles.interactions.slots import SHEAR, FilmState
-from cfddem.particles.pair_graph import places_of
-from cfddem.particles.vectors import NOTHING, across, at, dot, put, times
+from cfddem.particles.interactions.slots import BRIDGE_RESISTS, DRIFTING, SHEAR, FilmState
+from cfddem.particles.pair_graph import geometry, places_of
+from cfddem.particles.vectors import NOTHING, across, dot, put, times
 
 FIELDS = (
     *WEAK_FIELDS,
     Field("impulse", "N s", 3, "memory", meaning="impulse of a film solved with others in the last step, on the first"),
+)
+"""Of pairs whose films act by impulses."""
+
+JOINT_FIELDS = (
     Field("joint_row", role="scratch", dtype=np.int32, meaning="place of the film among those solved together"),
     Field("joint_edge", role="scratch", dtype=np.int32, meaning="pair of each film solved together"),
     Field("joint_first", role="scratch", dtype=np.int32, meaning="its first body"),
     Field("joint_second", role="scratch", dtype=np.int32, meaning="its second body; below 0 at a wall"),
-    Field("joint_share", role="scratch", meaning="part of the film that belongs to the edge"),
+    Field("joint_share", role="scratch", meaning="part of the film that belongs to the edge; 0 without one"),
     Field("joint_viscosity", "Pa s", role="scratch", meaning="of the film"),
     Field("joint_reduced_radius", "m", role="scratch", meaning="R*"),
     Field("joint_minimum_gap", "m", role="scratch", meaning="h_min"),
@@ -38,7 +42,7 @@ FIELDS = (
     ),
     Field("joint_normal", "1", 3, "scratch", meaning="direction from the second body to the first"),
     Field("joint_weight", "1/kg", role="scratch", meaning="sum of the inverse masses"),
-    Field("joint_passing", "m/s", role="scratch", meaning="rate at which bodies that pass each other part"),
+    Field("joint_before", "m/s", role="scratch", meaning="rate of the gap before all impulses, with that of passing"),
     Field("joint_gap", "m", role="scratch", meaning="gap at the beginning of the step"),
     Field("joint_speed", "m/s", role="scratch", meaning="rate of the gap for which the resistance holds"),
     Field("joint_shift", "m/s", role="scratch", meaning="change of that rate since"),
@@ -51,10 +55,23 @@ FIELDS = (
     Field("joint_product", "m/s", role="scratch", meaning="matrix times direction"),
     Field("joint_terms", "1", 4, "scratch", meaning="terms of sums over all films"),
 )
-"""Of pairs whose films act by impulses. Those named joint_, but `joint_row`, hold one row for each film solved."""
+"""Of pairs whose films or bridges are solved together. All but `joint_row` hold one row for each of these."""
+
+LARGE_TURN = 0.1
+"""Angle by which the normal turns in a step, above which terms of second order in the step say nothing [rad]."""
+
+BRIDGE_FIELDS = (
+    Field("joint_bridge", role="scratch", meaning="part of the bridge in the impulse without the debt"),
+    Field("joint_floor", "m", role="scratch", meaning="gap below which a bridge without a film resists evenly"),
+)
+"""The same of bridges."""
 
 SHEAR_FIELDS = (
     Field("shear_impulse", "1", 9, "memory", meaning="the same against sliding, see `put_impulses` [N s, N m s]"),
+)
+"""Of pairs whose films resist sliding."""
+
+SLIDING_FIELDS = (
     Field("joint_arms", "m", 2, "scratch", meaning="lever arms of slip on the first and the second body"),
     Field("joint_sliding", "1", 4, "scratch", meaning="compliances of slip, of both, of roll and of twist"),
     Field("joint_inverse", "1", 4, "scratch", meaning="preconditioner of slip, of both, of roll and of twist"),
@@ -63,18 +80,22 @@ SHEAR_FIELDS = (
     Field("joint_shear_direction", "1", 6, "scratch", meaning="directions of conjugate gradients"),
     Field("joint_shear_product", "1", 6, "scratch", meaning="matrix times direction"),
 )
-"""The same of films that resist sliding."""
+"""Rows of films and bridges that are solved together, where these resist sliding."""
 
-PARTICLE_FIELDS = (
+WEAK_PARTICLE_FIELDS = (
     Field("film_gain", "m/s", 3, "scratch", halo=("work",), meaning="velocity given by weak films in the last step"),
     Field("film_spin_gain", "rad/s", 3, "scratch", halo=("work",), meaning="spin given by weak films in the last step"),
+)
+"""Fields of particles whose films act by impulses."""
+
+PARTICLE_FIELDS = (
     Field("film_change", "m/s", 3, "scratch", halo=("film_change",), meaning="change of velocity by films"),
     Field("film_turn", "rad/s", 3, "scratch", halo=("film_change",), meaning="change of spin by films"),
     Field("film_along", "m/s", 3, "scratch", halo=("film_direction",), meaning="the same along the direction"),
     Field("film_turn_along", "rad/s", 3, "scratch", halo=("film_direction",), meaning="the same along the direction"),
     Field("joint_end", role="scratch", dtype=np.int64, meaning="end of the films of the particle in joint_incident"),
 )
-"""Fields of particles whose films act by impulses."""
+"""Fields of particles whose films or bridges are solved together."""
 
 # ---------------------------------------------------------------- which films are solved together
 
@@ -84,12 +105,23 @@ def passing_rate(normal, distance, velocity, free, step):
     """Mean rate at which two spheres that pass each other part in a step beyond the speed along their normal.
 
     At most that speed: so a film takes what its gap changes, and gives no energy to a pair that turns as a whole.
+    Nothing where the pair turns by more than `LARGE_TURN` in the step.
 
     velocity  of the first centre relative to the second
     """
     moving = (free[0] * velocity[0], free[1] * velocity[1], free[2] * velocity[2])
     aside = across(moving, normal)
-    return min(0.5 * step * dot(aside, aside) / distance, abs(dot(velocity, normal)))
+    square = dot(aside, aside)
+    if step * step * square > LARGE_TURN * LARGE_TURN * distance * distance:
+        return 0.0
+    return min(0.5 * step * square / distance, abs(dot(velocity, normal)))
+
+
+@inline
+def normal_of(k, system):
+    """Direction from the second body of edge k to the first, as `renew_film` has it."""
+    separation, distance, _ = geometry(k, system)
+    return times(1.0 / distance, separation)
 
 
 @inline
@@ -105,18 +137,42 @@ def note_approach(k, system):
     """Remember the speed of approach of edge k, the fastest since its film began."""
     memory = system.memory
     film = film_at(k, memory.film_gap[k], system)
-    speed, row = dot(relative_velocity(k, system), at(memory.film_normal, k)), pair_row(k, system)
+    speed, row = dot(relative_velocity(k, system), normal_of(k, system)), pair_row(k, system)
     record_approach(k, memory, speed, film.gap, film.viscosity, film.reduced_radius, row)
 
 
 @inline
-def enter(k, row, memory):
-    """List the film of edge k at a row; one that has acted by itself so far begins with the impulse that it owes."""
-    if not memory.film_solved[k]:
-        memory.film_solved[k] = True
-        put(memory.impulse, k, times(memory.film_owed[k], at(memory.film_normal, k)))
+def is_due(k, memory):
+    """Whether the film or the bridge of edge k is solved with the others in the next step."""
+    if DRIFTING and BRIDGE_RESISTS:
+        return memory.film_due[k] or memory.bridge_resistance[k] > 0.0
+    return memory.film_due[k] if DRIFTING else memory.bridge_resistance[k] > 0.0
+
+
+@inline
+def enter(k, row, system):
+    """List edge k at a row; a film that has acted by itself so far begins with the impulse that it owes."""
+    memory = system.memory
+    if DRIFTING:
+        if not memory.film_due[k]:
+            stay_apart(k, system)
+        elif not memory.film_solved[k]:
+            memory.film_solved[k] = True
+            put(memory.impulse, k, times(memory.film_owed[k], normal_of(k, system)))
     memory.joint_edge[row] = k
     memory.joint_row[k] = row
+
+
+@inline
+def leave(k, system):
+    """Edge k is not solved with the others, perhaps not any more."""
+    memory = system.memory
+    if BRIDGE_RESISTS and memory.bridge_solved[k]:
+        memory.bridge_solved[k] = False
+        put(memory.bridge_impulse, k, NOTHING)
+        put(memory.bridge_couple, k, NOTHING)
+    if DRIFTING:
+        stay_apart(k, system)
 
 
 @inline
@@ -140,44 +196,47 @@ def collect(system):
     for chunk in prange(CHUNKS):
         count = 0
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
-            count += 1 if memory.film_due[k] else 0
+            count += 1 if is_due(k, memory) else 0
         counts[chunk + 1] = count
     for chunk in range(CHUNKS):
         counts[chunk + 1] += counts[chunk]
     for chunk in prange(CHUNKS):
         row = counts[chunk]
         for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
-            if memory.film_due[k]:
-                enter(k, row, memory)
+            if is_due(k, memory):
+                enter(k, row, system)
                 row += 1
-            elif memory.film_solved[k] or memory.faster[k]:
-                stay_apart(k, system)
+            else:
+                leave(k, system)
     return counts[CHUNKS]
 
 
 @inline
 def list_due(place, end, system):
-    """Let the edge at a place of `incident` follow the listed ones of its particle if its film is solved."""
+    """Let the edge at a place of `incident` follow the listed ones of its particle if it is solved."""
     memory, incident = system.memory, system.edges.incident[place]
     memory.joint_incident[end] = incident
-    return end + (1 if memory.film_due[np.int64(incident) ^ (np.int64(incident) >> 63)] else 0)
+    return end + (1 if is_due(np.int64(incident) ^ (np.int64(incident) >> 63), memory) else 0)
 
 
 @inline
 def mark_due(k, system, step):
     """Solve the film of edge k with the others if it is not weak at this step."""
     memory = system.memory
-    leaps, gap = False, memory.film_gap[k]
-    if memory.film_unmoved[k] and memory.film_rate[k] > 0.0:
-        speed = dot(relative_velocity(k, system), at(memory.film_normal, k))
+    if memory.film_due[k] or memory.resistance[k] == 0.0:
+        return
+    leaps, gap, (_, weight) = False, memory.film_gap[k], pair_mass_and_radius(k, system)
+    rate = memory.resistance[k] * weight * min(max(gap, 0.0) / memory.minimum_gap[k], 1.0)
+    if memory.film_unmoved[k] and weight > 0.0:
+        speed = dot(relative_velocity(k, system), normal_of(k, system))
         leaps = gap > memory.minimum_gap[k] and abs(step * speed) > LEAP * gap
-    if not memory.film_due[k] and (leaps or step * memory.film_rate[k] >= WEAK):
+    if leaps or step * rate >= WEAK:
         memory.film_due[k], memory.film_owed[k] = True, 0.0
 
 
 @inline
 def list_all_due(i, system):
-    """List the edges of particle i whose films are solved with the others."""
+    """List the edges of particle i that are solved with the others."""
     end = system.edges.start[i]
     for place in places_of(i, system.edges):
         end = list_due(place, end, system)
@@ -186,8 +245,9 @@ def list_all_due(i, system):
 
 @part
 def find_due(system, step):
-    """Find the films that are solved together at a step that may differ from the last one."""
-    for k in prange(len(system.edges.first)):
-        mark_due(k, system, step)
+    """Find the films and bridges that are solved together at a step that may differ from the last one."""
+    if DRIFTING:
+        for k in prange(len(system.edges.first)):
+            mark_due(k, system, step)
     for i in prange(system.particles.owned):
         list_all_due(i, system)

@@ -5,11 +5,21 @@ See `cfddem.particles.interactions.joint_solution`.
 
 from __future__ import annotations
 
-from cfddem.backend.compile import inline, part, prange
-from cfddem.particles.interactions.joint_equations import four_of, own, rates_of
-from cfddem.particles.interactions.shear_film import by_blocks, couples, put_impulses, put_two, two
-from cfddem.particles.interactions.slots import SHEAR
-from cfddem.particles.vectors import LEAST, at, dot, minus, plus, put, times
+import numpy as np
+
+from cfddem.backend.compile import CHUNKS, inline, part, prange
+from cfddem.particles.interactions.joint_bridges import keep_bridge
+from cfddem.particles.interactions.joint_equations import greater, greatest, own, rates_of
+from cfddem.particles.interactions.shear_film import (
+    by_blocks,
+    couples,
+    four_of,
+    put_impulses,
+    put_slip_and_roll,
+    slip_and_roll_of,
+)
+from cfddem.particles.interactions.slots import BRIDGE_RESISTS, DRIFTING, SHEAR, SLIDES
+from cfddem.particles.vectors import LEAST, NOTHING, at, dot, minus, plus, put, times
 
 
 @inline
@@ -17,14 +27,12 @@ def film_direction(e, system, share):
     """New direction of film e."""
     memory = system.memory
     steepest = memory.joint_residual[e] / (memory.joint_compliance[e] + memory.joint_weight[e])
-    memory.joint_direction[e] = steepest + share * memory.joint_direction[e] if share > 0.0 else steepest
-    if SHEAR:
-        s, q = two(memory.joint_shear_residual, e)
+    memory.joint_direction[e] = steepest + share * memory.joint_direction[e]
+    if SLIDES:
+        s, q = slip_and_roll_of(memory.joint_shear_residual, e)
         s, q = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
-        if share > 0.0:
-            a, b = two(memory.joint_shear_direction, e)
-            s, q = plus(s, times(share, a)), plus(q, times(share, b))
-        put_two(memory.joint_shear_direction, e, s, q)
+        a, b = slip_and_roll_of(memory.joint_shear_direction, e)
+        put_slip_and_roll(memory.joint_shear_direction, e, plus(s, times(share, a)), plus(q, times(share, b)))
 
 
 @part
@@ -36,32 +44,39 @@ def find_direction(system, count, share):
 
 @inline
 def film_product(e, system):
-    """Matrix times direction of film e."""
+    """Matrix times direction of film e; returns its term of their product."""
     particles, memory = system.particles, system.memory
     product, slip, roll = rates_of(e, particles.film_along, particles.film_turn_along, False, system)
     direction = memory.joint_direction[e]
     product += memory.joint_compliance[e] * direction
     memory.joint_product[e] = product
     term = direction * product
-    if SHEAR:
-        push, couple = two(memory.joint_shear_direction, e)
+    if SLIDES:
+        push, couple = slip_and_roll_of(memory.joint_shear_direction, e)
         s, q = by_blocks(four_of(memory.joint_sliding, e), push, couple, at(memory.joint_normal, e))
         s, q = plus(slip, s), plus(roll, q)
-        put_two(memory.joint_shear_product, e, s, q)
+        put_slip_and_roll(memory.joint_shear_product, e, s, q)
         term += dot(push, s) + dot(couple, q)
-    memory.joint_terms[e] = term if own(e, system) else 0.0
+    term = term if own(e, system) else 0.0
+    memory.joint_terms[e] = term
+    return term
 
 
 @part
 def find_product(system, count):
-    """Matrix times direction, and the terms of its product with the direction."""
-    for e in prange(count):
-        film_product(e, system)
+    """Matrix times direction, and the terms of its product with the direction; returns the largest of these."""
+    tops = np.zeros(CHUNKS)
+    for chunk in prange(CHUNKS):
+        top = 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            top = greater(top, film_product(e, system))
+        tops[chunk] = top
+    return greatest(tops)
 
 
 @inline
 def film_follows(e, system, length, step):
-    """New impulse and residual of film e."""
+    """New impulse and residual of film e; returns its terms of two sums."""
     memory = system.memory
     direction, compliance = memory.joint_direction[e], memory.joint_compliance[e]
     memory.joint_impulse[e] += length * direction
@@ -73,39 +88,50 @@ def film_follows(e, system, length, step):
     shift = memory.joint_shift[e] + length * (memory.joint_product[e] - compliance * direction)
     memory.joint_shift[e] = shift
     gap = memory.joint_gap[e]
-    farther = max(gap, gap + step * memory.joint_speed[e], LEAST)
+    end = gap + step * memory.joint_speed[e]
+    farther = max(gap, end, LEAST)
+    if BRIDGE_RESISTS:
+        farther = max(farther, memory.joint_floor[e])
     stale = compliance * memory.joint_impulse[e] * 0.5 * step * shift / farther
+    if BRIDGE_RESISTS and max(gap, end, end + step * shift) < memory.joint_floor[e]:
+        stale = 0.0  # the resistance of a closed bridge stays
     outdated = inverse * stale * stale
-    if SHEAR:
-        push, couple = two(memory.joint_shear_impulse, e)
-        s, q = two(memory.joint_shear_direction, e)
-        put_two(memory.joint_shear_impulse, e, plus(push, times(length, s)), plus(couple, times(length, q)))
-        a, b = two(memory.joint_shear_product, e)
-        s, q = two(memory.joint_shear_residual, e)
+    if SLIDES:
+        push, couple = slip_and_roll_of(memory.joint_shear_impulse, e)
+        s, q = slip_and_roll_of(memory.joint_shear_direction, e)
+        put_slip_and_roll(memory.joint_shear_impulse, e, plus(push, times(length, s)), plus(couple, times(length, q)))
+        a, b = slip_and_roll_of(memory.joint_shear_product, e)
+        s, q = slip_and_roll_of(memory.joint_shear_residual, e)
         s, q = minus(s, times(length, a)), minus(q, times(length, b))
-        put_two(memory.joint_shear_residual, e, s, q)
+        put_slip_and_roll(memory.joint_shear_residual, e, s, q)
         a, b = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
         term += dot(a, s) + dot(b, q)
     mine = 1.0 if own(e, system) else 0.0
-    memory.joint_terms[e] = mine * term
-    memory.joint_terms[len(system.edges.first) + e] = mine * outdated
+    memory.joint_terms[e], memory.joint_terms[len(system.edges.first) + e] = mine * term, mine * outdated
+    return mine * term, mine * outdated
 
 
 @part
 def follow_direction(system, count, length, step):
     """New impulses at a length along the direction, and what they do to the particles; terms of two sums.
 
-    The sums are the squares of the residual, and of its part due to resistances that should be found anew.
+    The sums are the squares of the residual, and of its part due to resistances that should be found anew. Returns the
+    largest term of each.
     """
-    particles = system.particles
-    for e in prange(count):
-        film_follows(e, system, length, step)
+    particles, tops = system.particles, np.zeros((2, CHUNKS))
+    for chunk in prange(CHUNKS):
+        left, outdated = 0.0, 0.0
+        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
+            made = film_follows(e, system, length, step)
+            left, outdated = greater(left, made[0]), greater(outdated, made[1])
+        tops[0, chunk], tops[1, chunk] = left, outdated
     for i in prange(len(particles.radius)):
         change, along = at(particles.film_change, i), at(particles.film_along, i)
         put(particles.film_change, i, plus(change, times(length, along)))
-        if SHEAR:
+        if SLIDES:
             turn, along = at(particles.film_turn, i), at(particles.film_turn_along, i)
             put(particles.film_turn, i, plus(turn, times(length, along)))
+    return greatest(tops[0]), greatest(tops[1])
 
 
 @inline
@@ -113,9 +139,9 @@ def scale_film(e, system, factor):
     """Multiply the impulse of film e."""
     memory = system.memory
     memory.joint_impulse[e] *= factor
-    if SHEAR:
-        push, couple = two(memory.joint_shear_impulse, e)
-        put_two(memory.joint_shear_impulse, e, times(factor, push), times(factor, couple))
+    if SLIDES:
+        push, couple = slip_and_roll_of(memory.joint_shear_impulse, e)
+        put_slip_and_roll(memory.joint_shear_impulse, e, times(factor, push), times(factor, couple))
 
 
 @part
@@ -126,18 +152,24 @@ def scale_impulses(system, count, factor):
         scale_film(e, system, factor)
     for i in prange(len(particles.radius)):
         put(particles.film_change, i, times(factor, at(particles.film_change, i)))
-        if SHEAR:
+        if SLIDES:
             put(particles.film_turn, i, times(factor, at(particles.film_turn, i)))
 
 
 @inline
 def keep_film(e, system):
-    """Keep the impulse of film e."""
+    """Keep the impulse of the film of row e, and that of its bridge."""
     memory = system.memory
-    k, normal = memory.joint_edge[e], at(memory.joint_normal, e)
-    put(memory.impulse, k, times(memory.joint_impulse[e], normal))
+    k, normal, along, by_bridge = memory.joint_edge[e], at(memory.joint_normal, e), memory.joint_impulse[e], NOTHING
+    if BRIDGE_RESISTS:
+        taken, by_bridge = keep_bridge(e, k, normal, memory)
+        along = along - taken if memory.joint_share[e] > 0.0 else 0.0
+    if DRIFTING:
+        put(memory.impulse, k, times(along, normal))
     if SHEAR:
-        push, roll = two(memory.joint_shear_impulse, e)
+        push, roll = slip_and_roll_of(memory.joint_shear_impulse, e)
+        if BRIDGE_RESISTS:
+            push = minus(push, by_bridge)
         first, second = couples(push, roll, normal, (memory.joint_arms[2 * e], memory.joint_arms[2 * e + 1]))
         put_impulses(k, memory.shear_impulse, push, first, second)
 
@@ -150,5 +182,5 @@ def give_joint(system, count):
         keep_film(e, system)
     for i in prange(particles.owned):
         put(particles.velocity, i, plus(at(particles.velocity, i), at(particles.film_change, i)))
-        if SHEAR:
+        if SLIDES:
             put(particles.spin, i, plus(at(particles.spin, i), at(particles.film_turn, i)))

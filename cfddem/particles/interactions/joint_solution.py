@@ -1,6 +1,6 @@
-"""The impulses of all films over a step, solved together.
+"""The impulses of all films and bridges over a step, solved together.
 
-Films of a body act on each other through its motion. Their impulses J follow from one system of equations,
+Films and bridges of a body act on each other through its motion. Their impulses J follow from one system of equations,
 
     (C^-1/dt + G M^-1 G^T) J = -G v + C^-1/dt J_d,        v' = v + M^-1 G^T J
 
@@ -52,21 +52,6 @@ LOST = 1e-9
 
 
 # ---------------------------------------------------------------- sums with the same bits in any order
-
-
-@part
-def largest_term(system, count, column):
-    """Largest absolute value of one of the terms of all films; NaN if one of them is NaN."""
-    terms, tops, largest, begin = system.memory.joint_terms, np.zeros(CHUNKS), 0.0, column * len(system.edges.first)
-    for chunk in prange(CHUNKS):
-        top = 0.0
-        for e in range(chunk * count // CHUNKS, (chunk + 1) * count // CHUNKS):
-            size = abs(terms[begin + e])
-            top = size if size > top or size != size else top
-        tops[chunk] = top
-    for chunk in range(CHUNKS):
-        largest = tops[chunk] if tops[chunk] > largest or tops[chunk] != tops[chunk] else largest
-    return largest
 
 
 @inline
@@ -132,7 +117,7 @@ def begin_solution(system, count, step):
 @serial
 def new_residual(system, count, step, renew):
     """See `find_residual`."""
-    find_residual(system, count, step, renew)
+    return find_residual(system, count, step, renew)
 
 
 @serial
@@ -143,21 +128,25 @@ def new_scale(system, count, factor):
 
 @serial
 def new_direction(system, count, share):
-    """A new direction, and what it does to the particles."""
-    find_direction(system, count, share)
+    """A new direction, and what it does to the particles.
+
+    share  of the last direction; 0 for the preconditioned residual, which is there
+    """
+    if share > 0.0:
+        find_direction(system, count, share)
     spread(system, True)
 
 
 @serial
 def new_product(system, count):
     """See `find_product`."""
-    find_product(system, count)
+    return find_product(system, count)
 
 
 @serial
 def along_direction(system, count, length, step):
     """See `follow_direction`."""
-    follow_direction(system, count, length, step)
+    return follow_direction(system, count, length, step)
 
 
 @serial
@@ -167,21 +156,17 @@ def finish_solution(system, count):
 
 
 @serial
-def largest_of(system, count, column):
-    """See `largest_term`."""
-    return largest_term(system, count, column)
-
-
-@serial
 def units_of(system, count, column, power):
     """See `sum_of_terms`."""
     return sum_of_terms(system, count, column, power)
 
 
 @serial
-def total_of(system, count, column):
-    """Sum of one of the four terms of all films."""
-    largest = largest_of(system, count, column)
+def total_of(system, count, column, largest):
+    """Sum of one of the four terms of all films.
+
+    largest  absolute value of these
+    """
     if not 0.0 < largest < math.inf:
         return largest
     power = scale_of(largest, count)
@@ -198,27 +183,27 @@ def film_kick(system, step):
     begin_solution(system, count, step)
     iterations, passes = 0, 0
     while passes < PASSES:
-        new_residual(system, count, step, True)
-        by_wanted, by_residual = total_of(system, count, 2), total_of(system, count, 3)
+        largest = new_residual(system, count, step, True)
+        by_wanted, by_residual = total_of(system, count, 2, largest[2]), total_of(system, count, 3, largest[3])
         if by_wanted + by_residual < 0.0:  # these impulses could add energy; a part of them takes the most
             new_scale(system, count, best_factor(by_wanted, by_residual))
-            new_residual(system, count, step, False)
-        left, whole = total_of(system, count, 0), total_of(system, count, 1)
+            largest = new_residual(system, count, step, False)
+        left, whole = total_of(system, count, 0, largest[0]), total_of(system, count, 1, largest[1])
         limit = tolerance * tolerance * whole
         if not left > (4.0 * limit if passes > 0 else min(limit, SETTLED * whole)):
             break
         passes += 1
-        share = 0.0
+        share, top = 0.0, (0.0, 0.0)
         for _ in range(MOST_ITERATIONS):
             new_direction(system, count, share)
-            new_product(system, count)
-            along_direction(system, count, left / total_of(system, count, 0), step)
-            before, left = left, total_of(system, count, 0)
+            product = total_of(system, count, 0, new_product(system, count))
+            top = along_direction(system, count, left / product, step)
+            before, left = left, total_of(system, count, 0, top[0])
             iterations += 1
             share = left / before
             if not left > limit:
                 break
-        if not total_of(system, count, 1) > limit:
+        if not total_of(system, count, 1, top[1]) > limit:
             break
     finish_solution(system, count)
     counts = system.film_counts

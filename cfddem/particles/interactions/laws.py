@@ -122,6 +122,16 @@ class Laws(NamedTuple):
         return bool(self.film) and self.integrator == "drift"
 
     @property
+    def joins(self) -> bool:
+        """Whether there are films or bridges that are solved together."""
+        return self.drifting or self.bridges.resists
+
+    @property
+    def slides(self) -> bool:
+        """Whether films or bridges resist sliding."""
+        return self.shears or self.bridges.slides
+
+    @property
     def film_law(self) -> FilmLaw | None:
         """The user's film law; None where the built-in one holds or there is no film."""
         if self.lubrication is None or isinstance(self.lubrication, FilmLaw):
@@ -158,6 +168,12 @@ class Laws(NamedTuple):
             fields += joint_films.FIELDS
         if self.shears:
             fields += [*shear_film.FIELDS, *joint_films.SHEAR_FIELDS]
+        if self.joins:
+            fields += joint_films.JOINT_FIELDS
+        if self.bridges.resists:
+            fields += joint_films.BRIDGE_FIELDS
+        if self.slides:
+            fields += joint_films.SLIDING_FIELDS
         if self.rolling != "none":
             fields += rolling.FIELDS
         fields += self.bridges.fields
@@ -167,7 +183,8 @@ class Laws(NamedTuple):
 
     def particle_fields(self) -> tuple[Field, ...]:
         """What particles remember under these laws, beyond the fields of every particle."""
-        return (*self.bridges.particle_fields, *(joint_films.PARTICLE_FIELDS if self.drifting else ()))
+        weak = joint_films.WEAK_PARTICLE_FIELDS if self.drifting else ()
+        return (*self.bridges.particle_fields, *weak, *(joint_films.PARTICLE_FIELDS if self.joins else ()))
 
     @property
     def kept_apart(self) -> set[str]:
@@ -190,6 +207,9 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         **contact_choices(contact_law),
         "FILM": bool(laws.film),
         "DRIFTING": laws.drifting,
+        "JOINT": laws.joins,
+        "SLIDES": laws.slides,
+        "BRIDGE_RESISTS": laws.bridges.resists,
         "RESCALED": laws.spring == "rescaled",
         "FROM_OVERLAP": laws.friction_onset == "overlap",
         "ROLLING": laws.rolling != "none",

@@ -16,7 +16,7 @@ from cfddem.backend.compile import inline, kept_whole, prange, vector_part
 from cfddem.backend.law_set import specialise, written
 from cfddem.backend.named import named_arrays
 from cfddem.data.fields import Field
-from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge, pair_bridge_impulse
+from cfddem.particles.interactions.bridge_loops import WetParticles, kept_separation, pair_bridge
 from cfddem.particles.interactions.contact import contact, contact_state
 from cfddem.particles.interactions.film import renew_film
 from cfddem.particles.interactions.kinematics import sphere_kinematics
@@ -89,16 +89,12 @@ def pair_film(n, system, step):
     row = system.rows[np.uint64(particles.material[i]) * system.kinds + np.uint64(particles.material[j])]
     viscosity = 0.5 * (particles.viscosity[i] + particles.viscosity[j])
     size = (reduced_radius, particles.inverse_mass[i] + particles.inverse_mass[j])
-    renew_film(k, (separation, distance, gap), viscosity, size, 1.0, system, row, step)
+    normal = renew_film(k, (separation, distance, gap), viscosity, size, 1.0, system, row, step)
     if SHEAR:
-        asymmetry, arms, normal = (
-            (radius[i] - radius[j]) / radii,
-            pair_arms(i, j, radius, gap),
-            at(memory.film_normal, k),
-        )
+        asymmetry, arms = (radius[i] - radius[j]) / radii, pair_arms(i, j, radius, gap)
         velocity = minus(at(particles.velocity, i), at(particles.velocity, j))
         slip, roll = slip_and_roll(velocity, at(particles.spin, i), at(particles.spin, j), normal, arms)
-        renew_shear(k, viscosity, reduced_radius, asymmetry, 1.0, (slip, roll, arms), memory, step)
+        renew_shear(k, normal, (viscosity, reduced_radius, asymmetry, 1.0), (slip, roll, arms), memory, step)
 
 
 class PairLoop(NamedTuple):
@@ -114,7 +110,6 @@ LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force),
     "update_films": PairLoop(pair_film, needed_by="FILM"),
     "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
-    "bridge_impulses": PairLoop(pair_bridge_impulse, particles=WetParticles, needed_by="BRIDGE"),
 }
 """Slot -> loop over pairs."""
 

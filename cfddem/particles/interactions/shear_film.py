@@ -11,7 +11,7 @@ import numpy as np
 from cfddem.backend.compile import inline
 from cfddem.data.fields import Field
 from cfddem.particles.interactions.kinematics import relative_velocity
-from cfddem.particles.interactions.slots import TWIST, film_sliding
+from cfddem.particles.interactions.slots import SHEAR, TWIST, film_sliding
 from cfddem.particles.vectors import LEAST, NOTHING, across, at, cross, dot, minus, plus, put, times
 from closures.tangential_lubrication import (
     roll_resistance,
@@ -26,7 +26,7 @@ FIELDS = (
 )
 """What pairs remember of the films between them that resist sliding."""
 
-_1, _2, _3 = np.uint64(1), np.uint64(2), np.uint64(3)
+_1, _2, _3, _4 = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
 
 _MANTISSA = np.int64(52)
 _ROOT_HALF = np.int64(0x3FE6A09E667F3BCD)
@@ -73,7 +73,12 @@ def slip_and_roll(velocity, spin, other, normal, arms):
 
 @inline
 def by_blocks(blocks, slip, roll, normal):
-    """Product of the symmetric matrix of an edge (of slip, of both, of roll, of twist) with slip and roll."""
+    """Product of the symmetric matrix of an edge (of slip, of both, of roll, of twist) with slip and roll.
+
+    Bridges alone resist neither rolling nor twisting: what rolls is nothing in their runs.
+    """
+    if not SHEAR:
+        return times(blocks[0], slip), NOTHING
     first = plus(times(blocks[0], slip), times(blocks[1], roll))
     second = plus(times(blocks[1], slip), times(blocks[2], roll))
     if TWIST:
@@ -87,6 +92,8 @@ def by_blocks(blocks, slip, roll, normal):
 def couples(push, roll, normal, arms):
     """Angular impulses on the first and the second body, from impulses against slip and against roll and twist."""
     turn = cross(push, normal)
+    if not SHEAR:
+        return times(arms[0], turn), times(arms[1], turn)
     moment = cross(roll, normal)
     if TWIST:
         moment = plus(moment, times(dot(roll, normal), normal))
@@ -120,14 +127,16 @@ def built_in_sliding(scale, gap, viscosity, reduced_radius, minimum_gap, asymmet
 
 
 @inline
-def renew_shear(k, viscosity, reduced_radius, asymmetry, share, motion, memory, step):
+def renew_shear(k, normal, film, motion, memory, step):
     """Resistance to sliding of the film of edge k, whose normal resistance is known, and what it does by itself.
 
-    share   part of the film that belongs to this edge: below 1 where triangles of a mesh share one
+    normal  direction from the second body to the first
+    film    viscosity, R*, asymmetry, and the part that belongs to this edge: below 1 where triangles of a mesh share it
     motion  slip and roll, see `slip_and_roll`, and the lever arms of slip
     step    since the last positions; 0 if these are the same [s]
     """
-    gap, minimum_gap, normal = memory.film_gap[k], memory.minimum_gap[k], at(memory.film_normal, k)
+    gap, minimum_gap = memory.film_gap[k], memory.minimum_gap[k]
+    viscosity, reduced_radius, asymmetry, share = film
     lever = min(max(gap, 0.0) / minimum_gap, 1.0)
     before = memory.shear_resistance[k]
     resistance = film_sliding(share * lever, max(gap, minimum_gap), viscosity, reduced_radius, minimum_gap, asymmetry)
@@ -164,6 +173,29 @@ def twist_strength(gap, minimum_gap, resistance, viscosity, reduced_radius, asym
     whole = resistance / (shear_resistance(viscosity, reduced_radius, asymmetry) * max(lever, LEAST))
     strength = lever * twist_resistance(viscosity, max(gap, minimum_gap), reduced_radius, whole)
     return strength if resistance > 0.0 else 0.0
+
+
+@inline
+def slip_and_roll_of(array, e):
+    """Slip and roll, or the impulses against them, in a row."""
+    row = _2 * np.uint64(e)
+    return at(array, row), at(array, row + _1) if SHEAR else NOTHING
+
+
+@inline
+def put_slip_and_roll(array, e, slip, roll):
+    """Write what `slip_and_roll_of` reads."""
+    row = _2 * np.uint64(e)
+    put(array, row, slip)
+    if SHEAR:
+        put(array, row + _1, roll)
+
+
+@inline
+def four_of(array, e):
+    """The four numbers of a row."""
+    row = _4 * np.uint64(e)
+    return array[row], array[row + _1], array[row + _2], array[row + _3]
 
 
 @inline

@@ -91,6 +91,8 @@ FILM = Slot("FILM")
 SHEAR = Slot("SHEAR")  # films resist sliding and rolling
 TWIST = Slot("TWIST")  # and twisting
 DRIFTING = Slot("DRIFTING")  # films act by impulses; else as an explicit force
+JOINT = Slot("JOINT")  # there are films that act by impulses, or bridges that resist
+SLIDES = Slot("SLIDES")  # these resist sliding
 film_resistance = Slot("film_resistance")  # at this gap or h_min, without lever [kg/s]
 explicit_resistance = Slot("explicit_resistance")  # with lever; 0 for overlaps and out of reach [kg/s]
 speed_after_short_film = Slot("speed_after_short_film")
@@ -111,6 +113,7 @@ film_outside = Slot("film_outside")
 # ---------------------------------------------------------------- liquid bridge; argument BridgeState
 
 BRIDGE = Slot("BRIDGE")  # bodies carry liquid, which forms bridges
+BRIDGE_RESISTS = Slot("BRIDGE_RESISTS")  # bridges resist along the line of centres or across it
 BRIDGE_FILM = Slot("BRIDGE_FILM")  # bridges resist along the line of centres
 BRIDGE_INERTIA = Slot("BRIDGE_INERTIA")  # films of bridges are reversed with the bodies at contact
 BRIDGE_SLIDING = Slot("BRIDGE_SLIDING")  # bridges resist across it
@@ -136,6 +139,5 @@ RECORD = Slot("RECORD")  # collisions are recorded
 pair_forces = Slot("pair_forces")
 update_films = Slot("update_films")
 pair_bridges = Slot("pair_bridges")
-bridge_impulses = Slot("bridge_impulses")
 copy_memory = Slot("copy_memory")  # (memory arrays, from, to)
 clear_contact = Slot("clear_contact")  # (memory arrays, k)
