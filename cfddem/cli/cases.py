@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as _json
 import sys
 from contextlib import nullcontext
 from pathlib import Path
@@ -10,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import table
+from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation, with_colour
 from cfddem.cli.ranks import on_ranks
 
@@ -24,6 +25,8 @@ SET = "KEY=VALUE that replaces a value of the case; may be repeated"
 THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
+REPORT = "print the report as JSON"
+JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
 LAWS = "Python file with the user's laws of the run, which is executed; nothing in a run folder ever is"
 
@@ -33,6 +36,7 @@ def new(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="file to write; default: NAME.toml")] = None,
     schema: Annotated[bool, Parameter(help="print the JSON schema of case files, for editors", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Copy a commented case from the gallery to this folder, as a start for your own.
 
@@ -42,12 +46,18 @@ def new(
     from cfddem.case.schema import Case
 
     if schema:
-        print(_json.dumps(Case.model_json_schema(), indent=2))
+        print(as_json(Case.model_json_schema(), indent=2))
     elif name is None:
         titles = [(known, each.title) for known, each in gallery().items()]
-        print("\n".join(table(titles, widths=(20,), gap=2)))
+        if json:
+            print_json("gallery", {"cases": [{"name": known, "title": title} for known, title in titles]})
+        else:
+            print("\n".join(table(titles, widths=(20,), gap=2)))
     else:
         written = copy_from_gallery(name, output)
+        if json:
+            print_json("written", {"files": [written]})
+            return
         print(f"written to {written}; edit it, then: cfddem check {written}, cfddem run {written}")
 
 
@@ -57,7 +67,7 @@ def check(
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
     ranks: Annotated[int | None, Parameter(help="number of processes that are to share the run")] = None,
-    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run or written.
 
@@ -70,7 +80,10 @@ def check(
     from cfddem.run.check import check as checked
 
     result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks)
-    print(_json.dumps(result.summary()) if json else "\n".join(with_colour(result.lines())))
+    if json:
+        print_json("check", result.summary())
+    else:
+        print("\n".join(with_colour(result.lines())))
     sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
 
 
@@ -79,7 +92,7 @@ def stability(
     *,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     plot: Annotated[Path | None, Parameter(help="PNG file for growth and speed against wavelength")] = None,
-    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Show which waves grow in a liquid bed, by linear theory: growth and speed against wavelength. Nothing is run.
 
@@ -102,7 +115,10 @@ def stability(
     if found is None:
         remedy = "waves are computed for free particles above minimum fluidisation, denser than their liquid"
         raise InputError("case", described.title or None, "a fluidised liquid bed", remedy)
-    print(_json.dumps(summary(found)) if json else "\n".join(lines(found)))
+    if json:
+        print_json("stability", summary(found))
+    else:
+        print("\n".join(lines(found)))
     if plot is not None:
         from cfddem.plotting.wave_figures import growth_curves
 
@@ -119,6 +135,7 @@ def run(
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
     go_on: Annotated[bool, Parameter(name="--continue", help=CONTINUE, negative="")] = False,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
+    json: Annotated[bool, Parameter(help=REPORT, negative="")] = False,
 ) -> None:
     """Run a case, write snapshots and history to a new folder, and print a report.
 
@@ -138,7 +155,7 @@ def run(
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
             _warn_of_another_case(described, folder)
-        resume(folder, threads=threads, ranks=ranks, log=log)
+        resume(folder, threads=threads, ranks=ranks, log=log, json=json)
         return
     _refuse_or_warn(described, communicator)
     from cfddem.backend.compile import use_threads
@@ -157,7 +174,7 @@ def run(
             )
         prepared.go()
     if communicator.rank == 0:
-        _print_report(folder)
+        _print_report(folder, json)
 
 
 def _warn_of_another_case(described: Case, folder: Path) -> None:
@@ -194,11 +211,14 @@ def print_warnings(result: Preflight) -> None:
         print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
 
 
-def _print_report(folder: Path) -> None:
+def _print_report(folder: Path, json: bool) -> None:
     """Print the report of a run, and where the run is."""
     from cfddem.analysis.report import report as summary
     from cfddem.analysis.report_text import lines
 
+    if json:
+        print_json("report", summary(folder).summary())
+        return
     print("\n".join(lines(summary(folder))))
     print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
 
@@ -212,6 +232,7 @@ def resume(
     threads: Annotated[int | None, Parameter(help=THREADS)] = None,
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
+    json: Annotated[bool, Parameter(help=REPORT, negative="")] = False,
 ) -> None:
     """Continue a run that was stopped or killed, or extend one that has finished, and print a report.
 
@@ -236,7 +257,9 @@ def resume(
     if laws is not None:
         import_laws(laws)
     if until is None and (before := open_run(folder)).status == "finished":
-        if communicator.rank == 0:
+        if communicator.rank == 0 and json:
+            _print_report(folder, json)
+        elif communicator.rank == 0:
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
         return
     if communicator.size == 1:
@@ -244,7 +267,7 @@ def resume(
     with live_line(log, communicator.rank == 0) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
-        _print_report(folder)
+        _print_report(folder, json)
 
 
 def sweep(
@@ -263,7 +286,7 @@ def sweep(
     scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None,
     write_jobs: Annotated[bool, Parameter(help="write commands and a Slurm script, run nothing", negative="")] = False,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
-    json: Annotated[bool, Parameter(help="print the outcomes as JSON", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Run a case for many values, one folder each, and write a table and a figure of the results.
 
@@ -275,8 +298,6 @@ def sweep(
 
     Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
     """
-    from dataclasses import asdict
-
     from cfddem.case.gallery import find_case, overrides
     from cfddem.studies.samples import chosen_values
     from cfddem.studies.sweep import Outcome, failures
@@ -289,7 +310,10 @@ def sweep(
         from cfddem.studies.job_array import write_jobs as write
 
         lines, script, count = write(path, values, folder, overrides(set or []))
-        print(f"{count} commands written to {lines}; submit with: sbatch {script}")
+        if json:
+            print_json("written", {"files": [lines, script]})
+        else:
+            print(f"{count} commands written to {lines}; submit with: sbatch {script}")
         return
     done = 0
 
@@ -306,7 +330,7 @@ def sweep(
     )
     failed = list(failures(outcomes))
     if json:
-        print(_json.dumps([asdict(each) for each in outcomes]))
+        print_json("sweep", {"folder": folder, "runs": [each.summary() for each in outcomes]})
     else:
         print(f"table and figure written to {folder}")
     for line in failed:

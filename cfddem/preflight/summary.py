@@ -41,6 +41,7 @@ class PreflightError(CfddemError):
     """A case with errors in its pre-run check."""
 
     exit_code = 2
+    issues: tuple[Issue, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -198,8 +199,11 @@ def refuse_errors(case: Case) -> Preflight:
     Raises PreflightError with all errors otherwise.
     """
     result = preflight(case)
-    if result.status == "error":
-        raise PreflightError("\n".join(str(each) for each in result.issues if each.severity == "error"))
+    errors = tuple(each for each in result.issues if each.severity == "error")
+    if errors:
+        failure = PreflightError("\n".join(map(str, errors)))
+        failure.issues = errors
+        raise failure
     return result
 
 

@@ -54,6 +54,11 @@ class Outcome:
         """Name of the run."""
         return Path(self.folder).name
 
+    def summary(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        measures = {name: dict(zip(("mean", "error", "unit"), each)) for name, each in self.measures.items()}
+        return asdict(self) | {"measures": measures}
+
 
 def ranges(given: Sequence[str]) -> dict[str, list[Any]]:
     """Keys and their values from texts such as `fluid.viscosity=1e-3,2e-3` and `seed=1..5`.
