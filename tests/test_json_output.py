@@ -11,11 +11,11 @@ from command_line import HOME, call, commands, parsed
 from made_up_run import made_up
 
 from cfddem.backend.json_text import as_json
-from cfddem.cli.json_output import SCHEMAS
+from cfddem.cli.json_output import SCHEMAS, word
 
 
 def test_every_command_that_prints_results_has_json() -> None:
-    assert [name for name in commands() if "--json" not in call(name, "--help").out] == ["schema"]
+    assert [name for name in commands() if "--json  " not in call(name, "--help").out] == ["schema"]
 
 
 @pytest.mark.parametrize("name", sorted(SCHEMAS))
@@ -63,7 +63,7 @@ def test_errors_are_an_object_with_place_key_value_limit_and_remedy(tmp_path: Pa
         line.removeprefix("cfddem: ") for line in done.err.splitlines()
     ]
     count = next(each for each in printed["errors"] if each["key"] == "bed.count")
-    assert (count["place"], count["value"], count["limit"]) == ("--set", "-1", "at least 1")
+    assert (count["place"], count["value"], count["limit"]) == ("--set", "-1", "above 0")
     assert any(re.search(r"bed\.toml:\d+", each["place"]) for each in printed["errors"])
     assert parsed(call("report", "nowhere", "--json").out)["errors"][0]["key"] == "folder"
     assert "--colou" in parsed(call("view", "--colou", "x", "--json").out)["errors"][0]["message"]
@@ -87,7 +87,7 @@ def test_collisions_over_a_range_are_listed_and_written(tmp_path: Path, monkeypa
     monkeypatch.chdir(tmp_path)
     words = ("collide", "--velocity", "0.1", "--stokes", "20,100")
     listed = parsed(call(*words, "--csv", "e.csv", "--json").out)["collisions"]
-    assert [each["stokes"] for each in listed] == [20.0, 100.0]
+    assert [each["stokes"] for each in listed] == pytest.approx([20.0, 100.0])
     rough = parsed(call(*words, "--roughness", "5e-6", "--json").out)["collisions"]
     assert all(one["restitution"] <= other["restitution"] for one, other in zip(listed, rough))
     assert {each["minimum_gap"] for each in rough} == {5e-6}
@@ -97,6 +97,11 @@ def test_collisions_over_a_range_are_listed_and_written(tmp_path: Path, monkeypa
     for wrong in ("1..0.5", "0..10", "..", "x", "1..inf"):
         refused = call("collide", "--velocity", "0.1", "--stokes", wrong)
         assert refused.code == 2 and "stokes" in refused.err and refused.err.count("\n") == 1, wrong
+
+
+def test_the_page_for_programs_has_every_schema() -> None:
+    page = (HOME / "docs/how-to/programs.md").read_text()
+    assert [name for name in SCHEMAS if word(name) not in page and f"`{name}`" not in page] == []
 
 
 def test_json_has_no_nan() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from cfddem.backend import html
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
+from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
@@ -130,6 +131,7 @@ def _preflight(case: Case, title: str) -> Preflight:
     if any(each.severity == "error" for each in own):
         return Preflight(title, (), tuple(own))
     try:
+        cell_counts(case.column.size, case.column.cell)  # also of a dry case, whose history is kept by cells
         bed = estimate_bed(case)
         collision = estimate_collision(case, bed)
         wet = estimate_wet(case, collision)
