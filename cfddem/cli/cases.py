@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import table
 from cfddem.cli.json_output import print_json
@@ -25,6 +26,7 @@ SET = "KEY=VALUE that replaces a value of the case; may be repeated"
 THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
+FROM = "run folder whose end is the beginning of this run"
 REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
@@ -100,7 +102,6 @@ def stability(
 
     Example: cfddem stability liquid-bed --set agitation=free_spheres
     """
-    from cfddem.backend.errors import InputError
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
     from cfddem.io.files import require_folder
@@ -134,23 +135,33 @@ def run(
     threads: Annotated[int | None, Parameter(help=THREADS)] = None,
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
     go_on: Annotated[bool, Parameter(name="--continue", help=CONTINUE, negative="")] = False,
+    origin: Annotated[Path | None, Parameter(name="--from", help=FROM)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
     json: Annotated[bool, Parameter(help=REPORT, negative="")] = False,
 ) -> None:
     """Run a case, write snapshots and history to a new folder, and print a report.
 
-    The case is checked first. With errors it is not run.
+    The case is checked first. With errors it is not run. With --from, the run has the case of another one, changed by
+    --set, and begins where that has ended, with its particles, contacts, flow and time.
 
     Example: cfddem run liquid-bed -o bed --set run.until=0.02 --set average_from=0.01
     """
     from cfddem.case.gallery import find_case, overrides
-
-    path = find_case(case)
-    folder = output or Path(f"{path.stem}-run")
     from cfddem.case.schema import Case
     from cfddem.case.toml_text import read_text
+    from cfddem.io.folder import read_about
 
-    described = Case.from_toml(path, overrides(set or []))
+    if origin is None:
+        path = find_case(case)
+        folder = output or Path(f"{path.stem}-run")
+        described = Case.from_toml(path, overrides(set or []))
+    else:
+        if case is not None:
+            remedy = "change its values with --set KEY=VALUE"
+            raise InputError("case", str(case), f"left out: the case is that of {origin}", remedy)
+        read_about(origin)
+        path, folder = origin / "case.toml", output or Path(f"{origin.absolute().name}-run")
+        described = Case.from_toml(path, overrides(set or []))
     communicator = on_ranks(ranks, threads, folder)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
@@ -167,11 +178,12 @@ def run(
     if communicator.size == 1:
         use_threads(threads_for(described, threads))
     with live_line(log, communicator.rank == 0) as line:
-        text = None if set else read_text(path)
+        text = None if set or origin is not None else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
             prepared = Run.begin(
-                described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator
-            )
+                described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator,
+                origin=origin,
+            )  # fmt: skip
         prepared.go()
     if communicator.rank == 0:
         _print_report(folder, json)
@@ -241,7 +253,6 @@ def resume(
     Example: cfddem resume bed --until 0.03
     """
     from cfddem.backend.compile import use_threads
-    from cfddem.backend.errors import InputError
     from cfddem.cli.laws_file import import_laws
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
