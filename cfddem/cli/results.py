@@ -118,11 +118,12 @@ def view(
         list[str] | None, Parameter(help="spheres, voidage, bubbles or streamlines; may be repeated", negative="")
     ] = None,
     colour: Annotated[
-        str,
+        str | None,
         Parameter(
-            help="quantity that colours the spheres: speed, collisions, or a recorded field (liquid, agglomerate)"
+            help="what colours the spheres: speed, collisions, or a recorded field (species, liquid, agglomerate); "
+            "default: species of a mixture, else speed"
         ),
-    ] = "speed",
+    ] = None,
     movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .gif, or .mp4 with cfddem[movie]")] = None,
     history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
     collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,
@@ -141,9 +142,10 @@ def view(
     Example: cfddem view bed --movie bed.gif
     """
     from cfddem.io.files import require_folder
-    from cfddem.io.reading import newest_run
+    from cfddem.io.reading import newest_run, open_run
     from cfddem.plotting import curves as plots
     from cfddem.plotting import pictures, wave_figures
+    from cfddem.plotting.colours import usual
     from cfddem.plotting.scene import window as on_screen
 
     folder, panels = folder or newest_run(Path()), show or ()
@@ -152,9 +154,9 @@ def view(
     if web:
         from cfddem.plotting.browser import browse
 
-        browse(folder, colour, port)
+        browse(folder, colour or usual(open_run(folder)), port)
     elif window:
-        on_screen(folder, colour)
+        on_screen(folder, colour or usual(open_run(folder)))
     else:
         if movie is not None:
             written = pictures.movie(folder, movie, show=panels, colour=colour)

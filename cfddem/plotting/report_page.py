@@ -268,7 +268,7 @@ def _picture(run: RunData) -> Any:
     if not len(run.times) or rendering.why_not() is not None:
         return None
     try:
-        return Stage.of(run, [-1], (), "speed", None).figure(-1)
+        return Stage.of(run, [-1], (), None, None).figure(-1)
     except CfddemError:
         return None
 
