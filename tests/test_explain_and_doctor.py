@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from command_line import HOME, WIDTH, call, cfddem, commands, parsed
 
+from cfddem.case.absent import TABLES, absent
 from cfddem.cli.app import app
 
 
@@ -51,6 +52,26 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
         assert said in call("explain", name).err
     unknown = call("explain", "di_felcie")
     assert unknown.code == 2 and "di_felice" in unknown.err
+
+
+def test_what_is_not_there_is_said_of_tables_and_of_words_that_are_asked_for() -> None:
+    from cfddem.cli import explain_pages as pages
+
+    heat = call("explain", "heat").out
+    assert heat.count("Not there:") == 1 and "density and viscosity that change" in heat
+    assert max(map(len, heat.splitlines())) <= WIDTH
+    assert "reactions" in parsed(call("explain", "heat", "--json").out)["not_there"]
+    assert call("explain", "bed.diameter").out.count("Not there") == 0
+    assert "[contact_heat] of contacts" in call("explain", "cooling").err
+    for words in (
+        ("check", "liquid-bed", "--set", "fluid.turbulence=1"),
+        ("check", "liquid-bed", "--set", "k_epsilon=1"),
+    ):
+        refused = call(*words)
+        assert refused.code == 2 and "no turbulence model acts in a case" in refused.err
+    known = {name for name, _ in pages._keys()}
+    assert not [name for name in known if absent(name.rpartition(".")[2])], "a key that there is"
+    assert TABLES.keys() <= {name.partition(".")[0] for name in known}
 
 
 def test_every_argument_of_every_law_is_plotted_with_its_unit() -> None:

@@ -13,7 +13,7 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import table
 from cfddem.cli.json_output import print_json
-from cfddem.cli.printing import announce_compilation, with_colour
+from cfddem.cli.printing import with_colour
 from cfddem.cli.ranks import on_ranks
 
 if TYPE_CHECKING:
@@ -279,72 +279,3 @@ def resume(
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
         _print_report(folder, json)
-
-
-def sweep(
-    case: Annotated[Path | None, Parameter(help=CASE)] = None,
-    *,
-    over: Annotated[
-        list[str] | None, Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")
-    ] = None,
-    vary: Annotated[
-        list[str] | None, Parameter(help="KEY=LOW..HIGH; may be repeated; the ranges are sampled", negative="")
-    ] = None,
-    sample: Annotated[str, Parameter(help="how ranges are sampled: latin (hypercube) or sobol")] = "latin",
-    runs: Annotated[int, Parameter(help="number of samples")] = 16,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
-    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
-    scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None,
-    write_jobs: Annotated[bool, Parameter(help="write commands and a Slurm script, run nothing", negative="")] = False,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
-    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
-) -> None:
-    """Run a case for many values, one folder each, and write a table and a figure of the results.
-
-    The values are listed (--over), or fill ranges evenly (--vary, --sample, --runs).
-
-    After a stop, the same command continues with the missing runs. With --write-jobs nothing is run: the folder gets
-    one command for each run, and a script for Slurm; the same command without it collects the results afterwards.
-    Exit code: 3 if a run fails; the others are kept.
-
-    Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
-    """
-    from cfddem.case.gallery import find_case, overrides
-    from cfddem.studies.samples import chosen_values
-    from cfddem.studies.sweep import Outcome, failures
-    from cfddem.studies.sweep import sweep as run_all
-
-    path = find_case(case)
-    values = chosen_values(over or [], vary or [], sample, runs)
-    folder = output or Path(f"{path.stem}-sweep")
-    if write_jobs:
-        from cfddem.studies.job_array import write_jobs as write
-
-        lines, script, count = write(path, values, folder, overrides(set or []))
-        if json:
-            print_json("written", {"files": [lines, script]})
-        else:
-            print(f"{count} commands written to {lines}; submit with: sbatch {script}")
-        return
-    done = 0
-
-    def progress(outcome: Outcome) -> None:
-        nonlocal done
-        done += 1
-        status = "already finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
-        print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
-
-    if jobs == 1 and scheduler is None and not json:
-        announce_compilation()
-    outcomes = run_all(
-        path, values, folder, overrides=overrides(set or []), jobs=jobs, scheduler=scheduler, progress=progress
-    )
-    failed = list(failures(outcomes))
-    if json:
-        print_json("sweep", {"folder": folder, "runs": [each.summary() for each in outcomes]})
-    else:
-        print(f"table and figure written to {folder}")
-    for line in failed:
-        print(f"cfddem: {line}", file=sys.stderr)
-    if failed:
-        sys.exit(3)

@@ -20,6 +20,7 @@ from pylatexenc.latexwalker import get_default_latex_context_db as arguments_of_
 from pylatexenc.macrospec import MacroSpec
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.case.absent import TABLES, absent
 from cfddem.case.input_errors import sections_of
 from cfddem.case.schema import Case
 from cfddem.cli.scenario_commands import descriptions
@@ -98,7 +99,7 @@ def find(name: str) -> Law:
     found = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not found:
         closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
-        raise InputError("law", name, f"a name listed by `cfddem explain`{closest}")
+        raise InputError("law", name, f"a name listed by `cfddem explain`{closest}", absent(name))
     if len(found) > 1:
         raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")
     return found[0]
@@ -355,6 +356,12 @@ def matching(name: str) -> dict[str, FieldInfo]:
     ]
     found = found or [key for key in every if word in key.lower()]
     return {key: every[key] for key in found}
+
+
+def not_there(name: str) -> list[str]:
+    """What the table of a name does not have, in lines of at most 100 columns; empty for other names."""
+    words = TABLES.get(name.lower(), "")
+    return ["", *textwrap.wrap(f"{words} The page Limits has more.", WIDTH)] if words else []
 
 
 def every_key() -> list[str]:

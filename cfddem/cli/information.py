@@ -40,11 +40,15 @@ def explain(
         assert law is not None
         found = pages.find(law)
         known = {found.kind: {found.name: found}}
+    absent = pages.not_there(law or "")
     if json:
         every = [pages.summary(each) for kind in known.values() for each in kind.values()]
-        print_json("explain", {"laws": every, "keys": [pages.key_summary(*each) for each in keys.items()]})
+        listed = [pages.key_summary(*each) for each in keys.items()]
+        print_json("explain", {"laws": every, "keys": listed, "not_there": " ".join(absent[1:])})
     else:
-        print("\n".join([*pages.listing(known), *pages.key_lines(keys)] if found is None else pages.page(found)))
+        print(
+            "\n".join([*pages.listing(known), *pages.key_lines(keys), *absent] if found is None else pages.page(found))
+        )
     if plot is not None and found is None:
         raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
     if plot is not None:

@@ -150,6 +150,22 @@ class SweepRun(TypedDict):
     kept: bool
 
 
+class SensitiveMeasure(TypedDict):
+    """How much each key matters for a measure: `first` and `total` (sobol), or `effect` (morris), with errors."""
+
+    unit: str
+    keys: list[dict[str, Any]]
+
+
+class SensitivityPart(TypedDict):
+    """How much keys matter."""
+
+    kind: Literal["sobol", "morris"]
+    rows: int
+    rows_asked: int
+    measures: dict[str, SensitiveMeasure]
+
+
 class LawPage(TypedDict):
     """Documentation of a law."""
 
@@ -276,11 +292,12 @@ class Comparison(TypedDict):
 
 
 class Sweep(TypedDict):
-    """`sweep`: its runs."""
+    """`sweep`: its runs; with `--sensitivity`, how much each key matters for each measure."""
 
     schema: str
     folder: str
     runs: list[SweepRun]
+    sensitivity: SensitivityPart | None
 
 
 class CalibrationOutput(TypedDict):
@@ -314,11 +331,12 @@ class Benchmark(TypedDict):
 
 
 class Explanation(TypedDict):
-    """`explain`: laws, and keys of a case."""
+    """`explain`: laws, keys of a case, and what a table does not have."""
 
     schema: str
     laws: list[LawPage]
     keys: list[KeyPage]
+    not_there: str
 
 
 class Doctor(TypedDict):
