@@ -15,7 +15,8 @@ import pytest
 from pydantic import TypeAdapter
 
 from cfddem.cli.app import app, main
-from cfddem.cli.json_output import SCHEMAS, word
+from cfddem.cli.json_forms import SCHEMAS
+from cfddem.cli.json_output import word
 
 HOME = Path(__file__).parents[1]
 WIDTH = 100

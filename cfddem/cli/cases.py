@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,6 +32,19 @@ REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
 LAWS = "Python file with the user's laws of the run, which is executed; nothing in a run folder ever is"
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Processors:
+    """On how many processors a run is made; its fields are options."""
+
+    threads: Annotated[int | None, Parameter(help=THREADS)] = None
+    ranks: Annotated[int | None, Parameter(help=RANKS)] = None
+
+
+WHOLE_MACHINE = Processors()
+"""As many threads as there are, or as the launcher says."""
 
 
 def new(
@@ -132,8 +146,7 @@ def run(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; default: NAME-run")] = None,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
-    threads: Annotated[int | None, Parameter(help=THREADS)] = None,
-    ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
+    processors: Processors = WHOLE_MACHINE,
     go_on: Annotated[bool, Parameter(name="--continue", help=CONTINUE, negative="")] = False,
     origin: Annotated[Path | None, Parameter(name="--from", help=FROM)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
@@ -162,11 +175,11 @@ def run(
         read_about(origin)
         path, folder = origin / "case.toml", output or Path(f"{origin.absolute().name}-run")
         described = Case.from_toml(path, overrides(set or []))
-    communicator = on_ranks(ranks, threads, folder)
+    communicator = on_ranks(processors.ranks, processors.threads, folder)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
             _warn_of_another_case(described, folder)
-        resume(folder, threads=threads, ranks=ranks, log=log, json=json)
+        resume(folder, processors=processors, log=log, json=json)
         return
     _refuse_or_warn(described, communicator)
     from cfddem.backend.compile import use_threads
@@ -176,7 +189,7 @@ def run(
     from cfddem.run.warmup import warmup
 
     if communicator.size == 1:
-        use_threads(threads_for(described, threads))
+        use_threads(threads_for(described, processors.threads))
     with live_line(log, communicator.rank == 0) as line:
         text = None if set or origin is not None else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
@@ -241,8 +254,7 @@ def resume(
     until: Annotated[float | None, Parameter(help="new end time [s]")] = None,
     laws: Annotated[Path | None, Parameter(help=LAWS)] = None,
     set: Annotated[list[str] | None, Parameter(show=False, negative="")] = None,
-    threads: Annotated[int | None, Parameter(help=THREADS)] = None,
-    ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
+    processors: Processors = WHOLE_MACHINE,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
     json: Annotated[bool, Parameter(help=REPORT, negative="")] = False,
 ) -> None:
@@ -264,7 +276,7 @@ def resume(
     if set:
         remedy = f"a changed case is a new run: cfddem run {folder}/case.toml --set {set[0]} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
-    communicator = on_ranks(ranks, threads, folder)
+    communicator = on_ranks(processors.ranks, processors.threads, folder)
     if laws is not None:
         import_laws(laws)
     if until is None and (before := open_run(folder)).status == "finished":
@@ -274,7 +286,7 @@ def resume(
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
         return
     if communicator.size == 1:
-        use_threads(threads_for(case_to_continue(folder, None, until), threads))
+        use_threads(threads_for(case_to_continue(folder, None, until), processors.threads))
     with live_line(log, communicator.rank == 0) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:

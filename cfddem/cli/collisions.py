@@ -23,9 +23,6 @@ def _collide(
     *,
     material: str,
     target: str | None,
-    diameter: float,
-    target_diameter: float | None,
-    spin: float,
     roughness: float | None,
     stokes: str | None,
     data: Path | None,
@@ -34,7 +31,9 @@ def _collide(
     **given: Any,
 ) -> immersed_pair.Collision | CollisionRange | MeasuredCollisions:
     """Collide two spheres of named materials: once, over a range of Stokes numbers, or at each measured point."""
-    known = immersed_pair.MATERIALS
+    known, spin = immersed_pair.MATERIALS, given.pop("spin")
+    own, other = given.pop("diameter"), given.pop("target_diameter")
+    diameters = own, own if other is None else other
     numbers = None if stokes is None else stokes_numbers(stokes)
     for name in (material, target):
         if name is not None and name not in known:
@@ -50,7 +49,7 @@ def _collide(
     def once(**point: float) -> immersed_pair.Collision:
         return immersed_pair.collide(
             pair,
-            diameter=(diameter, diameter if target_diameter is None else target_diameter),
+            diameter=diameters,
             spin=(spin, 0.0),
             **given | point,
         )

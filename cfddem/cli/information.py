@@ -49,9 +49,9 @@ def explain(
         print(
             "\n".join([*pages.listing(known), *pages.key_lines(keys), *absent] if found is None else pages.page(found))
         )
-    if plot is not None and found is None:
-        raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
     if plot is not None:
+        if found is None:
+            raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
         print(pages.plot(found, plot), file=sys.stderr if json else sys.stdout)
 
 

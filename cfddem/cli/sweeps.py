@@ -45,7 +45,6 @@ def sweep(
 
     Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
     """
-    from cfddem.backend.errors import InputError
     from cfddem.case.gallery import find_case, overrides
     from cfddem.studies import sensitivity as of_keys
     from cfddem.studies.samples import chosen_values
@@ -53,14 +52,8 @@ def sweep(
     from cfddem.studies.sweep import sweep as run_all
 
     path = find_case(case)
-    if sensitivity is None:
-        values = chosen_values(over or [], vary or [], sample, runs)
-    else:
-        if over or not vary:
-            raise InputError("--sensitivity", sensitivity, "used with --vary KEY=LOW..HIGH, without --over")
-        varied = of_keys.factors(vary)
-        chosen = of_keys.design(sensitivity, runs, len(varied))
-        values = of_keys.runs_of(of_keys.values_of(chosen, varied))
+    asked = None if sensitivity is None else of_keys.asked(sensitivity, over or [], vary or [], runs)
+    values = chosen_values(over or [], vary or [], sample, runs) if asked is None else asked.runs
     folder = output or Path(f"{path.stem}-sweep")
     if write_jobs:
         from cfddem.studies.job_array import write_jobs as write
@@ -88,8 +81,8 @@ def sweep(
     for line in failed:
         print(f"cfddem: {line}", file=sys.stderr)
     found = None
-    if sensitivity is not None and not any(each.status == "waiting" for each in outcomes):
-        found = of_keys.sensitivity(chosen, varied, outcomes)
+    if asked is not None and not any(each.status == "waiting" for each in outcomes):
+        found = of_keys.sensitivity(asked.design, asked.varied, outcomes)
         of_keys.write_results(found, folder)
     if json:
         runs_made = [each.summary() for each in outcomes]

@@ -130,10 +130,12 @@ def sample_figure(points: Sequence[Point], path: Path) -> bool:
 class Sensitive(Protocol):
     """What the figure needs of a sensitivity."""
 
-    kind: str
-    keys: list[str]
-    measures: dict[str, tuple[str, list[dict[str, float]]]]
-
+    @property
+    def kind(self) -> str: ...
+    @property
+    def keys(self) -> list[str]: ...
+    @property
+    def measures(self) -> dict[str, tuple[str, list[dict[str, float]]]]: ...
     def shown(self) -> list[str]: ...
 
 

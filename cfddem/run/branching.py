@@ -56,8 +56,8 @@ def branch_state(case: Case, origin: Path) -> dict[str, Any]:
     parts = state["simulation"]
     parts["particle_step"] = None  # that of the new stiffness
     parts["particles"]["counters"]["accepted"] = 0.0
-    if case.fluid is not None and case.fluid != before.fluid:
+    if case.fluid != before.fluid:  # neither of them lacks one
         cells, places = parts["fluid"]["viscosity"], parts["particles"]["particles"]["position"]
-        cells[:] = np.broadcast_to(case.fluid.viscosity_at(grid_of(case).centres()[2]), cells.shape)
-        parts["particles"]["particles"]["viscosity"][:] = case.fluid.viscosity_at(places[:, 2])
+        cells[:] = np.broadcast_to(case.required_fluid.viscosity_at(grid_of(case).centres()[2]), cells.shape)
+        parts["particles"]["particles"]["viscosity"][:] = case.required_fluid.viscosity_at(places[:, 2])
     return state

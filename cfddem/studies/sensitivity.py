@@ -159,6 +159,29 @@ def runs_of(values: Sequence[Sequence[Mapping[str, Any]]]) -> list[dict[str, Any
     return list({run_name(each): dict(each) for rows in values for each in rows}.values())
 
 
+class Asked(NamedTuple):
+    """What a command asks for."""
+
+    design: Design
+    varied: list[Variable | Choice]
+
+    @property
+    def runs(self) -> list[dict[str, Any]]:
+        """Values of all runs."""
+        return runs_of(values_of(self.design, self.varied))
+
+
+def asked(kind: str, over: Sequence[str], vary: Sequence[str], count: int) -> Asked:
+    """The design for the options of a command.
+
+    errors  InputError
+    """
+    if over or not vary:
+        raise InputError("--sensitivity", kind, "used with --vary KEY=LOW..HIGH, without --over")
+    varied = factors(vary)
+    return Asked(design(kind, count, len(varied)), varied)
+
+
 # ---------------------------------------------------------------- indices
 
 
@@ -311,7 +334,7 @@ def sensitivity(chosen: Design, varied: Sequence[Variable | Choice], outcomes: S
         limit = f"at least {FEWEST} rows of {chosen.rows} with all runs finished"
         raise InputError("--sensitivity", int(whole.sum()), limit, "more --runs, or narrower ranges")
     kept = Design(chosen.kind, chosen.points[:, whole], chosen.order[whole])
-    points = [[known[each] for each, there in zip(rows, whole) if there] for rows in names]
+    points = [[known[each] for each, there in zip(rows, whole.tolist()) if there] for rows in names]
     common = [name for name in points[0][0].measures if all(name in each.measures for rows in points for each in rows)]
     measures: dict[str, tuple[str, list[dict[str, float]]]] = {}
     for name in common:
