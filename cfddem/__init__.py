@@ -59,6 +59,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.run.simulation import Simulation as Simulation
     from cfddem.run.time_steps import StepSettings as StepSettings
     from cfddem.studies.notebook import run_case as run_case
+    from cfddem.studies.sweep_table import open_sweep as open_sweep
 
 _MODULES = {
     "Box": "cfddem.particles.walls.shapes",
@@ -90,6 +91,7 @@ _MODULES = {
     "Mesh": "cfddem.particles.walls.shapes",
     "NoSlip": "cfddem.fluid.conditions",
     "open_run": "cfddem.io.reading",
+    "open_sweep": "cfddem.studies.sweep_table",
     "Outlet": "cfddem.fluid.conditions",
     "OwnForce": "cfddem.model.feature",
     "pair_table": "cfddem.particles.material_pairs",

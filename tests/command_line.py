@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
+from pydantic import TypeAdapter
 
 from cfddem.cli.app import app, main
+from cfddem.cli.json_forms import SCHEMAS
+from cfddem.cli.json_output import word
 
 HOME = Path(__file__).parents[1]
 WIDTH = 100
@@ -52,6 +56,16 @@ def cfddem(*words: str, folder: Path | None = None, seconds: float = 900) -> sub
         text=True,
         timeout=seconds,
     )
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """What a command printed with `--json`; it has all names of its schema, and no others."""
+    printed: dict[str, Any] = json.loads(text)
+    name = printed["schema"].split("/")[1]
+    assert printed["schema"] == word(name)
+    form = TypeAdapter(SCHEMAS[name][1])
+    assert form.dump_python(form.validate_json(text, strict=True), mode="json") == printed
+    return printed
 
 
 def commands() -> list[str]:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import urllib.request
 from collections.abc import Iterator
+from html import escape
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,6 +20,7 @@ import numpy as np
 import pytest
 from chromium import Chromium, programs, until
 from command_line import HOME, call
+from made_up_run import made_up
 from PIL import Image
 
 from cfddem.backend.errors import InputError
@@ -29,6 +31,7 @@ from cfddem.particles.collision_events import COLLISION, COLLISION_FIELDS
 from cfddem.particles.state import PARTICLE_FIELDS
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.browser import strip
+from cfddem.plotting.report_page import page
 from cfddem.plotting.scene import FLUID, NOTHING, Look, Scene
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
@@ -214,6 +217,21 @@ def chromium(tmp_path: Path) -> Iterator[Chromium]:
     browser = Chromium(tmp_path / "profile")
     yield browser
     browser.close()
+
+
+def test_a_report_fits_the_screen_of_a_phone(tmp_path: Path, chromium: Chromium) -> None:
+    """390 pixels wide: the page itself does not scroll sideways, and key results are read without scrolling a table."""
+    page(made_up(tmp_path / "bed", trend=1e-3), tmp_path / "report.html")
+    outer = tmp_path / "phone.html"
+    frame = f'<iframe id="phone" width="390" height="800" srcdoc="{escape((tmp_path / "report.html").read_text())}">'
+    outer.write_text(f"<!doctype html><body style='margin:0'>{frame}</iframe>")
+    chromium.open(outer.as_uri())
+    inner = "const page = document.getElementById('phone').contentDocument;"
+    chromium.wait(f"{inner} return page.querySelector('table.key_results') && page.readyState == 'complete'")
+    assert chromium.script(f"{inner} return page.documentElement.scrollWidth") <= 390
+    wide = "return [...page.querySelectorAll('table.key_results')].map(each => each.scrollWidth - each.clientWidth)"
+    assert chromium.script(f"{inner} {wide}") == [0]
+    chromium.screenshot(tmp_path / "phone.png")
 
 
 def test_the_page_is_drawn_and_moves_through_time(address: str, run: RunFolder, chromium: Chromium) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import call
+from command_line import call, parsed
 from made_up_run import BED
 
 from cfddem.analysis.response import FLAT, response
@@ -63,7 +63,7 @@ def test_a_sweep_takes_values_or_ranges(tmp_path: Path, monkeypatch: pytest.Monk
     line = ("sweep", "liquid-bed", "--vary", "diameter=1e-3..2e-3", "--runs", "8", "--sample", "sobol", "-o", "many")
     done = call(*line, "--json")
     assert done.code == 0, done.err
-    assert len({each["values"]["bed.diameter"] for each in json.loads(done.out)}) == 8
+    assert len({each["values"]["bed.diameter"] for each in parsed(done.out)["runs"]}) == 8
     assert (tmp_path / "many" / "sweep.png").exists()
     assert "only one of them" in call(*line, "--over", "seed=1..2").err
     assert "did you mean 'sobol'" in call(*line[:-4], "--sample", "sobl").err

@@ -7,8 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from cfddem.features import liquid
 from cfddem.features.spray import SprayZone, spray_zone_share
+from cfddem.plotting.curves import draw_coating, panels
 from cfddem.preflight.summary import refuse_errors
+from cfddem.run.history import all_columns
 from cfddem.run.simulation import Simulation
 from scenarios.beds.coating import bed, coating, distribution
 
@@ -41,6 +44,20 @@ def test_the_share_in_the_spray_zone_is_measured_from_the_start() -> None:
     inside = simulation.feature(SprayZone).spray.zone(simulation.owned.position)
     assert 0 < inside.sum() < case.bed.count
     assert spray_zone_share(simulation) == inside.mean()
+
+
+def test_the_distribution_of_the_coating_is_measured_and_drawn() -> None:
+    """Ten particles with 1 to 10 parts of liquid: deciles over the mean, and a histogram of 100 % of them."""
+    carried = 1e-13 * np.arange(1.0, 11.0)
+    names = ("coating_at_10_percent", "coating_at_50_percent", "coating_at_90_percent")
+    assert set(names) <= set(all_columns(bed()))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(liquid, "_carried", lambda solver: carried)
+        found = [getattr(liquid, name)(SimpleNamespace(particle_solver=None)) for name in names]
+    assert found == pytest.approx([1.9 / 5.5, 1.0, 9.1 / 5.5])
+    _, axes = panels()
+    draw_coating(axes, carried)
+    assert sum(each.get_height() for each in axes.patches) == pytest.approx(90.0)  # the last one is beyond 99.5 %
 
 
 def test_coating_of_a_snapshot() -> None:

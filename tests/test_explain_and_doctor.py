@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import json
 import os
 import re
 import subprocess
@@ -11,8 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import HOME, WIDTH, call, cfddem, commands
+from command_line import HOME, WIDTH, call, cfddem, commands, parsed
 
+from cfddem.case.absent import TABLES, absent
 from cfddem.cli.app import app
 
 
@@ -32,12 +32,12 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
     done = call("explain", "di_felice", "--plot", str(tmp_path / "law.png"))
     assert "range of voidage: 0.4 to 1" in done.out
     assert (tmp_path / "law.png").stat().st_size > 10_000
-    assert json.loads(call("explain", "wen-yu", "--json").out)["kind"] == "drag"
+    assert parsed(call("explain", "wen-yu", "--json").out)["laws"][0]["kind"] == "drag"
     drags = call("explain", "drag").out
     assert (
         "di_felice" in drags
         and "asperities" not in drags
-        and len(json.loads(call("explain", "drag", "--json").out)) > 9
+        and len(parsed(call("explain", "drag", "--json").out)["laws"]) > 9
     )
     found = call("explain", "richardson").out
     assert "exponent_richardson_zaki" in found and "wen_yu" not in found
@@ -52,6 +52,26 @@ def test_the_documentation_of_every_law_is_readable_text(tmp_path: Path) -> None
         assert said in call("explain", name).err
     unknown = call("explain", "di_felcie")
     assert unknown.code == 2 and "di_felice" in unknown.err
+
+
+def test_what_is_not_there_is_said_of_tables_and_of_words_that_are_asked_for() -> None:
+    from cfddem.cli import explain_pages as pages
+
+    heat = call("explain", "heat").out
+    assert heat.count("Not there:") == 1 and "density and viscosity that change" in heat
+    assert max(map(len, heat.splitlines())) <= WIDTH
+    assert "reactions" in parsed(call("explain", "heat", "--json").out)["not_there"]
+    assert call("explain", "bed.diameter").out.count("Not there") == 0
+    assert "[contact_heat] of contacts" in call("explain", "cooling").err
+    for words in (
+        ("check", "liquid-bed", "--set", "fluid.turbulence=1"),
+        ("check", "liquid-bed", "--set", "k_epsilon=1"),
+    ):
+        refused = call(*words)
+        assert refused.code == 2 and "no turbulence model acts in a case" in refused.err
+    known = {name for name, _ in pages._keys()}
+    assert not [name for name in known if absent(name.rpartition(".")[2])], "a key that there is"
+    assert TABLES.keys() <= {name.partition(".")[0] for name in known}
 
 
 def test_every_argument_of_every_law_is_plotted_with_its_unit() -> None:
@@ -71,7 +91,7 @@ def test_every_argument_of_every_law_is_plotted_with_its_unit() -> None:
 
 def test_the_doctor_lists_versions_and_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    answers = {each["name"]: each for each in json.loads(call("doctor", "--quick", "--json").out)}
+    answers = {each["name"]: each for each in parsed(call("doctor", "--quick", "--json").out)["checks"]}
     assert {"cfddem", "python", "packages", "threads", "compiled loops", "folder"} <= set(answers)
     assert "numba" in answers["packages"]["text"]
     assert list(tmp_path.iterdir()) == []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from functools import cache
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import parsed
 
 from cfddem.backend.errors import InputError
 from closures.bridge import deforming_potential
@@ -119,7 +119,7 @@ def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.Captur
         return str(capsys.readouterr().out)
 
     words = ("--diameter", "5.5e-3", "--liquid", "m5", "--film", "0.45e-3", "--velocity", "0.5")
-    assert json.loads(printed(*words, "--json"))["restitution"] == pytest.approx(oil(5).restitution, abs=1e-12)
+    assert parsed(printed(*words, "--json"))["restitution"] == pytest.approx(oil(5).restitution, abs=1e-12)
     assert "viscous_energy" in printed(*words)
     assert "surface_energy" in printed(*words, "--surface-tension", "0.0192", "--contact-angle", "20")
     with pytest.raises(InputError, match="film"):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import call
+from command_line import HOME, call
+from wheel import wheel_environment
 
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
@@ -51,3 +54,17 @@ def test_a_fifth_of_every_gallery_case_starts_reports_and_draws(name: str, tmp_p
 @pytest.mark.parametrize("name", gallery())
 def test_every_gallery_case_starts_reports_and_draws(name: str, tmp_path: Path) -> None:
     try_out(name, tmp_path, {})
+
+
+@pytest.mark.slow
+def test_every_gallery_case_starts_from_the_wheel(tmp_path: Path) -> None:
+    """As before a release: every command, case and data file of the installed package, away from the source."""
+    home, _ = wheel_environment(tmp_path)
+    here = tmp_path / "here"
+    here.mkdir()
+    done = subprocess.run(
+        [home / "bin" / "python", "-I", HOME / ".ci" / "try_installed.py"],
+        cwd=here, env={key: each for key, each in os.environ.items() if key != "PYTHONPATH"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0 and "cases started" in done.stdout, done.stderr[-2000:]

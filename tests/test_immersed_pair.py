@@ -6,7 +6,6 @@ of Nijssen, Ottens & Padding, Powder Technol. 413 (2023) 118017.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_line import call
+from command_line import call, parsed
 from impacts import Pair
 
 from cfddem.backend.errors import InputError, UnstableStep
@@ -316,10 +315,10 @@ def test_bad_input_is_refused_by_name_value_and_limit(wrong: dict[str, Any], sai
 def test_measured_rebounds_are_computed_drawn_and_scored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A point at the computed restitution, and one three errors above it."""
     monkeypatch.chdir(tmp_path)
-    once = json.loads(call("collide", "--velocity", "0.1", "--stokes", "100", "--json").out)["restitution"]
+    once = parsed(call("collide", "--velocity", "0.1", "--stokes", "100", "--json").out)["restitution"]
     (tmp_path / "points.csv").write_text(f"St [-], e [-], error [%]\n100, {once}, 2\n100, {once + 0.06}, 2\n")
     done = call("collide", "--velocity", "0.1", "--data", "points.csv", "--json")
-    score = json.loads(done.out)
+    score = parsed(done.out)
     assert score["points"] == 2 and score["chi2"] == pytest.approx(4.5) and score["holds"] is False
     assert (tmp_path / "collide.png").stat().st_size > 10_000
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from command_line import call
+from command_line import call, parsed
 from made_up_run import BED, WEIGHT, made_up
 
 from cfddem.analysis.comparison import compare, distinct_names, lines
@@ -133,7 +132,7 @@ def test_compare_writes_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert code == 0 and "compare.html" in out
     page = Path("compare.html").read_text()
     assert page.count("data:image/png;base64,") == 2 and "the cases are the same" in page
-    assert json.loads(call("compare", "a", "b", "--json", "-o", "two.png")[1])["runs"][1]["name"] == "b"
+    assert parsed(call("compare", "a", "b", "--json", "-o", "two.png")[1])["runs"][1]["name"] == "b"
     assert call("compare", "a")[0] == 2 and call("compare", "a", "b", "-o", "x.pdf")[0] == 2
 
 
@@ -322,7 +321,7 @@ def test_data_that_a_run_will_not_have_are_refused_before_it_starts(tmp_path: Pa
     csv_file(tmp_path, text)
     (tmp_path / "case.toml").write_text(f'{BED}[compare.data]\nfile = "points.csv"\n')
     done = call("check", str(tmp_path / "case.toml"), "--json")
-    (error,) = (each for each in json.loads(done.out)["issues"] if each["severity"] == "error")
+    (error,) = (each for each in parsed(done.out)["issues"] if each["severity"] == "error")
     assert done.code == 2 and error["key"] == "compare.data" and said in error["reason"]
     with pytest.raises(InputError, match=said):
         Run.begin(Case.from_toml(tmp_path / "case.toml"), tmp_path / "run")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import call
+from command_line import call, parsed
 from disturbed_runs import TINY
 from example_case import TEXT
 
@@ -142,7 +141,7 @@ def test_stability_of_a_case_is_shown(tmp_path: Path) -> None:
     assert done.code == 0 and "breaks up into plugs" in done.out, done.out + done.err
     assert (tmp_path / "growth.png").stat().st_size > 10_000
     plain, agitated = (
-        json.loads(call("stability", str(case), "--json", "--set", f"agitation={law}").out)
+        parsed(call("stability", str(case), "--json", "--set", f"agitation={law}").out)
         for law in ("none", "pseudo_turbulence")
     )
     assert plain["granular_temperature"] == 0.0 < agitated["granular_temperature"]

@@ -272,6 +272,25 @@ def test_curves_of_the_history(bed, tmp_path):
         history(bed, tmp_path / "other.png", ["bed_hight"])
 
 
+def test_species_of_a_mixture_colour_its_spheres_and_are_named(tmp_path: Path) -> None:
+    text = 'title = "two"\n[bed.species.beads]\ncount = 2\n[bed.species.pellets]\ncount = 1\n'
+    run = RunFolder.create(
+        tmp_path / "two",
+        text,
+        {},
+        None,
+        QUANTITIES | {"particles": {**QUANTITIES["particles"], "species": Quantity("1", "")}},
+    )
+    particles = {"id": np.arange(3), "position": np.eye(3), "velocity": np.eye(3), "radius": np.full(3, 0.1)}
+    run.write_snapshot(0.0, 0, None, particles | {"species": np.array([0, 1, 0], np.int32)})
+    mixed = open_run(tmp_path / "two")
+    assert colours.usual(mixed) == colours.choices(mixed)[0] == "species"
+    assert colours.label(mixed, "species") == "0 beads, 1 pellets"
+    low, high = colours.limits(colours.values(mixed, 0, "species")[1], "species")
+    first, last = (colours.colour_map("species")((each - low) / (high - low)) for each in (0.0, 1.0))
+    assert first[2] > first[0] and last[0] > last[2], "blue and orange"
+
+
 def test_wrong_options_give_one_line(renders, bed, tmp_path):
     with pytest.raises(InputError, match="did you mean 'bubbles'"):
         picture(bed, tmp_path / "a.png", show=("bubles",))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import io
 import logging
 import math
 import re
@@ -11,12 +12,13 @@ from pathlib import Path
 
 import pytest
 from numba import njit
+from rich.console import Console
 from rich.progress import Progress
 
 from cfddem.backend import stopwatch
 from cfddem.backend.compile import _compilation, announce_compilation, announced, seconds_of_compilation
 from cfddem.backend.errors import InputError
-from cfddem.run.progress import ProgressLine, Status, live_line
+from cfddem.run.progress import ProgressLine, Status, columns, live_line
 
 
 def status(time: float, remaining: float = 3725.0) -> Status:
@@ -25,9 +27,21 @@ def status(time: float, remaining: float = 3725.0) -> Status:
 
 
 def test_progress_shows_time_remaining_wall_time_and_measures() -> None:
-    expected = "0.5/2 s  1:02:05 left  limit: collision  12345 steps  bed 45.6 mm  0.12 m/s  789 contacts"
+    expected = "0.5/2 s  1:02:05 left  bed 45.6 mm  0.12 m/s  limit: collision  789 contacts  12345 steps"
     assert str(status(0.5)) == expected
     assert "  - left  " in str(status(0.5, math.nan))
+
+
+def test_the_live_line_keeps_to_one_line_of_a_narrow_terminal() -> None:
+    """At 80 columns what is less useful is left out; at 40, too, and never cut within a word."""
+    assert status(0.5).within(68) == "0.5/2 s  1:02:05 left  bed 45.6 mm  0.12 m/s  limit: collision"
+    for width in (80, 40):
+        console = Console(width=width, file=io.StringIO(), force_terminal=True, color_system=None)
+        bar = Progress(*columns(), console=console)
+        ProgressLine(bar).update(status(1.0))
+        console.print(bar.get_renderable())
+        shown = re.sub("\x1b.*?m", "", console.file.getvalue()).rstrip("\n")  # type: ignore[attr-defined]
+        assert "\n" not in shown and len(shown) <= width and re.search(r"(s|left|collision)\s*$", shown), shown
 
 
 def test_the_log_gets_one_line_per_row_and_a_pipe_gets_none(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -16,8 +16,9 @@ from made_up_run import BED, made_up, quantities
 from cfddem.analysis.bed_laws import comparison, expansion_note
 from cfddem.analysis.measures import voidage_from_pressure
 from cfddem.analysis.report import report
-from cfddem.analysis.report_text import as_json, lines, markdown
+from cfddem.analysis.report_text import lines, markdown
 from cfddem.backend.errors import InputError
+from cfddem.backend.json_text import as_json
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.cli import app as cli

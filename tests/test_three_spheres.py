@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cfddem
+from command_line import cfddem, parsed
 from matplotlib.colors import to_hex
 
 from cfddem.backend.errors import InputError
@@ -206,7 +205,7 @@ def test_invalid_arguments_are_refused_by_name(name: str, value: float) -> None:
 
 def test_the_command_prints_json() -> None:
     done = cfddem("three-spheres", "--stokes", "20", "--theta12", "30", "--json")
-    result = json.loads(done.stdout)
+    result = parsed(done.stdout)
     assert (result["outcome"], round(result["restitution12"], 3)) == ("FS", 0.774)
     assert result["events"][0]["pair"] == 12
     words = cfddem("three-spheres", "--stokes", "20", "--theta12", "30").stdout

@@ -8,11 +8,11 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from command_line import call
+from command_line import call, parsed
 from made_up_run import made_up
 
 import cfddem
-from cfddem.analysis.report_text import as_json
+from cfddem.backend.json_text import as_json
 
 
 def test_check_gives_what_the_command_prints() -> None:
@@ -40,7 +40,8 @@ def test_a_report_is_an_object_that_prints_as_the_command_does(tmp_path: Path) -
     assert isinstance(found, cfddem.Report) and height.stationary and height.mean == pytest.approx(0.04, rel=0.01)
     assert found.key_results[0].name == "bed height" and found.key_results[0].value == height.mean
     assert f"{found}\n" in call("report", str(folder), "-o", str(tmp_path / "page.html")).out
-    printed = json.loads(call("report", str(folder), "--json").out)
+    printed = parsed(call("report", str(folder), "--json").out)
+    assert printed.pop("schema") == "cfddem/report/1"
     assert printed == json.loads(as_json(found)) == json.loads(as_json(found.summary()))
     assert printed["measures"]["bed_height"]["mean"] == height.mean
     assert "<td>bed height</td>" in found._repr_html_()

@@ -13,7 +13,7 @@ from types import ModuleType
 import h5py
 import numpy as np
 import pytest
-from command_line import call
+from command_line import call, parsed
 
 from cfddem.backend.errors import InputError
 from cfddem.plotting import curves as plots
@@ -92,8 +92,13 @@ def test_the_table_can_be_printed_as_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target(monkeypatch, Row("e", 0.5, 0.4, 0.2))
-    validate("example", tmp_path, json=True)
-    assert json.loads(capsys.readouterr().out)["target"] == "example"
+    from cfddem.cli import app as cli
+
+    monkeypatch.setattr(sys, "argv", ["cfddem", "validate", "example", "--json", "--output", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        cli.main()
+    printed = parsed(capsys.readouterr().out)
+    assert printed["holds"] and [each["target"] for each in printed["targets"]] == ["example"]
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path) -> None:

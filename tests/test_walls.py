@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from cfddem.backend.communicator import SERIAL
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.case.walls import CaseWall
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
+from cfddem.run.wall_loads import columns, wall_loads
 from closures import contact
 
 RADIUS, GRAVITY = 1e-3, 9.81
@@ -243,6 +247,26 @@ def test_a_moving_wall_gives_momentum(kind: str) -> None:
     assert struck == pytest.approx(angle / 5.0 if kind == "paddle" else 0.02, rel=2e-3)
     assert MASS * run.particles.velocity[0] == pytest.approx(given, abs=1e-6 * MASS)
     assert np.linalg.norm(run.particles.velocity[0]) == pytest.approx(1.0, rel=2e-2 if kind == "paddle" else 2e-3)
+
+
+def test_the_power_and_torque_of_a_paddle_are_what_the_sphere_gains() -> None:
+    """Over an elastic strike: the power sums up to the kinetic energy, the torque to the angular momentum."""
+    solid = SOLID.model_copy(update={"friction": 0.0})
+    run = sphere([0.0, 0.0, RADIUS], [MOVING["paddle"]], solid=solid, gravity=(0.0, 0.0, 0.0))
+    case = SimpleNamespace(wall=(CaseWall(shape="cylinder", axis=(0.0, 1.0, 0.0), radius=1.0, spin=(0.0, 5.0, 0.0)),))
+    simulation = SimpleNamespace(particle_solver=run, case=case, communicator=SERIAL)
+    assert set(wall_loads(simulation)) == set(columns(case))  # type: ignore[arg-type]
+    run.advance(STEP, 9900)
+    given = dict.fromkeys(columns(case), 0.0)  # type: ignore[arg-type]
+    for _ in range(400):
+        run.advance(STEP)
+        given = {name: total + wall_loads(simulation)[name] * STEP for name, total in given.items()}  # type: ignore[arg-type]
+    place, velocity = run.particles.position[0], run.particles.velocity[0]
+    assert np.linalg.norm(velocity) > 0.9
+    assert given["wall_0_power"] == pytest.approx(0.5 * MASS * velocity @ velocity, rel=2e-3)
+    momentum = MASS * np.cross(place - np.array([0.1, 0.0, -0.01]), velocity)[1]
+    assert given["wall_0_torque"] == pytest.approx(-momentum, rel=2e-3)
+    assert [given[f"wall_0_force_{axis}"] for axis in "xyz"] == pytest.approx(-MASS * velocity, abs=1e-6 * MASS)
 
 
 @pytest.mark.parametrize("wall", [Box(low=(-0.02, -0.02, 0.0), high=(0.02, 0.02, 0.02)), sheet(5, size=0.04)], ids=str)

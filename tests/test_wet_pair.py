@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 
 import numpy as np
 import pytest
-from command_line import cfddem
+from command_line import cfddem, parsed
 from test_three_spheres import failed
 
 from cfddem.backend.errors import InputError
@@ -131,7 +130,7 @@ def test_invalid_arguments_are_refused_by_name(name: str, value: object, said: s
 
 def test_the_command_prints_json() -> None:
     done = cfddem("wet-pair", "--stokes", "2", "--angle", "45", "--json")
-    result = json.loads(done.stdout)
+    result = parsed(done.stdout)
     assert (result["outcome"], round(result["restitution"], 3)) == ("bounce", 0.527)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
+from command_line import parsed
 
 from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
@@ -256,7 +256,7 @@ def test_the_command_prints_the_result_and_refuses_by_name(capsys: pytest.Captur
         app(["wet-wall", *words], result_action="return_value")
         return str(capsys.readouterr().out)
 
-    printed = json.loads(say("--film", "2e-4", "--velocity", "0.6", "--json"))
+    printed = parsed(say("--film", "2e-4", "--velocity", "0.6", "--json"))
     assert printed["restitution"] == pytest.approx(impact(film=200e-6, velocity=0.6).restitution, abs=1e-9)
     assert printed["restitution_tangential"] is None
     assert "contact_lost" in say()

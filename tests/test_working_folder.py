@@ -8,13 +8,13 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-import venv
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 from command_line import HOME
 from made_up_run import made_up
+from wheel import wheel_environment
 
 from cfddem.backend.launch import python_command, safe_workers
 from cfddem.cli.doctor import TEST_CASE
@@ -178,23 +178,8 @@ def test_no_command_of_this_installation_executes_a_canary(tmp_path: Path) -> No
 @pytest.mark.slow
 def test_no_command_of_the_wheel_executes_a_canary(tmp_path: Path) -> None:
     """The wheel in an environment of its own, which takes the dependencies from this one."""
-    built = subprocess.run(
-        [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", str(tmp_path), str(HOME)],
-        capture_output=True, text=True, cwd=tmp_path,
-    )  # fmt: skip
-    if built.returncode:
-        pytest.skip(f"the wheel cannot be built here: {built.stderr.strip().splitlines()[-1]}")
-    home = tmp_path / "environment"
-    venv.create(home, symlinks=True)
-    python, wheel = home / "bin" / "python", next(tmp_path.glob("*.whl"))
-    with (home / "of_this_one.pth").open("w") as file:
-        file.write(sysconfig.get_path("purelib") + "\n")
-    where = subprocess.run(
-        [python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"], capture_output=True, text=True
-    ).stdout.strip()
-    shutil.move(home / "of_this_one.pth", where)
-    install = [sys.executable, "-m", "pip", "--python", str(python), "install", "-q", "--no-deps", str(wheel)]
-    subprocess.run(install, check=True, cwd=tmp_path)
+    home, where = wheel_environment(tmp_path)
+    python = home / "bin" / "python"
     trap = lay(tmp_path / "here")
     seen = execute(trap, [str(python), "-P", "-c", "import cfddem; print(cfddem.__file__)"], "")
     assert seen.stdout.startswith(where), "the wheel is tested, not the source"

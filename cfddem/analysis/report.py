@@ -91,22 +91,24 @@ def window_of(run: RunData, case: Case) -> tuple[float, float]:
 
     The run has recorded the start if the errors of its means have ended it.
     """
-    end = float(run.history["time"][-1])
+    first, end = float(run.history["time"][0]), float(run.history["time"][-1])
     if run.averages_from is not None:
         return run.averages_from, end
-    return (_start_of_means(case, end) if case.run.average_from is None else min(case.run.average_from, end)), end
+    if case.run.average_from is None:
+        return _start_of_means(case, first, end), end
+    return min(max(case.run.average_from, first), end), end
 
 
-def _start_of_means(case: Case, end: float) -> float:
+def _start_of_means(case: Case, first: float, end: float) -> float:
     """Middle of a run, or of the time for which its inlet holds its last velocity [s]."""
     inlet = case.bed.inlet_velocity
     if isinstance(inlet, float):
-        return 0.5 * end
+        return 0.5 * (first + end)
     times, velocities = np.array(inlet).T
     last = np.interp(end, times, velocities)
     changing = [time for time, each in zip(times, velocities) if time < end and each != last]
     begins = [time for time in times if time < end and time > max(changing, default=-math.inf)]
-    return 0.5 * (max(begins[0], 0.0) + end) if begins else 0.5 * end
+    return 0.5 * (max(begins[0], first) + end) if begins else 0.5 * (first + end)
 
 
 def recorded_regimes(run: RunData, begin: float) -> RegimeMap | None:

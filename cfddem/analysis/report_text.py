@@ -1,12 +1,11 @@
-"""The report of a run as text, JSON and Markdown: key results first, then what to do about warnings, then details."""
+"""The report of a run as text and Markdown: key results first, then what to do about warnings, then details."""
 
 from __future__ import annotations
 
-import json
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from cfddem.analysis.bed_laws import FROM_PRESSURE
@@ -103,21 +102,6 @@ def lines(result: Report) -> list[str]:
         *_energy(result),
         *_wall_time(result.wall_time),
     ]
-
-
-def as_json(result: Any) -> str:
-    """A report or comparison as JSON, with null for NaN and infinity."""
-
-    def plain(value: Any) -> Any:
-        if is_dataclass(value) and not isinstance(value, type):
-            value = asdict(value)
-        if isinstance(value, dict):
-            return {name: plain(each) for name, each in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(each) for each in value]
-        return None if isinstance(value, float) and not math.isfinite(value) else value
-
-    return json.dumps(plain(result), allow_nan=False)
 
 
 def steadiness(measure: Measure) -> str:

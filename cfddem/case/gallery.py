@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.case.absent import absent
 from cfddem.case.input_errors import sections_of
 from cfddem.case.materials import Material
 from cfddem.case.renamed import new_name
@@ -118,5 +119,6 @@ def full_key(key: str) -> str:
         meant = " or ".join([*found, f"material.NAME.{key}"])
         raise InputError("key", key, f"written as {meant}", "NAME is the name of a material of the case")
     if not found:
-        raise InputError("key", key, nearest(key, sorted({*Case.model_fields, *itertools.chain(*tables.values())})))
+        known = sorted({*Case.model_fields, *itertools.chain(*tables.values())})
+        raise InputError("key", key, nearest(key, known), absent(key))
     return found[0]

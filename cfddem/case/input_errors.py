@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from cfddem.backend.errors import LONGEST, InputError, nearest, shown
+from cfddem.case.absent import absent
 from cfddem.case.renamed import new_key, new_value
 
 MOST = 20
@@ -152,9 +153,8 @@ def _one(key: Key, reports: Sequence[Any], model: type[BaseModel]) -> InputError
     if first["type"] == "literal_error" and (renamed := new_value(field, first["input"])):
         return InputError(field, shown(first["input"]), f"written as {renamed!r}", "the value has been renamed")
     if first["type"] == "extra_forbidden":
-        return InputError(
-            field, shown(first["input"]), nearest(last, owner.model_fields), _right_table(last, owner, model)
-        )
+        remedy = absent(last) or _right_table(last, owner, model)
+        return InputError(field, shown(first["input"]), nearest(last, owner.model_fields), remedy)
     limits = dict.fromkeys(filter(None, (_limit(each) for each in reports)))
     named = next((str(part) for part in reversed(key[-2:]) if part in owner.model_fields), last)  # or values by name
     about = owner.model_fields[named].description if named in owner.model_fields else None

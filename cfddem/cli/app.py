@@ -15,7 +15,8 @@ from cfddem import __version__
 from cfddem.backend.errors import CfddemError
 from cfddem.backend.launch import several_ranks
 from cfddem.backend.working_folder import ignore_settings_files
-from cfddem.cli import calibration, cases, information, results, validation
+from cfddem.cli import calibration, cases, information, results, sweeps, validation
+from cfddem.cli.json_output import asked_for_json, print_failure
 from cfddem.cli.ranks import end_together
 
 WIDTH = 100
@@ -37,11 +38,11 @@ Exit codes: 0 success. 1 a limit is exceeded (validate), warnings with --strict 
 )
 
 COMMANDS = {
-    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, cases.sweep, calibration.calibrate),
+    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, sweeps.sweep, calibration.calibrate),
     "Results": (results.report, results.compare, results.view, results.export),
     "Collisions of a few spheres": ("collide", "wet-wall", "film-impact", "three-spheres", "wet-pair"),
     "Validation": (validation.validate, validation.bench),
-    "Information": (information.explain, information.doctor),
+    "Information": (information.explain, information.schema, information.doctor),
 }
 """Commands by the panel of the help that lists them; those given by name are in :data:`COLLISIONS`."""
 
@@ -85,7 +86,7 @@ def main() -> None:
     except CycloptsError as failure:
         _fail(" ".join(str(failure).split()), 2)
     except CfddemError as failure:
-        _fail(str(failure), failure.exit_code)
+        _fail(str(failure), failure.exit_code, failure)
     except BrokenPipeError:  # the reader of the output has closed it, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as failure:  # such as a full disk, or a folder without write permission
@@ -98,12 +99,14 @@ def main() -> None:
         end_together("", 1)
 
 
-def _fail(message: str, code: int) -> NoReturn:
-    """Print an error, one for each line, and end."""
+def _fail(message: str, code: int, failure: CfddemError | None = None) -> NoReturn:
+    """Print an error, one for each line, and end; with `--json`, also as JSON."""
     if several_ranks():
         end_together(message, code)
     for line in message.splitlines():
         _print_error(line)
+    if asked_for_json():
+        print_failure(message, code, failure)
     sys.exit(code)
 
 

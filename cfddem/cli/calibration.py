@@ -10,6 +10,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from cfddem.cli.cases import CASE, SET, print_warnings
+from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation
 from cfddem.preflight.issue import WIDTH
 
@@ -37,7 +38,6 @@ def calibrate(
 
     Example: cfddem calibrate box.toml --match measured.csv --vary material.glass.restitution=0.6..1
     """
-    from cfddem.analysis.report_text import as_json
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
     from cfddem.preflight.summary import preflight
@@ -60,7 +60,10 @@ def calibrate(
         path, match or (), variables(vary), folder, trials=trials, jobs=jobs, overrides=overrides(set or []),
         progress=progress,
     )  # fmt: skip
-    print(as_json(found.summary()) if json else "\n".join(lines(found.summary(), folder)))
+    if json:
+        print_json("calibrate", {"folder": folder, **found.summary()})
+    else:
+        print("\n".join(lines(found.summary(), folder)))
     if not found.finished:
         sys.exit(3)
 

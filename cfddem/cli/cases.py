@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import json as _json
 import sys
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.errors import InputError
+from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import table
-from cfddem.cli.printing import announce_compilation, with_colour
+from cfddem.cli.json_output import print_json
+from cfddem.cli.printing import with_colour
 from cfddem.cli.ranks import on_ranks
 
 if TYPE_CHECKING:
@@ -24,8 +27,24 @@ SET = "KEY=VALUE that replaces a value of the case; may be repeated"
 THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
+FROM = "run folder whose end is the beginning of this run"
+REPORT = "print the report as JSON"
+JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
 LAWS = "Python file with the user's laws of the run, which is executed; nothing in a run folder ever is"
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Processors:
+    """On how many processors a run is made; its fields are options."""
+
+    threads: Annotated[int | None, Parameter(help=THREADS)] = None
+    ranks: Annotated[int | None, Parameter(help=RANKS)] = None
+
+
+WHOLE_MACHINE = Processors()
+"""As many threads as there are, or as the launcher says."""
 
 
 def new(
@@ -33,6 +52,7 @@ def new(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="file to write; default: NAME.toml")] = None,
     schema: Annotated[bool, Parameter(help="print the JSON schema of case files, for editors", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Copy a commented case from the gallery to this folder, as a start for your own.
 
@@ -42,12 +62,18 @@ def new(
     from cfddem.case.schema import Case
 
     if schema:
-        print(_json.dumps(Case.model_json_schema(), indent=2))
+        print(as_json(Case.model_json_schema(), indent=2))
     elif name is None:
         titles = [(known, each.title) for known, each in gallery().items()]
-        print("\n".join(table(titles, widths=(20,), gap=2)))
+        if json:
+            print_json("gallery", {"cases": [{"name": known, "title": title} for known, title in titles]})
+        else:
+            print("\n".join(table(titles, widths=(20,), gap=2)))
     else:
         written = copy_from_gallery(name, output)
+        if json:
+            print_json("written", {"files": [written]})
+            return
         print(f"written to {written}; edit it, then: cfddem check {written}, cfddem run {written}")
 
 
@@ -57,7 +83,7 @@ def check(
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
     ranks: Annotated[int | None, Parameter(help="number of processes that are to share the run")] = None,
-    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run or written.
 
@@ -70,7 +96,10 @@ def check(
     from cfddem.run.check import check as checked
 
     result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks)
-    print(_json.dumps(result.summary()) if json else "\n".join(with_colour(result.lines())))
+    if json:
+        print_json("check", result.summary())
+    else:
+        print("\n".join(with_colour(result.lines())))
     sys.exit({"ok": 0, "warning": int(strict), "error": 2}[result.status])
 
 
@@ -79,7 +108,7 @@ def stability(
     *,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     plot: Annotated[Path | None, Parameter(help="PNG file for growth and speed against wavelength")] = None,
-    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+    json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Show which waves grow in a liquid bed, by linear theory: growth and speed against wavelength. Nothing is run.
 
@@ -87,7 +116,6 @@ def stability(
 
     Example: cfddem stability liquid-bed --set agitation=free_spheres
     """
-    from cfddem.backend.errors import InputError
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
     from cfddem.io.files import require_folder
@@ -102,7 +130,10 @@ def stability(
     if found is None:
         remedy = "waves are computed for free particles above minimum fluidisation, denser than their liquid"
         raise InputError("case", described.title or None, "a fluidised liquid bed", remedy)
-    print(_json.dumps(summary(found)) if json else "\n".join(lines(found)))
+    if json:
+        print_json("stability", summary(found))
+    else:
+        print("\n".join(lines(found)))
     if plot is not None:
         from cfddem.plotting.wave_figures import growth_curves
 
@@ -115,30 +146,40 @@ def run(
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; default: NAME-run")] = None,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
-    threads: Annotated[int | None, Parameter(help=THREADS)] = None,
-    ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
+    processors: Processors = WHOLE_MACHINE,
     go_on: Annotated[bool, Parameter(name="--continue", help=CONTINUE, negative="")] = False,
+    origin: Annotated[Path | None, Parameter(name="--from", help=FROM)] = None,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
+    json: Annotated[bool, Parameter(help=REPORT, negative="")] = False,
 ) -> None:
     """Run a case, write snapshots and history to a new folder, and print a report.
 
-    The case is checked first. With errors it is not run.
+    The case is checked first. With errors it is not run. With --from, the run has the case of another one, changed by
+    --set, and begins where that has ended, with its particles, contacts, flow and time.
 
     Example: cfddem run liquid-bed -o bed --set run.until=0.02 --set average_from=0.01
     """
     from cfddem.case.gallery import find_case, overrides
-
-    path = find_case(case)
-    folder = output or Path(f"{path.stem}-run")
     from cfddem.case.schema import Case
     from cfddem.case.toml_text import read_text
+    from cfddem.io.folder import read_about
 
-    described = Case.from_toml(path, overrides(set or []))
-    communicator = on_ranks(ranks, threads, folder)
+    if origin is None:
+        path = find_case(case)
+        folder = output or Path(f"{path.stem}-run")
+        described = Case.from_toml(path, overrides(set or []))
+    else:
+        if case is not None:
+            remedy = "change its values with --set KEY=VALUE"
+            raise InputError("case", str(case), f"left out: the case is that of {origin}", remedy)
+        read_about(origin)
+        path, folder = origin / "case.toml", output or Path(f"{origin.absolute().name}-run")
+        described = Case.from_toml(path, overrides(set or []))
+    communicator = on_ranks(processors.ranks, processors.threads, folder)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
             _warn_of_another_case(described, folder)
-        resume(folder, threads=threads, ranks=ranks, log=log)
+        resume(folder, processors=processors, log=log, json=json)
         return
     _refuse_or_warn(described, communicator)
     from cfddem.backend.compile import use_threads
@@ -148,16 +189,17 @@ def run(
     from cfddem.run.warmup import warmup
 
     if communicator.size == 1:
-        use_threads(threads_for(described, threads))
+        use_threads(threads_for(described, processors.threads))
     with live_line(log, communicator.rank == 0) as line:
-        text = None if set else read_text(path)
+        text = None if set or origin is not None else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
             prepared = Run.begin(
-                described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator
-            )
+                described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator,
+                origin=origin,
+            )  # fmt: skip
         prepared.go()
     if communicator.rank == 0:
-        _print_report(folder)
+        _print_report(folder, json)
 
 
 def _warn_of_another_case(described: Case, folder: Path) -> None:
@@ -194,11 +236,14 @@ def print_warnings(result: Preflight) -> None:
         print("\n".join(issue.lines("cfddem: ")), file=sys.stderr)
 
 
-def _print_report(folder: Path) -> None:
+def _print_report(folder: Path, json: bool) -> None:
     """Print the report of a run, and where the run is."""
     from cfddem.analysis.report import report as summary
     from cfddem.analysis.report_text import lines
 
+    if json:
+        print_json("report", summary(folder).summary())
+        return
     print("\n".join(lines(summary(folder))))
     print(f"\nwritten to {folder}; for a picture: cfddem view {folder}")
 
@@ -209,9 +254,9 @@ def resume(
     until: Annotated[float | None, Parameter(help="new end time [s]")] = None,
     laws: Annotated[Path | None, Parameter(help=LAWS)] = None,
     set: Annotated[list[str] | None, Parameter(show=False, negative="")] = None,
-    threads: Annotated[int | None, Parameter(help=THREADS)] = None,
-    ranks: Annotated[int | None, Parameter(help=RANKS)] = None,
+    processors: Processors = WHOLE_MACHINE,
     log: Annotated[Path | None, Parameter(help=LOG)] = None,
+    json: Annotated[bool, Parameter(help=REPORT, negative="")] = False,
 ) -> None:
     """Continue a run that was stopped or killed, or extend one that has finished, and print a report.
 
@@ -220,7 +265,6 @@ def resume(
     Example: cfddem resume bed --until 0.03
     """
     from cfddem.backend.compile import use_threads
-    from cfddem.backend.errors import InputError
     from cfddem.cli.laws_file import import_laws
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
@@ -232,84 +276,18 @@ def resume(
     if set:
         remedy = f"a changed case is a new run: cfddem run {folder}/case.toml --set {set[0]} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
-    communicator = on_ranks(ranks, threads, folder)
+    communicator = on_ranks(processors.ranks, processors.threads, folder)
     if laws is not None:
         import_laws(laws)
     if until is None and (before := open_run(folder)).status == "finished":
-        if communicator.rank == 0:
+        if communicator.rank == 0 and json:
+            _print_report(folder, json)
+        elif communicator.rank == 0:
             print(f"{folder} has already finished, at {before.history['time'][-1]:g} s; extend it with --until TIME")
         return
     if communicator.size == 1:
-        use_threads(threads_for(case_to_continue(folder, None, until), threads))
+        use_threads(threads_for(case_to_continue(folder, None, until), processors.threads))
     with live_line(log, communicator.rank == 0) as line:
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
-        _print_report(folder)
-
-
-def sweep(
-    case: Annotated[Path | None, Parameter(help=CASE)] = None,
-    *,
-    over: Annotated[
-        list[str] | None, Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")
-    ] = None,
-    vary: Annotated[
-        list[str] | None, Parameter(help="KEY=LOW..HIGH; may be repeated; the ranges are sampled", negative="")
-    ] = None,
-    sample: Annotated[str, Parameter(help="how ranges are sampled: latin (hypercube) or sobol")] = "latin",
-    runs: Annotated[int, Parameter(help="number of samples")] = 16,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
-    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
-    scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None,
-    write_jobs: Annotated[bool, Parameter(help="write commands and a Slurm script, run nothing", negative="")] = False,
-    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
-    json: Annotated[bool, Parameter(help="print the outcomes as JSON", negative="")] = False,
-) -> None:
-    """Run a case for many values, one folder each, and write a table and a figure of the results.
-
-    The values are listed (--over), or fill ranges evenly (--vary, --sample, --runs).
-
-    After a stop, the same command continues with the missing runs. With --write-jobs nothing is run: the folder gets
-    one command for each run, and a script for Slurm; the same command without it collects the results afterwards.
-    Exit code: 3 if a run fails; the others are kept.
-
-    Example: cfddem sweep liquid-bed --over seed=1..2 --set start=suspended --set until=0.01 -o seeds
-    """
-    from dataclasses import asdict
-
-    from cfddem.case.gallery import find_case, overrides
-    from cfddem.studies.samples import chosen_values
-    from cfddem.studies.sweep import Outcome, failures
-    from cfddem.studies.sweep import sweep as run_all
-
-    path = find_case(case)
-    values = chosen_values(over or [], vary or [], sample, runs)
-    folder = output or Path(f"{path.stem}-sweep")
-    if write_jobs:
-        from cfddem.studies.job_array import write_jobs as write
-
-        lines, script, count = write(path, values, folder, overrides(set or []))
-        print(f"{count} commands written to {lines}; submit with: sbatch {script}")
-        return
-    done = 0
-
-    def progress(outcome: Outcome) -> None:
-        nonlocal done
-        done += 1
-        status = "already finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
-        print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
-
-    if jobs == 1 and scheduler is None and not json:
-        announce_compilation()
-    outcomes = run_all(
-        path, values, folder, overrides=overrides(set or []), jobs=jobs, scheduler=scheduler, progress=progress
-    )
-    failed = list(failures(outcomes))
-    if json:
-        print(_json.dumps([asdict(each) for each in outcomes]))
-    else:
-        print(f"table and figure written to {folder}")
-    for line in failed:
-        print(f"cfddem: {line}", file=sys.stderr)
-    if failed:
-        sys.exit(3)
+        _print_report(folder, json)

@@ -6,12 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.tables import table
+from cfddem.case.materials import Material
 from cfddem.cli.printing import show
 from cfddem.cli.scenario_commands import command
+from cfddem.io.files import require_folder
 from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_pair, wet_wall
 from scenarios.collisions.film_impact.figures import draw_moments
 from scenarios.collisions.film_impact.movie import movie as write_movie
 from scenarios.collisions.immersed_pair.measured import MeasuredCollisions, compare_points
+from scenarios.collisions.immersed_pair.ranges import UNITS, CollisionRange, stokes_numbers, write_csv
 from scenarios.collisions.three_spheres.figures import MEANINGS, draw_map
 
 
@@ -19,55 +23,82 @@ def _collide(
     *,
     material: str,
     target: str | None,
-    diameter: float,
-    target_diameter: float | None,
-    spin: float,
+    roughness: float | None,
+    stokes: str | None,
     data: Path | None,
     figure: Path,
+    csv: Path | None,
     **given: Any,
-) -> immersed_pair.Collision | MeasuredCollisions:
-    """Collide two spheres of named materials, once or at each measured point."""
-    known = immersed_pair.MATERIALS
+) -> immersed_pair.Collision | CollisionRange | MeasuredCollisions:
+    """Collide two spheres of named materials: once, over a range of Stokes numbers, or at each measured point."""
+    known, spin = immersed_pair.MATERIALS, given.pop("spin")
+    own, other = given.pop("diameter"), given.pop("target_diameter")
+    diameters = own, own if other is None else other
+    numbers = None if stokes is None else stokes_numbers(stokes)
     for name in (material, target):
         if name is not None and name not in known:
             raise InputError("material", name, nearest(name, known))
+    pair = known[material], known[target or material]
+    if roughness is not None:
+        rough = [Material(**each.model_dump() | {"roughness": roughness}) for each in pair]
+        pair = rough[0], rough[1]
+    if data is not None and csv is not None:
+        raise InputError("--csv", str(csv), "left out with --data", "the points of a figure are those of the data")
+    require_folder(csv)
 
     def once(**point: float) -> immersed_pair.Collision:
         return immersed_pair.collide(
-            (known[material], known[target or material]),
-            diameter=(diameter, diameter if target_diameter is None else target_diameter),
+            pair,
+            diameter=diameters,
             spin=(spin, 0.0),
             **given | point,
         )
 
-    return once() if data is None else compare_points(data, once, figure)
+    if data is not None:
+        return compare_points(data, once, figure)
+    found = [once(**({} if numbers is None else {"stokes": each})) for each in numbers or [0.0]]
+    if csv is not None:
+        write_csv(found, csv)
+    return found[0] if len(found) == 1 else CollisionRange(found)
+
+
+SCHEMA_OF: dict[type, str] = {
+    immersed_pair.Collision: "collide", CollisionRange: "collide-range", MeasuredCollisions: "collide-data",
+}  # fmt: skip
+
+
+def _show_collision(result: immersed_pair.Collision | CollisionRange | MeasuredCollisions) -> None:
+    if not isinstance(result, CollisionRange):
+        show(result.summary(), UNITS)
+        return
+    rows = [
+        (f"{each.stokes:.4g}", each.outcome, f"{each.restitution:.4f}", f"{each.minimum_gap:.4g} m", each.mechanism)
+        for each in result.collisions
+    ]
+    print("\n".join(table(rows, ("stokes", "outcome", "restitution", "minimum gap", "mechanism"), gap=2)))
 
 
 collide = command(
     immersed_pair.collide,
-    units={
-        "velocity": "m/s",
-        "viscosity": "Pa s",
-        "rebound_angle_striker": "deg",
-        "rebound_angle_relative": "deg",
-        "minimum_gap": "m",
-        "stop_gap": "m",
-        "spin": "rad/s",
-    },
+    lambda result: SCHEMA_OF[type(result)],
     options={
         "material": (str, "delrin", "steel_smooth, steel_rough, glass or delrin"),
         "target": (str | None, None, "material of the target or wall; the same if not given"),
         "diameter": (float, 12.7e-3, "of the striker [m]"),
         "target_diameter": (float | None, None, "of the target; the same if not given [m]"),
+        "roughness": (float | None, None, "of both; that of the material if not given [m]"),
+        "stokes": (str | None, None, "of the normal approach: a number, LOW..HIGH, or numbers with commas [-]"),
+        "csv": (Path | None, None, "CSV file with one row for each collision"),
         "spin": (float, 0.0, "of the striker before the collision [rad/s]"),
         "data": (Path | None, None, "CSV file of measured points, restitution over stokes or rebound angle over angle"),
         "figure": (Path, Path("collide.png"), "PNG file that shows the measured points"),
     },
     call=_collide,
+    show_result=_show_collision,
 )
 
 
-def _show_impact(result: wet_wall.Impact, json: bool) -> None:
+def _show_impact(result: wet_wall.Impact) -> None:
     values = result.summary()
     units = {
         "spin": "rad/s",
@@ -77,15 +108,13 @@ def _show_impact(result: wet_wall.Impact, json: bool) -> None:
         "rupture_length": "m",
         "duration": "s",
     }
-    if not json:
-        lost = {f"{name}_lost": energy for name, energy in values.pop("energy_lost").items()}
-        values |= lost
-        units |= dict.fromkeys(lost, "J/kg")
-    show(values, units, json)
+    lost = {f"{name}_lost": energy for name, energy in values.pop("energy_lost").items()}
+    show(values | lost, units | dict.fromkeys(lost, "J/kg"))
 
 
 impact = command(
     wet_wall.impact,
+    "wet-wall",
     show_result=_show_impact,
 )
 
@@ -97,14 +126,11 @@ def _three_spheres(*, map: Path | None, **given: Any) -> three_spheres.Triplet:
     return three_spheres.simulate_three_spheres(**given)
 
 
-def _show_triplet(result: three_spheres.Triplet, json: bool) -> None:
+def _show_triplet(result: three_spheres.Triplet) -> None:
     values = result.summary()
-    if json:
-        show(values, {}, json)
-        return
     events, contacts = values.pop("events"), values.pop("contacts")
     values["outcome"] = MEANINGS[values["outcome"]]
-    show(values | {f"contacts{pair}": count for pair, count in contacts.items()}, {}, json)
+    show(values | {f"contacts{pair}": count for pair, count in contacts.items()}, {})
     print("\nt: time over (film / impact speed); t*: time over (diameter / impact speed)")
     print("speeds: over the impact speed")
     for event in events:
@@ -113,6 +139,7 @@ def _show_triplet(result: three_spheres.Triplet, json: bool) -> None:
 
 simulate_three_spheres = command(
     three_spheres.simulate_three_spheres,
+    "three-spheres",
     options={"map": (Path | None, None, "PNG file for a map of the outcomes at all St and angles, by the equations")},
     call=_three_spheres,
     show_result=_show_triplet,
@@ -120,6 +147,7 @@ simulate_three_spheres = command(
 
 collide_wet = command(
     wet_pair.collide_wet,
+    "wet-pair",
     units={"spin": "rad/s", "separation_time": "s", "minimum_gap": "m", "velocity": "m/s", "turned": "deg"},
 )
 
@@ -132,11 +160,8 @@ def _strike_film(*, figure: Path | None, movie: Path | None, **given: Any) -> fi
     return result
 
 
-def _show_film_impact(result: film_impact.FilmImpact, json: bool) -> None:
+def _show_film_impact(result: film_impact.FilmImpact) -> None:
     values = result.summary()
-    if json:
-        show(values, {}, json)
-        return
     units = dict.fromkeys(("minimum_gap", "wetted_radius"), "m") | dict.fromkeys(("turned_speed", "fastest"), "m/s")
     units |= dict.fromkeys(("lowest_pressure", "highest_pressure"), "Pa") | {"mass_carried": "kg", "seconds": "s"}
     for name in ("p1", "p2", "p3", "p4"):
@@ -144,11 +169,12 @@ def _show_film_impact(result: film_impact.FilmImpact, json: bool) -> None:
         values |= {f"{name}_time": time, f"{name}_velocity": velocity}
         units |= {f"{name}_time": "s", f"{name}_velocity": "m/s"}
     values |= {f"{name}_energy": share for name, share in values.pop("energies").items()}
-    show(values, units, json)
+    show(values, units)
 
 
 strike_film = command(
     film_impact.impact,
+    "film-impact",
     options={
         "figure": (Path | None, None, "PNG file of the bead in the film at P1 to P4"),
         "movie": (Path | None, None, "GIF file of the impact"),

@@ -20,6 +20,7 @@ from pylatexenc.latexwalker import get_default_latex_context_db as arguments_of_
 from pylatexenc.macrospec import MacroSpec
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.case.absent import TABLES, absent
 from cfddem.case.input_errors import sections_of
 from cfddem.case.schema import Case
 from cfddem.cli.scenario_commands import descriptions
@@ -98,7 +99,7 @@ def find(name: str) -> Law:
     found = [law for law in every if law.name == word and kind in ("", law.kind)]
     if not found:
         closest = _closest(word, [law.name for law in every]) or _closest(name, every_key())
-        raise InputError("law", name, f"a name listed by `cfddem explain`{closest}")
+        raise InputError("law", name, f"a name listed by `cfddem explain`{closest}", absent(name))
     if len(found) > 1:
         raise InputError("law", name, f"unambiguous: {' or '.join(f'{law.kind}.{law.name}' for law in found)}")
     return found[0]
@@ -342,12 +343,10 @@ SEVERAL |= {name: f"{name}.NUMBER" for name in ("wall", "feed", "outlet")}
 """Tables that a case has several of, by the place of their keys."""
 
 
-def matching(name: str) -> list[str]:
-    """Documentation of a key, of all keys of a table, or of all keys that contain a word.
+def matching(name: str) -> dict[str, FieldInfo]:
+    """A key, all keys of a table, or all keys that contain a word; empty if nothing matches.
 
-    returns  lines of at most 100 columns; empty if nothing matches
-
-    >>> matching("bed.jet.velocity"), matching("run.until")[0][:34]
+    >>> key_lines(matching("bed.jet.velocity")), key_lines(matching("run.until"))[0][:34]
     (['bed.jet.velocity = (required)     superficial velocity, upward [m/s]'], 'run.until = (required)            ')
     """
     every, word = dict(_keys()), name.lower()
@@ -356,7 +355,13 @@ def matching(name: str) -> list[str]:
         key for key in every if any(each == word or each.startswith(f"{word}.") for each in (key.lower(), plain[key]))
     ]
     found = found or [key for key in every if word in key.lower()]
-    return [line for key in found for line in _lines(key, every[key])]
+    return {key: every[key] for key in found}
+
+
+def not_there(name: str) -> list[str]:
+    """What the table of a name does not have, in lines of at most 100 columns; empty for other names."""
+    words = TABLES.get(name.lower(), "")
+    return ["", *textwrap.wrap(f"{words} The page Limits has more.", WIDTH)] if words else []
 
 
 def every_key() -> list[str]:
@@ -378,12 +383,38 @@ def _keys() -> Iterator[tuple[str, FieldInfo]]:
                 yield from ((f"{below}.{inner}", rest) for inner, rest in part.model_fields.items())
 
 
-def _lines(key: str, field: FieldInfo) -> list[str]:
-    """A key, its default and its meaning."""
+def key_lines(keys: Mapping[str, FieldInfo]) -> list[str]:
+    """Keys with default and meaning, in lines of at most 100 columns."""
+    out: list[str] = []
+    for key, field in keys.items():
+        default, choices = _default(field), _choices(field)
+        shown = " = (required)" if field.is_required() else "" if default is None else f" = {json.dumps(default)}"
+        meaning = (field.description or "") + (f"; one of {choices[0]}" if choices else "")
+        out += textwrap.wrap(f"{key + shown:<33} {meaning}", WIDTH, subsequent_indent=" " * 34)
+    return out
+
+
+def key_summary(key: str, field: FieldInfo) -> dict[str, Any]:
+    """Documentation of a key as plain values.
+
+    >>> found = key_summary("run.until", dict(_keys())["run.until"])
+    >>> found["required"], found["unit"]
+    (True, 's')
+    """
+    meaning, choices = field.description or "", _choices(field)
+    units = re.findall(r"\[([^\]]*)\]$", meaning)
+    words = [each.strip(" '\"") for each in choices[0].split(",")] if choices else []
+    return {
+        "key": key, "required": field.is_required(), "default": _default(field), "meaning": meaning,
+        "unit": units[0] if units else None, "choices": words,
+    }  # fmt: skip
+
+
+def _default(field: FieldInfo) -> Any:
+    """Default of a key; None where it has none, or one that stands for a key that is left out."""
     default = None if field.is_required() else field.get_default()
-    if any(getattr(rule, "gt", None) == default for rule in field.metadata):  # it stands for a key that is left out
-        default = None
-    shown = " = (required)" if field.is_required() else "" if default is None else f" = {json.dumps(default)}"
-    choices = re.findall(r"Literal\[([^\]]*)\]", str(field.annotation))
-    meaning = (field.description or "") + (f"; one of {choices[0]}" if choices else "")
-    return textwrap.wrap(f"{key + shown:<33} {meaning}", WIDTH, subsequent_indent=" " * 34)
+    return None if any(getattr(rule, "gt", None) == default for rule in field.metadata) else default
+
+
+def _choices(field: FieldInfo) -> list[str]:
+    return re.findall(r"Literal\[([^\]]*)\]", str(field.annotation))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as _json
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +9,10 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.errors import InputError
+from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import table
+from cfddem.cli.json_output import json_schema, print_json
 from cfddem.cli.printing import announce_compilation
 
 
@@ -29,19 +31,40 @@ def explain(
     from cfddem.cli import explain_pages as pages
     from cfddem.io.files import require_folder
 
-    known, keys = pages.laws() if law is None else pages.of_kind(law), list[str]()
+    known, keys = pages.laws() if law is None else pages.of_kind(law), dict[str, pages.FieldInfo]()
     if law is not None and not pages.is_law(law):
         known, keys = known or pages.containing(law), pages.matching(law)
-    if known or (keys and not json):
-        every = [pages.summary(each) for kind in known.values() for each in kind.values()]
-        print(_json.dumps(every) if json else "\n".join([*pages.listing(known), *keys]))
-        return
-    assert law is not None
-    found = pages.find(law)
     require_folder(plot)
-    print(_json.dumps(pages.summary(found)) if json else "\n".join(pages.page(found)))
+    several, found = bool(known or keys), None
+    if not several:
+        assert law is not None
+        found = pages.find(law)
+        known = {found.kind: {found.name: found}}
+    absent = pages.not_there(law or "")
+    if json:
+        every = [pages.summary(each) for kind in known.values() for each in kind.values()]
+        listed = [pages.key_summary(*each) for each in keys.items()]
+        print_json("explain", {"laws": every, "keys": listed, "not_there": " ".join(absent[1:])})
+    else:
+        print(
+            "\n".join([*pages.listing(known), *pages.key_lines(keys), *absent] if found is None else pages.page(found))
+        )
     if plot is not None:
+        if found is None:
+            raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
         print(pages.plot(found, plot), file=sys.stderr if json else sys.stdout)
+
+
+def schema(
+    name: Annotated[str, Parameter(help="case, or the name in the middle of the word `schema` of an output")] = "case",
+) -> None:
+    """Print the JSON schema of case files, or of what a command prints with --json.
+
+    Example: cfddem schema report
+    """
+    from cfddem.case.schema import Case
+
+    print(as_json(Case.model_json_schema() if name == "case" else json_schema(name), indent=2))
 
 
 def doctor(
@@ -67,6 +90,6 @@ def doctor(
             rows = [("ok" if answer.ok else "FAILS", answer.name, first), *(("", "", line) for line in others)]
             print("\n".join(table(rows, widths=(6, 15))), flush=True)
     if json:
-        print(_json.dumps([asdict(each) for each in answers]))
+        print_json("doctor", {"ok": all(each.ok for each in answers), "checks": [asdict(each) for each in answers]})
     if not all(each.ok for each in answers):
         sys.exit(1)

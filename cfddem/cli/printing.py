@@ -1,12 +1,11 @@
-"""Prints results as aligned lines or as JSON."""
+"""Prints results as aligned lines."""
 
 from __future__ import annotations
 
-import json as _json
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from cfddem.backend.tables import table
@@ -31,13 +30,10 @@ def with_colour(lines: Iterable[str]) -> Iterator[str]:
         yield re.sub(r"^(ok|warning|error)(?=:)", lambda word: f"\x1b[{_COLOURS[word[0]]}m{word[0]}\x1b[0m", line)
 
 
-def show(values: dict[str, Any], units: dict[str, str], as_json: bool) -> None:
-    """Print a result as aligned lines or as JSON."""
-    if as_json:
-        print(_json.dumps(values))
-        return
-    shown = {name: "" if value is None else units.get(name, "") for name, value in values.items()}
-    print("\n".join(table([(name, f"{_readable(values[name])} {unit}") for name, unit in shown.items()], gap=2)))
+def show(values: Mapping[str, Any], units: Mapping[str, str]) -> None:
+    """Print a result as aligned lines."""
+    shown = {each: "" if value is None else units.get(each, "") for each, value in values.items()}
+    print("\n".join(table([(each, f"{_readable(values[each])} {unit}") for each, unit in shown.items()], gap=2)))
 
 
 def _readable(value: Any) -> str:

@@ -16,6 +16,7 @@ from typing import IO, NoReturn
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, failure_elsewhere
 from cfddem.backend.launch import TERMINAL, communicator, launch_command, launched, python_command, require_mpi4py
+from cfddem.cli.json_output import asked_for_json, print_failure
 
 PATIENCE = 3.0
 """How long a rank that fails waits for the others to fail too, before it ends them [s]."""
@@ -166,6 +167,9 @@ def end_together(message: str, code: int) -> NoReturn:
         where = "" if together else f"rank {rank}: "
         text = message or traceback.format_exc()
         print("\n".join(f"cfddem: {where}{line}" for line in text.splitlines()), file=sys.stderr, flush=True)
+        if asked_for_json() and message:
+            print_failure(message, code)
+            sys.stdout.flush()
     if not together:
         time.sleep(FORWARDED)
         world.Abort(code)

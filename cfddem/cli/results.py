@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
+
+from cfddem.cli.json_output import print_json
+
+if TYPE_CHECKING:
+    from cfddem.analysis.report_text import Report
+
+FILES = "print the names of the written files as JSON"
 
 
 def report(
@@ -33,17 +40,15 @@ def report(
     Example: cfddem report bed
     """
     from cfddem.analysis.report import report as summary
-    from cfddem.analysis.report_text import as_json, lines
-    from cfddem.analysis.report_text import markdown as as_markdown
+    from cfddem.analysis.report_text import lines
     from cfddem.io.files import require_folder
     from cfddem.io.reading import newest_run
 
     folder = folder or newest_run(Path())
     require_folder(output)
     result = summary(folder, data or ())
-    printed = as_json(result) if json else as_markdown(result).rstrip() if markdown else ""
-    if printed and output is None:
-        print(printed)
+    if (json or markdown) and output is None:
+        _print(result, json)
         return
     from cfddem.plotting.report_page import markdown_page, page
 
@@ -51,7 +56,20 @@ def report(
         written = markdown_page(folder, output, result, data or ())
     else:
         written = page(folder, output, result, data or ())
-    print(printed or "\n".join([*lines(result), "", f"  page with figures: {written}"]))
+    if json or markdown:
+        _print(result, json)
+    else:
+        print("\n".join([*lines(result), "", f"  page with figures: {written}"]))
+
+
+def _print(result: Report, json: bool) -> None:
+    """Print a report as JSON or as Markdown."""
+    from cfddem.analysis.report_text import markdown
+
+    if json:
+        print_json("report", result.summary())
+    else:
+        print(markdown(result).rstrip())
 
 
 def compare(
@@ -70,7 +88,6 @@ def compare(
     """
     from cfddem.analysis.comparison import compare as compared
     from cfddem.analysis.comparison import lines
-    from cfddem.analysis.report_text import as_json
     from cfddem.backend.errors import InputError
     from cfddem.io.files import require_folder
     from cfddem.io.folder import runs_inside
@@ -85,8 +102,11 @@ def compare(
     from cfddem.plotting.comparison_page import comparison_page
 
     written = comparison_page(folders, output, result)
+    if json:
+        print_json("compare", result | {"page": written})
+        return
     kind = "figure" if output.suffix.lower() == ".png" else "page with figures"
-    print(as_json(result) if json else "\n".join([*lines(result), "", f"{kind}: {written}"]))
+    print("\n".join([*lines(result), "", f"{kind}: {written}"]))
 
 
 def view(
@@ -102,12 +122,12 @@ def view(
         ),
     ] = None,
     colour: Annotated[
-        str,
+        str | None,
         Parameter(
-            help="quantity that colours the spheres: speed, collisions, moisture, or a recorded field (temperature, "
-            "liquid, agglomerate)"
+            help="what colours the spheres: speed, collisions, moisture, or a recorded field (species, temperature, "
+            "liquid, agglomerate); default: species of a mixture, else speed"
         ),
-    ] = "speed",
+    ] = None,
     movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .gif, or .mp4 with cfddem[movie]")] = None,
     history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
     collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,
@@ -117,6 +137,7 @@ def view(
         bool, Parameter(help="page in the browser instead of a file; stop with Ctrl-C", negative="")
     ] = False,
     port: Annotated[int | None, Parameter(help="port of the page; default: 8080, or any free one")] = None,
+    json: Annotated[bool, Parameter(help=FILES, negative="")] = False,
 ) -> None:
     """Make a picture or movie of a run, or curves over time; or look at it in a window or in the browser.
 
@@ -125,9 +146,10 @@ def view(
     Example: cfddem view bed --movie bed.gif
     """
     from cfddem.io.files import require_folder
-    from cfddem.io.reading import newest_run
+    from cfddem.io.reading import newest_run, open_run
     from cfddem.plotting import curves as plots
     from cfddem.plotting import pictures, wave_figures
+    from cfddem.plotting.colours import usual
     from cfddem.plotting.scene import window as on_screen
 
     folder, panels = folder or newest_run(Path()), show or ()
@@ -136,19 +158,24 @@ def view(
     if web:
         from cfddem.plotting.browser import browse
 
-        browse(folder, colour, port)
+        browse(folder, colour or usual(open_run(folder)), port)
     elif window:
-        on_screen(folder, colour)
-    elif movie is not None:
-        print(pictures.movie(folder, movie, show=panels, colour=colour))
-    elif collisions:
-        print(plots.collisions(folder, output))
-    elif waves:
-        print(wave_figures.wave_map(folder, output))
-    elif history:
-        print(plots.history(folder, output))
+        on_screen(folder, colour or usual(open_run(folder)))
     else:
-        print(pictures.picture(folder, output, snapshot=snapshot, show=panels, colour=colour))
+        if movie is not None:
+            written = pictures.movie(folder, movie, show=panels, colour=colour)
+        elif collisions:
+            written = plots.collisions(folder, output)
+        elif waves:
+            written = wave_figures.wave_map(folder, output)
+        elif history:
+            written = plots.history(folder, output)
+        else:
+            written = pictures.picture(folder, output, snapshot=snapshot, show=panels, colour=colour)
+        if json:
+            print_json("written", {"files": [written]})
+        else:
+            print(written)
 
 
 def export(
@@ -159,6 +186,7 @@ def export(
     snapshot: Annotated[
         list[int] | None, Parameter(help="number of a snapshot, may be repeated; default: all", negative="")
     ] = None,
+    json: Annotated[bool, Parameter(help=FILES, negative="")] = False,
 ) -> None:
     """Convert a run to another format. ParaView, pyvista and h5py read run.vtkhdf directly.
 
@@ -168,4 +196,7 @@ def export(
     from cfddem.io.reading import newest_run
 
     files = run(folder or newest_run(Path()), to, output, snapshot)
+    if json:
+        print_json("written", {"files": files})
+        return
     print(f"{len(files)} files in {files[0].parent}" if files else "nothing written: the run has no snapshots")

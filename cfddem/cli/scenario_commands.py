@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation, show
 
 SIMPLE = (float, int, bool, str)
@@ -25,11 +26,12 @@ JSON = inspect.Parameter(
 
 def command(
     function: Callable[..., Any],
+    schema: str | Callable[[Any], str],
     *,
     units: Mapping[str, str] | None = None,
     options: Mapping[str, tuple[Any, Any, str]] | None = None,
     call: Callable[..., Any] | None = None,
-    show_result: Callable[[Any, bool], None] | None = None,
+    show_result: Callable[[Any], None] | None = None,
 ) -> Callable[..., None]:
     """Make a command that calls a function and prints the summary of its result.
 
@@ -40,7 +42,8 @@ def command(
     units        of the printed values, by name
     options      further options, or replacements: name -> (type, default, help)
     call         takes all options and returns the result; the function itself if not given
-    show_result  prints the result, given it and whether to print JSON; prints the summary if not given
+    show_result  prints the result as text; prints the summary if not given
+    schema       name of that of the summary in :data:`cfddem.cli.json_output.SCHEMAS`, or a function of the result
     """
     lines = descriptions(function)
     parameters: dict[str, inspect.Parameter] = {}
@@ -58,10 +61,12 @@ def command(
         if not as_json:
             announce_compilation()
         result = (call or function)(**defaults | given)
-        if show_result is None:
-            show(result.summary(), dict(units or {}), as_json)
+        if as_json:
+            print_json(schema if isinstance(schema, str) else schema(result), result.summary())
+        elif show_result is None:
+            show(result.summary(), dict(units or {}))
         else:
-            show_result(result, as_json)
+            show_result(result)
 
     run.__signature__ = inspect.Signature([*parameters.values(), JSON])  # type: ignore[attr-defined]
     return run

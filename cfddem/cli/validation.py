@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as _json
 import sys
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,8 +10,9 @@ from cyclopts import Parameter
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.tables import table
+from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation
-from scenarios.validation.targets import ONLY_IF_NAMED, PIECEMEAL, TARGETS
+from scenarios.validation.targets import ONLY_IF_NAMED, PIECEMEAL, TARGETS, measure
 from scenarios.validation.targets import validate as run
 
 
@@ -49,7 +49,12 @@ def validate(
     if hours is not None and not hours >= 0.0:
         raise InputError("--hours", hours, "at least 0")
     names = [name for name in TARGETS if name not in ONLY_IF_NAMED] if target == "all" else [target]
-    held = [run(name, output, json, data or (), hours) for name in names]  # every target runs, even after a failure
+    if json:
+        targets = [measure(name, output, data or (), hours) for name in names]
+        held = [each["holds"] for each in targets]
+        print_json("validate", {"holds": all(held), "targets": targets})
+    else:
+        held = [run(name, output, data or (), hours) for name in names]  # every target runs, even after a failure
     if not all(held):
         sys.exit(1)
 
@@ -97,9 +102,9 @@ def bench(
     }
     if target not in targets:
         raise InputError("target", target, nearest(target, list(targets)))
-    measure, rows = targets[target]
-    result = measure()
+    timed, rows = targets[target]
+    result = timed()
     if json:
-        print(_json.dumps(result))
+        print_json("bench", {"target": target, "result": result})
     else:
         print("\n".join(table(rows(result), widths=(20,), gap=2)))

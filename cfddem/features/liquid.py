@@ -179,6 +179,27 @@ def coating_variation(simulation: Any) -> float:
     return float(carried.std() / mean) if mean > 0.0 else math.nan  # local: of all ranks
 
 
+def coating_at_10_percent(simulation: Any) -> float:
+    """Liquid on a particle over the mean, below which 10 % of the particles lie."""
+    return _coating_quantile(simulation, 0.1)
+
+
+def coating_at_50_percent(simulation: Any) -> float:
+    """Median of the liquid on a particle over the mean."""
+    return _coating_quantile(simulation, 0.5)
+
+
+def coating_at_90_percent(simulation: Any) -> float:
+    """Liquid on a particle over the mean, below which 90 % of the particles lie."""
+    return _coating_quantile(simulation, 0.9)
+
+
+def _coating_quantile(simulation: Any, share: float) -> float:
+    carried = _carried(simulation.particle_solver)
+    mean = carried.mean()  # local: of all ranks
+    return float(np.quantile(carried, share) / mean) if mean > 0.0 else math.nan  # local: of all ranks
+
+
 def bridge_count(simulation: Any) -> float:
     """Number of liquid bridges."""
     return float(_budget(simulation).bridges.count)
@@ -221,6 +242,9 @@ MEASURES = tuple(
         ("1", "measure", bridge_liquid_share),
         ("1", "measure", wet_share),
         ("1", "measure", coating_variation),
+        ("1", "measure", coating_at_10_percent),
+        ("1", "measure", coating_at_50_percent),
+        ("1", "measure", coating_at_90_percent),
         ("1", "measure", bridge_count),
         ("1", "measure", bridges_per_particle),
         ("1", "measure", agglomerate_size),

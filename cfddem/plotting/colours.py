@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.case.toml_text import parse
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData
 
@@ -28,6 +29,9 @@ MOISTURE = "moisture"
 LIQUIDS = ("liquid_carried", "liquid")
 """Fields from which the moisture follows, the best first."""
 
+SPECIES = "species"
+"""The field whose values are numbers of the species of a mixture."""
+
 SINGLE = 0.04
 """Part of the colours that is for single particles."""
 
@@ -40,11 +44,17 @@ _PLACES = ("id", "position")
 def choices(run: RunData) -> list[str]:
     """Quantities of a run that can colour its spheres, the most useful first."""
     known = set(run.particle_fields)
-    found = [SPEED] if "velocity" in known else []
+    found = [SPECIES] if SPECIES in known else []
+    found += [SPEED] if "velocity" in known else []
     found += [name for name in ("liquid", AGGLOMERATE, TEMPERATURE) if name in known]
     found += [MOISTURE] if known & set(LIQUIDS) else []
     found += [COLLISIONS] if run.collisions_of(-1) else []
     return found + sorted(known - {"velocity", *_PLACES, *found})
+
+
+def usual(run: RunData) -> str:
+    """What colours the spheres where nothing is named: the species of a mixture, else the speed."""
+    return SPECIES if SPECIES in run.particle_fields else SPEED
 
 
 def values(run: RunData, snapshot: int, colour: str) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -74,6 +84,8 @@ def limits(found: np.ndarray, colour: str) -> tuple[float, float]:
     """Values of the first and the last colour; a few extreme values lie beyond."""
     if colour == AGGLOMERATE:
         return 0.0, 1.0
+    if colour == SPECIES:
+        return 0.0, max(1.0, float(found.max(initial=0.0)))
     high = float(np.quantile(found, 0.998)) if found.size else 1.0
     if colour == TEMPERATURE and found.size:
         low = float(np.quantile(found, 0.002))
@@ -86,6 +98,8 @@ def label(run: RunData, colour: str) -> str:
     """Label of the colour bar of the spheres."""
     if colour == AGGLOMERATE:
         return "agglomerate; grey: single spheres"
+    if colour == SPECIES:
+        return ", ".join(f"{number} {name}" for number, name in enumerate(_species_names(run))) or colour
     if colour == COLLISIONS and colour not in run.particle_fields:
         return "collisions since previous snapshot  [-]"
     if colour == MOISTURE and colour not in run.particle_fields:
@@ -94,8 +108,18 @@ def label(run: RunData, colour: str) -> str:
     return f"{colour.replace('_', ' ')}  [{shown_unit(run.quantities['particles'][name].unit)}]"
 
 
+def _species_names(run: RunData) -> list[str]:
+    bed = parse(run.case_text, str(run.folder / "case.toml")).get("bed")
+    species = bed.get("species") if isinstance(bed, dict) else None
+    return list(species) if isinstance(species, dict) else []
+
+
 def colour_map(colour: str) -> Any:
     """Colour map of the spheres."""
+    if colour == SPECIES:
+        from matplotlib.colors import LinearSegmentedColormap
+
+        return LinearSegmentedColormap.from_list(SPECIES, ["#1f6fb5", "#12995a", "#e08a00"])
     if colour == AGGLOMERATE:
         return _many_colours()
     name, begin, end = _MAPS.get(colour, ("viridis", 0.12, 1.0))

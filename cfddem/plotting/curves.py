@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cfddem.backend.errors import InputError, nearest
 from cfddem.io.files import write_whole
 from cfddem.io.quantities import shown_unit
@@ -137,8 +139,6 @@ def draw_regimes(axes: Axes, found: RegimeMap, title: str = "", most: float | No
     most     density of the darkest colour; that of the map if not given
     returns  the coloured mesh, for a colour bar
     """
-    import numpy as np
-
     shown = np.where(found.density > 0.0, found.density, np.nan)
     shades = axes.pcolormesh(found.stokes, found.gap_ratio, shown, cmap="Blues", vmin=0.0, vmax=most, rasterized=True)
     column = np.nansum(found.contact * found.density, axis=0) / np.maximum(np.nansum(found.density, axis=0), 1e-300)
@@ -154,6 +154,16 @@ def draw_regimes(axes: Axes, found: RegimeMap, title: str = "", most: float | No
         transform=axes.transAxes, ha="left", va="top", fontsize=9.5,
     )  # fmt: skip
     return shades
+
+
+def draw_coating(axes: Axes, carried: np.ndarray) -> None:
+    """Draw the distribution over the particles of the liquid that they carry [m3], over its mean."""
+    share = carried / carried.mean()
+    weights = np.full(share.size, 100.0 / share.size)
+    axes.hist(share, bins=40, range=(0.0, float(np.quantile(share, 0.995))), color=BLUE, weights=weights)
+    axes.axvline(1.0, color=ORANGE, linewidth=1.2, label="mean")
+    label(axes, "liquid on a particle over the mean", "-", "particles", "%")
+    legend(axes)
 
 
 def label(axes: Axes, x: str, x_unit: str, y: str, y_unit: str, title: str = "") -> None:

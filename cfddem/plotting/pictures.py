@@ -34,16 +34,16 @@ def picture(
     *,
     snapshot: int = -1,
     show: Sequence[str] = (),
-    colour: str = "speed",
+    colour: str | None = None,
     cut: bool | None = None,
 ) -> Path:
-    """Draw one snapshot: spheres coloured by speed and, with a fluid, a slice of the voidage.
+    """Draw one snapshot: spheres coloured by species in a mixture, else by speed, and with a fluid a slice of voidage.
 
     folder    of a run
     output    PNG; NAME.png in the current folder if not given
     snapshot  0 the first, -1 the last
     show      panels: spheres, voidage, bubbles, streamlines, temperature and vapour of the fluid
-    colour    of the spheres: speed, moisture, or a recorded field; of a vector its magnitude
+    colour    of the spheres: speed, moisture, or a recorded field; of a vector its magnitude; None for the usual one
     cut       leave out the spheres in front of the middle plane; None does so in deep beds
     returns   the file
     errors    RunFailed with the remedy if this machine cannot render
@@ -63,7 +63,7 @@ def movie(
     *,
     frames_per_second: float = 10.0,
     show: Sequence[str] = (),
-    colour: str = "speed",
+    colour: str | None = None,
     cut: bool | None = None,
 ) -> Path:
     """Make a film of all snapshots, drawn as by `picture`, with the same colour limits throughout.
@@ -158,15 +158,18 @@ class Stage:
     limits: dict[str, tuple[float, float]]  # of the colours, by panel
 
     @classmethod
-    def of(cls, run: RunData, snapshots: Sequence[int], show: Sequence[str], colour: str, cut: bool | None) -> Stage:
+    def of(
+        cls, run: RunData, snapshots: Sequence[int], show: Sequence[str], colour: str | None, cut: bool | None
+    ) -> Stage:
         """The stage for a run.
 
         snapshots  that set the limits of view and colours
         show       panels; spheres and voidage as far as they are recorded if empty
-        colour     speed, or a particle field
+        colour     speed, or a particle field; None for species in a mixture, else speed
         cut        None cuts deep beds only
         errors     InputError for an unknown panel or field; RunFailed if this machine cannot render
         """
+        colour = colour or colours.usual(run)
         recorded = {"spheres": run.particle_fields, "voidage": "voidage" in run.fluid_fields}
         recorded |= {each: each in run.fluid_fields for each in [BESIDE.get(colour, "")]}
         panels = tuple(show) or tuple(name for name, there in recorded.items() if there)
@@ -251,7 +254,8 @@ class Stage:
         if self.colour == colours.AGGLOMERATE:
             title = title.replace("spheres", "agglomerates, grey: single")
         else:
-            _colour_bar(axes, shades, limits, colours.label(self.run, self.colour))
+            label, whole = colours.label(self.run, self.colour), self.colour == colours.SPECIES
+            _colour_bar(axes, shades, limits, label, whole)
         axes.set_title(title, loc="left")
 
     def _behind(self, middle: float) -> Callable[[Any], Any]:
@@ -349,7 +353,8 @@ class Stage:
 # ---------------------------------------------------------------- colour bars and surfaces
 
 
-def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str) -> None:
+def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str, whole: bool = False) -> None:
+    """Draw a colour bar; `whole` has ticks at whole numbers alone."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -357,7 +362,7 @@ def _colour_bar(axes: Axes, shades: Any, limits: tuple[float, float], label: str
     bar = figure.colorbar(ScalarMappable(Normalize(*limits), shades), ax=axes, fraction=0.08, pad=0.03, aspect=30)
     bar.set_label(label)
     bar.outline.set_visible(False)
-    bar.ax.locator_params(axis="y", nbins=6)
+    bar.ax.locator_params(axis="y", nbins=6, integer=whole)
 
 
 def _corners(run: RunData) -> tuple[np.ndarray, np.ndarray]:

@@ -44,6 +44,7 @@ from cfddem.plotting.curves import (
     ORANGE,
     SKY,
     blank,
+    draw_coating,
     draw_regimes,
     encoded,
     label,
@@ -246,6 +247,11 @@ def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, s
         draw_impacts(axes, impacts(run.collisions, begin, end, int(run.history["particle_count"][-1])), temperature)
         caption = "Normal speed of approach of collisions between particles in the averaging window, and a Maxwellian "
         yield "impacts", figure, f"{caption}gas of the same granular temperature."
+    if "liquid_carried" in run.particle_fields and (carried := run.particles(-1)["liquid_carried"]).any():
+        figure, axes = panels(1, width=6.4, height=3.8)
+        draw_coating(axes, carried)
+        caption = f"Liquid on each particle, with its part of the liquid of its bridges, at {run.times[-1]:.4g} s."
+        yield "coating", figure, caption
     if (regimes := recorded_regimes(run, begin)) is not None:
         figure, axes = panels(1, width=6.4, height=4.6)
         draw_regimes(axes, regimes)
@@ -260,7 +266,7 @@ def _all(run: RunData, case: Case, result: Report) -> Iterator[tuple[str, Any, s
 
 def _pictures(run: RunData) -> Iterator[tuple[str, str, str]]:
     """Name, colour of the spheres, and end of the caption of every picture of a run."""
-    yield "bed", colours.SPEED, ""
+    yield "bed", colours.usual(run), ""
     if colours.TEMPERATURE in run.particle_fields:
         yield "temperature", colours.TEMPERATURE, ", by temperature"
         if "vapour" in run.fluid_fields and colours.MOISTURE in colours.choices(run):

@@ -131,6 +131,49 @@ def sample_figure(points: Sequence[Point], path: Path) -> bool:
     return True
 
 
+class Sensitive(Protocol):
+    """What the figure needs of a sensitivity."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def keys(self) -> list[str]: ...
+    @property
+    def measures(self) -> dict[str, tuple[str, list[dict[str, float]]]]: ...
+    def shown(self) -> list[str]: ...
+
+
+BARS = {
+    "sobol": (("first", BLUE, "alone"), ("total", SKY, "with interactions")),
+    "morris": (("effect", BLUE, "effect over the whole range"),),
+}
+"""Numbers of a sensitivity that are drawn, with colour and name."""
+
+
+def sensitivity_figure(found: Sensitive, path: Path) -> None:
+    """Draw how much each key matters: a panel for each measure, bars with standard errors for each key."""
+    names, bars = found.shown(), BARS[found.kind]
+    if not names:
+        return
+    short = [key if len(key) < 28 else f"...{key[-25:]}" for key in found.keys]
+    place, thick = np.arange(len(short)), 0.8 / len(bars)
+    high = 1.2 + 0.34 * len(bars) * len(short)
+    figure, panels = blank(1, len(names), width=1.6 + 3.2 * len(names), height=high, sharey=True)
+    for name, panel in zip(names, panels):
+        unit, rows = found.measures[name]
+        for number, (column, colour, words) in enumerate(bars):
+            size, error = ([row[each] for row in rows] for each in (column, f"{column}_error"))
+            panel.barh(place + number * thick, size, thick, xerr=error, color=colour, label=words, capsize=2.0)
+        panel.set_yticks(place + 0.5 * thick * (len(bars) - 1), short)
+        label(
+            panel, name.replace("_", " "), shown_unit(unit) if found.kind == "morris" else "share of variance", "", ""
+        )
+        panel.set_ylabel("")
+    panels[0].invert_yaxis()
+    legend_below(figure, panels[0])
+    save(figure, path)
+
+
 def unit_of(key: str) -> str:
     """Unit of a key of a case, from its description."""
     found = re.search(r"\[([^\]]*)\]$", field_of(Case, key.split(".")) or "")

@@ -18,6 +18,7 @@ import numpy as np
 from cfddem.backend import html
 from cfddem.backend.errors import CfddemError, InputError
 from cfddem.case.schema import Case
+from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
@@ -41,6 +42,7 @@ class PreflightError(CfddemError):
     """A case with errors in its pre-run check."""
 
     exit_code = 2
+    issues: tuple[Issue, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,6 +131,7 @@ def _preflight(case: Case, title: str) -> Preflight:
     if any(each.severity == "error" for each in own):
         return Preflight(title, (), tuple(own))
     try:
+        cell_counts(case.column.size, case.column.cell)  # also of a dry case, whose history is kept by cells
         bed = estimate_bed(case)
         collision = estimate_collision(case, bed)
         wet = estimate_wet(case, collision)
@@ -198,8 +201,11 @@ def refuse_errors(case: Case) -> Preflight:
     Raises PreflightError with all errors otherwise.
     """
     result = preflight(case)
-    if result.status == "error":
-        raise PreflightError("\n".join(str(each) for each in result.issues if each.severity == "error"))
+    errors = tuple(each for each in result.issues if each.severity == "error")
+    if errors:
+        failure = PreflightError("\n".join(map(str, errors)))
+        failure.issues = errors
+        raise failure
     return result
 
 

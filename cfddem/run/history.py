@@ -30,7 +30,7 @@ from cfddem.fluid.budgets import continuity_residual, drag_exchange
 from cfddem.io.quantities import TIME, Quantity, of_function
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
-from cfddem.run import liquid_bed_measures
+from cfddem.run import liquid_bed_measures, wall_loads
 from cfddem.run.liquid_bed_measures import BED, bed_solids, cells_of, open_area, open_volume
 from cfddem.run.simulation import Simulation
 
@@ -310,6 +310,9 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
 
 
 _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
+
+
+_declare("wall_loads", Measure(wall_loads.columns, wall_loads.wall_loads))
 
 
 # ---------------------------------------------------------------- conservation

@@ -25,6 +25,9 @@ from cfddem.backend.launch import TERMINAL
 
 _log = logging.getLogger("cfddem.run.progress")
 
+BAR = 10
+"""Length of the bar [characters]."""
+
 
 @dataclass(frozen=True)
 class Status:
@@ -38,12 +41,23 @@ class Status:
     row: Mapping[str, float]  # last row of the history
 
     def __str__(self) -> str:
+        return "  ".join(self._parts())
+
+    def within(self, columns: int) -> str:
+        """The status without the parts at its end for which there is no room."""
+        parts = self._parts()
+        while len(parts) > 1 and len("  ".join(parts)) > columns:
+            parts.pop()
+        return "  ".join(parts)
+
+    def _parts(self) -> list[str]:
+        """Parts of the status, the most useful first."""
         row = self.row
-        return (
-            f"{self.time:.4g}/{self.end:g} s  {_duration(self.remaining)} left  limit: {self.criterion or '-'}  "
-            f"{self.steps} steps  bed {1e3 * row['bed_height']:.3g} mm  {row['largest_speed']:.2g} m/s  "
-            f"{row['contact_count']:.0f} contacts"
-        )
+        return [
+            f"{self.time:.4g}/{self.end:g} s", f"{_duration(self.remaining)} left",
+            f"bed {1e3 * row['bed_height']:.3g} mm", f"{row['largest_speed']:.2g} m/s",
+            f"limit: {self.criterion or '-'}", f"{row['contact_count']:.0f} contacts", f"{self.steps} steps",
+        ]  # fmt: skip
 
 
 class ProgressLine:
@@ -65,10 +79,16 @@ class ProgressLine:
 
     def update(self, status: Status) -> None:
         """Show the progress of the run; the log gets one line for each row of the history."""
-        self._bar.update(self._task, description="", completed=status.time / status.end, status=str(status))
+        room = self._bar.console.width - BAR - 2  # and the spaces between the columns
+        self._bar.update(self._task, description="", completed=status.time / status.end, status=status.within(room))
         if status.row["time"] > self._logged:
             self._logged = status.row["time"]
             _log.info(str(status))
+
+
+def columns() -> tuple[TextColumn | BarColumn, ...]:
+    """Columns of the live line: what is being done, how far, and the status."""
+    return TextColumn("{task.description}"), BarColumn(bar_width=BAR), TextColumn("{task.fields[status]}")
 
 
 @contextmanager
@@ -82,13 +102,7 @@ def live_line(log: Path | None = None, shown: bool = True) -> Iterator[ProgressL
     terminal = sys.stderr.isatty() or TERMINAL in os.environ
     width = min(Console(stderr=True).width, 120)
     console = Console(stderr=True, quiet=not (shown and terminal), force_terminal=terminal or None, width=width)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=10),
-        TextColumn("{task.fields[status]}"),
-        console=console,
-        transient=True,
-    )
+    bar = Progress(*columns(), console=console, transient=True)
     with _logged(log if shown else None), bar:
         line = ProgressLine(bar)
         before = announce_compilation(None if not shown else line.compiling if terminal else announced)

@@ -30,6 +30,7 @@ from cfddem.io.writer import RunFolder, folder_of_ranks
 from cfddem.model.feature import Feature, Function
 from cfddem.particles.guard import guard
 from cfddem.run import history
+from cfddem.run.branching import branch_state
 from cfddem.run.own_laws import record_of, require_compiled, warn_of_changes
 from cfddem.run.progress import Status
 from cfddem.run.resuming import (
@@ -53,6 +54,9 @@ _SAME = 1.0 - 1e-12
 
 RECORDED = ("voidage", "velocity", "pressure")
 """Fields of the fluid in snapshots, at cell centres."""
+
+ORIGIN = "from"
+"""Entry of the provenance of a run that began with the state of another: its folder and time."""
 
 SOLID = "solid"
 """Field of the solid cells of a grid that has any."""
@@ -98,6 +102,7 @@ class Run:
         callbacks: Sequence[Callback] = (),
         features: Sequence[Feature | Function] = (),
         communicator: Communicator = SERIAL,
+        origin: Path | None = None,
     ) -> Run:
         """Prepare a case in a new folder, and write its initial state.
 
@@ -106,19 +111,25 @@ class Run:
         progress           called with a line of text for each part of the preparation
         fields, callbacks, features  of the simulation, see `Simulation`
         communicator       of the ranks that share the run; all of them call this. Rank 0 writes
-        errors             InputError if the folder holds a run or cannot be written
+        origin             folder of a run whose last state this one begins with: particles, contacts, flow and time
+        errors             InputError if the folder holds a run or cannot be written, or for a case that differs from
+                           that of `origin` in more than a run can change
         """
         folder, text = Path(folder), text_with_kept_files(case) if text is None else text
         history.require_shared(case, communicator.size)
         require_measures_of(case)
         require_measured_units(case.compare, history.units_of(case))
         require_compiled(case)
+        state = None if origin is None else branch_state(case, Path(origin))
         communicator.by_first(lambda: prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
         given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         wall = Stopwatch()
         with _no_empty_folder(folder):
-            simulation = Simulation(case, progress, communicator=communicator, **given)
+            if state is None:
+                simulation = Simulation(case, progress, communicator=communicator, **given)
+            else:
+                simulation = restored(case, state, Path(origin or ""), communicator, **given)
         wall.count("preparation")  # initial packing, loading of compiled loops
         simulation.wall.seconds |= wall.seconds
         grid = None if simulation.fluid is None else simulation.fluid.grid.whole
@@ -126,6 +137,7 @@ class Run:
             provenance(case.bed.seed)
             | record_of(case)
             | ({"ranks": communicator.size} if communicator.size > 1 else {})
+            | ({} if state is None else {ORIGIN: {"folder": str(origin), "time": simulation.time}})
         )
         written = folder_of_ranks(
             communicator, lambda: RunFolder.create(folder, text, about, grid, quantities_of(simulation))
@@ -159,6 +171,9 @@ class Run:
         given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
         before = read_about(folder)
+        if state is None and ORIGIN in before["provenance"]:
+            remedy = f"begin it again in another folder: cfddem run --from {before['provenance'][ORIGIN]['folder']}"
+            raise InputError("folder", str(folder), "a run with a checkpoint", remedy)
         require_forward(until, state)
         case = case_to_continue(folder, state, until)
         history.require_shared(case, communicator.size)

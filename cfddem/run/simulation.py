@@ -316,8 +316,8 @@ class Simulation:
         """The simulation of a case as it was at a `checkpoint()`; it continues bit for bit."""
         return cls(case, fields=fields, callbacks=callbacks, features=features, state=state, communicator=communicator)
 
-    def _restore(self, state: dict[str, Any], fields: list[Field]) -> float:
-        """Take over a checkpoint; returns the particle step [s]."""
+    def _restore(self, state: dict[str, Any], fields: list[Field]) -> float | None:
+        """Take over a checkpoint; returns the particle step [s], None where it is to be chosen anew."""
         for field in fields:
             if field.name in state["particles"]["particles"]:
                 self.particles.declare(field)
@@ -327,7 +327,7 @@ class Simulation:
             self.coupling.restore(state["coupling"])
         self.forces.restore(state.get("forces", {}), self.communicator)
         self.steps, self.last_step = int(state["steps"]), float(state.get("last_step", 0.0))
-        return float(state["particle_step"])
+        return None if state["particle_step"] is None else float(state["particle_step"])
 
     def _restore_features(self, kept: dict[str, Any]) -> None:
         """Take over what a checkpoint keeps of the features."""

@@ -24,6 +24,7 @@ from cfddem.analysis.measured import compared_at, largest_chi2, with_files
 from cfddem.analysis.report import window_of
 from cfddem.analysis.response import Response, fewest_runs, response
 from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.backend.json_text import as_json
 from cfddem.case.compare import Points, held, points_of, require_measured_units, steps_of
 from cfddem.case.schema import Case
 from cfddem.io.files import write_whole
@@ -351,7 +352,6 @@ def _verdict(identified: bool, tied: Sequence[str], at_limit: bool, agrees: bool
 
 def write_results(found: Calibration, output: Path) -> None:
     """Write `calibration.json`, `trials.csv` and `calibration.png`."""
-    from cfddem.analysis.report_text import as_json
     from cfddem.plotting.study_figures import calibration_figure
 
     write_whole(output / "calibration.json", as_json(found.summary()).encode())

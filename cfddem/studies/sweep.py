@@ -11,6 +11,7 @@ import itertools
 import math
 import re
 import time
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.util import find_spec
@@ -33,6 +34,9 @@ Over = Mapping[str, Sequence[Any]] | Sequence[Mapping[str, Any]]
 PUBLISHED = "voidage by "
 """Beginning of the names of voidages by published laws, which stand beside the measures of a run."""
 
+LONGEST_NAME = 120
+"""Most characters of the name of a run; longer ones end in a number of their own."""
+
 MOST = 10_000
 """Largest number of runs."""
 
@@ -53,6 +57,11 @@ class Outcome:
     def name(self) -> str:
         """Name of the run."""
         return Path(self.folder).name
+
+    def summary(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        measures = {name: dict(zip(("mean", "error", "unit"), each)) for name, each in self.measures.items()}
+        return asdict(self) | {"measures": measures}
 
 
 def ranges(given: Sequence[str]) -> dict[str, list[Any]]:
@@ -95,7 +104,8 @@ def run_name(values: Mapping[str, Any]) -> str:
     'viscosity-0.001_seed-2'
     """
     parts = [f"{key.split('.')[-1]}-{value}" for key, value in values.items()]
-    return re.sub(r"[^\w.+-]+", "-", "_".join(parts)).strip("-")[:120]
+    name = re.sub(r"[^\w.+-]+", "-", "_".join(parts)).strip("-")
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 9]}-{zlib.crc32(name.encode()):08x}"
 
 
 def sweep(
@@ -248,6 +258,8 @@ def _measured(outcome: Outcome, seconds: float, kept: bool) -> Outcome:
     if outcome.status == "finished":
         found = report(Path(outcome.folder))
         means = {name: (each.mean, each.error, each.unit) for name, each in found.measures.items()}
+        if "rate" in found.impacts:
+            means["collision_rate"] = (found.impacts["rate"], math.nan, "1/s")
         laws = {row.law: (row.expected, math.nan, row.unit) for row in found.laws}
         values["measures"] = means | {name: law for name, law in laws.items() if name.startswith(PUBLISHED)}
     return Outcome(**values)

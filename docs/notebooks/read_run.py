@@ -11,12 +11,13 @@ run = cfddem.run_case(case, "bed", overwrite=True)
 run
 
 # %% [markdown]
-# The history is a dictionary of columns, which makes a table:
+# The history is a dictionary of columns, which makes a table; `run.unit` has the unit of each:
 
 # %%
 import pandas
 
 history = pandas.DataFrame(run.history).set_index("time")
+print({name: run.unit(name) for name in ("bed_height", "pressure_drop")})
 history[["bed_height", "bed_voidage", "pressure_drop", "largest_speed"]].tail()
 
 # %% [markdown]
@@ -31,22 +32,11 @@ table = pandas.DataFrame(columns).set_index("id")
 table.describe().loc[["mean", "std", "min", "max"], ["position_z", "velocity_z", "radius"]]
 
 # %% [markdown]
-# The fluid with its coordinates, all snapshots in one array, as xarray:
+# The whole run as an xarray Dataset, with coordinates and units. Fields are read when they are asked for:
 
 # %%
-import numpy as np
-import xarray
-
-grid = run.grid
-axes = {
-    name: origin + width * (np.arange(count) + 0.5)
-    for name, origin, width, count in zip("xyz", grid.origin, grid.spacing, grid.cells)
-}
-voidage = xarray.DataArray(
-    np.stack([run.fluid("voidage", k) for k in range(len(run.times))]),
-    dims=("time", "z", "y", "x"), coords={"time": run.times, **axes}, attrs={"units": run.unit("voidage")},
-)  # fmt: skip
-voidage.sizes
+data = run.dataset()
+data["voidage"]
 
 # %% [markdown]
 # The mean over each layer, against height and time:
@@ -54,7 +44,7 @@ voidage.sizes
 # %%
 import matplotlib.pyplot as plt
 
-layers = voidage.mean(("x", "y"))
+layers = data["voidage"].mean(("x", "y"))
 figure, panel = plt.subplots(figsize=(6, 3.2), layout="constrained")
 shown = panel.pcolormesh(layers.time, layers.z, layers.T, cmap="Blues_r", shading="nearest")
 figure.colorbar(shown, label="voidage  [-]")
@@ -65,5 +55,7 @@ plt.show()
 # One particle through all snapshots:
 
 # %%
+import numpy as np
+
 one = run.track(17)
 pandas.DataFrame({"time": one["time"], "z": one["position"][:, 2], "speed": np.linalg.norm(one["velocity"], axis=1)})

@@ -13,15 +13,22 @@ case = Path("liquid_bed.toml")
 if not case.exists():
     copy_from_gallery("liquid-bed", case)
 shared = {"bed.count": 400, "column.height": 0.0125, "run.until": 0.2, "run.average_from": 0.1, "run.every": 0.02}
-outcomes = sweep(case, {"bed.inlet_velocity": [0.025, 0.035, 0.045]}, Path("velocities"), overrides=shared)
+sweep(case, {"bed.inlet_velocity": [0.025, 0.035, 0.045]}, Path("velocities"), overrides=shared)
 
 # %% [markdown]
-# Runs that have finished are kept: run the cell again, and nothing is computed twice. `sweep.csv` has one line per run:
+# Runs that have finished are kept: run the cell again, and nothing is computed twice. All runs as a table, with standard errors beside the means:
 
 # %%
-import pandas
+import cfddem
 
-pandas.read_csv("velocities/sweep.csv").dropna(axis=1, how="all").iloc[:, :8]
+runs = cfddem.open_sweep("velocities")
+runs[["bed.inlet_velocity", "status", "bed_height", "bed_height_error", "pressure_drop"]]
+
+# %% [markdown]
+# The units of its columns:
+
+# %%
+{name: runs.attrs["units"][name] for name in ("bed.inlet_velocity", "bed_height", "pressure_drop")}
 
 # %% [markdown]
 # Bed height with its error against the inlet velocity:
@@ -29,11 +36,8 @@ pandas.read_csv("velocities/sweep.csv").dropna(axis=1, how="all").iloc[:, :8]
 # %%
 import matplotlib.pyplot as plt
 
-velocity = [each.values["bed.inlet_velocity"] for each in outcomes]
-height = [each.measures["bed_height"][0] for each in outcomes]
-error = [each.measures["bed_height"][1] for each in outcomes]
 figure, axes = plt.subplots(figsize=(6, 3.4), layout="constrained")
-axes.errorbar(velocity, height, error, marker="o", capsize=3)
+axes.errorbar(runs["bed.inlet_velocity"], runs["bed_height"], runs["bed_height_error"], marker="o", capsize=3)
 axes.set(xlabel="inlet velocity  [m/s]", ylabel="bed height  [m]")
 plt.show()
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json as _json
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import version
@@ -13,6 +12,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import WIDTH, grid
 
 if TYPE_CHECKING:
@@ -44,17 +44,24 @@ PIECEMEAL = ("wet-beds",)
 """Targets that make their table of what has been computed, and go on with the rest another time."""
 
 
-def validate(
-    name: str, output: Path, json: bool = False, data: Sequence[Path] = (), hours: float | None = None
-) -> bool:
-    """Run a target, print its table and write its files into `output`/`name`.
+def validate(name: str, output: Path, data: Sequence[Path] = (), hours: float | None = None) -> bool:
+    """Run a target, print its table and write its files into `output`/`name`; arguments as in :func:`measure`.
+
+    returns  whether every limit holds
+    """
+    report = measure(name, output, data, hours)
+    _show(report, Path(output) / name)
+    return bool(report["holds"])
+
+
+def measure(name: str, output: Path, data: Sequence[Path] = (), hours: float | None = None) -> dict[str, Any]:
+    """Run a target and write its files into `output`/`name`.
 
     name     one of TARGETS
     output   folder for all targets
-    json     print the table as JSON
     data     files of measured points, for targets that have a function `compare_data`
     hours    after which a target of `PIECEMEAL` begins no further piece; the table is made of those there are
-    returns  whether every limit holds
+    returns  `target`, whether every limit `holds`, `seconds`, `versions` and `rows`, as in `table.json`
     """
     from scenarios.validation.table import replacing
 
@@ -80,27 +87,9 @@ def validate(
         | {package: version(package) for package in ("cfddem", "numpy", "numba")},
         "rows": [row.as_dict() for row in rows],
     }
-    text = _json.dumps(_finite(report), indent=1)
     with replacing(folder / "table.json") as path:
-        path.write_text(text + "\n", encoding="utf-8")
-    if json:
-        print(text)
-    else:
-        _show(name, rows, folder, seconds)
-    return bool(report["holds"])
-
-
-def _finite(value: Any) -> Any:
-    """The same value with None for NaN and infinity, which JSON cannot hold."""
-    import numpy as np
-
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value
+        path.write_text(as_json(report, indent=1) + "\n", encoding="utf-8")
+    return report
 
 
 @contextmanager
@@ -112,7 +101,7 @@ def _progress(name: str) -> Iterator[Progress]:
         yield lambda doing: status.update(f"{name}: {doing}")
 
 
-def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
+def _show(report: Mapping[str, Any], folder: Path) -> None:
     """Print the table, the verdict and the folder of the files."""
     from rich.console import Console
     from rich.text import Text
@@ -122,18 +111,21 @@ def _show(name: str, rows: Sequence[Row], folder: Path, seconds: float) -> None:
     colour = {"holds": "green", "FAILS": "bold red", "report": "dim"}
     shown: list[Sequence[str | Text]] = [
         (
-            row.quantity if row.unit == "-" else f"{row.quantity} [{row.unit}]",
-            *map(_number, (row.value, row.reference, row.difference, row.limit)),
-            Text(row.verdict, style=colour[row.verdict], no_wrap=True),
+            row["quantity"] if row["unit"] == "-" else f"{row['quantity']} [{row['unit']}]",
+            *(_number(row[name]) for name in ("value", "reference", "difference", "limit")),
+            Text(row["verdict"], style=colour[row["verdict"]], no_wrap=True),
         )
-        for row in rows
+        for row in report["rows"]
     ]
     headings = ("quantity (worst of n)", "model", "reference", "difference", "limit", "verdict")
     console.print(grid(shown, headings, right=(1, 2, 3, 4), widths=(20, 0, 0, 0, 0, 7), gap=2))
-    failed = sum(row.verdict == "FAILS" for row in rows)
-    judged = sum(row.verdict != "report" for row in rows)
-    console.print(f"{name}: {judged - failed} of {judged} limits hold; {len(rows) - judged} rows are for information.")
-    print(f"{seconds:.0f} s; figures, histories and table in {folder}")
+    verdicts = [row["verdict"] for row in report["rows"]]
+    judged = len(verdicts) - verdicts.count("report")
+    console.print(
+        f"{report['target']}: {judged - verdicts.count('FAILS')} of {judged} limits hold; "
+        f"{verdicts.count('report')} rows are for information."
+    )
+    print(f"{report['seconds']:.0f} s; figures, histories and table in {folder}")
 
 
 def _number(value: float | None) -> str:

@@ -1,0 +1,36 @@
+"""Results as JSON text."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+
+def as_json(value: Any, indent: int | None = None) -> str:
+    """Plain values or dataclasses as JSON, with null for NaN and infinity.
+
+    >>> as_json({"height": 0.04, "error": math.nan, "window": (0.0, math.inf)})
+    '{"height": 0.04, "error": null, "window": [0.0, null]}'
+    """
+    return json.dumps(_plain(value), allow_nan=False, indent=indent)
+
+
+def _plain(value: Any) -> Any:
+    """The value in the types of JSON."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Mapping):
+        return {str(name): _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, PathLike) else value

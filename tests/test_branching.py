@@ -1,0 +1,90 @@
+"""`cfddem run --from`: a run that begins where another has ended, with other values of its case."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call, parsed
+
+from cfddem.case.schema import Case
+from cfddem.io.reading import open_run
+from cfddem.run.branching import branch_state
+from cfddem.run.runner import Run
+
+TINY = ("start=suspended", "bed.count=50", "run.until=0.01", "run.every=0.005", "run.average_from=0")
+
+
+@pytest.fixture(scope="module")
+def bed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bed in water, run to 0.01 s."""
+    folder = tmp_path_factory.mktemp("runs") / "bed"
+    done = call("run", "liquid-bed", "-o", str(folder), *(word for each in TINY for word in ("--set", each)))
+    assert done.code == 0, done.err
+    return folder
+
+
+def test_without_a_change_it_goes_on_as_a_resumed_run(bed: Path, tmp_path: Path) -> None:
+    """Bit for bit: contacts, films and flow are kept; the first row and snapshot are the last ones of the first run."""
+    shutil.copytree(bed, tmp_path / "resumed")
+    assert call("resume", str(tmp_path / "resumed"), "--until", "0.02").code == 0
+    done = call("run", "--from", str(bed), "--set", "until=0.02", "-o", str(tmp_path / "branch"), "--json")
+    assert parsed(done.out)["window"] == [pytest.approx(0.01), pytest.approx(0.02)]
+    first, one, other = (open_run(each) for each in (bed, tmp_path / "resumed", tmp_path / "branch"))
+    assert other.history["time"][0] == first.history["time"][-1] == pytest.approx(0.01)
+    assert np.array_equal(other.particles(0)["position"], first.particles(-1)["position"])
+    for name in ("position", "velocity", "spin"):
+        assert np.array_equal(other.particles(-1)[name], one.particles(-1)[name]), name
+    assert other.provenance["from"] == {"folder": str(bed), "time": pytest.approx(0.01)}
+
+
+def test_a_changed_value_acts_and_the_branch_can_be_resumed(bed: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "thick"
+    changes = (
+        "fluid.viscosity=0.003",
+        "laws.agitation=free_spheres",
+        "bed.inlet_velocity=0.06",
+        "material.glass.restitution=0.5",
+        "until=0.015",
+    )
+    done = call("run", "--from", str(bed), "-o", str(folder), *(word for each in changes for word in ("--set", each)))
+    assert done.code == 0, done.err
+    case = Case.from_toml(folder / "case.toml")
+    assert (case.required_fluid.viscosity, case.solid.restitution) == (0.003, 0.5)
+    resumed = Run.resume(folder, until=0.016)
+    simulation = resumed.simulation
+    assert np.unique(simulation.required_fluid.viscosity).tolist() == [0.003]
+    assert np.unique(simulation.particles.viscosity).tolist() == [0.003]
+    resumed.go()
+    assert open_run(folder).history["time"][-1] == pytest.approx(0.016)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("bed.count=60", ["bed.count", "left as it is", "bed.inlet_velocity"]),
+        ("material.glass.density=3000", ["material.glass.density", "left as it is", "friction"]),
+        ("column.height=0.2", ["column.height", "from its beginning"]),
+        ("fluid.viscosity=0.003", ["laws.agitation = 'none'", "--set laws.agitation=free_spheres"]),
+        ("until=0.01", ["run.until = 0.01", "above 0.01", "time goes on"]),
+    ],
+)
+def test_what_a_run_cannot_change_is_refused(bed: Path, tmp_path: Path, change: str, said: list[str]) -> None:
+    folder = tmp_path / "other"
+    until = () if "until" in change else ("--set", "until=0.02")
+    done = call("run", "--from", str(bed), *until, "--set", change, "-o", str(folder))
+    assert (done.code, done.out) == (2, "") and all(word in done.err for word in said), done.err
+    assert not folder.exists()
+
+
+def test_a_case_beside_from_and_a_folder_without_a_run_are_refused(bed: Path, tmp_path: Path) -> None:
+    assert "left out: the case is that of" in call("run", "liquid-bed", "--from", str(bed)).err
+    assert call("run", "--from", str(tmp_path), "--set", "until=1").code == 2
+
+
+def test_the_state_is_that_of_the_checkpoint_but_for_the_step(bed: Path) -> None:
+    case = Case.from_toml(bed / "case.toml", {"run.until": 1.0})
+    state = branch_state(case, bed)
+    assert state["time"] == pytest.approx(0.01) and state["simulation"]["particle_step"] is None
