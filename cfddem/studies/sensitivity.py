@@ -329,12 +329,13 @@ def sensitivity(chosen: Design, varied: Sequence[Variable | Choice], outcomes: S
     known = {run_name(each.values): each for each in outcomes}
     names = [[run_name(point) for point in rows] for rows in values_of(chosen, varied)]
     finished = np.array([[bool(known[each].measures) if each in known else False for each in rows] for rows in names])
-    whole = finished.all(axis=0)
+    whole = np.all(finished, axis=0)
     if whole.sum() < FEWEST:
         limit = f"at least {FEWEST} rows of {chosen.rows} with all runs finished"
         raise InputError("--sensitivity", int(whole.sum()), limit, "more --runs, or narrower ranges")
     kept = Design(chosen.kind, chosen.points[:, whole], chosen.order[whole])
-    points = [[known[each] for each, there in zip(rows, whole.tolist()) if there] for rows in names]
+    places = np.flatnonzero(whole).tolist()
+    points = [[known[rows[place]] for place in places] for rows in names]
     common = [name for name in points[0][0].measures if all(name in each.measures for rows in points for each in rows)]
     measures: dict[str, tuple[str, list[dict[str, float]]]] = {}
     for name in common:
