@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -37,13 +38,14 @@ def reductions(communicator: Communicator, values: list[np.ndarray]) -> dict[str
         "first": communicator.first(f"rank {rank}" if rank else None),
         "broadcast": communicator.broadcast({"from": rank}, 1),
         "exchange": communicator.exchange([(rank, n) for n in range(communicator.size)]),
+        "beside": communicator.exchange_with({n: (rank, n) for n in range(communicator.size) if abs(n - rank) == 1}),
         "swap": incoming,
     }  # fmt: skip
 
 
 @needs_mpi
-def test_all_ranks_get_the_same_bits_in_the_order_of_ranks() -> None:
-    """Against the sums made here one rank after the other; three parts whose sum depends on the order."""
+def test_all_ranks_get_the_bits_of_one_process() -> None:
+    """Three parts whose sum by floats depends on the order."""
     draw = np.random.default_rng(1)
     values = [draw.normal(0.0, 1.0, 5), draw.normal(0.0, 1e9, 7)]
     values.append(-values[1][::-1].copy())
@@ -51,8 +53,8 @@ def test_all_ranks_get_the_same_bits_in_the_order_of_ranks() -> None:
     sums = [np.sum(each) for each in values]
     assert (sums[0] + sums[1]) + sums[2] != sums[0] + (sums[1] + sums[2])
     for rank, each in enumerate(results):
-        assert each["sum"] == (sums[0] + sums[1]) + sums[2]
-        assert np.array_equal(each["columns"], sum(np.array([v[0], v[-1]]) for v in values))
+        assert each["sum"] == SERIAL.sum(np.concatenate(values)) == pytest.approx(math.fsum(np.concatenate(values)))
+        assert np.array_equal(each["columns"], SERIAL.sum([[v[0], v[-1]] for v in values], axis=0))
         assert each["largest"] == max(v.max() for v in values) and each["smallest"] == min(v.min() for v in values)
         assert np.isnan(each["nan"]) and each["any"] is True and each["all"] is False
         assert each["count"] == sum((v > 0).sum() for v in values)
@@ -61,6 +63,7 @@ def test_all_ranks_get_the_same_bits_in_the_order_of_ranks() -> None:
         assert np.array_equal(each["gathered"], gathered)
         assert np.array_equal(each["flags"], np.concatenate([v[:n] > 0.0 for n, v in enumerate(values)]))
         assert np.array_equal(each["joined"], np.concatenate(values)) and each["first"] == "rank 1"
+        assert each["beside"] == {n: (n, rank) for n in range(3) if abs(n - rank) == 1}
         assert each["broadcast"] == {"from": 1} and each["exchange"] == [(n, rank) for n in range(3)]
         assert all(
             np.array_equal(got, np.stack([v, v + rank], axis=1)) for got, v in zip(each["swap"].values(), values)

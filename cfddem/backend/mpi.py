@@ -52,6 +52,13 @@ class Ranks(Communicator):
         """See `Communicator.exchange`."""
         return list(self.world.alltoall(list(parcels)))
 
+    def exchange_with(self, parcels: Mapping[int, Value]) -> dict[int, Value]:
+        """See `Communicator.exchange_with`."""
+        requests = [self.world.isend(parcel, rank, _TAG) for rank, parcel in parcels.items()]
+        given = {rank: self.world.recv(source=rank, tag=_TAG) for rank in parcels}
+        MPI.Request.Waitall(requests)
+        return given
+
     def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
         """See `Communicator.swap`."""
         requests = [self.world.Irecv(into, rank, _TAG) for rank, into in incoming.items()]

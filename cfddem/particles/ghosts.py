@@ -31,6 +31,9 @@ from cfddem.particles.system import System
 BINS = 1000
 """Places among which a plane between two ranks is chosen."""
 
+FAR = 1e300
+"""Where the space of the first and the last rank ends along an open axis: a number, since differences are taken [m]."""
+
 IMBALANCE = 1.1
 """Largest number of particles of a rank over the mean; where it is exceeded the planes are moved."""
 
@@ -72,29 +75,36 @@ class Slabs:
 
         box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
         """
-        borders = np.zeros((2, 3))
-        borders[:, self.axis] = self.range_of(rank, box)
-        borders = borders[np.isfinite(borders[:, self.axis])]
-        others = [other for other in range(len(self.planes) + 1) if other != rank]
-        return [other for other in others if (self.distance(borders, other, box) < reach).any()]  # local: two borders
-
-    def range_of(self, rank: int, box: np.ndarray) -> tuple[float, float]:
-        """Ends of the space of a rank along the axis, within a periodic box [m]."""
-        ends, length = (-np.inf, *self.planes, np.inf), float(box[self.axis])
-        if np.isinf(length):
-            return ends[rank], ends[rank + 1]
-        return max(ends[rank], 0.0), min(ends[rank + 1], length)
+        low, high = self._ranges(box)
+        place = np.array([low[rank], high[rank]])
+        from_here = _gap(place[:, None], low, high, box[self.axis])
+        from_there = _gap(
+            np.stack([low, high]), low[rank], high[rank], box[self.axis]
+        )  # the same numbers, seen from the other rank
+        gaps = np.concatenate([from_here, from_there]).min(axis=0)  # local: borders
+        return [other for other in np.flatnonzero(gaps < reach).tolist() if other != rank]
 
     def distance(self, position: np.ndarray, rank: int, box: np.ndarray) -> np.ndarray:
         """Distance of each position from the space of a rank, over the borders of a periodic box too (N,) [m].
 
         box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
         """
-        (low, high), place, length = self.range_of(rank, box), position[:, self.axis], box[self.axis]
-        if np.isinf(length):
-            return np.maximum(np.maximum(low - place, place - high), 0.0)
-        images = [np.maximum(low - place - shift, place + shift - high) for shift in (-length, 0.0, length)]
-        return np.maximum(np.minimum(np.minimum(*images[:2]), images[2]), 0.0)
+        low, high = self._ranges(box)
+        return _gap(position[:, self.axis], low[rank], high[rank], box[self.axis])
+
+    def _ranges(self, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper end of the space of every rank along the axis, within a periodic box [m]."""
+        low, high = np.array([-FAR, *self.planes]), np.array([*self.planes, FAR])
+        if np.isfinite(box[self.axis]):
+            low, high = np.maximum(low, 0.0), np.minimum(high, box[self.axis])
+        return low, high
+
+
+def _gap(place: Any, low: Any, high: Any, length: float) -> np.ndarray:
+    """Distance of places from ranges, over the borders of a periodic box of finite length, too; arrays [m]."""
+    images = (-length, 0.0, length) if np.isfinite(length) else (0.0,)
+    gaps = [np.maximum(low - place - shift, place + shift - high) for shift in images]
+    return np.maximum(np.minimum.reduce(gaps), 0.0)  # local: images
 
 
 class Whole:
@@ -142,6 +152,7 @@ class Divided(Whole):
         self._order = np.zeros(0, np.int64)  # rows in the order of these ids
         self._arrived: list[dict[str, np.ndarray]] = []
         self._particles: Any = None
+        self._near: list[int] | None = None  # ranks to which particles go between lists; all ranks if None
 
     def own(self, particles: Particles) -> Particles:
         """See `Whole.own`."""
@@ -154,8 +165,8 @@ class Divided(Whole):
             self._move_planes(particles)
         owner = self.division.owner(particles.position)
         leave = np.flatnonzero(owner != self.communicator.rank)
-        parcels: list[Any] = [None] * self.communicator.size
-        for rank in np.unique(owner[leave]):
+        parcels: dict[int, Any] = dict.fromkeys(self._near or ())
+        for rank in np.unique(owner[leave]).tolist():
             go = leave[owner[leave] == rank]
             parcels[rank] = (particles.copy(go).arrays, {} if edges is None else edges.of(old_row[go], self._ids))
         if len(leave):
@@ -163,7 +174,7 @@ class Divided(Whole):
             particles.keep(stay)
             old_row = old_row[stay]
         self._arrived = []
-        for comers, pairs in filter(None, self.communicator.exchange(parcels)):
+        for comers, pairs in filter(None, self._exchanged(parcels)):
             old_row = np.append(old_row, self._known(comers["id"]))
             particles.append(particles.rows_from(comers))
             if pairs:
@@ -173,12 +184,13 @@ class Divided(Whole):
     def renew(self, particles: Particles, reach: float, box: np.ndarray) -> np.ndarray:
         """See `Whole.renew`."""
         self._sent, self._received = {}, {}
-        parcels: list[Any] = [None] * self.communicator.size
-        for other in self.division.near(self.communicator.rank, reach, box):
+        self._near = self.division.near(self.communicator.rank, reach, box)
+        parcels: dict[int, Any] = dict.fromkeys(self._near)
+        for other in self._near:
             rows = np.flatnonzero(self.division.distance(particles.position, other, box) < reach)
             if len(rows):
                 self._sent[other], parcels[other] = rows, particles.copy(rows).arrays
-        for other, ghosts in enumerate(self.communicator.exchange(parcels)):
+        for other, ghosts in self.communicator.exchange_with(parcels).items():
             if ghosts is not None:
                 begin = particles.count
                 particles.add_ghosts(particles.rows_from(ghosts))
@@ -211,6 +223,13 @@ class Divided(Whole):
                 ghosts = array[self._received[rank]]
                 begin, end = end, end + ghosts.size
                 ghosts[...] = buffer[begin:end].reshape(ghosts.shape)
+
+    def _exchanged(self, parcels: dict[int, Any]) -> list[Any]:
+        """What other ranks give to this one, in their order; all ranks write to all where a parcel goes far."""
+        far = self._near is None or len(parcels) > len(self._near)
+        if self.communicator.any(far):
+            return self.communicator.exchange([parcels.get(rank) for rank in range(self.communicator.size)])
+        return list(self.communicator.exchange_with(parcels).values())
 
     def _move_planes(self, particles: Particles) -> None:
         """Divide space anew if a rank has many more particles than the mean."""

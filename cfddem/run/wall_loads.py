@@ -5,6 +5,8 @@ The impulses of lubrication films on walls are not contacts and do not count.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from cfddem.case.schema import Case
@@ -44,7 +46,7 @@ def wall_loads(simulation: Simulation) -> dict[str, float]:
             continue
         found |= {f"{name}_force_{axis}": float(each) for axis, each in zip(AXES, force[m])}
         if any(wall.spin):
-            found[f"{name}_torque"] = float(torque[m] @ np.array(wall.spin)) / float(np.linalg.norm(wall.spin))
+            found[f"{name}_torque"] = float(torque[m] @ np.array(wall.spin)) / math.hypot(*wall.spin)
         found[f"{name}_power"] = -float(force[m] @ solver.walls.velocity[m] + torque[m] @ solver.walls.spin[m])
     return found
 
