@@ -76,11 +76,9 @@ class Slabs:
         box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
         """
         low, high = self._ranges(box)
-        place = np.array([low[rank], high[rank]])
-        from_here = _gap(place[:, None], low, high, box[self.axis])
-        from_there = _gap(
-            np.stack([low, high]), low[rank], high[rank], box[self.axis]
-        )  # the same numbers, seen from the other rank
+        ends, length = np.array([low[rank], high[rank]])[:, None], box[self.axis]
+        from_here = _gap(ends, low, high, length)
+        from_there = _gap(np.stack([low, high]), low[rank], high[rank], length)  # what the other rank finds from here
         gaps = np.concatenate([from_here, from_there]).min(axis=0)  # local: borders
         return [other for other in np.flatnonzero(gaps < reach).tolist() if other != rank]
 
