@@ -81,9 +81,7 @@ def test_a_layer_of_wet_beads_is_dry_when_the_balance_says() -> None:
     plateau = float(particles.temperature.mean())
     end = simulation.time + 998.0 * float(particles.liquid.sum()) / by_air
     whole = then["liquid_on_particles"]
-    while (
-        particles.liquid.sum() > 1e-4 * whole and simulation.time < 10.0
-    ):  # the cells take the last of it step by step
+    while particles.liquid.sum() > 1e-4 * whole and simulation.time < 10.0:
         simulation.step()
     print(f"rate {rate:.5g}, by the air {by_air:.5g} kg/s; plateau {plateau:.3f} K")
     print(f"dry at {simulation.time:.3f} s, by the balance {end:.3f} s")
