@@ -158,7 +158,7 @@ def dilute_drive(saturation: float, partial: float, gas_temperature: float, dens
     return WATER * (saturation - partial) / (GAS_CONSTANT * gas_temperature * density)
 
 
-@law("evaporation", "falling-rate period of a film that covers a part of the surface")
+@law("drying", "falling-rate period of a film that covers a part of the surface")
 def wet_share(volume: float, area: float, full_thickness: float) -> float:
     r"""Share of the surface of a sphere that is wet.
 

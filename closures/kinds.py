@@ -19,6 +19,10 @@ HEAT_ARGUMENTS = ("reynolds", "prandtl", "voidage")
 """Arguments that a law of heat transfer may take, by name: Reynolds number of the superficial slip; Prandtl number, or
 the Schmidt number where the law is used for mass; voidage. It must take the first two."""
 
+DRYING_ARGUMENTS = ("volume", "area", "full_thickness", "diameter", "sherwood")
+"""Arguments that a law of drying may take, by name: volume of the liquid on a particle [m3], its area [m2], thickness
+of a film that covers all [m], diameter [m], and Sherwood number [-]; it must take the first."""
+
 BUILT_IN: dict[str, tuple[str, ...]] = {
     "drag": ("none",),
     "minimum_gap": ("elastohydrodynamic",),
@@ -26,6 +30,7 @@ BUILT_IN: dict[str, tuple[str, ...]] = {
     "added_mass": (),
     "agitation": ("auto", "none", "lattanzi"),
     "heat_transfer": (),
+    "drying": (),
 }
 """Names that a case may use besides those of registered laws: no law, or the built-in one."""
 
@@ -36,6 +41,7 @@ ARGUMENTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "added_mass": (("voidage",), ("voidage",)),
     "agitation": (AGITATION_ARGUMENTS, AGITATION_ARGUMENTS[:1]),
     "heat_transfer": (HEAT_ARGUMENTS, HEAT_ARGUMENTS[:2]),
+    "drying": (DRYING_ARGUMENTS, DRYING_ARGUMENTS[:1]),
 }
 """Arguments that a law of a kind may take, and those that it must take."""
 

@@ -65,6 +65,32 @@ def test_a_wet_bed_dries_at_the_rate_of_the_air_that_leaves_and_at_the_wet_bulb(
     assert now["vapour_from_particles"] == pytest.approx(now["evaporated_mass"], rel=1e-10)
 
 
+def test_a_layer_of_wet_beads_is_dry_when_the_balance_says() -> None:
+    """Beads with films: a plateau at the wet bulb, a constant rate, and the end within 2 % of the water over the rate
+    by the air that leaves."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.07, "thickness": 3e-6}
+    case = wet_bed(1, liquid=film).with_(**{"evaporation": {}, "heat.particle_temperature": 294.0})
+    simulation = Simulation(case)
+    simulation.until(0.6)
+    begin, then = simulation.time, row(simulation)
+    simulation.until(0.8)
+    now, particles, keys = row(simulation), simulation.particles, Evaporation.of(simulation.case)
+    assert keys is not None
+    rate = (now["evaporated_mass"] - then["evaporated_mass"]) / (simulation.time - begin)
+    by_air = 1.2 * SPEED * 0.008**2 * (outlet_vapour(simulation) - 0.005)
+    plateau = float(particles.temperature.mean())
+    end = simulation.time + 998.0 * float(particles.liquid.sum()) / by_air
+    whole = then["liquid_on_particles"]
+    while particles.liquid.sum() > 1e-4 * whole and simulation.time < 10.0:
+        simulation.step()
+    print(f"rate {rate:.5g}, by the air {by_air:.5g} kg/s; plateau {plateau:.3f} K")
+    print(f"dry at {simulation.time:.3f} s, by the balance {end:.3f} s")
+    assert rate == pytest.approx(by_air, rel=0.01)
+    assert plateau == pytest.approx(keys.wet_bulb(simulation.case), abs=0.3)
+    assert simulation.time == pytest.approx(end, rel=0.02)
+    assert row(simulation)["liquid_imbalance"] < 1e-12 and vapour_imbalance(simulation) < 1e-10
+
+
 def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
     """The drops shrink, so that air flows in through the open end; it is counted."""
     case = wet_bed(

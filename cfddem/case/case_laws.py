@@ -99,6 +99,11 @@ class CaseLaws(Checked):
         description="Nusselt number of particles, where the case has heat; Sherwood number by analogy, where it has a "
         "vapour: ranz_marshall, gunn, wakao_kaguei, a law's name, or a function",
     )
+    drying: str | Callable[..., float] = Field(
+        "wet_share",
+        description="rate of evaporation from a particle over that of a surface that is all wet: wet_share, in which "
+        "the film covers a part of it, a law's name, or a function",
+    )
     mapping: Literal["linear", "centroid", "divided"] = Field(
         "linear", description="distribution of particle volume over cells, before the filter kernel"
     )
@@ -122,7 +127,7 @@ class CaseLaws(Checked):
         """None means no drag, too: as a word, because a case file has no null and would fall back to the default."""
         return "none" if value is None else value
 
-    @field_validator("drag", "minimum_gap", "lubrication", "agitation", "heat_transfer")
+    @field_validator("drag", "minimum_gap", "lubrication", "agitation", "heat_transfer", "drying")
     @classmethod
     def _laws_exist(cls, value: Any, about: ValidationInfo) -> Any:
         kind = about.field_name or ""
@@ -217,6 +222,11 @@ class CaseLaws(Checked):
         return None if "heat_transfer" in self.missing else chosen("heat_transfer", self.heat_transfer)
 
     @property
+    def drying_law(self) -> Law | None:
+        """Law of the falling rate; None if this machine lacks it."""
+        return None if "drying" in self.missing else chosen("drying", self.drying)
+
+    @property
     def pair_laws(self) -> dict[str, Law]:
         """Laws that replace the built-in laws of the pair loop, by kind."""
         given = {kind: getattr(self, kind) for kind in ("minimum_gap", "lubrication") if kind not in self.missing}
@@ -233,6 +243,7 @@ class CaseLaws(Checked):
             **self.pair_laws,
             "agitation": None if named else chosen("agitation", agitation),
             "heat_transfer": self.heat_law,
+            "drying": self.drying_law,
         }
         return {kind: law for kind, law in found.items() if isinstance(law, Law) and not is_built_in(law.function)}
 

@@ -40,6 +40,21 @@ def _law(key: str, meaning: str) -> Any:
     return Field(LAWS[key][0], description=f"{meaning}; one of {words}", json_schema_extra={"examples": [*LAWS[key]]})
 
 
+class Bond(Checked):
+    """Solid bond that a bridge between particles leaves when it dries; without this table the bridge breaks."""
+
+    solid_fraction: float = Field(
+        gt=0, lt=1, description="volume of solids in a new bridge over that of its liquid; they make the bond [-]"
+    )
+    youngs_modulus: Positive = Field(description="Young's modulus of the bond [Pa]")
+    tensile_strength: Positive = Field(description="tensile stress at which the bond breaks [Pa]")
+    shear_strength: Positive | None = Field(
+        None, description="shear stress at which it breaks; default: as the tensile strength [Pa]"
+    )
+    shear_ratio: Positive = Field(0.4, description="stiffness across the line of centres over that along it [-]")
+    damping: float = Field(0.1, ge=0, lt=1, description="damping of the bond, over critical [-]")
+
+
 class Liquid(Checked):
     """Liquid on the particles: it forms bridges between particles and at walls."""
 
@@ -92,6 +107,8 @@ class Liquid(Checked):
         "bridge; 0: walls take no liquid [-]",
     )
     wall_thickness: NonNegative = Field(0.0, description="thickness of the liquid on the walls at the start [m]")
+
+    bond: Bond | None = Field(None, description="solid bonds that dry bridges leave; needs [evaporation]")
 
     @field_validator(*LAWS)
     @classmethod

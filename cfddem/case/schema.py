@@ -70,6 +70,8 @@ class Case(CaseTables):
     @model_validator(mode="after")
     def _liquid_goes_with_the_rest(self) -> Case:
         check_wet(self.liquid, self.spray, self.fluid, self.column.size, self.column.shape == "cylinder")
+        if self.liquid and self.liquid.bond and not getattr(self, "evaporation", None):
+            raise InputError("liquid.bond", None, "left out without [evaporation]", "bridges leave bonds as they dry")
         return self
 
     @model_validator(mode="after")

@@ -24,6 +24,7 @@ STORED = {
     "normal_springs": "of normal springs",
     "tangential_springs": "of tangential springs",
     "bridges": "of the pull of liquid bridges, from contact",
+    "bonds": "of solid bonds",
     "fluid_kinetic": "of the fluid's motion",
     "added_mass": "of the fluid that moves with the particles, the added mass",
     "deferred_momentum": "that the pressure has given to particles and the fluid loses in the next two steps",
@@ -57,6 +58,9 @@ LOST = {
     "film_shear": "by films to sliding and rolling",
     "bridge": "by the resistance of liquid bridges",
     "bridges_broken": "where liquid bridges break",
+    "bridges_dried": "as liquid bridges dry",
+    "bond_damping": "by the dashpots of solid bonds",
+    "bonds_broken": "where solid bonds break",
     "contact_damping": "by the dashpots of contacts",
     "hysteresis": "by the contact law, to plastic deformation",
     "friction": "by sliding",
@@ -194,7 +198,7 @@ class EnergyLedger(CaseFeature):
         names = [name for name in [*GAINED, *LOST, *PASSED] if name not in absent]
         lines |= {name: sums[name] for name in names}
         put_in = self.start["kinetic"] + self.start["normal_springs"] + self.start["tangential_springs"]
-        put_in += self.start.get("bridges", 0.0)
+        put_in += self.start.get("bridges", 0.0) + self.start.get("bonds", 0.0)
         put_in += self.start.get("fluid_kinetic", 0.0) + max(-lines["potential"], 0.0)
         put_in += sum(max(lines[name], 0.0) for name in GAINED if name in lines)
         explained = sum(lines[name] for name in GAINED if name in lines)

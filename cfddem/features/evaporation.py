@@ -1,4 +1,4 @@
-r"""Evaporation of the liquid of particles, and of drops, into humid air of one state.
+r"""Evaporation of the liquid of particles, of their bridges, and of drops, into humid air.
 
 .. math:: m c\,\dot T = \pi d k\,Nu\,(T_g - T) - L\,\dot m, \qquad
           \dot m = s\,\pi d\,Sh\,\rho D\,\ln\frac{1-Y}{1-Y_s(T)}
@@ -19,14 +19,20 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.law_set import adapted, specialise
 from cfddem.case.schema import Case
 from cfddem.features.case_feature import CaseFeature, Measured
+from cfddem.features.evaporating_bridges import Menisci
+from cfddem.features.evaporating_walls import WallFilms
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.evaporation_loops import Air, Surfaces, evaporate
 from cfddem.features.heat import HeatExchange
+from cfddem.features.heat_keys import Heat
 from cfddem.features.liquid import LiquidOnParticles
 from cfddem.features.vapour import Vapour
+from cfddem.particles.energy_of_bridges import DRIED
 from closures.evaporation import vapour_fraction
+from closures.kinds import DRYING_ARGUMENTS
 
 SMALLEST = 1e-6
 """Radius of a drop that has evaporated [m]."""
@@ -48,8 +54,18 @@ class EvaporationOfLiquid(CaseFeature):
         self.diffusivity = keys.diffusivity_in(case)
         self.fraction = vapour_fraction(keys.partial_pressure(case), keys.pressure)
         self.gains = Vapour.is_in(case)
+        law = case.laws.drying_law
+        assert law is not None
+        share = adapted(law.function, ", ".join(DRYING_ARGUMENTS), {name: name for name in DRYING_ARGUMENTS})
+        self._evaporate = specialise(evaporate, {"drying_share": share})
         self.drops = np.array([name in keys.drops for name in case.material])
         self.mass, self.heat = 0.0, 0.0
+        self.walls: WallFilms | None = None
+        if keys.wall_coefficient > 0.0:
+            heat = Heat.of(case)
+            assert heat
+            temperature = keys.wall_temperature or heat.gas_temperature
+            self.walls = WallFilms(simulation, keys.wall_coefficient, temperature, keys.liquid_density)
 
     @classmethod
     def is_in(cls, case: Case) -> bool:
@@ -59,7 +75,9 @@ class EvaporationOfLiquid(CaseFeature):
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:
         """What evaporated, and the heat that it took."""
-        return (Measured("kg", "recorded", evaporated_mass), Measured("J", "recorded", latent_heat_taken))
+        keys = Evaporation.of(case)
+        of_walls = (Measured("J", "recorded", latent_heat_of_walls),) if keys and keys.wall_coefficient > 0.0 else ()
+        return (Measured("kg", "recorded", evaporated_mass), Measured("J", "recorded", latent_heat_taken), *of_walls)
 
     def before(self, simulation: Any, step: float) -> None:
         """Evaporate over the step [s], after the exchange of heat with the gas."""
@@ -69,6 +87,8 @@ class EvaporationOfLiquid(CaseFeature):
         smallest = particles.density * (4.0 / 3.0 * math.pi * SMALLEST**3)
         drops, begin = np.maximum(particles.mass - smallest, 0.0), particles.temperature.copy()
         vapour = simulation.feature(Vapour) if self.gains else None
+        menisci = Menisci(simulation, keys.liquid_density) if "liquid" in particles else None
+        nothing = np.zeros(len(diameter))
         surfaces = Surfaces(
             temperature=particles.temperature.copy(),
             diameter=diameter,
@@ -76,24 +96,34 @@ class EvaporationOfLiquid(CaseFeature):
             gas=heat.around,
             fraction=vapour.around(simulation) if vapour else np.full(len(diameter), self.fraction),
             film=np.where(is_drop, np.inf, on_films),
+            menisci=menisci.area if menisci else nothing,
             response=heat.response,
             mass=np.where(is_drop, drops, on_films * keys.liquid_density),
+            bridged=menisci.mass.copy() if menisci else nothing.copy(),
             heat=np.zeros(len(diameter)),
             saturated=np.zeros(len(diameter)),
         )
-        there = surfaces.mass.copy()
+        there = surfaces.mass.copy(), surfaces.bridged.copy()
         air = Air(keys.pressure, self.fluid.density, self.diffusivity, keys.rate == "stefan", keys.full_thickness)
-        evaporate(surfaces, air, step)
+        self._evaporate(surfaces, air, step)
         if vapour:
             _give(simulation, vapour, surfaces, begin, there, step)
-        lost = surfaces.mass
+        lost, of_bridges = surfaces.mass, surfaces.bridged
         particles.temperature[...] = surfaces.temperature
         self._remove(particles, lost, is_drop)
-        self.mass += float(self.communicator.sum(lost))
+        self.mass += float(self.communicator.sum(lost + of_bridges))
         self.heat += float(self.communicator.sum(surfaces.heat))
-        if "liquid" in particles:
-            volume = np.where(is_drop, 0.0, lost / keys.liquid_density)
+        if menisci:
+            energy, energies = menisci.lose(of_bridges), simulation.particle_solver.energies
+            if energies:
+                energies.add(DRIED, energy)
+            volume = np.where(is_drop, 0.0, lost / keys.liquid_density) + of_bridges / keys.liquid_density
             simulation.feature(LiquidOnParticles).evaporated += float(self.communicator.sum(volume))
+
+        if self.walls:
+            gone = self.walls.lose(self.fraction, keys.pressure, self.fluid.density, step)
+            self.mass += gone * keys.liquid_density
+            simulation.feature(LiquidOnParticles).evaporated += gone
 
     def _remove(self, particles: Any, lost: np.ndarray, is_drop: np.ndarray) -> None:
         """Take the mass [kg] from films, and from drops, which shrink."""
@@ -108,29 +138,43 @@ class EvaporationOfLiquid(CaseFeature):
 
     def checkpoint(self) -> dict[str, Any]:
         """What evaporated, and its heat."""
-        return {"mass": self.mass, "heat": self.heat}
+        kept: dict[str, Any] = {"mass": self.mass, "heat": self.heat}
+        return kept | {"walls": self.walls.checkpoint()} if self.walls else kept
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.mass, self.heat = float(state["mass"]), float(state["heat"])
+        if self.walls:
+            self.walls.restore(state["walls"])
 
 
 def _give(
-    simulation: Any, vapour: Vapour, surfaces: Surfaces, begin: np.ndarray, there: np.ndarray, step: float
+    simulation: Any,
+    vapour: Vapour,
+    surfaces: Surfaces,
+    begin: np.ndarray,
+    there: tuple[np.ndarray, np.ndarray],
+    step: float,
 ) -> None:
     """Give the vapour to the cells, which take it implicitly; surfaces then have what the cells took.
 
     begin  temperature of the surfaces before [K]
-    there  liquid that can evaporate [kg]
+    there  liquid that can evaporate, of films and of bridges [kg]
     """
+    mass = surfaces.mass + surfaces.bridged
     difference = surfaces.saturated - surfaces.fraction
     differs = np.abs(difference) > 1e-12
-    conductance = np.where(differs, surfaces.mass / step / np.where(differs, difference, 1.0), 0.0)
-    most = there / (step * np.maximum(surfaces.saturated, 1e-300))  # no more than there is, also into dry air
+    conductance = np.where(differs, mass / step / np.where(differs, difference, 1.0), 0.0)
+    most = (there[0] + there[1]) / (step * np.maximum(surfaces.saturated, 1e-300))  # not more, also into dry air
     conductance = np.maximum(np.minimum(conductance, most), 0.0)
-    latent = surfaces.heat / np.where(surfaces.mass == 0.0, 1.0, surfaces.mass)
-    surfaces.mass[...] = -vapour.exchange(simulation, conductance, surfaces.saturated, step)
-    surfaces.heat[...] = latent * surfaces.mass
+    latent = surfaces.heat / np.where(mass == 0.0, 1.0, mass)
+    taken = -vapour.exchange(simulation, conductance, surfaces.saturated, step)
+    # by their rates, as far as there is liquid
+    of_bridges = taken * np.where(mass == 0.0, 0.0, surfaces.bridged / np.where(mass == 0.0, 1.0, mass))
+    of_bridges = np.clip(of_bridges, taken - there[0], np.where(there[1] > 0.0, there[1], 0.0))
+    surfaces.bridged[...] = of_bridges
+    surfaces.mass[...] = taken - of_bridges
+    surfaces.heat[...] = latent * taken
     surfaces.temperature[...] = begin - surfaces.response * surfaces.heat / step
 
 
@@ -140,5 +184,11 @@ def evaporated_mass(simulation: Any) -> float:
 
 
 def latent_heat_taken(simulation: Any) -> float:
-    """Latent heat of the liquid that has evaporated."""
+    """Latent heat of the liquid that has evaporated, from the particles."""
     return float(simulation.feature(EvaporationOfLiquid).heat)
+
+
+def latent_heat_of_walls(simulation: Any) -> float:
+    """Latent heat of the liquid that has evaporated from walls, from the walls."""
+    walls = simulation.feature(EvaporationOfLiquid).walls
+    return float(walls.heat)

@@ -75,6 +75,13 @@ class Evaporation(FeatureTable):
         (), description="materials whose particles are drops of water, which shrink; others carry their [liquid]"
     )
 
+    wall_coefficient: NonNegative = Field(
+        0.0, description="coefficient of mass transfer of liquid on walls; 0: it does not evaporate [m/s]"
+    )
+    wall_temperature: Positive | None = Field(
+        None, description="temperature of liquid on walls, which give its latent heat; default: of the gas [K]"
+    )
+
     def refuse(self, case: Any) -> None:
         """Refuse vapour without heat, nothing that evaporates, and air above saturation."""
         heat = Heat.of(case)
@@ -93,6 +100,13 @@ class Evaporation(FeatureTable):
         if not self.drops and not case.liquid:
             remedy = "or name the materials of drops in evaporation.drops"
             raise InputError("evaporation", None, "left out without [liquid]", remedy)
+        if self.wall_coefficient > 0.0:
+            if not case.liquid or case.liquid.wall_share == 0.0:
+                limit = "0 where walls take no liquid"
+                raise InputError("evaporation.wall_coefficient", self.wall_coefficient, limit, "see liquid.wall_share")
+            if VapourTable.of(case):
+                remedy = "cells do not take the vapour of walls"
+                raise InputError("evaporation.wall_coefficient", self.wall_coefficient, "0 with [vapour]", remedy)
         saturated = saturation_pressure(heat.gas_temperature)
         if self.partial_pressure(case) > SATURATED * saturated:
             vapour = VapourTable.of(case)

@@ -7,7 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, serial
+from cfddem.backend.law_set import Slot
+from closures.bond import neck_area
 from closures.evaporation import (
     dilute_drive,
     latent_heat,
@@ -15,8 +18,10 @@ from closures.evaporation import (
     stefan_drive,
     vapour_fraction,
     vapour_pressure,
-    wet_share,
 )
+
+drying_share = Slot("drying_share")
+"""Rate of a particle over that of a wet surface: (volume, area, full_thickness, diameter, sherwood)."""
 
 CLOSEST = 1e-9
 """Difference up to which the temperature is known [K]."""
@@ -31,8 +36,10 @@ class Surfaces(NamedTuple):
     gas: np.ndarray  # temperature of the gas around [K]
     fraction: np.ndarray  # mass fraction of the vapour in the gas around [-]
     film: np.ndarray  # volume of liquid on the surface; infinite for a drop [m3]
+    menisci: np.ndarray  # area of the particle's part of its bridges [m2]
     response: np.ndarray  # cooling by a loss of 1 W over the step [K/W]
     mass: np.ndarray  # of liquid that is there; what evaporates is written, negative for vapour that condenses [kg]
+    bridged: np.ndarray  # the same of the particle's part of its bridges [kg]
     heat: np.ndarray  # latent heat of what evaporates; written [J]
     saturated: np.ndarray  # mass fraction of the vapour at the surface; written [-]
 
@@ -63,18 +70,32 @@ def drive(temperature, gas, fraction, air):
 
 
 @serial
+def meniscus_areas(volume, gap, reduced_radius, areas):
+    """Area of the free surface of every bridge, written (n,) [m2]."""
+    for k in range(len(areas)):
+        areas[k] = neck_area(volume[k], gap[k], reduced_radius[k])
+
+
+@serial
 def evaporate(surfaces, air, step):
-    """Let every surface evaporate over a step [s], at the temperature that it comes to: implicit.
+    """Let every surface evaporate over a step [s], at the temperature that it comes to: implicit. Films and bridges of
+    a particle are at its temperature, with the same transport per area.
 
     The new temperature solves T = T' - s L(T) m(T), where m falls with T: the root is between T' and what m(T') gives.
     """
     for i in range(len(surfaces.mass)):
         there, begin, diameter = surfaces.mass[i], surfaces.temperature[i], surfaces.diameter[i]
-        surfaces.mass[i] = surfaces.heat[i] = 0.0
-        share = wet_share(surfaces.film[i], math.pi * diameter**2, air.full_thickness)
-        if there <= 0.0 or share <= 0.0:
+        in_bridges, sherwood, film = surfaces.bridged[i], surfaces.sherwood[i], surfaces.film[i]
+        surfaces.mass[i] = surfaces.bridged[i] = surfaces.heat[i] = 0.0
+        area, share = math.pi * diameter**2, 1.0
+        if film < math.inf:
+            share = drying_share(film, area, air.full_thickness, diameter, sherwood) if film > 0.0 else 0.0
+        of_film = max(share, 0.0) * math.pi * diameter * sherwood * air.density * air.diffusivity
+        of_bridges = surfaces.menisci[i] / diameter * sherwood * air.density * air.diffusivity
+        of_film, of_bridges = of_film if there > 0.0 else 0.0, of_bridges if in_bridges > 0.0 else 0.0
+        transport = of_film + of_bridges
+        if transport <= 0.0:
             continue
-        transport = share * math.pi * diameter * surfaces.sherwood[i] * air.density * air.diffusivity
         slowness, gas, fraction = surfaces.response[i], surfaces.gas[i], surfaces.fraction[i]
         scale = slowness * transport
         low = begin
@@ -94,10 +115,12 @@ def evaporate(surfaces, air, step):
             else:
                 at_low *= 0.5
             high, at_high = middle, value
-        mass = step * transport * drive(middle, gas, fraction, air)
-        if mass > there:
-            mass = there
+        passing = step * drive(middle, gas, fraction, air)
+        surfaces.mass[i] = min(passing * of_film, there)
+        surfaces.bridged[i] = min(passing * of_bridges, in_bridges)
+        mass = surfaces.mass[i] + surfaces.bridged[i]
+        if mass < passing * transport:
             middle = begin - slowness * latent_heat(begin) * mass / step
-        surfaces.mass[i], surfaces.temperature[i] = mass, middle
+        surfaces.temperature[i] = middle
         surfaces.heat[i] = mass * latent_heat(middle)
         surfaces.saturated[i] = vapour_fraction(saturated(middle, air), air.pressure)

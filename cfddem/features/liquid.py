@@ -51,7 +51,8 @@ class LiquidOnParticles(CaseFeature):
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:
         """Where the liquid is, and what it joins."""
-        return MEASURES
+        bonds = (Measured("1", "measure", bond_count), Measured("1", "recorded", bonds_formed))
+        return (*MEASURES, *(bonds if case.liquid and case.liquid.bond else ()))
 
     def before_snapshot(self, simulation: Any) -> None:
         """Find the liquid that each particle carries, and its agglomerate."""
@@ -103,12 +104,19 @@ def _ids(solver: ParticleSolver) -> np.ndarray:
     return np.sort(solver.communicator.joined(particles.id[: particles.owned]))
 
 
-def _joined(solver: ParticleSolver) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places among `_ids` of the particles that each bridge between particles joins (n,), (n,), and its liquid [m3]."""
+def _joined(solver: ParticleSolver, bonds: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places among `_ids` of the particles that each bridge between particles joins (n,), (n,), and its liquid [m3].
+
+    bonds  whether solid bonds count, too, without liquid
+    """
     bridges, all_ids = solver.feature(Bridges), _ids(solver)
     bodies, volume = bridges.bodies.reshape(-1, 2), bridges.volume
     pairs = bodies[:, 1] >= 0
-    bodies, volume = solver.communicator.joined(bodies[pairs]), solver.communicator.joined(volume[pairs])
+    bodies, volume = bodies[pairs], volume[pairs]
+    if bonds:
+        solid = solver.edges.ends(solver.particles.id, bridges.bonds)
+        bodies, volume = np.concatenate([bodies, solid]), np.append(volume, np.zeros(len(solid)))
+    bodies, volume = solver.communicator.joined(bodies), solver.communicator.joined(volume)
     return np.searchsorted(all_ids, bodies[:, 0]), np.searchsorted(all_ids, bodies[:, 1]), volume
 
 
@@ -128,7 +136,7 @@ def _carried(solver: ParticleSolver) -> np.ndarray:
 def _fill_snapshot_fields(solver: ParticleSolver) -> None:
     """Find the `SNAPSHOT_FIELDS` of the particles of this rank."""
     particles, all_ids = solver.particles, _ids(solver)
-    first, second, _ = _joined(solver)
+    first, second, _ = _joined(solver, bonds=True)
     belongs = agglomerates(first, second, len(all_ids))
     lowest = np.full(len(all_ids), np.iinfo(np.int64).max)
     np.minimum.at(lowest, belongs, all_ids)
@@ -205,6 +213,17 @@ def bridge_count(simulation: Any) -> float:
     return float(_budget(simulation).bridges.count)
 
 
+def bond_count(simulation: Any) -> float:
+    """Number of solid bonds."""
+    bridges = _budget(simulation).bridges
+    return float(simulation.communicator.sum([len(bridges.bonds)]))
+
+
+def bonds_formed(simulation: Any) -> float:
+    """Number of solid bonds that have formed between the particles that are there."""
+    return float(_budget(simulation).bridges.bonds_formed)
+
+
 def bridges_per_particle(simulation: Any) -> float:
     """Mean number of bridges of a particle to other particles."""
     first, _, _ = _joined(simulation.particle_solver)
@@ -222,7 +241,7 @@ def largest_agglomerate(simulation: Any) -> float:
 
 
 def agglomerated_share(simulation: Any) -> float:
-    """Share of the particles that a bridge joins to another."""
+    """Share of the particles that a bridge or a bond joins to another."""
     return _sizes(simulation).joined
 
 
@@ -232,7 +251,7 @@ def _budget(simulation: Any) -> LiquidOnParticles:
 
 
 def _sizes(simulation: Any) -> AgglomerateSizes:
-    first, second, _ = _joined(simulation.particle_solver)
+    first, second, _ = _joined(simulation.particle_solver, bonds=True)
     return summary(first, second, len(_ids(simulation.particle_solver)))
 
 

@@ -21,7 +21,8 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Field
-from cfddem.particles.energy_of_bridges import BridgeEnergies
+from cfddem.particles.energy_of_bonds import BondEnergies
+from cfddem.particles.energy_of_bridges import DRIED, BridgeEnergies
 from cfddem.particles.energy_of_contacts import (
     CHANNELS,
     WALLS,
@@ -42,7 +43,7 @@ WORK_DISPLACEMENT = Field(
 )
 
 
-EVERY_CHANNEL = (*CHANNELS, *BridgeEnergies.channels, *ShearEnergies.channels)
+EVERY_CHANNEL = (*CHANNELS, *BridgeEnergies.channels, DRIED, *BondEnergies.channels, *ShearEnergies.channels)
 """Channels of a run that has everything."""
 
 
@@ -66,7 +67,8 @@ class Energies(ParticleFeature):
         if laws.film and laws.integrator != "drift":
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
         self._work, self._motion = specialise(count_work, engine.choices), specialise(count_motion, engine.choices)
-        present = {BridgeEnergies: engine.choices["BRIDGE"], ShearEnergies: laws.shears}
+        choices = engine.choices
+        present = {BridgeEnergies: choices["BRIDGE"], BondEnergies: choices["BOND"], ShearEnergies: laws.shears}
         self._accounts: list[EnergyAccount] = [each(engine) for each, counted in present.items() if counted]
         self.channels = (*CHANNELS, *(name for each in self._accounts for name in each.channels))
         self.totals = np.zeros(len(self.channels))
@@ -95,6 +97,10 @@ class Energies(ParticleFeature):
     def after(self, engine: Engine, step: float, last: bool, ended: int) -> None:
         """Count after a step [s]; `last` of an advance."""
         self._pass(engine, step, 0.5 * step, 0.0 if last else 0.5 * step)
+
+    def add(self, channel: str, energy: float) -> None:
+        """Add what something outside of the steps has taken from a channel [J]."""
+        self.totals[self.channels.index(channel)] += energy
 
     def before_exchange(self, engine: Engine) -> None:
         """Note the energy of the particles that are there."""

@@ -32,6 +32,9 @@ from cfddem.particles.walls.nearest_point import SURFACE, touched
 CHANNELS = ("bridge", "bridges_formed", "bridges_broken")
 """Energy lost to the resistance of bridges; energy gained where bridges form and lost where they break."""
 
+DRIED = "bridges_dried"
+"""Energy lost as bridges dry, of runs in which they do."""
+
 RESISTANCE, FORMED, BROKEN, BY_WALLS = range(4)
 
 
@@ -48,12 +51,14 @@ class BridgeCount(NamedTuple):
 class BridgeEnergies(EnergyAccount):
     """The energy account of the bridges of a particle engine.
 
-    channels  `CHANNELS`
+    channels  `CHANNELS`, and `DRIED` where bridges dry, which is counted as they do
     """
 
-    channels = CHANNELS
+    channels: tuple[str, ...] = CHANNELS
 
     def __init__(self, engine: Engine) -> None:
+        if engine.choices["DRYING"]:
+            self.channels = (*CHANNELS, DRIED)
         self._loop = specialise(_count_bridges, engine.choices)
         self.make_room(engine)
 
@@ -77,7 +82,9 @@ class BridgeEnergies(EnergyAccount):
         """Count at this instant."""
         done = self._sums(engine, step, before, after)
         done[RESISTANCE] -= contacts[BY_IMPULSES]
-        return done[[RESISTANCE, FORMED, BROKEN]], float(done[BY_WALLS])
+        counted = np.zeros(len(self.channels))
+        counted[:BY_WALLS] = done[:BY_WALLS]
+        return counted, float(done[BY_WALLS])
 
     def _sums(self, engine: Engine, step: float, before: float, after: float) -> np.ndarray:
         state = flat(self._state._replace(totals=None))._replace(totals=self._state.totals)  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ A step consists of these phases:
     walls                geometry of every particle and wall
     [halo: liquid for new bridges]
     bridges              those that form and break, and the pull of all
-    pairs                films, contacts and rolling of every edge
+    pairs                films, contacts, rolling and bonds of every edge
     sum                  force, torque and impulses of weak films of every particle over its own edges, in a fixed order
     kick                 the other half
 
@@ -28,6 +28,7 @@ import numpy as np
 
 from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
+from cfddem.particles.interactions.bond import bond_forces
 from cfddem.particles.interactions.bridge import renew_wall_bridges
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.bridge_reversal import reverse_films
@@ -38,6 +39,7 @@ from cfddem.particles.interactions.kinematics import wall_kinematics
 from cfddem.particles.interactions.pair_loops import edge_contact
 from cfddem.particles.interactions.slots import (
     ADHESIVE,
+    BOND,
     BRIDGE,
     BRIDGE_INERTIA,
     DRIFTING,
@@ -127,6 +129,8 @@ def find_forces(system, step):
             wall_contact(np.uint64(k), system, step)
     if FILM and not DRIFTING:
         add_film_forces(system)
+    if BOND:
+        bond_forces(system, step)
 
 
 @part

@@ -23,6 +23,7 @@ class Parameters(NamedTuple):
     rolling_damping: float  # of the rolling dashpot, over critical [-]
     contact: Any  # of the contact law, by the names that it has declared
     bridge: Any  # `BridgeNumbers` of the laws of liquid bridges; nothing without them
+    bond: Any  # `BondNumbers` of the bonds that dried bridges leave; nothing without them
     bridge_functions: Any  # of a user's functions of bridges, by their names
 
 

@@ -12,13 +12,18 @@ from cfddem.backend.compile import inline, serial
 from cfddem.backend.law_choice import called_by_name
 from cfddem.backend.law_set import specialise
 from cfddem.backend.named import named_arrays
+from cfddem.particles.interactions.bond import asperity_volume, stiffness_for_step
 from cfddem.particles.interactions.bridge import bridge_state
+from cfddem.particles.interactions.bridge_solution import held_gap
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.slots import (
+    BOND,
     BRIDGE,
     BRIDGE_PULL,
+    DRYING,
     FILM,
+    BridgeState,
     ContactState,
     bridge_pull,
     derive,
@@ -97,16 +102,29 @@ def _lightest_pairs(particles: Particles, table: np.ndarray) -> list[tuple[float
 
 
 @inline
+def _almost_dry(state, gap):
+    """The same bridge at a gap, with the least liquid of a bridge."""
+    volume = asperity_volume(state.reduced_radius, held_gap(state))
+    return BridgeState(
+        gap, state.film, volume, state.reduced_radius, state.minimum_gap,
+        state.viscosity, state.surface_tension, state.contact_angle, state.capillary_number, state.functions,
+    )  # fmt: skip
+
+
+@inline
 def _bridge_stiffness(k, gap, system):
     """Slope of the pull of the bridge of edge k over its gap, to one side [N/m]."""
     memory, p = system.memory, system.parameters
     radius, _ = pair_mass_and_radius(k, system)
     change = 1e-3 * memory.bridge_film[k]
     far = max(gap, change)
-    pulls = bridge_pull(bridge_state(k, far - change, radius, memory, p)) - bridge_pull(
-        bridge_state(k, far, radius, memory, p)
-    )
-    return abs(pulls) / change
+    near_state, far_state = bridge_state(k, far - change, radius, memory, p), bridge_state(k, far, radius, memory, p)
+    slope = abs(bridge_pull(near_state) - bridge_pull(far_state)) / change
+    if DRYING:  # the pull of a bridge that is almost dry ends within the asperities
+        floor = held_gap(near_state)
+        pulls = bridge_pull(_almost_dry(near_state, 0.0)) - bridge_pull(_almost_dry(near_state, 0.1 * floor))
+        slope = max(slope, abs(pulls) / (0.1 * floor))
+    return slope
 
 
 @serial
@@ -127,6 +145,10 @@ def _largest_rate(system, gap):
             stiffness[edges.first[k]] += stiff
             if k < edges.between_particles:
                 stiffness[edges.second[k]] += stiff
+        if BOND and k < edges.between_particles:
+            stiff = stiffness_for_step(k, system)
+            stiffness[edges.first[k]] += stiff
+            stiffness[edges.second[k]] += stiff
         separated = memory.minimum_gap[k] if FILM else 0.0
         overlap = separated - gap[k]
         if overlap <= 0.0:

@@ -12,18 +12,21 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Jet
 from cfddem.case.column_grid import grid_of, open_floor
+from cfddem.case.liquid import Bond
 from cfddem.case.materials import pair_overrides
 from cfddem.case.particle_properties import SPECIES
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.moving_walls import case_walls
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.ghosts import Slabs
+from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
@@ -209,7 +212,17 @@ def bridge_laws_of(case: Case) -> BridgeLaws | None:
         film_density=liquid.film_density,
         wall_film=liquid.wall_thickness,
         wall_patch=case.bed.diameter if liquid.wall_share > 0.0 else 0.0,
+        dries=Evaporation.of(case) is not None,
+        bond=_bond_of(liquid.bond),
     )
+
+
+def _bond_of(bond: Bond | None) -> BondLaw | None:
+    """Law of the solid bonds of dry bridges; None if these break."""
+    if bond is None:
+        return None
+    given = bond.model_dump()
+    return BondLaw(**given | {"shear_strength": bond.shear_strength or bond.tensile_strength})
 
 
 def _domain(case: Case) -> tuple[tuple[float, float, float], tuple[float, float, float]]:

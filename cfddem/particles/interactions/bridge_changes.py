@@ -13,6 +13,7 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange, serial
 from cfddem.particles.collision_events import move_event
+from cfddem.particles.interactions.bond import SMALLEST_GAP, dried, form_bonds, forms_bond, thinnest_film
 from cfddem.particles.interactions.bridge import (
     FLAT,
     bridge_state,
@@ -21,10 +22,11 @@ from cfddem.particles.interactions.bridge import (
     renew_bridge,
     renew_resistance,
 )
-from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
 from cfddem.particles.interactions.slots import (
+    BOND,
     BRIDGE_INERTIA,
+    DRYING,
     RECORD,
     WALL_LIQUID,
     WALLS,
@@ -112,6 +114,8 @@ def return_liquid(system):
     if WALLS and WALL_LIQUID:
         transfer_wall_liquid(system)
     transfer_liquid(system)
+    if BOND:
+        form_bonds(system)
     clear_bridges(system.edges, system.memory)
 
 
@@ -122,10 +126,16 @@ def _change(k, gap, film, system):
     film  thickness of the liquid on both bodies [m]
     """
     memory = system.memory
+    thinnest, reduced_radius = SMALLEST_GAP, 1.0
+    if DRYING:
+        reduced_radius, _ = pair_mass_and_radius(k, system)
+        thinnest = max(thinnest, thinnest_film(reduced_radius, system.parameters.bridge.minimum_gap))
     if memory.bridge_film[k] > 0.0:
         parted = gap > memory.bridge_film[k] and gap > longest_gap(k, system)
+        if DRYING:
+            parted = parted or dried(k, reduced_radius, memory)
         return -1 if parted else 0
-    return 1 if film > SMALLEST_GAP and gap < film else 0  # dry solids overlap without a bridge
+    return 1 if film > thinnest and gap < film else 0  # dry solids overlap without a bridge
 
 
 @part
@@ -199,6 +209,8 @@ def _move_bridge(memory, k, to):
     memory.bridge_film[to], memory.bridge_volume[to] = memory.bridge_film[k], memory.bridge_volume[k]
     memory.bridge_gap[to], memory.bridge_solved[to] = memory.bridge_gap[k], memory.bridge_solved[k]
     memory.closed_along[to], memory.closed_across[to] = memory.closed_along[k], memory.closed_across[k]
+    if BOND:
+        memory.bridge_solid[to] = memory.bridge_solid[k]
     if BRIDGE_INERTIA:
         memory.bridge_impact_speed[to] = memory.bridge_impact_speed[k]
     put(memory.bridge_impulse, to, at(memory.bridge_impulse, k))
@@ -272,6 +284,8 @@ def _fill(k, system):
     glass = glass_transition(n.viscosity, approach, n.transition_pressure, reduced_radius, film)
     memory.bridge_volume[k], memory.bridge_film[k] = volume, film
     memory.bridge_gap[k] = max(glass, n.minimum_gap)
+    if BOND:
+        memory.bridge_solid[k] = p.bond.solid_fraction * volume
     find_closed(k, reduced_radius, memory, p)
     if k < edges.between_particles:
         renew_bridge(k, system)
@@ -290,7 +304,7 @@ def transfer_liquid(system):
 def _transfer(i, system):
     """See `transfer_liquid`, for particle i."""
     particles, edges, memory = system.particles, system.edges, system.memory
-    drawn, returned, formed, broken = 0.0, 0.0, 0, 0
+    drawn, returned, formed, broken, bonds = 0.0, 0.0, 0, 0, 0
     for place in range(edges.start[i], edges.start[i + 1]):
         k, sign = edge_role(edges.incident[place])
         change = memory.bridge_change[k]
@@ -300,11 +314,15 @@ def _transfer(i, system):
         elif change < 0:
             returned += _part_returned(k, sign, system)
             broken += 1 if sign > 0.0 else 0
+            if BOND:
+                bonds += 1 if sign > 0.0 and forms_bond(k, system) else 0
     if drawn > 0.0 or returned > 0.0:
         particles.liquid[i] = max(particles.liquid[i] - particles.liquid_supply[i] * drawn, 0.0) + returned
         find_thickness(i, particles)
     particles.bridges_formed[i] += formed
     particles.bridges_broken[i] += broken
+    if BOND:
+        particles.bonds_formed[i] += bonds
 
 
 @inline

@@ -16,6 +16,8 @@ from cfddem.backend.law_set import adapted, check_compiles
 from cfddem.backend.named import can_be_named
 from cfddem.data.fields import Field
 from cfddem.particles.collision_events import COLLISION_FIELDS, WET_COLLISION_FIELDS, WET_FIELDS
+from cfddem.particles.interactions import bond as solid_bond
+from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge import FIELDS, INERTIA_FIELDS, PARTICLE_FIELDS
 from cfddem.particles.interactions.slots import BridgeState
 from cfddem.particles.system import numbers
@@ -206,6 +208,8 @@ class BridgeLaws:
                          take no liquid [-]
     wall_film            thickness of the liquid on the walls at the start [m]
     wall_patch           edge of the patches of wall whose liquid is counted, for instance a particle diameter [m]
+    dries                bridges lose water to evaporation, and break where none is left
+    bond                 what dry bridges between particles leave; nothing if not given
     parameters           numbers of a user's functions, by name: another value compiles nothing anew
     """
 
@@ -226,6 +230,8 @@ class BridgeLaws:
     wall_patch: float = 0.0
     film_density: float = 0.0
     wall_contact_angle: float | None = None
+    dries: bool = False
+    bond: BondLaw | None = None
     parameters: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def check(self) -> None:
@@ -238,6 +244,10 @@ class BridgeLaws:
                 raise InputError(name, angle, "0 to pi")
         if not self.transition_pressure > 0.0:
             raise InputError("transition_pressure", self.transition_pressure, "above 0")
+        if self.bond is not None:
+            self.bond.check()
+            if not self.dries:
+                raise InputError("bond", None, "left out where bridges do not dry", "take dries=True")
         if not 0.0 <= self.wall_share <= 1.0:
             raise InputError("wall_share", self.wall_share, "0 to 1")
         if self.wall_share == 0.0 and self.wall_film > 0.0:
@@ -264,15 +274,30 @@ class BridgeLaws:
         for name, function in self._functions().items():
             check_compiles(f"laws.bridge.{name}", function)
 
-    particle_fields = PARTICLE_FIELDS
     collision_memory, collision_fields = WET_FIELDS, WET_COLLISION_FIELDS
-    kept_apart = frozenset(each.name for each in (*FIELDS, *INERTIA_FIELDS))
-    pulling = ("bridge_film", "bridge_volume", "bridge_gap")
+    kept_apart = frozenset(each.name for each in (*FIELDS, *INERTIA_FIELDS, *solid_bond.FIELDS))
+
+    @property
+    def particle_fields(self) -> tuple[Field, ...]:
+        """What particles remember."""
+        return (*PARTICLE_FIELDS, *(solid_bond.PARTICLE_FIELDS if self.bond else ()))
 
     @property
     def fields(self) -> tuple[Field, ...]:
         """What pairs remember of their bridges."""
-        return (*FIELDS, *(INERTIA_FIELDS if self.film_density > 0.0 else ()))
+        bonds = solid_bond.FIELDS if self.bond else ()
+        return (*FIELDS, *(INERTIA_FIELDS if self.film_density > 0.0 else ()), *bonds)
+
+    @property
+    def pulling(self) -> tuple[str, ...]:
+        """Fields of pairs on which pull and stiffness depend."""
+        bonds = ("bridge_solid", "bond_radius") if self.bond else ()
+        return ("bridge_film", "bridge_volume", "bridge_gap", *bonds)
+
+    @property
+    def bond_numbers(self) -> Any:
+        """The numbers of bonds."""
+        return self.bond.numbers if self.bond else numbers({})
 
     @property
     def slides(self) -> bool:
@@ -299,6 +324,8 @@ class BridgeLaws:
         of_angles = {name: name for name in ("contact_angle", "other_contact_angle")}
         made: dict[str, Any] = {
             "BRIDGE": True,
+            "DRYING": self.dries,
+            "BOND": self.bond is not None,
             "CUT_CONSTANT": self.cut == "constant",
             "WALL_LIQUID": self.wall_share > 0.0,
         }
@@ -362,13 +389,15 @@ class NoBridges:
     resists = slides = False
     parameters: Mapping[str, float] = {}
     numbers = numbers({})
+    bond_numbers = numbers
 
     def check(self) -> None:
         """Nothing can be wrong."""
 
     def choices(self) -> dict[str, Any]:
         """What a run without liquid puts into the slots of the loops."""
-        return dict.fromkeys(("BRIDGE", "BRIDGE_FILM", "BRIDGE_INERTIA", "BRIDGE_SLIDING"), False)
+        absent = ("BRIDGE", "BRIDGE_FILM", "BRIDGE_INERTIA", "BRIDGE_SLIDING", "DRYING", "BOND")
+        return dict.fromkeys(absent, False)
 
 
 NO_BRIDGES = NoBridges()

@@ -11,9 +11,10 @@ from collections import namedtuple
 import numpy as np
 
 from cfddem.backend.compile import inline
+from cfddem.particles.interactions.bond import SMALLEST_GAP, dried, thinnest_film
 from cfddem.particles.interactions.bridge import bridge_state
-from cfddem.particles.interactions.bridge_solution import SMALLEST_GAP, held_gap
-from cfddem.particles.interactions.slots import BRIDGE_PULL, bridge_pull
+from cfddem.particles.interactions.bridge_solution import held_gap
+from cfddem.particles.interactions.slots import BRIDGE_PULL, DRYING, bridge_pull
 from cfddem.particles.pair_graph import of_two_spheres
 from cfddem.particles.vectors import at, put, times
 
@@ -43,9 +44,14 @@ def pair_bridge(n, system):
     film = particles.film_thickness[i] + particles.film_thickness[j]
     bridged = memory.bridge_film[k] > 0.0
     closed = gap < held_gap(state)
-    forms = (not bridged) & (film > SMALLEST_GAP) & (gap < film)  # dry solids overlap without a bridge
+    thinnest = SMALLEST_GAP
+    if DRYING:
+        thinnest = max(thinnest, thinnest_film(reduced_radius, p.bridge.minimum_gap))
+    forms = (not bridged) & (film > thinnest) & (gap < film)  # dry solids overlap without a bridge
     memory.bridge_change[k] = 1 if forms else 0
     memory.bridge_open[k] = bridged & (not closed)
+    if DRYING:
+        memory.bridge_open[k] = bridged & ((not closed) | dried(k, reduced_radius, memory))
     memory.bridge_resistance[k] = memory.closed_along[k] + memory.closed_across[k] if bridged & closed else 0.0
     if BRIDGE_PULL:
         pull = bridge_pull(state)

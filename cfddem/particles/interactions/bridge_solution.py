@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from cfddem.backend.compile import inline
+from cfddem.particles.interactions.bond import SMALLEST_GAP
 from cfddem.particles.interactions.newton import next_guess
 from cfddem.particles.interactions.slots import (
     BRIDGE_ENERGY,
@@ -18,9 +19,6 @@ from cfddem.particles.interactions.slots import (
     bridge_pull,
     bridge_resistance,
 )
-
-SMALLEST_GAP = 1e-9
-"""Gap below which the resistance of a bridge is cut if nothing else limits it; thinner films form no bridge [m]."""
 
 SHORT = 0.05
 """Change of the gap up to which Gauss' rule of three points is used, over the gap: it integrates A/h to 1e-11."""

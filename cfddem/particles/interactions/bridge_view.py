@@ -13,11 +13,14 @@ from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.particles.agglomerates import agglomerates
-from cfddem.particles.interactions.bridge import thickness_of_films
+from cfddem.particles.interactions.bridge import bridge_state, find_closed, thickness_of_films
 from cfddem.particles.interactions.bridge_changes import longest_gap, mark_bodies, return_liquid
 from cfddem.particles.interactions.bridge_law import BridgeLaws
+from cfddem.particles.interactions.bridge_solution import pull_energy
+from cfddem.particles.interactions.kinematics import pair_mass_and_radius
+from cfddem.particles.interactions.slots import BRIDGE_PULL
 from cfddem.particles.interactions.wall_liquid import gained_by_walls, with_room
-from cfddem.particles.pair_graph import Edges
+from cfddem.particles.pair_graph import Edges, geometry
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.nearest_point import Walls
@@ -52,6 +55,19 @@ class Bridges(ParticleFeature):
     def bodies(self) -> np.ndarray:
         """Ids of the bodies of every bridge, -1 - w for piece w of the walls (n, 2)."""
         return self._solver.edges.ends(self._solver.particles.id, self.edges)
+
+    @property
+    def bonds(self) -> np.ndarray:
+        """Rows of the edges that have a solid bond (n,)."""
+        edges = self._solver.edges
+        if not self._laws.bond:
+            return np.zeros(0, np.int64)
+        return np.flatnonzero((edges.bond_radius > 0.0) & (edges.first < self._solver.particles.owned))
+
+    @property
+    def bonds_formed(self) -> int:
+        """Number of solid bonds that have formed between the particles that are there."""
+        return self._sum("bonds_formed") if self._laws.bond else 0
 
     @property
     def volume(self) -> np.ndarray:
@@ -97,9 +113,9 @@ class Bridges(ParticleFeature):
 
     @property
     def agglomerates(self) -> np.ndarray:
-        """Number of the agglomerate of each particle: particles joined by bridges (N,), by row."""
+        """Number of the agglomerate of each particle: particles joined by bridges and bonds (N,), by row."""
         edges, count = self._solver.edges, self._solver.particles.count
-        joined = self.edges[self.edges < edges.between_particles]
+        joined = np.append(self.edges[self.edges < edges.between_particles], self.bonds)
         return agglomerates(edges.first[joined].astype(np.int64), edges.second[joined].astype(np.int64), count)
 
     def gaps(self) -> tuple[np.ndarray, np.ndarray]:
@@ -109,6 +125,15 @@ class Bridges(ParticleFeature):
         specialise(_longest, solver.choices)(rows, solver.system, longest)
         gap = solver.gap[rows]
         return gap, longest - gap
+
+    def dry(self, rows: np.ndarray, lost: np.ndarray) -> float:
+        """Let bridges lose water; those that have none left break with the next step.
+
+        rows     of their edges, also of those whose first body another process owns (n,)
+        lost     volume (n,), below 0 where vapour condenses [m3]
+        returns  energy of the pulls that is gone, of bridges whose first body this process owns [J]
+        """
+        return float(specialise(_dry, self._solver.choices)(rows, lost, self._solver.system))
 
     def checkpoint(self) -> dict[str, Any]:
         """What the fields of particles do not tell."""
@@ -147,7 +172,10 @@ class Bridges(ParticleFeature):
         edges: Edges | None = getattr(engine, "edges", None)
         longest = np.zeros(0)
         if edges is not None and len(edges.first):
-            rows = np.flatnonzero(edges.bridge_film > 0.0)
+            joined = edges.bridge_film > 0.0
+            if self._laws.bond:
+                joined |= edges.bond_radius > 0.0
+            rows = np.flatnonzero(joined)
             at_wall = rows >= edges.between_particles
             first, second = edges.first[rows], edges.second[rows]
             np.add.at(most, first, edges.bridge_volume[rows])
@@ -193,3 +221,22 @@ def _longest(rows, system, longest):
 def _break(system):
     mark_bodies(system)
     return_liquid(system)
+
+
+@serial
+def _dry(rows, lost, system):
+    """See `Bridges.dry`; returns the energy of the pulls that is gone [J]."""
+    memory, p, edges, energy = system.memory, system.parameters, system.edges, 0.0
+    for n in range(len(rows)):
+        k = rows[n]
+        _, _, gap = geometry(k, system)
+        reduced_radius, _ = pair_mass_and_radius(k, system)
+        owned = edges.first[k] < system.particles.owned
+        if BRIDGE_PULL and owned:
+            energy += pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
+        left = memory.bridge_volume[k] - lost[n]
+        memory.bridge_volume[k] = left if left > 1e-12 * memory.bridge_volume[k] else 0.0
+        find_closed(k, reduced_radius, memory, p)
+        if BRIDGE_PULL and owned:
+            energy -= pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
+    return energy

@@ -11,7 +11,7 @@ from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import adapted, check_compiles, written
 from cfddem.backend.named import NAMES, can_be_named
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
-from cfddem.particles.interactions import bridge, contact, film, rolling, shear_film
+from cfddem.particles.interactions import bond, bridge, contact, film, rolling, shear_film
 from cfddem.particles.interactions.contact_law import COLUMNS, ContactLaw, Function
 from cfddem.particles.interactions.slots import ContactState
 from cfddem.particles.pair_graph import Graph
@@ -22,7 +22,7 @@ TAKEN = {
     each.name
     for each in (*contact.FIELDS, *film.FIELDS, film.OUTSIDE, *shear_film.FIELDS, *rolling.FIELDS, *RECORD_FIELDS)
 }
-TAKEN |= {each.name for each in bridge.FIELDS} | set(Graph._fields)
+TAKEN |= {each.name for each in (*bridge.FIELDS, *bond.FIELDS)} | set(Graph._fields)
 """Names of the built-in fields of pairs."""
 
 

@@ -156,6 +156,7 @@ class Laws(NamedTuple):
             rolling_damping=float(self.rolling_damping),
             contact=numbers(self.contact_law.parameters),
             bridge=self.bridges.numbers,
+            bond=self.bridges.bond_numbers,
             bridge_functions=numbers(self.bridges.parameters),
         )
 

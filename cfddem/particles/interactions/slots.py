@@ -114,6 +114,8 @@ film_outside = Slot("film_outside")
 
 BRIDGE = Slot("BRIDGE")  # bodies carry liquid, which forms bridges
 BRIDGE_RESISTS = Slot("BRIDGE_RESISTS")  # bridges resist along the line of centres or across it
+DRYING = Slot("DRYING")  # bridges lose water, and break where none is left
+BOND = Slot("BOND")  # and leave solid bonds
 BRIDGE_FILM = Slot("BRIDGE_FILM")  # bridges resist along the line of centres
 BRIDGE_INERTIA = Slot("BRIDGE_INERTIA")  # films of bridges are reversed with the bodies at contact
 BRIDGE_SLIDING = Slot("BRIDGE_SLIDING")  # bridges resist across it
