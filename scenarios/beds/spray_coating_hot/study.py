@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cfddem.analysis.defluidisation import Defluidisation, defluidisation_of
 from cfddem.analysis.drying import DryingRates, drying_rates
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
@@ -36,10 +35,9 @@ class Coated:
     evaporated_share: float  # of the water that landed
     lowest: float  # temperature of the coldest bead [K]
     highest: float  # [K]
-    granular_temperature: float  # mean in the window [m2/s2]
+    granular_temperature: float  # mean in the window; tells whether the bed moves [m2/s2]
     carried: float  # pressure drop over the weight of the beads, mean in the window
     rates: DryingRates
-    defluidised: Defluidisation | None
 
 
 def case(cold: bool = False) -> Case:
@@ -64,7 +62,6 @@ def coated(run: RunData) -> Coated:
         granular_temperature=float(history["granular_temperature"][inside].mean()),
         carried=float(history["pressure_drop"][inside].mean()) / weight,
         rates=rates,
-        defluidised=defluidisation_of(run, described),
     )
 
 
