@@ -1,11 +1,16 @@
 """Spray coating in hot air and in cold air: whether the bed dries as fast as it is wetted, or loses its fluidisation.
 
 Both runs have the same beads, nozzle, spray and volume flow of air. Nothing is fitted.
+
+`python -m scenarios.beds.spray_coating_hot.study FOLDER` runs the case with cold air; with a third word, the liquid at
+the start over the volume of the beads, for 0.8 s.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +18,7 @@ from cfddem.analysis.drying import DryingRates, drying_rates
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
+from cfddem.run.runner import Run
 
 ROOM = 293.15
 """Temperature of the room, from which the air comes [K]."""
@@ -40,9 +46,15 @@ class Coated:
     rates: DryingRates
 
 
-def case(cold: bool = False) -> Case:
-    """The case of the gallery, or the same with air that is not heated."""
-    return Case.from_toml(gallery_files()["spray-coating-hot"], COLD if cold else {})
+def case(cold: bool = False, moisture: float = 0.0) -> Case:
+    """The case of the gallery, or the same with air that is not heated.
+
+    moisture  liquid at the start over the volume of the beads; if it is above 0, the run is short
+    """
+    changes = dict(COLD) if cold else {}
+    if moisture > 0.0:
+        changes |= {"liquid.liquid_fraction": moisture, "run.until": 0.8, "run.average_from": 0.6}
+    return Case.from_toml(gallery_files()["spray-coating-hot"], changes)
 
 
 def coated(run: RunData) -> Coated:
@@ -69,3 +81,7 @@ def moisture(run: RunData) -> np.ndarray:
     """Liquid on beads and in bridges over the volume of the beads, in time (n,)."""
     history, described = run.history, Case.from_text(run.case_text)
     return np.asarray((history["liquid_on_particles"] + history["liquid_in_bridges"]) / sum(described.volumes.values()))
+
+
+if __name__ == "__main__":
+    Run.begin(case(True, *map(float, sys.argv[2:3])), Path(sys.argv[1])).go()
