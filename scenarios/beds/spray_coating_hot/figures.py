@@ -15,7 +15,7 @@ from scenarios.beds.spray_coating_hot.study import coated, moisture
 
 def figure(hot: Path, cold: Path, output: Path) -> None:
     """Moisture, motion and temperature of the beads of both runs in time."""
-    drawn, axes = panels(3, width=10.0, height=3.4)
+    drawn, axes = panels(3, width=11.0, height=3.6)
     for folder, colour, name in ((hot, ORANGE, "hot air"), (cold, BLUE, "cold air")):
         run = open_run(folder)
         time, history = run.history["time"], run.history
@@ -26,7 +26,7 @@ def figure(hot: Path, cold: Path, output: Path) -> None:
         print(f"{name}: {coated(run)}")
     label(axes[0], "time", "s", "liquid over solid volume", "%")
     label(axes[1], "time", "s", "granular temperature", "m2/s2")
-    label(axes[2], "time", "s", "temperature; dashed: air that leaves", "C")
+    label(axes[2], "time", "s", "temperature, dashed: outlet", "C")
     legend(axes[0], loc="upper left")
     save(drawn, output)
 
