@@ -16,7 +16,7 @@ from cfddem.case.schema import Case
 
 SHARE = 5
 """The plain test takes a fifth of the particles."""
-OWN_LAWS = {name: pytest.param(name, marks=pytest.mark.slow) for name in ("lubrication-study",)}
+OWN_LAWS = {name: pytest.param(name, marks=pytest.mark.slow) for name in ("lubrication-study", "spray-coating-hot")}
 """Cases whose laws no other test compiles."""
 
 
