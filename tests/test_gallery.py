@@ -16,7 +16,10 @@ from cfddem.case.schema import Case
 
 SHARE = 5
 """The plain test takes a fifth of the particles."""
-OWN_LAWS = {name: pytest.param(name, marks=pytest.mark.slow) for name in ("lubrication-study", "drying-bed")}
+OWN_LAWS = {
+    name: pytest.param(name, marks=pytest.mark.slow)
+    for name in ("lubrication-study", "drying-bed", "spray-coating-hot")
+}
 """Cases whose laws no other test compiles."""
 
 

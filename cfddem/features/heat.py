@@ -69,9 +69,10 @@ class HeatExchange(CaseFeature):
                 keys.effective_conductivity,
             )  # fmt: skip
             self.cells = Scalar(fluid, kind, keys.sides_of(case))
-            self.transfer = Transfer(kernel, "temperature", RECEIVED, self.capacity)
+            self.transfer = Transfer(kernel, "temperature", RECEIVED, lambda particles: self._capacity)
             if keys.buoyancy != "none":
                 fluid.body_forces.append(lambda: self.buoyancy(fluid))
+        self._capacity = self.capacity(simulation.owned)
         self.start = self.stored(simulation.owned)
         self.scale, self.other, self.last, self.sprayed = 0.0, 0.0, self.start, 0.0
         self.around, self.response = np.full(simulation.owned.count, self.fluid_temperature), np.zeros(0)
@@ -122,8 +123,11 @@ class HeatExchange(CaseFeature):
 
     def stored(self, particles: Any) -> float:
         """Heat in all particles, above the temperature of new ones [J]."""
+        return self._held(particles, self.capacity(particles))
+
+    def _held(self, particles: Any, capacity: np.ndarray) -> float:
         above = particles.temperature - self.keys.particle_temperature
-        return float(self.communicator.sum(self.capacity(particles) * above))
+        return float(self.communicator.sum(capacity * above))
 
     def buoyancy(self, fluid: FluidSolver) -> np.ndarray:
         """Weight that warm fluid lacks, per volume of the cell (nz, ny, nx, 3) [N/m3]."""
@@ -151,8 +155,9 @@ class HeatExchange(CaseFeature):
     def before(self, simulation: Any, step: float) -> None:
         """Exchange heat over the step [s], at the slip of the coupling."""
         particles, total = simulation.owned, self.communicator.sum
-        self.other += self.stored(particles) - self.last
-        capacity, terms = self.capacity(particles), simulation.terms
+        self._capacity = capacity = self.capacity(particles)  # of the whole step
+        self.other += self._held(particles, capacity) - self.last
+        terms = simulation.terms
         if self.cells is None:
             received = self._from_uniform(particles, capacity, self.conductance(terms), step)
         else:
@@ -161,7 +166,7 @@ class HeatExchange(CaseFeature):
         self.given += float(total(received))
         self.scale += float(total(np.abs(received)))
         particles.temperature += received / capacity
-        self.last = self.stored(particles)
+        self.last = self._held(particles, capacity)
 
     def _from_uniform(self, particles: Any, capacity: np.ndarray, conductance: np.ndarray, step: float) -> np.ndarray:
         """Heat that every particle receives from a fluid of one temperature (N,) [J]."""
