@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import sys
 import textwrap
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.errors import InputError
 from cfddem.cli.cases import CASE, SET, print_warnings
 from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation
 from cfddem.preflight.issue import WIDTH
+
+if TYPE_CHECKING:
+    from cfddem.studies.calibration import Calibration, Trial
+
+COLLIDE = "material of measured collisions, instead of a case: delrin, glass, steel_smooth or steel_rough"
 
 
 def calibrate(
@@ -23,6 +30,7 @@ def calibrate(
         list[Path] | None,
         Parameter(help="CSV file of measured points with errors, beside those of the case", negative=""),
     ] = None,
+    collide: Annotated[str | None, Parameter(help=COLLIDE)] = None,
     trials: Annotated[int, Parameter(help="number of runs, with those of earlier calls")] = 30,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
@@ -34,20 +42,18 @@ def calibrate(
     After a stop, the same command continues. Trials that fail are recorded, and the search goes on.
     Exit code: 3 if every trial fails.
 
-    The data need a column of errors. See the page "Calibration".
+    With --collide the data are collisions of two spheres or a sphere and a wall; keys are values of the material and
+    options of the command collide. The data need a column of errors. See the page "Calibration".
 
     Example: cfddem calibrate box.toml --match measured.csv --vary material.glass.restitution=0.6..1
     """
     from cfddem.case.gallery import find_case, overrides
     from cfddem.case.schema import Case
     from cfddem.preflight.summary import preflight
-    from cfddem.studies.calibration import Trial
     from cfddem.studies.calibration import calibrate as search
+    from cfddem.studies.calibration import write_results
     from cfddem.studies.samples import variables
-
-    path = find_case(case)
-    print_warnings(preflight(Case.from_toml(path, overrides(set or []))))
-    folder = output or Path(f"{path.stem}-calibration")
+    from cfddem.studies.sweep import make_output
 
     def progress(trial: Trial) -> None:
         values = ", ".join(f"{key.split('.')[-1]} {value:.4g}" for key, value in trial.values.items())
@@ -56,10 +62,40 @@ def calibrate(
 
     if jobs == 1 and not json:
         announce_compilation()
+    if collide is not None:
+        if case is not None or jobs != 1:
+            raise InputError("--collide", collide, "used without a case and without --jobs")
+        folder = output or Path("collide-calibration")
+        made = _of_collisions(collide, match or (), vary, set or (), trials, progress)
+        make_output(folder)
+        write_results(made, folder)
+        _print(made, folder, json)
+        return
+    path = find_case(case)
+    print_warnings(preflight(Case.from_toml(path, overrides(set or []))))
+    folder = output or Path(f"{path.stem}-calibration")
+
     found = search(
         path, match or (), variables(vary), folder, trials=trials, jobs=jobs, overrides=overrides(set or []),
         progress=progress,
     )  # fmt: skip
+    _print(found, folder, json)
+
+
+def _of_collisions(
+    material: str, match: Sequence[Path], vary: Sequence[str], given: Sequence[str], trials: int,
+    progress: Callable[[Trial], None],
+) -> Calibration:  # fmt: skip
+    """The calibration of collisions."""
+    from cfddem.studies.samples import variables
+    from scenarios.collisions.immersed_pair.calibration import fit, key_of, settings
+
+    varied = variables(vary, key_of)
+    return fit(material, match, varied, settings(given), trials=trials, progress=progress)
+
+
+def _print(found: Calibration, folder: Path, json: bool) -> None:
+    """Print a result; ends with code 3 where every trial has failed."""
     if json:
         print_json("calibrate", {"folder": folder, **found.summary()})
     else:

@@ -25,6 +25,9 @@ SHOWN = ("bed_height", "bed_voidage", "pressure_drop")
 VELOCITY = "bed.inlet_velocity"
 """Key of a sweep beside which measured curves are drawn."""
 
+OF_COLLISIONS = {"stokes": "-", "angle": "deg"}
+"""What collisions were measured against, and its unit."""
+
 MOST_LABELLED = 8
 """Largest number of curves with a legend."""
 
@@ -239,7 +242,9 @@ def _series(panel: Axes, found: Found, data: Points, part: slice) -> None:
     panel.plot(data.place, found.best.computed[part], color=BLUE, marker=".", label="best trial")
     style: dict[str, Any] = {"fmt": "o", "color": ORANGE, "capsize": 2.5, "zorder": 3}
     panel.errorbar(data.place, data.value, yerr=data.error, label="measured", **style)
-    axis = (data.against.replace("_", " "), ABSCISSAE[data.against])
+    axis = (data.against.replace("_", " "), (ABSCISSAE | OF_COLLISIONS)[data.against])
+    if data.against == "stokes":
+        panel.set_xscale("log")
     label(panel, *axis, data.quantity.replace("_", " "), shown_unit(data.unit))
 
 

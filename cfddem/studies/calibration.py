@@ -173,7 +173,7 @@ def calibrate(
             if outcome.status == "stopped":
                 raise RunStopped("calibration stopped; the same command continues it", signal.SIGINT)
             progress(search.tell(number, outcome, _computed(outcome, case, data)))
-    found = Calibration(tuple(varied), tuple(data), tuple(search.done), _response(varied, data, search.done))
+    found = Calibration(tuple(varied), tuple(data), tuple(search.done), response_of(varied, data, search.done))
     write_results(found, output)
     return found
 
@@ -245,7 +245,7 @@ class _Search:
         """Fix the values of the trial at a place: a sample first, then each second one at the best of the fit."""
         if place < len(self.first):
             shares = self.first[place]
-        elif place % 2 and (found := _response(self.varied, self.data, self.done)) is not None:
+        elif place % 2 and (found := response_of(self.varied, self.data, self.done)) is not None:
             spread = np.random.default_rng(place).normal(size=len(found.best))
             shares = (found.best + 0.5 * found.error * spread).clip(0.0, 1.0)
         else:
@@ -330,7 +330,8 @@ def _joined(data: Sequence[Points]) -> tuple[Array, Array, Array]:
     )  # fmt: skip
 
 
-def _response(varied: Sequence[Variable], data: Sequence[Points], done: Sequence[Trial]) -> Response | None:
+def response_of(varied: Sequence[Variable], data: Sequence[Points], done: Sequence[Trial]) -> Response | None:
+    """The response of a model to its keys, by the trials with a value; None with too few of them."""
     if not (good := [each for each in done if each.computed]):
         return None
     shares = np.array([[each.share(trial.values[each.key]) for each in varied] for trial in good])

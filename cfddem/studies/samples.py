@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,9 +52,10 @@ class Variable(NamedTuple):
         return (value - self.low) / (self.high - self.low)
 
 
-def variables(given: Sequence[str]) -> list[Variable]:
+def variables(given: Sequence[str], key_of: Callable[[str], str] = full_key) -> list[Variable]:
     """Keys and ranges from texts such as `friction=0.1..0.5` and `viscosity=1e-4..1e-2 log`.
 
+    key_of  gives the whole name of a key
     errors  InputError for an unknown key or a range that is none
 
     >>> variables(["inlet_velocity=0.02..0.05", "fluid.viscosity=1e-4..1e-2 log"])[1]
@@ -70,7 +71,7 @@ def variables(given: Sequence[str]) -> list[Variable]:
             low = high = math.nan
         if not low < high < math.inf:
             raise InputError("--vary", each, "key=low..high, such as friction=0.1..0.5; for a log scale, add ' log'")
-        name, logarithmic = full_key(key.strip()), bool(span and span[3])
+        name, logarithmic = key_of(key.strip()), bool(span and span[3])
         if logarithmic and low <= 0.0:
             raise InputError("--vary", each, "a range above 0 for a log scale")
         if name in [known.key for known in found]:

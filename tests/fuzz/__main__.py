@@ -11,7 +11,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from fuzz.trials import Surroundings, described
+from fuzz.trials import PLAUSIBLE, Surroundings, described
 from fuzz.workers import Limits, Outcome, many, real_command, trial
 
 
@@ -20,6 +20,7 @@ def main(words: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--count", type=int, default=2000, help="trials in worker processes")
     parser.add_argument("--commands", type=int, default=0, help="further trials as real commands")
+    parser.add_argument("--plausible", type=int, default=0, help="command lines of all commands, mostly valid")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=20.0, help="limit of one trial")
@@ -44,7 +45,8 @@ def _report(given: argparse.Namespace, limits: Limits, around: Surroundings) -> 
     begun, outcome = time.monotonic(), Outcome()
     end = begun + 60.0 * given.minutes
     home = str(around.home)
-    for number, answer, seconds in many(given.seed, given.count, given.workers, limits, end - time.monotonic(), home):
+    numbers = [*range(given.count), *range(PLAUSIBLE, PLAUSIBLE + given.plausible)]
+    for number, answer, seconds in many(given.seed, numbers, given.workers, limits, end - time.monotonic(), home):
         if outcome.add(number, answer, seconds):
             print(f"trial {number}: {answer}", flush=True)
         done = sum(outcome.counts.values())

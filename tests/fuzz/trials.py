@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import random
 import re
 import shutil
@@ -15,6 +16,7 @@ from typing import Any
 from unittest import mock
 
 from fuzz.mutations import mutate_folder, mutated_case, mutated_table, mutated_words
+from fuzz.plausible import plausible_words
 
 CODES = (0, 1, 2, 3, 130, 143)
 """Documented exit codes."""
@@ -22,6 +24,11 @@ CODES = (0, 1, 2, 3, 130, 143)
 LONGEST_LINE = 600
 KINDS = {"case": 0.62, "words": 0.12, "data": 0.16, "folder": 0.1}
 """Share of each kind of trial."""
+
+PLAUSIBLE = 2 * 10**9
+"""Trials with numbers from this one on are command lines with mostly valid options."""
+
+REBOUNDS = "stokes [-], restitution [-], error [-]\n20, 0.1, 0.02\n100, 0.7, 0.02\n400, 0.85, 0.02\n"
 
 TABLES = [
     "time [s], bed height [mm], error [mm]\n0.0, 40.1, 0.4\n0.5, 41.2, 0.4\n1.0, 40.7, 0.5\n",
@@ -113,13 +120,18 @@ def chance_of(seed: int, number: int) -> random.Random:
     return random.Random(f"{seed} {number}")
 
 
+def kind_of(chance: random.Random, number: int) -> str:
+    """The kind of a trial."""
+    return "plausible" if number >= PLAUSIBLE else chance.choices(list(KINDS), list(KINDS.values()))[0]
+
+
 def perform(around: Surroundings, seed: int, number: int) -> str:
     """Make one trial in an empty folder; returns `accepted` or `refused`.
 
     errors  AssertionError for an answer that is not clear, or whatever the program raises
     """
     chance = chance_of(seed, number)
-    kind = chance.choices(list(KINDS), list(KINDS.values()))[0]
+    kind = kind_of(chance, number)
     with tempfile.TemporaryDirectory(dir=around.home) as folder, contextlib.chdir(folder):
         return TRIALS[kind](around, chance)
 
@@ -127,11 +139,13 @@ def perform(around: Surroundings, seed: int, number: int) -> str:
 def described(around: Surroundings, seed: int, number: int) -> str:
     """What a trial tries."""
     chance = chance_of(seed, number)
-    kind = chance.choices(list(KINDS), list(KINDS.values()))[0]
+    kind = kind_of(chance, number)
     if kind == "case":
         return f"case\n{mutated_case(chance, around.texts, around.keys).decode(errors='replace')[:6000]}"
     if kind == "data":
         return f"data\n{mutated_table(chance, TABLES).decode(errors='replace')[:2000]}"
+    if kind == "plausible":
+        return f"plausible {plausible_words(chance)}"
     if kind == "words":
         return f"words {mutated_words(chance, around.lines, around.options, around.case_keys)}"
     with tempfile.TemporaryDirectory(dir=around.home) as folder:
@@ -218,8 +232,22 @@ def words_trial(around: Surroundings, chance: random.Random) -> str:
     return "accepted" if code == 0 else "refused"
 
 
+def plausible_trial(around: Surroundings, chance: random.Random) -> str:
+    """A command line with mostly valid options, in this process."""
+    words = plausible_words(chance)
+    Path("bed.toml").write_text(around.texts[0])
+    Path("points.csv").write_text(TABLES[0])
+    Path("rebounds.csv").write_text(REBOUNDS)
+    shutil.copytree(around.run_folder, "bed")
+    code, out, err = called(words)
+    judge_command(code, out, err, max(map(len, words), default=0))
+    if "--json" in words and out.strip() and "--help" not in words and "--version" not in words:
+        assert json.loads(out)["schema"].startswith("cfddem/"), "no object with a schema"
+    return "accepted" if code == 0 else "refused"
+
+
 TRIALS: dict[str, Callable[[Surroundings, random.Random], str]] = {
-    "case": case_trial, "words": words_trial, "data": data_trial, "folder": folder_trial,
+    "case": case_trial, "words": words_trial, "data": data_trial, "folder": folder_trial, "plausible": plausible_trial,
 }  # fmt: skip
 
 
@@ -251,6 +279,10 @@ def called(words: list[str]) -> tuple[int, str, str]:
     patches = {
         "cfddem.run.runner.Simulation": stop, "cfddem.studies.sweep.on_this_machine": stop, "os.execv": stop,
         "cfddem.plotting.browser.browse": stop, "cfddem.cli.validation.run": stop,
+        "cfddem.cli.validation.measure": stop,
+        "cfddem.plotting.scene.window": stop, "scenarios.benchmarks.fluid_box.bench": stop,
+        "scenarios.beds.wet_bed.study.bench": stop, "scenarios.benchmarks.scaling.bench": stop,
+        "scenarios.benchmarks.table.bench": stop, "cfddem.cli.doctor.subprocess.run": stop,
         "scenarios.benchmarks.dense_bed.bench": stop, "scenarios.beds.gas_bed.study.bench": stop,
         "sys.argv": ["cfddem", *words],
     }  # fmt: skip
@@ -291,7 +323,7 @@ def judge_command(code: int, out: str, err: str, longest_word: int = 0) -> None:
 def as_command(around: Surroundings, seed: int, number: int, folder: Path) -> list[str]:
     """The words of a trial as a real command, whose files are written to a folder."""
     chance = chance_of(seed, number)
-    kind = chance.choices(list(KINDS), list(KINDS.values()))[0]
+    kind = kind_of(chance, number)
     if kind == "case":
         (folder / "bed.toml").write_bytes(mutated_case(chance, around.texts, around.keys))
         return ["check", "bed.toml"]

@@ -14,7 +14,7 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from pathlib import Path
@@ -134,13 +134,14 @@ class Worker:
 
 
 def many(
-    seed: int, count: int, workers: int, limits: Limits, seconds: float, home: str
+    seed: int, numbers: Iterable[int], workers: int, limits: Limits, seconds: float, home: str
 ) -> Iterator[tuple[int, str, float]]:
     """Number, answer and time of each trial, until all are made or the time is over.
 
+    numbers  of the trials
     seconds  for all of them
     """
-    end, waiting = time.monotonic() + seconds, iter(range(count))
+    end, waiting = time.monotonic() + seconds, iter(numbers)
     team = [Worker(home, seed, limits) for _ in range(workers)]
     busy = {each.pipe: each for each in team if _give(each, waiting)}
     while busy:

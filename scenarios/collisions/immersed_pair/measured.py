@@ -62,21 +62,24 @@ def compare_points(path: Path, collide: Collide, figure: Path) -> MeasuredCollis
     errors   InputError, one line, for a file that cannot be read
     """
     require_folder(figure)
-    points = _points(path)
+    points = read_points(path)
     low, high = float(points.place.min()), float(points.place.max())
     spaced = np.geomspace(0.8 * low, 1.25 * high, ON_THE_LINE) if points.against == "stokes" else (
         np.linspace(max(0.0, low - 2.0), min(89.0, high + 2.0), ON_THE_LINE))  # fmt: skip
 
-    def values(places: Array) -> Array:
-        name = FIELDS.get(points.quantity, points.quantity)
-        return np.array([getattr(collide(**{points.against: float(each)}), name) for each in places])
-
-    made = MeasuredComparison(points, values(points.place), 0.0, (spaced, values(spaced)))
+    curve = values_at(points, collide, spaced)
+    made = MeasuredComparison(points, values_at(points, collide, points.place), 0.0, (spaced, curve))
     _draw(made, figure)
     return MeasuredCollisions(made, figure)
 
 
-def _points(path: Path) -> Points:
+def values_at(points: Points, collide: Collide, places: Array) -> Array:
+    """Computed values of the quantity of measured points, at Stokes numbers or angles."""
+    name = FIELDS.get(points.quantity, points.quantity)
+    return np.array([getattr(collide(**{points.against: float(each)}), name) for each in places])
+
+
+def read_points(path: Path) -> Points:
     """Measured points of a file."""
     columns = {_meaning(each): each for each in read_table(path)}
     places = [name for name in ("stokes", "angle") if name in columns]
