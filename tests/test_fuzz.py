@@ -12,8 +12,9 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from command_line import HOME, call
+from command_line import HOME, call, commands
 from fuzz import workers
+from fuzz.plausible import LINES
 from fuzz.trials import judge_command, refused_or_accepted
 from made_up_run import made_up
 
@@ -31,6 +32,18 @@ def test_two_thousand_mutated_inputs_are_accepted_or_refused_in_clear_lines(tmp_
     answers = json.loads((tmp_path / "out").read_text())["answers"]
     assert answers["accepted"] + answers["refused"] == 2000
     assert min(answers.values()) > 200, "both kinds of answers are tried"
+
+
+@pytest.mark.slow
+def test_a_thousand_likely_command_lines_of_all_commands_end_without_a_traceback(tmp_path: Path) -> None:
+    """With `--json` they print one object with a schema."""
+    command = [sys.executable, "-m", "tests.fuzz", "--count", "0", "--plausible", "1000", "--seconds", "60", "--memory"]
+    done = subprocess.run([*command, "8", "--workers", "1"], cwd=HOME, capture_output=True, text=True, timeout=3600)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+
+
+def test_every_command_has_a_likely_line() -> None:
+    assert {line.split()[0] for line in LINES.strip().splitlines()} == {*commands()}
 
 
 @pytest.mark.parametrize("given", ["bed.diameter=1e12", "material.glass.density=1e300", "fluid.viscosity=1e-300"])

@@ -16,7 +16,7 @@ from cfddem.backend.errors import CfddemError
 from cfddem.backend.launch import several_ranks
 from cfddem.backend.working_folder import ignore_settings_files
 from cfddem.cli import calibration, cases, information, results, sweeps, validation
-from cfddem.cli.json_output import asked_for_json, print_failure
+from cfddem.cli.json_output import asked_for_json, begin, print_failure
 from cfddem.cli.ranks import end_together
 
 WIDTH = 100
@@ -78,6 +78,7 @@ def main() -> None:
     if os.name == "nt":  # a redirected output may have an encoding that lacks a sign
         for stream in (sys.stdout, sys.stderr):
             getattr(stream, "reconfigure", lambda **_: None)(errors="replace")
+    begin()
     try:
         ignore_settings_files()
         with warnings.catch_warnings():

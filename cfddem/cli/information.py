@@ -36,6 +36,8 @@ def explain(
         known, keys = known or pages.containing(law), pages.matching(law)
     require_folder(plot)
     several, found = bool(known or keys), None
+    if plot is not None and several:
+        raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
     if not several:
         assert law is not None
         found = pages.find(law)
@@ -49,9 +51,7 @@ def explain(
         print(
             "\n".join([*pages.listing(known), *pages.key_lines(keys), *absent] if found is None else pages.page(found))
         )
-    if plot is not None:
-        if found is None:
-            raise InputError("--plot", str(plot), "used with one law", "cfddem explain lists their names")
+    if plot is not None and found is not None:
         print(pages.plot(found, plot), file=sys.stderr if json else sys.stdout)
 
 

@@ -37,8 +37,20 @@ def json_schema(name: str) -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": word(name)} | made
 
 
+_printed = False
+"""Whether the command has printed its object."""
+
+
+def begin() -> None:
+    """A command begins: it has not printed anything."""
+    global _printed
+    _printed = False
+
+
 def print_json(name: str, value: Mapping[str, Any]) -> None:
     """Print a result in the form of a schema."""
+    global _printed
+    _printed = True
     print(as_json({"schema": word(name), **value}))
 
 
@@ -48,12 +60,13 @@ def asked_for_json() -> bool:
 
 
 def print_failure(message: str, code: int, failure: BaseException | None = None) -> None:
-    """Print an error as JSON.
+    """Print an error as JSON, unless the command has printed its result, and failed after that.
 
     message  one error in each line
     failure  the error itself, if it is known
     """
-    print_json("error", {"exit_code": code, "errors": list(_mistakes(message, failure))})
+    if not _printed:
+        print_json("error", {"exit_code": code, "errors": list(_mistakes(message, failure))})
 
 
 def _mistakes(message: str, failure: BaseException | None) -> Iterator[Mistake]:

@@ -49,15 +49,25 @@ def branch_state(case: Case, origin: Path) -> dict[str, Any]:
     if was != now:
         limit = f"{was!r}, as in {origin}"
         raise InputError("laws.agitation", now, limit, f"name it where it is auto: --set laws.agitation={was}")
-    time = float(state["time"])
+    try:
+        time = float(state["time"])
+        if case.run.until > time:
+            _adapt(state["simulation"], case, before)
+    except (KeyError, IndexError, TypeError, ValueError) as failure:
+        remedy = "its checkpoint does not fit; run the case from its beginning"
+        raise InputError("--from", str(origin), "a run of this version of cfddem", remedy) from failure
     if not case.run.until > time:
         remedy = "time goes on: --set run.until=END"
         raise InputError("run.until", case.run.until, f"above {time:.6g} s, where {origin} has ended", remedy)
-    parts = state["simulation"]
+    return state
+
+
+def _adapt(parts: dict[str, Any], case: Case, before: Case) -> None:
+    """Change what the state of a simulation holds of the values of its case."""
     parts["particle_step"] = None  # that of the new stiffness
     parts["particles"]["counters"]["accepted"] = 0.0
     if case.fluid != before.fluid:  # neither of them lacks one
-        cells, places = parts["fluid"]["viscosity"], parts["particles"]["particles"]["position"]
-        cells[:] = np.broadcast_to(case.required_fluid.viscosity_at(grid_of(case).centres()[2]), cells.shape)
-        parts["particles"]["particles"]["viscosity"][:] = case.required_fluid.viscosity_at(places[:, 2])
-    return state
+        cells, particles = parts["fluid"]["viscosity"], parts["particles"]["particles"]
+        fluid = case.required_fluid
+        cells[:] = np.broadcast_to(fluid.viscosity_at(grid_of(case).centres()[2]), cells.shape)
+        particles["viscosity"][:] = fluid.viscosity_at(particles["position"][:, 2])
