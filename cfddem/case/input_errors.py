@@ -170,7 +170,8 @@ _LIMITS = {
     **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
     "string_type": "a string",
     "string_pattern_mismatch": "made of letters, digits, _ and -",
-    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "a table"),
+    "dict_type": "a table, such as {NAME = value}",
+    **dict.fromkeys(("model_type", "model_attributes_type"), "a table"),
     "callable_type": "",
     "none_required": "",
 }

@@ -121,6 +121,7 @@ impact = command(
 
 def _three_spheres(*, map: Path | None, **given: Any) -> three_spheres.Triplet:
     """Simulate three spheres, and draw the map of outcomes if asked for."""
+    require_folder(map)
     if map is not None:
         draw_map(map, given)
     return three_spheres.simulate_three_spheres(**given)
@@ -154,6 +155,8 @@ collide_wet = command(
 
 def _strike_film(*, figure: Path | None, movie: Path | None, **given: Any) -> film_impact.FilmImpact:
     """Let the bead fall, and draw the impact if asked for."""
+    require_folder(figure)
+    require_folder(movie)
     result = film_impact.impact(**given) if movie is None else write_movie(movie, **given)
     if figure is not None:
         draw_moments(figure, result, given["diameter"])

@@ -114,6 +114,8 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
             remedy = f"use at least {plain(rounded_up(needed))} Pa{beyond}" + " for less than 2 %" * (
                 severity == "note"
             )
+            if severity != "note" and cause == "collisions at the reference speed" and case.run.reference_speed is None:
+                remedy += f"; or set run.reference_speed, here {case.reference_speed:.3g} m/s, if collisions are slower"
     reason = f"overlap of {percent(part)} of a diameter under {cause}; {effect}"
     if math.isinf(part):
         reason = "the contacts are too soft: particles pass through each other"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.errors import InputError
 from cfddem.plotting.curves import blank
 from scenarios.collisions.film_impact.result import FilmImpact, Frame, Record
 from scenarios.collisions.film_impact.solver import GridImpact
@@ -40,6 +41,8 @@ def movie(
     options  of :func:`~scenarios.collisions.film_impact.impact`, as the other arguments
     returns  the result of the impact
     """
+    if path.suffix.lower() != ".gif":
+        raise InputError("movie", str(path), "a file that ends in .gif")
     frames: list[Frame] = []
     turning: list[int] = []
 
