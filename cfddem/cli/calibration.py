@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,6 +23,18 @@ if TYPE_CHECKING:
 COLLIDE = "material of measured collisions, instead of a case: delrin, glass, steel_smooth or steel_rough"
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Effort:
+    """How many runs a search makes; its fields are options."""
+
+    trials: Annotated[int, Parameter(help="number of runs, with those of earlier calls")] = 30
+    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1
+
+
+USUAL = Effort()
+
+
 def calibrate(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
@@ -31,9 +44,8 @@ def calibrate(
         Parameter(help="CSV file of measured points with errors, beside those of the case", negative=""),
     ] = None,
     collide: Annotated[str | None, Parameter(help=COLLIDE)] = None,
-    trials: Annotated[int, Parameter(help="number of runs, with those of earlier calls")] = 30,
+    effort: Effort = USUAL,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
-    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-calibration")] = None,
     json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
 ) -> None:
@@ -60,13 +72,13 @@ def calibrate(
         result = f"mean square difference {trial.chi2:.4g}" if trial.computed else trial.status[:60]
         print(f"{trial.number:>4}  {values:<40}  {result}", file=sys.stderr if json else sys.stdout, flush=True)
 
-    if jobs == 1 and not json:
+    if effort.jobs == 1 and not json:
         announce_compilation()
     if collide is not None:
-        if case is not None or jobs != 1:
+        if case is not None or effort.jobs != 1:
             raise InputError("--collide", collide, "used without a case and without --jobs")
         folder = output or Path("collide-calibration")
-        made = _of_collisions(collide, match or (), vary, set or (), trials, progress)
+        made = _of_collisions(collide, match or (), vary, set or (), effort.trials, progress)
         make_output(folder)
         write_results(made, folder)
         _print(made, folder, json)
@@ -76,7 +88,8 @@ def calibrate(
     folder = output or Path(f"{path.stem}-calibration")
 
     found = search(
-        path, match or (), variables(vary), folder, trials=trials, jobs=jobs, overrides=overrides(set or []),
+        path, match or (), variables(vary), folder, trials=effort.trials, jobs=effort.jobs,
+        overrides=overrides(set or []),
         progress=progress,
     )  # fmt: skip
     _print(found, folder, json)
