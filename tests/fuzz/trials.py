@@ -28,6 +28,9 @@ KINDS = {"case": 0.62, "words": 0.12, "data": 0.16, "folder": 0.1}
 PLAUSIBLE = 2 * 10**9
 """Trials with numbers from this one on are command lines with mostly valid options."""
 
+COMPUTING = ("calibrate", "collide", "film-impact", "three-spheres", "wet-pair", "wet-wall")
+"""Commands that may compute for longer than a trial."""
+
 REBOUNDS = "stokes [-], restitution [-], error [-]\n20, 0.1, 0.02\n100, 0.7, 0.02\n400, 0.85, 0.02\n"
 
 TABLES = [
@@ -239,7 +242,12 @@ def plausible_trial(around: Surroundings, chance: random.Random) -> str:
     Path("points.csv").write_text(TABLES[0])
     Path("rebounds.csv").write_text(REBOUNDS)
     shutil.copytree(around.run_folder, "bed")
-    code, out, err = called(words)
+    try:
+        code, out, err = called(words)
+    except TooSlow:
+        if words[0] in COMPUTING:  # it compiles loops, or computes what it was asked for
+            return "accepted"
+        raise
     judge_command(code, out, err, max(map(len, words), default=0))
     if "--json" in words and out.strip() and not {"--help", "--version", "--schema"} & set(words):
         assert json.loads(out)["schema"].startswith("cfddem/"), "no object with a schema"
