@@ -95,6 +95,8 @@ def test_collisions_over_a_range_are_listed_and_written(tmp_path: Path, monkeypa
     rows = Path("e.csv").read_text().splitlines()
     assert len(rows) == 3 and rows[0].startswith("stokes [-],velocity [m/s],viscosity [Pa s],outcome,restitution [-]")
     assert "e.csv" not in call(*words, "--csv", "nowhere/e.csv").out
+    rough = call(*words, "--roughness", "60")
+    assert rough.code == 2 and "roughness = 60" in rough.err and "5 % of a diameter" in rough.err
     for wrong in ("1..0.5", "0..10", "..", "x", "1..inf"):
         refused = call("collide", "--velocity", "0.1", "--stokes", wrong)
         assert refused.code == 2 and "stokes" in refused.err and refused.err.count("\n") == 1, wrong

@@ -37,6 +37,9 @@ from scenarios.collisions.results import plain
 SLOWEST, FASTEST = 1e-12, 1e3
 """Speeds of approach that are computed [m/s]."""
 
+ROUGH = 0.05
+"""Largest roughness over the smaller diameter, as of cases [-]."""
+
 MATERIALS = {
     "steel_smooth": Material(
         density=7780, youngs_modulus=190e9, poisson=0.27, restitution=0.97,
@@ -213,6 +216,9 @@ class Bodies(NamedTuple):
             _check("material", each, isinstance(each, Material), "a Material, such as MATERIALS['glass']")
         for name, diameter in zip(("diameter", "diameter of the target"), self.diameters):
             _check(name, diameter, 1e-9 <= diameter <= 1e3, "between 1e-9 and 1000 m")
+        most = ROUGH * min(self.diameters)
+        for each in self.materials:
+            _check("roughness", each.roughness, each.roughness <= most, f"at most 5 % of a diameter, {most:.3g} m")
         wall = _choice("against", self.against, {"sphere": False, "wall": True})
         mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(self.materials, self.diameters)]
         other = (math.inf, math.inf) if wall else (0.5 * self.diameters[1], mass[1])
