@@ -183,8 +183,8 @@ def test_energy_falls_and_momentum_stays_at_any_tolerance() -> None:
 
 @pytest.mark.slow
 def test_a_film_and_a_bridge_of_one_pair_share_its_impulse_by_their_resistances() -> None:
-    """Wet spheres in oil: along and across the line of centres, at X of a hundredth and of a hundred."""
-    for step in (1e-2 * STEP_OF_ONE, 1e2 * STEP_OF_ONE):
+    """Wet spheres in oil: along and across the line of centres, at X of a tenth and of a hundred."""
+    for step in (0.1 * STEP_OF_ONE, 100.0 * STEP_OF_ONE):
         places = np.zeros((4, 3))
         places[:, 0] = np.arange(4) * (2.0 * RADIUS + GAP)
         made = make_particles(places, RADIUS, GRAIN.density, viscosity=0.5 * SYRUP.viscosity)
