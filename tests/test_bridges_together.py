@@ -179,3 +179,30 @@ def test_energy_falls_and_momentum_stays_at_any_tolerance() -> None:
                 assert kinetic_energy(run.particles) <= energy * (1.0 + 1e-14)
                 drift = np.abs((mass * run.particles.velocity).sum(axis=0) - momentum).max()
                 assert drift < 1e-13 * carried
+
+
+@pytest.mark.slow
+def test_a_film_and_a_bridge_of_one_pair_share_its_impulse_by_their_resistances() -> None:
+    """Wet spheres in oil: along and across the line of centres, at X of a tenth and of a hundred."""
+    for step in (0.1 * STEP_OF_ONE, 100.0 * STEP_OF_ONE):
+        places = np.zeros((4, 3))
+        places[:, 0] = np.arange(4) * (2.0 * RADIUS + GAP)
+        made = make_particles(places, RADIUS, GRAIN.density, viscosity=0.5 * SYRUP.viscosity)
+        coat(made, FILM)
+        laws = Laws(film=True, film_motions="full", bridge=SYRUP, film_tolerance=TIGHT)
+        run = without_pull(ParticleSolver(made, pair_table([GRAIN]), laws=laws, check_steps=False, skin=RADIUS))
+        draw, speed = np.random.default_rng(2), 1e-3 * GAP / step
+        run.particles.velocity[:] = draw.normal(0.0, speed, (4, 3))
+        run.particles.spin[:] = draw.normal(0.0, speed / RADIUS, (4, 3))
+        edges, mass = run.edges, run.particles.mass[:, None]
+        energy, momentum = kinetic_energy(run.particles), (mass * run.particles.velocity).sum(axis=0)
+        run.advance(step)
+        assert kinetic_energy(run.particles) < energy
+        assert np.abs((mass * run.particles.velocity).sum(axis=0) - momentum).max() < 1e-12 * np.abs(mass).max() * speed
+        film = 2.0 * FILM
+        along = film_strength(SYRUP.viscosity, 0.5 * RADIUS) * bridge.deforming_share(GAP, film) / GAP
+        assert edges.impulse[:3, 0] / edges.bridge_impulse[:3, 0] == pytest.approx(
+            edges.resistance[:3] / along, rel=5e-3
+        )
+        rolled = edges.shear_impulse.reshape(-1, 3, 3)[:3]
+        assert (edges.bridge_impulse[:3, 1:] != 0.0).all() and (rolled[:, 0, 1:] != 0.0).all()

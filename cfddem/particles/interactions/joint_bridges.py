@@ -34,7 +34,7 @@ def mean_along(e, rate, speed, impulse, system, step):
     impulse  of the bridge, as found so far [N s]
     """
     memory, p, k = system.memory, system.parameters, system.memory.joint_edge[e]
-    if not BRIDGE_FILM or not memory.bridge_resistance[k] > 0.0:
+    if not BRIDGE_FILM or not memory.bridge_film[k] > 0.0:
         return 0.0
     gap, weight, floor = memory.joint_gap[e], memory.joint_weight[e], floor_of(k, memory)
     if max(gap, gap + step * speed) < floor:
@@ -51,7 +51,7 @@ def mean_along(e, rate, speed, impulse, system, step):
 def across_of(k, gap, rate, system):
     """Resistance of the bridge of edge k to sliding; 0 without one."""
     memory, p = system.memory, system.parameters
-    if not BRIDGE_SLIDING or not memory.bridge_resistance[k] > 0.0:
+    if not BRIDGE_SLIDING or not memory.bridge_film[k] > 0.0:
         return 0.0
     if gap < floor_of(k, memory):
         return memory.closed_across[k]
@@ -66,7 +66,7 @@ def begin_bridge(e, k, normal, by_film, memory):
     by_film  impulse of the film in the last step, without what it owed [N s]
     """
     impulse = dot(at(memory.bridge_impulse, k), normal) if memory.bridge_solved[k] else 0.0
-    memory.bridge_solved[k] = memory.bridge_resistance[k] > 0.0
+    memory.bridge_solved[k] = memory.bridge_film[k] > 0.0
     part = 1.0
     if DRIFTING:
         both = by_film + impulse

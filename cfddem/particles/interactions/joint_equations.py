@@ -147,7 +147,7 @@ def prepare_sliding(e, k, place, share, system, step):
         inverses = (inverse * roll_own, -inverse * crossed, inverse * own, 1.0 / (twist + turn_i + turn_j))
         push, roll = last_sliding(k, normal, arms, memory)
     else:
-        own = 1.0 / (step * max(by_bridge, _LITTLE * memory.bridge_resistance[k]))
+        own = 1.0 / max(step * by_bridge, _NO_BRIDGE / weight)
         put_four(memory.joint_sliding, e, (own, 0.0, 0.0, 0.0))
         own += weight + arms[0] * arms[0] * turn_i + arms[1] * arms[1] * turn_j
         inverses = (1.0 / own, 0.0, 0.0, 0.0)
@@ -184,7 +184,7 @@ def sliding_compliances(e, k, gap, by_bridge, system, step):
     film, asymmetry = film_at(k, gap, system), edge_asymmetry(k, system)
     normal_resistance, of_film = memory.resistance[k], memory.shear_resistance[k]
     if BRIDGE_RESISTS:
-        normal_resistance = max(normal_resistance, memory.bridge_resistance[k])
+        normal_resistance = max(normal_resistance, memory.bridge_resistance[k], memory.joint_least[e])
         of_film = of_film if share > 0.0 else 0.0
     least = _LITTLE * normal_resistance
     resistance = max(of_film, least)

@@ -143,10 +143,13 @@ def note_approach(k, system):
 
 @inline
 def is_due(k, memory):
-    """Whether the film or the bridge of edge k is solved with the others in the next step."""
+    """Whether the film or the bridge of edge k is solved with the others in the next step.
+
+    A closed bridge that does not resist may open in the step: all bridges are.
+    """
     if DRIFTING and BRIDGE_RESISTS:
-        return memory.film_due[k] or memory.bridge_resistance[k] > 0.0
-    return memory.film_due[k] if DRIFTING else memory.bridge_resistance[k] > 0.0
+        return memory.film_due[k] or memory.bridge_film[k] > 0.0
+    return memory.film_due[k] if DRIFTING else memory.bridge_film[k] > 0.0
 
 
 @inline
