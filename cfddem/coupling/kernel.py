@@ -11,6 +11,10 @@ the given standard deviation, for any cell size:
 S is symmetric, keeps sums, and does not pass walls or solid cells. What the first stage puts behind a wall is put into
 the nearest open cell.
 
+Particles of unequal sizes have kernels of unequal widths: each deposits and gathers with the second stage of its own
+size, so that small particles among large ones exchange with their own surroundings. Deposit and gather of each size
+are adjoint, and so are those of all together.
+
 Where several ranks share the grid, each deposits its own particles, on its cells and on ghosts of those around
 (:class:`cfddem.coupling.reach.Reach`). Ghosts are then added to the cells that they stand for; a gather fills them
 before. Deposit and gather stay adjoint.
@@ -19,8 +23,8 @@ before. Deposit and gather stay adjoint.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,6 +77,8 @@ class FilterKernel:
     periodic      whether x, y, z are periodic
     mapping       "linear", "centroid" or "divided", see `MAPPINGS`
     smoothing     standard deviation of the whole kernel [m]; 0 for the mapping alone
+    sizes         radius and standard deviation of each size of particles, ascending [m]; a particle between two has the
+                  kernel of the nearer one, by its logarithm. Empty where all have the same
     twice         whether this is that of a deposit and a gather together, both with the mapping
     parts         into how many the cells of the fluid are divided along x, y, z
     communicator  of the run
@@ -85,6 +91,7 @@ class FilterKernel:
         *,
         mapping: str = "linear",
         smoothing: float = 0.0,
+        sizes: Sequence[tuple[float, float]] = (),
         twice: bool = False,
         parts: Sequence[int] = (1, 1, 1),
         communicator: Communicator = SERIAL,
@@ -107,17 +114,99 @@ class FilterKernel:
         self._corners = np.array(corners, np.uint32)
         self._homes = self.reach.homes()
         self._gates = _gates(grid, self.halo)
-        self.sweeps, self.strength = self._diffusion()
+        self.sizes = tuple(sizes)
+        radii = np.array([radius for radius, _ in self.sizes])
+        self._edges = np.sqrt(radii[1:] * radii[:-1])
+        self.widths = np.array([width for _, width in self.sizes] or [self.smoothing])
+        self.stages = [self._diffusion(width) for width in self.widths]
+        self.sweeps, self.strength = self._diffusion(self.smoothing)
 
-    def _diffusion(self) -> tuple[int, Array]:
-        """Number of sweeps, and strength of each along x, y, z, that widen the mapping to the whole kernel."""
+    def _diffusion(self, width: float) -> tuple[int, Array]:
+        """Number of sweeps, and strength of each along x, y, z, that widen the mapping to a standard deviation."""
         spacing = np.array(self.grid.spacing)
         own = spacing**2 / 6.0  # mean variance of the linear mapping, twice that of a point within its cell
         own *= 1.0 + self.twice
-        missing = np.maximum(self.smoothing**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
+        missing = np.maximum(width**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
         total = missing / (2.0 * spacing**2)
         sweeps = math.ceil(2.0 * float(total.sum()) - 1e-9)  # local: three directions
         return sweeps, total / max(sweeps, 1)
+
+    # ------------------------------------------------------------ particles of unequal sizes
+
+    @property
+    def unequal(self) -> bool:
+        """Whether particles have kernels of several widths."""
+        return len(self.stages) > 1
+
+    def kinds(self, radius: Array) -> np.ndarray:
+        """Place of every particle's kernel among `stages` (N,)."""
+        return np.searchsorted(self._edges, radius)
+
+    def width(self, radius: Array) -> Array:
+        """Standard deviation of the kernel of every particle (N,) [m]."""
+        found: Array = self.widths[self.kinds(radius)]
+        return found
+
+    def of_each_kind(self, radius: Array) -> Iterator[tuple[int, Any]]:
+        """Each kind of kernel, and the rows of its particles; all rows, as a slice, where there is one kind."""
+        if not self.unequal:
+            yield 0, slice(None)
+            return
+        kinds = self.kinds(radius)
+        for kind in range(len(self.stages)):
+            rows = np.flatnonzero(kinds == kind)
+            if len(rows):
+                yield kind, rows
+
+    def spread(self, cell_map: ParticleCellMap, values: Array, volume: float = 1.0) -> Array:
+        """Both stages: sum over particles of weight times value, values (N, m) to fields (m, nz, ny, nx).
+
+        volume  by which deposits are divided before the second stage [m3]
+        """
+        if not self.unequal:
+            return self.smooth(self.deposit(cell_map, values) / volume)
+        kinds, columns = self.kinds(cell_map.radius), values.shape[1]
+        apart = np.zeros((len(values), len(self.stages), columns))
+        apart[np.arange(len(values)), kinds] = values
+        fields = self.deposit(cell_map, apart.reshape(len(values), -1)) / volume
+        spread = np.zeros((columns, *self.grid.shape))
+        for kind, stage in enumerate(self.stages):
+            spread += self.smooth(fields[kind * columns : (kind + 1) * columns], stage)
+        return spread
+
+    def sample(self, stencil: Stencil, radius: Array, fields: Array, plain: Array | None = None) -> Array:
+        """Both stages: weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `spread`.
+
+        plain  fields that have passed the second stage (k, nz, ny, nx); their means follow (N, m + k)
+        """
+        more = () if plain is None else (plain,)
+        smoothed = [self.smooth(fields, stage) for stage in self.stages]
+        gathered = self.gather(stencil, np.concatenate([*smoothed, *more]) if more or smoothed[1:] else smoothed[0])
+        return self._own(gathered, radius, len(fields))
+
+    def sample_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, radius: Array, fields: Array) -> Array:
+        """As `sample`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
+        smoothed = [self.smooth(fields, stage) for stage in self.stages]
+        gathered = self.gather_over_steps(earlier, last, now, np.concatenate(smoothed) if smoothed[1:] else smoothed[0])
+        return self._own(gathered, radius, len(fields))
+
+    def solids_with_slope(self, cell_map: ParticleCellMap) -> Array:
+        """Solid fraction around every particle, and its derivatives along x, y, z (N, 4) [-], [1/m]."""
+        deposited, values = self.deposit(cell_map, cell_map.volume[:, None]), np.empty((len(cell_map.volume), 4))
+        for kind, rows in self.of_each_kind(cell_map.radius):
+            solid = self.smooth(deposited, self.stages[kind])[0] / self.grid.cell_volume
+            values[rows] = self.gather_with_slope(cell_map.stencil, solid)[rows]
+        return values
+
+    def _own(self, gathered: Array, radius: Array, count: int) -> Array:
+        """Of means with the kernel of every kind (N, kinds count + k) those of the particle's own (N, count + k)."""
+        if not self.unequal:
+            return gathered
+        last = len(self.stages) - 1
+        own, kinds = gathered[:, last * count :].copy(), self.kinds(radius)
+        for kind in range(last):
+            np.copyto(own[:, :count], gathered[:, kind * count : (kind + 1) * count], where=(kinds == kind)[:, None])
+        return own
 
     # ------------------------------------------------------------ particles to cells
 
@@ -198,15 +287,19 @@ class FilterKernel:
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
-    def smooth(self, fields: Array) -> Array:
-        """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""
-        if self.sweeps == 0:
+    def smooth(self, fields: Array, stage: tuple[int, Array] | None = None) -> Array:
+        """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint.
+
+        stage  one of `stages`; that of the widest kernel if None
+        """
+        sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
+        if sweeps == 0:
             return np.array(fields, float)
         now, other = self._scratch(len(fields))
         self.halo.inner(now)[:] = fields
-        for _ in range(self.sweeps):
+        for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
-            loops.sweep(now, other, self.strength, *self._gates)
+            loops.sweep(now, other, strength, *self._gates)
             now, other = other, now
         return self.halo.inner(now).copy()
 
@@ -219,7 +312,7 @@ class FilterKernel:
 
     def solid_fraction(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction of the cells (nz, ny, nx) [-]."""
-        solid: Array = self.smooth(self.deposit(cell_map, cell_map.volume[:, None]))[0] / self.grid.cell_volume
+        solid: Array = self.spread(cell_map, cell_map.volume[:, None])[0] / self.grid.cell_volume
         return solid
 
     # ------------------------------------------------------------ flux
@@ -249,6 +342,8 @@ class FilterKernel:
             )
         if grid.solid is not None:
             raise InputError("solid_flux", None, "computed on a grid without solid cells")
+        if self.unequal:
+            raise InputError("solid_flux", None, "computed for particles with one width of the kernel")
         flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
         volume = new.volume
         loops.carry_all(

@@ -62,18 +62,26 @@ class SelfDisturbance(FluidForce):
     ) -> None:
         grid, self.fluid = kernel.grid, fluid
         walls = fluid.boundaries if beside_walls else None
-        self._in_cells = OwnSolids(kernel, 2 if sharp else 1, walls)
-        self._seen = OwnSolids(cells_of(kernel), 1, walls) if sharp else None
-        self._walls = WallsOfGrid(kernel, fluid.boundaries) if beside_walls else None
+        self._kernel, kinds = kernel, range(len(kernel.stages))
+        self._in_cells = [OwnSolids(kernel, 2 if sharp else 1, walls, kind) for kind in kinds]
+        cells = cells_of(kernel) if sharp else kernel
+        self._seen = [OwnSolids(cells, 1, walls, kind) for kind in kinds] if sharp else []
+        self._walls = [WallsOfGrid(kernel, fluid.boundaries, kind) for kind in kinds] if beside_walls else []
         self._cell = np.array(grid.whole.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
-        self._tables = tables(kernel)
+        self._tables = [tables(kernel, kind) for kind in kinds]
 
     def own(self, particles: Particles, cell_map: ParticleCellMap) -> Own:
         """What every particle gathers of its own."""
         modes = particles[DISTURBANCE.name]
-        left = modes if self._walls is None else modes * self._walls.left(cell_map.position)
-        in_cells = self._in_cells.of(cell_map)
-        return Own(left, in_cells, in_cells if self._seen is None else self._seen.of(cell_map))
+        left = modes.copy() if self._walls else modes
+        in_cells, seen = np.empty((2, particles.count))
+        for kind, rows in self._kernel.of_each_kind(cell_map.radius):
+            position, volume = cell_map.position[rows], cell_map.volume[rows]
+            if self._walls:
+                left[rows] *= self._walls[kind].left(position)
+            in_cells[rows] = self._in_cells[kind].of(position, volume)
+            seen[rows] = self._seen[kind].of(position, volume) if self._seen else in_cells[rows]
+        return Own(left, in_cells, seen)
 
     def end(self, terms: CouplingTerms) -> None:
         """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""
@@ -101,11 +109,15 @@ class SelfDisturbance(FluidForce):
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         density    of the fluid [kg/m3]
         """
-        left = np.empty((0, 0, 3)) if self._walls is None else self._walls.left(cell_map.position)
-        _build_up(
-            cell_map.position, *self._cell, drag, slip, screening, *self._tables, density, particles.viscosity,
-            step, left, particles.disturbance_modes,
-        )  # fmt: skip
+        every = particles[DISTURBANCE.name]
+        for kind, rows in self._kernel.of_each_kind(cell_map.radius):
+            position, modes = cell_map.position[rows], every[rows]
+            left = self._walls[kind].left(position) if self._walls else np.empty((0, 0, 3))
+            _build_up(
+                position, *self._cell, drag[rows], slip[rows], screening[rows], *self._tables[kind], density,
+                particles.viscosity[rows], step, left, modes,
+            )  # fmt: skip
+            every[rows] = modes
 
 
 @inline
