@@ -68,6 +68,12 @@ class ParticleCellMap(NamedTuple):
     start: np.ndarray  # (slabs + 1,) first place of each slab in `order`
     stencil: Stencil
     number: int  # of particles on all ranks
+    of_kinds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # order and start of each kind of kernel, if unequal
+
+
+def _over(fields: Array, volume: float) -> Array:
+    """Fields per volume [m3]."""
+    return fields if volume == 1.0 else fields / volume
 
 
 class FilterKernel:
@@ -164,14 +170,10 @@ class FilterKernel:
         volume  by which deposits are divided before the second stage [m3]
         """
         if not self.unequal:
-            return self.smooth(self.deposit(cell_map, values) / volume)
-        kinds, columns = self.kinds(cell_map.radius), values.shape[1]
-        apart = np.zeros((len(values), len(self.stages), columns))
-        apart[np.arange(len(values)), kinds] = values
-        fields = self.deposit(cell_map, apart.reshape(len(values), -1)) / volume
-        spread = np.zeros((columns, *self.grid.shape))
-        for kind, stage in enumerate(self.stages):
-            spread += self.smooth(fields[kind * columns : (kind + 1) * columns], stage)
+            return self.smooth(_over(self.deposit(cell_map, values), volume))
+        spread = np.zeros((values.shape[1], *self.grid.shape))
+        for places, stage in zip(cell_map.of_kinds, self.stages):
+            spread += self._smoothed(_over(self.deposit(cell_map, values, places), volume), stage)
         return spread
 
     def sample(self, stencil: Stencil, radius: Array, fields: Array, plain: Array | None = None) -> Array:
@@ -180,15 +182,25 @@ class FilterKernel:
         plain  fields that have passed the second stage (k, nz, ny, nx); their means follow (N, m + k)
         """
         more = () if plain is None else (plain,)
-        smoothed = [self.smooth(fields, stage) for stage in self.stages]
-        gathered = self.gather(stencil, np.concatenate([*smoothed, *more]) if more or smoothed[1:] else smoothed[0])
-        return self._own(gathered, radius, len(fields))
+        smoothed = [np.concatenate([self._smoothed(fields, stage), *more]) for stage in self.stages]
+        if not self.unequal:
+            return self.gather(stencil, smoothed[0])
+        values = np.empty((len(radius), len(smoothed[0])))
+        loops.gather_of_kinds(
+            self.kinds(radius), *stencil, self._corners, self._layered(np.concatenate(smoothed)), values
+        )
+        return values
 
     def sample_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, radius: Array, fields: Array) -> Array:
         """As `sample`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
-        smoothed = [self.smooth(fields, stage) for stage in self.stages]
-        gathered = self.gather_over_steps(earlier, last, now, np.concatenate(smoothed) if smoothed[1:] else smoothed[0])
-        return self._own(gathered, radius, len(fields))
+        if not self.unequal:
+            return self.gather_over_steps(earlier, last, now, self.smooth(fields))
+        smoothed = np.concatenate([self._smoothed(fields, stage) for stage in self.stages])
+        gathered, kinds = self.gather_over_steps(earlier, last, now, smoothed), self.kinds(radius)
+        values, count = gathered[:, : len(fields)].copy(), len(fields)
+        for kind in range(1, len(self.stages)):
+            np.copyto(values, gathered[:, kind * count : (kind + 1) * count], where=(kinds == kind)[:, None])
+        return values
 
     def solids_with_slope(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction around every particle, and its derivatives along x, y, z (N, 4) [-], [1/m]."""
@@ -198,15 +210,9 @@ class FilterKernel:
             values[rows] = self.gather_with_slope(cell_map.stencil, solid)[rows]
         return values
 
-    def _own(self, gathered: Array, radius: Array, count: int) -> Array:
-        """Of means with the kernel of every kind (N, kinds count + k) those of the particle's own (N, count + k)."""
-        if not self.unequal:
-            return gathered
-        last = len(self.stages) - 1
-        own, kinds = gathered[:, last * count :].copy(), self.kinds(radius)
-        for kind in range(last):
-            np.copyto(own[:, :count], gathered[:, kind * count : (kind + 1) * count], where=(kinds == kind)[:, None])
-        return own
+    def _smoothed(self, fields: Array, stage: tuple[int, Array]) -> Array:
+        """As `smooth`; the fields themselves where the stage does nothing."""
+        return self.smooth(fields, stage) if stage[0] else fields
 
     # ------------------------------------------------------------ particles to cells
 
@@ -216,10 +222,12 @@ class FilterKernel:
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
         loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
-        number = int(self.communicator.sum([len(position)]))
-        return ParticleCellMap(
-            position.copy(), radius, sphere_volume(radius), order, start, self.stencil(position, radius), number
-        )
+        number, stencil, places = int(self.communicator.sum([len(position)])), self.stencil(position, radius), []
+        for kind in range(len(self.stages) if self.unequal else 0):
+            own = self.kinds(radius)[order] == kind
+            places.append((order[own], np.append(0, np.cumsum(own))[start]))
+        volume = sphere_volume(radius)
+        return ParticleCellMap(position.copy(), radius, volume, order, start, stencil, number, tuple(places))
 
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""
@@ -241,15 +249,20 @@ class FilterKernel:
         loops.stencils(position, radius, self._offsets, self._linear, self._axes, *stencil)
         return stencil
 
-    def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
+    def deposit(
+        self, cell_map: ParticleCellMap, values: Array, places: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> Array:
         """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx).
 
         Whole numbers are summed, so that the bits depend neither on threads nor on ranks; NaN where a value is NaN.
+
+        places  order and start of some of the particles; of all if None
         """
         values, homes, shape = np.ascontiguousarray(values), self._homes, self.reach.shape
         unit = self._unit(cell_map, values)
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
-        loops.deposit(cell_map.order, cell_map.start, values, unit, *cell_map.stencil, self._corners, deposits)
+        order, start = places or (cell_map.order, cell_map.start)
+        loops.deposit(order, start, values, unit, *cell_map.stencil, self._corners, deposits)
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]

@@ -109,15 +109,13 @@ class SelfDisturbance(FluidForce):
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         density    of the fluid [kg/m3]
         """
-        every = particles[DISTURBANCE.name]
+        numbers = np.arange(particles.count)
         for kind, rows in self._kernel.of_each_kind(cell_map.radius):
-            position, modes = cell_map.position[rows], every[rows]
-            left = self._walls[kind].left(position) if self._walls else np.empty((0, 0, 3))
+            left = self._walls[kind].left(cell_map.position[rows]) if self._walls else np.empty((0, 0, 3))
             _build_up(
-                position, *self._cell, drag[rows], slip[rows], screening[rows], *self._tables[kind], density,
-                particles.viscosity[rows], step, left, modes,
+                numbers[rows], cell_map.position, *self._cell, drag, slip, screening, *self._tables[kind], density,
+                particles.viscosity, step, left, particles.disturbance_modes,
             )  # fmt: skip
-            every[rows] = modes
 
 
 @inline
@@ -131,12 +129,17 @@ def _steady(moving, slowest, wave_number, shares):
 
 @threaded
 def _build_up(
-    position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
+    rows, position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
     viscosity, step, left, modes_of,
 ):  # fmt: skip
-    """Exact relaxation of every mode towards its value under a steady force; walls leave a share of it (or empty)."""
+    """Exact relaxation of every mode of some particles towards its value under a steady force.
+
+    rows  of these particles
+    left  share that walls leave, by place among the rows; empty without walls
+    """
     modes = rates.shape[1]
-    for n in prange(len(position)):
+    for place in prange(len(rows)):
+        n = rows[place]
         diffusivity = viscosity[n] / density
         shares = shares_in_cell(n, position, origin, inverse, linear)
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
@@ -156,5 +159,5 @@ def _build_up(
                 remaining = math.exp(-step * (rate + screening[n]))
                 steady *= rate / (rate + screening[n])
                 if len(left) > 0:
-                    steady *= left[n, k, d]
+                    steady *= left[place, k, d]
                 modes_of[n, k, d] = steady + remaining * (modes_of[n, k, d] - steady)
