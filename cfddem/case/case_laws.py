@@ -108,7 +108,9 @@ class CaseLaws(Checked):
         "linear", description="distribution of particle volume over cells, before the filter kernel"
     )
     kernel_width: float = Field(
-        1.5, ge=0, description="standard deviation of the filter kernel over the mean diameter [-]"
+        1.5,
+        ge=0,
+        description="standard deviation of the filter kernel over the mean diameter of the species of a particle [-]",
     )
     surface: Literal["smeared", "sharp"] = Field(
         "smeared",

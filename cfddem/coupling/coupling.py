@@ -195,5 +195,5 @@ class Coupling:
 
     def _source(self, cell_map: ParticleCellMap, force: Array) -> Array:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
-        source = self.kernel.smooth(self.kernel.deposit(cell_map, force)) / self.fluid.grid.cell_volume
+        source = self.kernel.spread(cell_map, force) / self.fluid.grid.cell_volume
         return np.ascontiguousarray(np.moveaxis(source, 0, -1))

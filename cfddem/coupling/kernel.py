@@ -11,6 +11,10 @@ the given standard deviation, for any cell size:
 S is symmetric, keeps sums, and does not pass walls or solid cells. What the first stage puts behind a wall is put into
 the nearest open cell.
 
+Particles of unequal sizes have kernels of unequal widths: each deposits and gathers with the second stage of its own
+size, so that small particles among large ones exchange with their own surroundings. Deposit and gather of each size
+are adjoint, and so are those of all together.
+
 Where several ranks share the grid, each deposits its own particles, on its cells and on ghosts of those around
 (:class:`cfddem.coupling.reach.Reach`). Ghosts are then added to the cells that they stand for; a gather fills them
 before. Deposit and gather stay adjoint.
@@ -19,8 +23,8 @@ before. Deposit and gather stay adjoint.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,6 +68,12 @@ class ParticleCellMap(NamedTuple):
     start: np.ndarray  # (slabs + 1,) first place of each slab in `order`
     stencil: Stencil
     number: int  # of particles on all ranks
+    of_kinds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # order and start of each kind of kernel, if unequal
+
+
+def _over(fields: Array, volume: float) -> Array:
+    """Fields per volume [m3]."""
+    return fields if volume == 1.0 else fields / volume
 
 
 class FilterKernel:
@@ -73,6 +83,8 @@ class FilterKernel:
     periodic      whether x, y, z are periodic
     mapping       "linear", "centroid" or "divided", see `MAPPINGS`
     smoothing     standard deviation of the whole kernel [m]; 0 for the mapping alone
+    sizes         radius and standard deviation of each size of particles, ascending [m]; a particle between two has the
+                  kernel of the nearer one, by its logarithm. Empty where all have the same
     twice         whether this is that of a deposit and a gather together, both with the mapping
     parts         into how many the cells of the fluid are divided along x, y, z
     communicator  of the run
@@ -85,6 +97,7 @@ class FilterKernel:
         *,
         mapping: str = "linear",
         smoothing: float = 0.0,
+        sizes: Sequence[tuple[float, float]] = (),
         twice: bool = False,
         parts: Sequence[int] = (1, 1, 1),
         communicator: Communicator = SERIAL,
@@ -107,17 +120,99 @@ class FilterKernel:
         self._corners = np.array(corners, np.uint32)
         self._homes = self.reach.homes()
         self._gates = _gates(grid, self.halo)
-        self.sweeps, self.strength = self._diffusion()
+        self.sizes = tuple(sizes)
+        radii = np.array([radius for radius, _ in self.sizes])
+        self._edges = np.sqrt(radii[1:] * radii[:-1])
+        self.widths = np.array([width for _, width in self.sizes] or [self.smoothing])
+        self.stages = [self._diffusion(width) for width in self.widths]
+        self.sweeps, self.strength = self._diffusion(self.smoothing)
 
-    def _diffusion(self) -> tuple[int, Array]:
-        """Number of sweeps, and strength of each along x, y, z, that widen the mapping to the whole kernel."""
+    def _diffusion(self, width: float) -> tuple[int, Array]:
+        """Number of sweeps, and strength of each along x, y, z, that widen the mapping to a standard deviation."""
         spacing = np.array(self.grid.spacing)
         own = spacing**2 / 6.0  # mean variance of the linear mapping, twice that of a point within its cell
         own *= 1.0 + self.twice
-        missing = np.maximum(self.smoothing**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
+        missing = np.maximum(width**2 - own, 0.0) * (np.array(self.grid.cells) > 1)
         total = missing / (2.0 * spacing**2)
         sweeps = math.ceil(2.0 * float(total.sum()) - 1e-9)  # local: three directions
         return sweeps, total / max(sweeps, 1)
+
+    # ------------------------------------------------------------ particles of unequal sizes
+
+    @property
+    def unequal(self) -> bool:
+        """Whether particles have kernels of several widths."""
+        return len(self.stages) > 1
+
+    def kinds(self, radius: Array) -> np.ndarray:
+        """Place of every particle's kernel among `stages` (N,)."""
+        return np.searchsorted(self._edges, radius)
+
+    def width(self, radius: Array) -> Array:
+        """Standard deviation of the kernel of every particle (N,) [m]."""
+        found: Array = self.widths[self.kinds(radius)]
+        return found
+
+    def of_each_kind(self, radius: Array) -> Iterator[tuple[int, Any]]:
+        """Each kind of kernel, and the rows of its particles; all rows, as a slice, where there is one kind."""
+        if not self.unequal:
+            yield 0, slice(None)
+            return
+        kinds = self.kinds(radius)
+        for kind in range(len(self.stages)):
+            rows = np.flatnonzero(kinds == kind)
+            if len(rows):
+                yield kind, rows
+
+    def spread(self, cell_map: ParticleCellMap, values: Array, volume: float = 1.0) -> Array:
+        """Both stages: sum over particles of weight times value, values (N, m) to fields (m, nz, ny, nx).
+
+        volume  by which deposits are divided before the second stage [m3]
+        """
+        if not self.unequal:
+            return self.smooth(_over(self.deposit(cell_map, values), volume))
+        spread = np.zeros((values.shape[1], *self.grid.shape))
+        for places, stage in zip(cell_map.of_kinds, self.stages):
+            spread += self._smoothed(_over(self.deposit(cell_map, values, places), volume), stage)
+        return spread
+
+    def sample(self, stencil: Stencil, radius: Array, fields: Array, plain: Array | None = None) -> Array:
+        """Both stages: weighted mean of fields (m, nz, ny, nx) around every particle (N, m); the adjoint of `spread`.
+
+        plain  fields that have passed the second stage (k, nz, ny, nx); their means follow (N, m + k)
+        """
+        more = () if plain is None else (plain,)
+        smoothed = [np.concatenate([self._smoothed(fields, stage), *more]) for stage in self.stages]
+        if not self.unequal:
+            return self.gather(stencil, smoothed[0])
+        values = np.empty((len(radius), len(smoothed[0])))
+        loops.gather_of_kinds(
+            self.kinds(radius), *stencil, self._corners, self._layered(np.concatenate(smoothed)), values
+        )
+        return values
+
+    def sample_over_steps(self, earlier: Stencil, last: Stencil, now: Stencil, radius: Array, fields: Array) -> Array:
+        """As `sample`, the mean of particles at the places of three steps, with the weights 1/4, 1/2 and 1/4."""
+        if not self.unequal:
+            return self.gather_over_steps(earlier, last, now, self.smooth(fields))
+        smoothed = np.concatenate([self._smoothed(fields, stage) for stage in self.stages])
+        gathered, kinds = self.gather_over_steps(earlier, last, now, smoothed), self.kinds(radius)
+        values, count = gathered[:, : len(fields)].copy(), len(fields)
+        for kind in range(1, len(self.stages)):
+            np.copyto(values, gathered[:, kind * count : (kind + 1) * count], where=(kinds == kind)[:, None])
+        return values
+
+    def solids_with_slope(self, cell_map: ParticleCellMap) -> Array:
+        """Solid fraction around every particle, and its derivatives along x, y, z (N, 4) [-], [1/m]."""
+        deposited, values = self.deposit(cell_map, cell_map.volume[:, None]), np.empty((len(cell_map.volume), 4))
+        for kind, rows in self.of_each_kind(cell_map.radius):
+            solid = self.smooth(deposited, self.stages[kind])[0] / self.grid.cell_volume
+            values[rows] = self.gather_with_slope(cell_map.stencil, solid)[rows]
+        return values
+
+    def _smoothed(self, fields: Array, stage: tuple[int, Array]) -> Array:
+        """As `smooth`; the fields themselves where the stage does nothing."""
+        return self.smooth(fields, stage) if stage[0] else fields
 
     # ------------------------------------------------------------ particles to cells
 
@@ -127,10 +222,12 @@ class FilterKernel:
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
         loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
-        number = int(self.communicator.sum([len(position)]))
-        return ParticleCellMap(
-            position.copy(), radius, sphere_volume(radius), order, start, self.stencil(position, radius), number
-        )
+        number, stencil, places = int(self.communicator.sum([len(position)])), self.stencil(position, radius), []
+        for kind in range(len(self.stages) if self.unequal else 0):
+            own = self.kinds(radius)[order] == kind
+            places.append((order[own], np.append(0, np.cumsum(own))[start]))
+        volume = sphere_volume(radius)
+        return ParticleCellMap(position.copy(), radius, volume, order, start, stencil, number, tuple(places))
 
     def wrapped(self, position: Array) -> Array:
         """Positions (N, 3) [m], moved into the grid along periodic directions."""
@@ -152,15 +249,20 @@ class FilterKernel:
         loops.stencils(position, radius, self._offsets, self._linear, self._axes, *stencil)
         return stencil
 
-    def deposit(self, cell_map: ParticleCellMap, values: Array) -> Array:
+    def deposit(
+        self, cell_map: ParticleCellMap, values: Array, places: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> Array:
         """Sum over particles of weight times value: values (N, m) to fields (m, nz, ny, nx).
 
         Whole numbers are summed, so that the bits depend neither on threads nor on ranks; NaN where a value is NaN.
+
+        places  order and start of some of the particles; of all if None
         """
         values, homes, shape = np.ascontiguousarray(values), self._homes, self.reach.shape
         unit = self._unit(cell_map, values)
         deposits = np.zeros((len(homes.of_layered), values.shape[1]), np.int64)
-        loops.deposit(cell_map.order, cell_map.start, values, unit, *cell_map.stencil, self._corners, deposits)
+        order, start = places or (cell_map.order, cell_map.start)
+        loops.deposit(order, start, values, unit, *cell_map.stencil, self._corners, deposits)
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
@@ -198,15 +300,19 @@ class FilterKernel:
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
-    def smooth(self, fields: Array) -> Array:
-        """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint."""
-        if self.sweeps == 0:
+    def smooth(self, fields: Array, stage: tuple[int, Array] | None = None) -> Array:
+        """Second stage for fields (m, nz, ny, nx): keeps sums and is its own adjoint.
+
+        stage  one of `stages`; that of the widest kernel if None
+        """
+        sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
+        if sweeps == 0:
             return np.array(fields, float)
         now, other = self._scratch(len(fields))
         self.halo.inner(now)[:] = fields
-        for _ in range(self.sweeps):
+        for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
-            loops.sweep(now, other, self.strength, *self._gates)
+            loops.sweep(now, other, strength, *self._gates)
             now, other = other, now
         return self.halo.inner(now).copy()
 
@@ -219,7 +325,7 @@ class FilterKernel:
 
     def solid_fraction(self, cell_map: ParticleCellMap) -> Array:
         """Solid fraction of the cells (nz, ny, nx) [-]."""
-        solid: Array = self.smooth(self.deposit(cell_map, cell_map.volume[:, None]))[0] / self.grid.cell_volume
+        solid: Array = self.spread(cell_map, cell_map.volume[:, None])[0] / self.grid.cell_volume
         return solid
 
     # ------------------------------------------------------------ flux
@@ -249,6 +355,8 @@ class FilterKernel:
             )
         if grid.solid is not None:
             raise InputError("solid_flux", None, "computed on a grid without solid cells")
+        if self.unequal:
+            raise InputError("solid_flux", None, "computed for particles with one width of the kernel")
         flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
         volume = new.volume
         loops.carry_all(

@@ -202,6 +202,20 @@ def gather(first, shares, corners, fields, values):
             _add_mean(n, part, _weights(n, s, shares), _cells(first[n, s], corners), fields, values)
 
 
+@threaded
+def gather_of_kinds(kinds, first, shares, corners, fields, values):
+    """As `gather`, of the fields of each particle's kind: those of kind 0 come first, (cells, kinds m) to (N, m)."""
+    part, count = 1.0 / first.shape[1], values.shape[1]
+    for n in prange(len(values)):
+        begin = kinds[n] * count
+        for m in range(count):
+            values[n, m] = 0.0
+        for s in range(first.shape[1]):
+            weights, cells = _weights(n, s, shares), _cells(first[n, s], corners)
+            for m in range(count):
+                values[n, m] += part * _mean(weights, cells, fields, begin + m)
+
+
 @inline
 def _add_mean(n, share, weights, cells, fields, values):
     """Add a share of the weighted means of all components; two by two, which is faster than one by one."""

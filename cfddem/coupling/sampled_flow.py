@@ -84,6 +84,8 @@ class FlowSampler:
         mean   the same in the middle of the step, which particles see; `solid` if None
         """
         gathered = self._gathered(cell_map, solid if mean is None else mean)
+        if self.kernel.unequal:
+            gathered[:, 3] *= self._seen_over_gathered(cell_map, solid)
         own = self.own(particles, cell_map)
         slip, disturbance = np.empty((2, particles.count, 3))
         voidage, reynolds, others = np.empty((3, particles.count))
@@ -99,8 +101,18 @@ class FlowSampler:
 
     def _gathered(self, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Mean velocity of the fluid and solid fraction around every particle (N, 4) [m/s], [-]."""
-        velocity = self.kernel.smooth(np.moveaxis(self.fluid.velocity, -1, 0))
-        return self.kernel.gather(cell_map.stencil, np.concatenate([velocity, solid[None]]))
+        velocity = np.moveaxis(self.fluid.velocity, -1, 0)
+        return self.kernel.sample(cell_map.stencil, cell_map.radius, velocity, solid[None])
+
+    def _seen_over_gathered(self, cell_map: ParticleCellMap, solid: Array) -> Array:
+        """Solid fraction with the kernel of each particle for all particles around it, over that of the cells (N,) [-].
+
+        The cells have each particle with its own kernel: beside large particles, small ones would see these smeared.
+        """
+        kernel = self.kernel
+        deposited = kernel.deposit(cell_map, cell_map.volume[:, None]) / kernel.grid.cell_volume
+        around = kernel.sample(cell_map.stencil, cell_map.radius, deposited, solid[None])
+        return np.asarray(around[:, 0] / np.maximum(around[:, 1], 1e-300))
 
     def _diameter_ratio(self, particles: Particles, cell_map: ParticleCellMap, solid: Array) -> Array:
         """Diameter of every particle over the Sauter mean around it (N,) [-]; 1 unless sizes are sampled.
@@ -110,8 +122,12 @@ class FlowSampler:
         if not self.sizes:
             return np.ones(particles.count)
         kernel, diameter, volume = self.kernel, 2.0 * particles.radius, cell_map.volume
-        surface = kernel.smooth(kernel.deposit(cell_map, (volume / diameter)[:, None])) / kernel.grid.cell_volume
-        around = kernel.gather(cell_map.stencil, np.concatenate([solid[None], surface]))
+        if kernel.unequal:
+            deposited = kernel.deposit(cell_map, np.stack([volume, volume / diameter], axis=1))
+            around = kernel.sample(cell_map.stencil, cell_map.radius, deposited)
+        else:
+            surface = kernel.spread(cell_map, (volume / diameter)[:, None]) / kernel.grid.cell_volume
+            around = kernel.gather(cell_map.stencil, np.concatenate([solid[None], surface]))
         ratio: Array = diameter * around[:, 1] / around[:, 0]
         return ratio
 

@@ -14,7 +14,7 @@ last layer. In a small wave the weights drop out, and what is left is the kernel
 :math:`\exp(-k^2\sigma^2)`.
 
 The cells of this mean are parts of those of the fluid, small enough for :math:`\sigma`. So what a particle sees does
-not depend on the cells of the fluid.
+not depend on the cells of the fluid. Of particles of unequal sizes each sees with the :math:`\sigma` of its own size.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class SeenSolids:
             self._sums = self._summed(cell_map.volume[:, None])[:, 0]
             return cells.gather(cell_map.stencil, cells.solid_fraction(cell_map)[None])[:, 0]
         self._map = cells.map_particles(cell_map.position, cell_map.radius)
-        gathered = cells.gather_with_slope(self._map.stencil, cells.solid_fraction(self._map))
+        gathered = cells.solids_with_slope(self._map)
         weighted = np.empty((len(gathered), 2))
-        _weigh(gathered, cell_map.volume, cells.smoothing / SHARPNESS, weighted)
+        _weigh(gathered, cell_map.volume, cells.width(cell_map.radius) / SHARPNESS, weighted)
         sums = self._summed(weighted)
         self._weights, self._sums = weighted[:, 1], sums[:, 1]
         mean: Array = sums[:, 0] / sums[:, 1]
@@ -78,7 +78,7 @@ class SeenSolids:
     def _summed(self, weighted: Array) -> Array:
         """Sums over the particles around every particle (N, m)."""
         assert self._map is not None
-        return self.cells.gather(self._map.stencil, self.cells.smooth(self.cells.deposit(self._map, weighted)))
+        return self.cells.sample(self._map.stencil, self._map.radius, self.cells.deposit(self._map, weighted))
 
 
 def cells_of(kernel: FilterKernel) -> FilterKernel:
@@ -87,14 +87,14 @@ def cells_of(kernel: FilterKernel) -> FilterKernel:
         return kernel
     parts = parts_of(kernel)
     return FilterKernel(
-        kernel.grid.divided(parts), kernel.periodic, smoothing=kernel.smoothing, twice=True, parts=parts,
-        communicator=kernel.communicator,
+        kernel.grid.divided(parts), kernel.periodic, smoothing=kernel.smoothing, sizes=kernel.sizes, twice=True,
+        parts=parts, communicator=kernel.communicator,
     )  # fmt: skip
 
 
 def parts_of(kernel: FilterKernel) -> tuple[int, int, int]:
     """Into how many parts along x, y, z the cells of the fluid are divided; those of a grid one cell thick are not."""
-    grid, widest = kernel.grid.whole, WIDEST * kernel.smoothing
+    grid, widest = kernel.grid.whole, WIDEST * float(kernel.widths.min())  # local: of the sizes of the run
     along = [
         1 if count == 1 else min(max(math.ceil(h / widest - 1e-9), 1), MOST_PARTS)
         for h, count in zip(grid.spacing, grid.cells)
@@ -107,11 +107,11 @@ def _weigh(gathered, volume, length, weighted):
     """Weight g times x, and g, of every particle.
 
     gathered  x, and its derivatives along x, y, z (N, 4) [-], [1/m]
-    length    standard deviation of the kernel over m_0 [m]
+    length    standard deviation of the particle's kernel over m_0 (N,) [m]
     """
     for n in prange(len(volume)):
         solid = gathered[n, 0]
         slope = gathered[n, 1] ** 2 + gathered[n, 2] ** 2 + gathered[n, 3] ** 2
-        uneven = slope * (length / solid) ** 2
+        uneven = slope * (length[n] / solid) ** 2
         weighted[n, 1] = volume[n] * max(math.exp(-uneven), LEAST_WEIGHT)
         weighted[n, 0] = weighted[n, 1] * solid

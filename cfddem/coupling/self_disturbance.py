@@ -62,18 +62,26 @@ class SelfDisturbance(FluidForce):
     ) -> None:
         grid, self.fluid = kernel.grid, fluid
         walls = fluid.boundaries if beside_walls else None
-        self._in_cells = OwnSolids(kernel, 2 if sharp else 1, walls)
-        self._seen = OwnSolids(cells_of(kernel), 1, walls) if sharp else None
-        self._walls = WallsOfGrid(kernel, fluid.boundaries) if beside_walls else None
+        self._kernel, kinds = kernel, range(len(kernel.stages))
+        self._in_cells = [OwnSolids(kernel, 2 if sharp else 1, walls, kind) for kind in kinds]
+        cells = cells_of(kernel) if sharp else kernel
+        self._seen = [OwnSolids(cells, 1, walls, kind) for kind in kinds] if sharp else []
+        self._walls = [WallsOfGrid(kernel, fluid.boundaries, kind) for kind in kinds] if beside_walls else []
         self._cell = np.array(grid.whole.origin), 1.0 / np.array(grid.spacing), float(kernel.mapping == "linear")
-        self._tables = tables(kernel)
+        self._tables = [tables(kernel, kind) for kind in kinds]
 
     def own(self, particles: Particles, cell_map: ParticleCellMap) -> Own:
         """What every particle gathers of its own."""
         modes = particles[DISTURBANCE.name]
-        left = modes if self._walls is None else modes * self._walls.left(cell_map.position)
-        in_cells = self._in_cells.of(cell_map)
-        return Own(left, in_cells, in_cells if self._seen is None else self._seen.of(cell_map))
+        left = modes.copy() if self._walls else modes
+        in_cells, seen = np.empty((2, particles.count))
+        for kind, rows in self._kernel.of_each_kind(cell_map.radius):
+            position, volume = cell_map.position[rows], cell_map.volume[rows]
+            if self._walls:
+                left[rows] *= self._walls[kind].left(position)
+            in_cells[rows] = self._in_cells[kind].of(position, volume)
+            seen[rows] = self._seen[kind].of(position, volume) if self._seen else in_cells[rows]
+        return Own(left, in_cells, seen)
 
     def end(self, terms: CouplingTerms) -> None:
         """The resistance of every particle has pushed the fluid; the drag of the others has stopped it."""
@@ -101,11 +109,13 @@ class SelfDisturbance(FluidForce):
         screening  rate at which the drag of all other particles there stops the fluid (N,) [1/s]
         density    of the fluid [kg/m3]
         """
-        left = np.empty((0, 0, 3)) if self._walls is None else self._walls.left(cell_map.position)
-        _build_up(
-            cell_map.position, *self._cell, drag, slip, screening, *self._tables, density, particles.viscosity,
-            step, left, particles.disturbance_modes,
-        )  # fmt: skip
+        numbers = np.arange(particles.count)
+        for kind, rows in self._kernel.of_each_kind(cell_map.radius):
+            left = self._walls[kind].left(cell_map.position[rows]) if self._walls else np.empty((0, 0, 3))
+            _build_up(
+                numbers[rows], cell_map.position, *self._cell, drag, slip, screening, *self._tables[kind], density,
+                particles.viscosity, step, left, particles.disturbance_modes,
+            )  # fmt: skip
 
 
 @inline
@@ -119,12 +129,17 @@ def _steady(moving, slowest, wave_number, shares):
 
 @threaded
 def _build_up(
-    position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
+    rows, position, origin, inverse, linear, drag, slip, screening, flow, rates, start, slowest, moving, density,
     viscosity, step, left, modes_of,
 ):  # fmt: skip
-    """Exact relaxation of every mode towards its value under a steady force; walls leave a share of it (or empty)."""
+    """Exact relaxation of every mode of some particles towards its value under a steady force.
+
+    rows  of these particles
+    left  share that walls leave, by place among the rows; empty without walls
+    """
     modes = rates.shape[1]
-    for n in prange(len(position)):
+    for place in prange(len(rows)):
+        n = rows[place]
         diffusivity = viscosity[n] / density
         shares = shares_in_cell(n, position, origin, inverse, linear)
         speed = math.sqrt(slip[n, 0] ** 2 + slip[n, 1] ** 2 + slip[n, 2] ** 2)
@@ -144,5 +159,5 @@ def _build_up(
                 remaining = math.exp(-step * (rate + screening[n]))
                 steady *= rate / (rate + screening[n])
                 if len(left) > 0:
-                    steady *= left[n, k, d]
+                    steady *= left[place, k, d]
                 modes_of[n, k, d] = steady + remaining * (modes_of[n, k, d] - steady)

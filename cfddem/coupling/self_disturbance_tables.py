@@ -38,9 +38,18 @@ class Tables(NamedTuple):
     moving: Array  # steady velocity of a moving particle, all modes (3, speeds, 2, 2, 2) [1/m]
 
 
-def tables(kernel: FilterKernel) -> Tables:
-    """The tables of a grid and its kernel."""
-    return tables_of(spacing_of(kernel), tuple(kernel.strength), kernel.sweeps)
+def tables(kernel: FilterKernel, kind: int = 0) -> Tables:
+    """The tables of a grid and its kernel, or of one kind of it."""
+    return tables_of(*lattice_of(kernel, kind))
+
+
+def lattice_of(kernel: FilterKernel, kind: int, passes: int = 1) -> tuple[tuple[float, ...], tuple[float, ...], int]:
+    """Spacing of the lattice of a grid [m], strength of a sweep of one kind of its kernel, and number of all sweeps.
+
+    passes  how often a field passes the second stage
+    """
+    sweeps, strength = kernel.stages[kind]
+    return spacing_of(kernel), tuple(strength), passes * sweeps
 
 
 def spacing_of(kernel: FilterKernel) -> tuple[float, ...]:

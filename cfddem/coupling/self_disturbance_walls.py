@@ -28,8 +28,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from cfddem.backend.compile import inline, prange, threaded
-from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.self_disturbance_tables import CELLS, MODES, mode_of, solid_table, spacing_of, tables_of
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.self_disturbance_tables import CELLS, MODES, lattice_of, mode_of, solid_table, tables_of
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.grid import Array
 
@@ -54,10 +54,11 @@ class WallsOfGrid:
 
     kernel      of the run; the tables are found once for each grid
     boundaries  of the fluid
+    kind        of the kernel
     """
 
-    def __init__(self, kernel: FilterKernel, boundaries: Boundaries) -> None:
-        lattice = spacing_of(kernel), tuple(kernel.strength), kernel.sweeps
+    def __init__(self, kernel: FilterKernel, boundaries: Boundaries, kind: int = 0) -> None:
+        lattice = lattice_of(kernel, kind)
         self._sides = [(side, flow_beside(side.axis, side.slips, *lattice)) for side in _sides(kernel, boundaries)]
 
     def left(self, position: Array) -> Array:
@@ -74,10 +75,11 @@ class OwnSolids:
     kernel      of the run
     passes      how often the gathered volume has passed the second stage of the kernel: 1 or 2
     boundaries  of the fluid, whose walls throw it back; None to leave them out
+    kind        of the kernel
     """
 
-    def __init__(self, kernel: FilterKernel, passes: int, boundaries: Boundaries | None) -> None:
-        lattice = spacing_of(kernel), tuple(kernel.strength), passes * kernel.sweeps
+    def __init__(self, kernel: FilterKernel, passes: int, boundaries: Boundaries | None, kind: int = 0) -> None:
+        lattice = lattice_of(kernel, kind, passes)
         self._cell = (
             np.array(kernel.grid.whole.origin),
             1.0 / np.array(kernel.grid.spacing),
@@ -86,12 +88,12 @@ class OwnSolids:
         self._table, sides = solid_table(*lattice), [] if boundaries is None else _sides(kernel, boundaries)
         self._sides = [(side, solid_beside(side.axis, *lattice)) for side in sides]
 
-    def of(self, cell_map: ParticleCellMap) -> Array:
-        """Of every particle (N,) [-]."""
-        own = np.empty((len(cell_map.volume), 1))
-        _own_solids(cell_map.position, cell_map.volume, self._table, *self._cell, own)
+    def of(self, position: Array, volume: Array) -> Array:
+        """Of particles at these places (N, 3) [m] with these volumes (N,) [m3]; (N,) [-]."""
+        own = np.empty((len(volume), 1))
+        _own_solids(position, volume, self._table, *self._cell, own)
         for side, shares in self._sides:
-            _leave(cell_map.position, side.axis, side.place, side.inward, shares[:, None], own)
+            _leave(position, side.axis, side.place, side.inward, shares[:, None], own)
         return own[:, 0]
 
 

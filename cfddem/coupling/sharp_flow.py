@@ -66,9 +66,10 @@ class SharpFlowSampler(FlowSampler):
         """Means of the cells around every particle: velocity of the fluid, solid fraction, solid fraction times
         velocity of the fluid, and of the particles (N, 10) [m/s], [-], [m/s], [m/s]."""
         kernel, velocity = self.kernel, np.moveaxis(self.fluid.velocity, -1, 0)
-        carried = kernel.deposit(cell_map, cell_map.volume[:, None] * particles.velocity) / kernel.grid.cell_volume
-        fields = np.concatenate([velocity, solid[None], solid * velocity, kernel.smooth(carried)])
-        return kernel.gather(cell_map.stencil, kernel.smooth(fields))
+        momentum = cell_map.volume[:, None] * particles.velocity
+        carried = kernel.spread(cell_map, momentum, kernel.grid.cell_volume)
+        fields = np.concatenate([velocity, solid[None], solid * velocity, carried])
+        return kernel.sample(cell_map.stencil, cell_map.radius, fields)
 
 
 class _Spheres(NamedTuple):

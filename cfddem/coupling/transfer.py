@@ -101,7 +101,7 @@ class Transfer:
         implicit, target, carried = implicit_coefficients(
             conductance, self.capacity(particles), value, disturbance, self._last(particles, value), step
         )
-        cells = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
+        cells = kernel.spread(cell_map, carried) / kernel.grid.cell_volume
         return ImplicitCoefficients(step, conductance, implicit, target, cells[0], np.moveaxis(cells[1:], 0, -1))
 
     def apply(
@@ -115,7 +115,7 @@ class Transfer:
         """
         kernel, value = self.kernel, _columns(particles[self.value])
         fields = np.concatenate([np.moveaxis(each, -1, 0) for each in (weight, weight * seen)])
-        gathered, rate = kernel.gather(cell_map.stencil, kernel.smooth(fields)), np.empty(value.shape)
+        gathered, rate = kernel.sample(cell_map.stencil, cell_map.radius, fields), np.empty(value.shape)
         before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
         _receive(gathered, sent.implicit, sent.target, sent.step, value, rate, before, received)
         self.last_step = sent.step

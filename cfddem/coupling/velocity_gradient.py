@@ -32,7 +32,7 @@ def vorticity_at(fluid: FluidSolver, kernel: FilterKernel, cell_map: ParticleCel
     """Vorticity of the fluid around every particle (N, 3) [1/s]."""
     slope = velocity_gradient(fluid, kernel)
     curl = np.stack([slope[2, 1] - slope[1, 2], slope[0, 2] - slope[2, 0], slope[1, 0] - slope[0, 1]])
-    return kernel.gather(cell_map.stencil, kernel.smooth(curl))
+    return kernel.sample(cell_map.stencil, cell_map.radius, curl)
 
 
 def change_along(fluid: FluidSolver, kernel: FilterKernel, cell_map: ParticleCellMap, direction: Array) -> Array:
@@ -41,5 +41,5 @@ def change_along(fluid: FluidSolver, kernel: FilterKernel, cell_map: ParticleCel
     direction  w (N, 3)
     """
     slope = velocity_gradient(fluid, kernel).reshape(9, *fluid.grid.shape)
-    gathered = kernel.gather(cell_map.stencil, kernel.smooth(slope)).reshape(-1, 3, 3)
+    gathered = kernel.sample(cell_map.stencil, cell_map.radius, slope).reshape(-1, 3, 3)
     return np.einsum("ncd,nd->nc", gathered, direction)

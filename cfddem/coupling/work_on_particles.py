@@ -71,14 +71,13 @@ class CouplingWork:
             particles.declare(field)
         self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0, 0.0, 0.0)
         self._added = 0.0
-        self._pressure = np.zeros(0)  # of the cells, smoothed by the kernel (1, nz, ny, nx) [Pa]
+        self._pressure = np.zeros(0)  # of the cells (1, nz, ny, nx) [Pa]
 
     def begin(self, terms: CouplingTerms) -> None:
         """After `Coupling.apply`, before the particles move."""
         particles = terms.particles
         total = self.coupling.fluid.communicator.sum
-        pressure = np.ascontiguousarray(self.coupling.fluid.pressure)[None]
-        self._pressure = self.coupling.kernel.smooth(pressure)
+        self._pressure = self.coupling.fluid.pressure[None].copy()
         self._on_fluid = self._implicit_work(particles, terms)
         particles[FLUCTUATING.name][:] = self._on_fluid.fluctuating
         self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
@@ -119,8 +118,8 @@ class CouplingWork:
     def _implicit_work(self, particles: Particles, terms: CouplingTerms) -> ImplicitWork:
         """Work of drag and history force on the fluid, and of forces from outside."""
         kernel, fluid, received = self.coupling.kernel, self.coupling.fluid, particles.drag_impulse / terms.step
-        weight = kernel.smooth(np.moveaxis(fluid.drag_response()[0], -1, 0))
-        conductance = kernel.gather(terms.cell_map.stencil, weight) * terms.implicit.implicit[:, None]
+        cell_map, weight = terms.cell_map, np.moveaxis(fluid.drag_response()[0], -1, 0)
+        conductance = kernel.sample(cell_map.stencil, cell_map.radius, weight) * terms.implicit.implicit[:, None]
         acting = terms.implicit.target + received / np.maximum(conductance, 1e-300)
 
         def work(force: Array) -> float:
@@ -143,10 +142,11 @@ class CouplingWork:
         if "external" not in terms.on_fluid:
             return 0.0
         kernel, fluid = self.coupling.kernel, self.coupling.fluid
-        velocity = kernel.gather(terms.cell_map.stencil, kernel.smooth(np.moveaxis(fluid.mean_velocity, -1, 0)))
+        cell_map, mean = terms.cell_map, np.moveaxis(fluid.mean_velocity, -1, 0)
+        velocity = kernel.sample(cell_map.stencil, cell_map.radius, mean)
         return terms.step * float(fluid.communicator.sum(terms.on_fluid["external"] * velocity))
 
     def _pressure_at(self, particles: Particles) -> Array:
         """Pressure at every particle, by the weights of the deposit (N,) [Pa]."""
-        kernel = self.coupling.kernel
-        return kernel.gather(kernel.stencil(particles.position, particles.radius), self._pressure)[:, 0]
+        kernel, radius = self.coupling.kernel, particles.radius
+        return kernel.sample(kernel.stencil(particles.position, radius), radius, self._pressure)[:, 0]

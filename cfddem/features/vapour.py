@@ -77,8 +77,8 @@ class Vapour(CaseFeature):
 
     def around(self, simulation: Any) -> np.ndarray:
         """Mass fraction in the cells around every particle now (N,) [-]."""
-        kernel = simulation.required_coupling.kernel
-        gathered = kernel.gather(simulation.terms.cell_map.stencil, kernel.smooth(self.cells.value[None]))
+        kernel, cell_map = simulation.required_coupling.kernel, simulation.terms.cell_map
+        gathered = kernel.sample(cell_map.stencil, cell_map.radius, self.cells.value[None])
         return np.asarray(gathered[:, 0])
 
     def exchange(self, simulation: Any, conductance: np.ndarray, surface: np.ndarray, step: float) -> np.ndarray:
@@ -91,9 +91,9 @@ class Vapour(CaseFeature):
         """
         kernel, cell_map = simulation.required_coupling.kernel, simulation.terms.cell_map
         sent = np.stack([conductance, conductance * surface], axis=1)
-        coefficient, product = kernel.smooth(kernel.deposit(cell_map, sent)) / kernel.grid.cell_volume
+        coefficient, product = kernel.spread(cell_map, sent) / kernel.grid.cell_volume
         seen = self.cells.step(coefficient, product)
-        around = kernel.gather(cell_map.stencil, kernel.smooth(np.stack([np.ones_like(seen), seen])))
+        around = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(seen), seen]))
         received = np.asarray(step * conductance * (around[:, 1] - around[:, 0] * surface))
         self.received += float(self.communicator.sum(received))
         self.scale += float(self.communicator.sum(np.abs(received)))

@@ -138,11 +138,29 @@ def flow_of(
         periodic_directions(case),
         mapping=case.laws.mapping,
         smoothing=case.laws.kernel_width * case.bed.largest_diameter,
+        sizes=kernels_of(case),
         communicator=communicator,
     )
     beside = wall_drag_of(case.laws.wall_drag, walls_of(case), laws_of(case))
     forces = forces_of(case, fluid, kernel, beside)
     return fluid, Coupling(spheres, fluid, kernel, forces)
+
+
+APART = 1.25
+"""Particles whose diameters differ by less than this factor have the same kernel, that of the largest of them."""
+
+
+def kernels_of(case: Case) -> list[tuple[float, float]]:
+    """Radius and standard deviation of the kernel of each size of particles, ascending [m]; empty for one size."""
+    if case.laws.kernel_width == 0.0:
+        return []
+    kinds = [each.sizes or [(each.diameter, 1.0)] for each in case.species.values()]
+    diameters, largest = sorted({diameter for kind in kinds for diameter, _ in kind}, reverse=True), list[float]()
+    for diameter in diameters:
+        if not largest or largest[-1] >= APART * diameter:
+            largest.append(diameter)
+    widths = [(0.5 * diameter, case.laws.kernel_width * diameter) for diameter in reversed(largest)]
+    return widths if len(widths) > 1 else []
 
 
 def materials_of(case: Case) -> np.ndarray:

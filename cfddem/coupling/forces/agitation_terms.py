@@ -84,7 +84,7 @@ class Agitation(FluidForce):
 def neighbourhood_mean(kernel: FilterKernel, cell_map: ParticleCellMap, solid: Array, values: Array) -> Array:
     """Mean of values (N, m) over the particles around each one, weighted by volume and kernel (N, m)."""
     carried = np.ascontiguousarray(cell_map.volume[:, None] * values)
-    fields = kernel.smooth(kernel.deposit(cell_map, carried)) / kernel.grid.cell_volume
+    fields = kernel.spread(cell_map, carried) / kernel.grid.cell_volume
     gathered = kernel.gather(cell_map.stencil, np.concatenate([fields, solid[None]]))
     mean: Array = gathered[:, :-1] / gathered[:, -1:]
     return mean

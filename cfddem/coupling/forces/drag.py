@@ -82,8 +82,8 @@ class Drag(FluidForce):
         if "drag" in terms.fluctuations:
             slip = slip - terms.fluctuations["drag"]
         drag = self._alone[:, None] * slip
-        density = kernel.smooth(kernel.deposit(terms.cell_map, drag)) / kernel.grid.cell_volume
-        in_cells = kernel.gather(terms.cell_map.stencil, kernel.smooth(density / (1.0 - terms.solid)))
+        density = kernel.spread(terms.cell_map, drag) / kernel.grid.cell_volume
+        in_cells = kernel.sample(terms.cell_map.stencil, terms.cell_map.radius, density / (1.0 - terms.solid))
         seen = ((1.0 - flow.voidage) / flow.voidage)[:, None] * terms.seen.averaged(drag / volume)
         rest = volume * (seen - flow.company[:, None] * in_cells)
         terms.push("drag", rest)

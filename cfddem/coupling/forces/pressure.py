@@ -43,13 +43,13 @@ class PressureForce(FluidForce):
         The fluid has used the voidage of the last three steps with the weights 1/4, 1/2 and 1/4. The gradient is
         gathered from the places of these three steps with the same weights.
         """
-        gradient = self.kernel.smooth(self.fluid.cell_pressure_gradient())
+        gradient = self.fluid.cell_pressure_gradient()
         if not np.array_equal(self._known_ids, particles.id):  # local: rows of this rank
             self._known = []  # rows have changed
         last, earlier = (
             self._stencil(particles, n, name) for n, name in enumerate(("mapped_position", MAPPED_EARLIER.name))
         )
-        force: Array = self.kernel.gather_over_steps(earlier, last, cell_map.stencil, gradient)
+        force: Array = self.kernel.sample_over_steps(earlier, last, cell_map.stencil, cell_map.radius, gradient)
         for along in force.T:
             along *= -cell_map.volume
         return force

@@ -22,5 +22,6 @@ class ViscousStress(FluidForce):
 
     def act(self, terms: CouplingTerms) -> None:
         """The force of the stress now."""
-        stress = self.kernel.gather(terms.cell_map.stencil, self.kernel.smooth(self.fluid.cell_viscous_force()))
-        terms.between("explicit", terms.cell_map.volume[:, None] * stress)
+        cell_map = terms.cell_map
+        stress = self.kernel.sample(cell_map.stencil, cell_map.radius, self.fluid.cell_viscous_force())
+        terms.between("explicit", cell_map.volume[:, None] * stress)
