@@ -160,9 +160,7 @@ class FilterKernel:
             return
         kinds = self.kinds(radius)
         for kind in range(len(self.stages)):
-            rows = np.flatnonzero(kinds == kind)
-            if len(rows):
-                yield kind, rows
+            yield kind, np.flatnonzero(kinds == kind)  # none too: all ranks pass the second stage together
 
     def spread(self, cell_map: ParticleCellMap, values: Array, volume: float = 1.0) -> Array:
         """Both stages: sum over particles of weight times value, values (N, m) to fields (m, nz, ny, nx).
