@@ -18,7 +18,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery_files, overrides
 from cfddem.case.input_errors import sections_of
 from cfddem.case.schema import Case
-from cfddem.cli.explain_pages import matching
+from cfddem.cli.explain_pages import key_lines, matching
 
 GALLERY = gallery_files()
 SAMPLE = ("liquid-bed", "segregation", "settling", "wet-bed")
@@ -93,7 +93,7 @@ def test_no_drag_has_a_word_in_python_files_and_on_the_command_line() -> None:
     written = TEXT.replace('drag = "di_felice"', 'drag = "none"')
     for same in (read_again(none), Case.from_text(written), Case.from_text(TEXT, "a", overrides(["laws.drag=none"]))):
         assert same == none and same.laws.drag_law is None
-    assert "none (no drag)" in " ".join(matching("laws.drag"))
+    assert "none (no drag)" in " ".join(key_lines(matching("laws.drag")))
 
 
 def values_of(field: FieldInfo) -> st.SearchStrategy[Any]:

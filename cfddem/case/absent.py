@@ -13,8 +13,8 @@ ABSENT: dict[str, str] = {
     "electrostatic|magnet|van_der_waals|hamaker": "no such force: add yours in Python (page Add a force), or "
         "take the cohesion of laws.contact",
     "breakage|attrition|fragment": "particles do not break",
-    "buoyan|natural_convection|thermal_expansion|boussinesq": "the buoyancy of particles is always there; the density "
-        "of the fluid does not change with the temperature",
+    "natural_convection|thermal_expansion|boussinesq": "warm fluid is lighter by heat.buoyancy; no density follows "
+        "a gas law",
     "reaction|combustion|arrhenius": "no reactions; [vapour] and [evaporation] are water in air",
     "melting|solidification|condensation": "of phase changes there is the evaporation of water, [evaporation]",
     "compressib|mach$|speed_of_sound": "the fluid is incompressible",
@@ -27,12 +27,12 @@ ABSENT: dict[str, str] = {
 """Patterns of words -> what to say."""
 
 TABLES: dict[str, str] = {
-    "heat": "Not there: density and viscosity that change with the temperature, temperatures inside a particle, and "
-    "reactions. Conduction at contacts and radiation are contact_heat, drying is evaporation.",
+    "heat": "Not there: viscosity that changes with the temperature, density that does beyond heat.buoyancy, "
+    "temperatures inside a particle, and reactions. Conduction at contacts and radiation are contact_heat, drying is evaporation.",
     "contact_heat": "Not there: temperatures inside a particle, and radiation from particle to particle: each sees "
     "surroundings of one temperature.",
     "vapour": "Not there: more than one vapour, its effect on the density of the gas, and reactions.",
-    "evaporation": "Not there: liquid in bridges and on walls that evaporates, condensation, and pores.",
+    "evaporation": "Not there: condensation, and pores; what bonds are made of has no mass.",
     "fluid": "Not there: turbulence models, compressibility, free surfaces, and a viscosity that flows with the fluid.",
     "wall": "Not there: the effect of a moving wall on the fluid; and wear.",
     "liquid": "Not there: several liquids, flow through bridges, and the mass of the liquid.",
