@@ -28,7 +28,8 @@ ABSENT: dict[str, str] = {
 
 TABLES: dict[str, str] = {
     "heat": "Not there: viscosity that changes with the temperature, density that does beyond heat.buoyancy, "
-    "temperatures inside a particle, and reactions. Conduction at contacts and radiation are contact_heat, drying is evaporation.",
+    "temperatures inside a particle, and reactions. Conduction at contacts and radiation are contact_heat, drying is "
+    "evaporation.",
     "contact_heat": "Not there: temperatures inside a particle, and radiation from particle to particle: each sees "
     "surroundings of one temperature.",
     "vapour": "Not there: more than one vapour, its effect on the density of the gas, and reactions.",
