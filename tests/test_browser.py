@@ -82,7 +82,9 @@ def write(run: RunFolder, k: int) -> None:
 
 
 def test_a_run_offers_the_colours_that_it_holds(run: RunFolder) -> None:
-    assert colours.choices(open_run(run.folder)) == ["speed", "liquid", "agglomerate", "collisions", "radius"]
+    assert colours.choices(open_run(run.folder)) == [
+        "speed", "liquid", "agglomerate", "moisture", "collisions", "radius",
+    ]  # fmt: skip
 
 
 def test_collisions_are_counted_for_both_particles_since_the_previous_snapshot(run: RunFolder) -> None:

@@ -7,7 +7,7 @@ import pytest
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
-from cfddem.cli.explain_pages import matching
+from cfddem.cli.explain_pages import key_lines, matching
 from cfddem.preflight.summary import preflight
 
 GALLERY = gallery()
@@ -90,4 +90,4 @@ def test_the_sum_of_the_drag_beside_all_walls_is_warned_of() -> None:
     assert "0.73 to 0.89" in issue.reason and '"nearest"' in issue.remedy
     for changes in ({**walls, "laws.wall_drag": "nearest"}, {"laws.wall_drag": "none"}):
         assert "laws.wall_drag" not in {each.key for each in preflight(settling.with_(**changes)).issues}
-    assert "0.73 to 0.89" in " ".join(" ".join(matching("laws.wall_drag")).split())
+    assert "0.73 to 0.89" in " ".join(" ".join(key_lines(matching("laws.wall_drag"))).split())

@@ -434,6 +434,7 @@ class FilmImpact(TypedDict):
     """`film-impact`."""
 
     schema: str
+    outcome: Literal["rebound", "stick"]
     restitution: Number
     stokes: Number
     film_ratio: float

@@ -302,8 +302,7 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
     particles, names, total = simulation.owned, list(simulation.case.bed.species), simulation.communicator.sum
 
     def by_species(weights: np.ndarray) -> np.ndarray:
-        here = np.bincount(particles.species, weights, len(names))  # local: summed over the ranks below
-        return np.asarray(total(here, axis=()))
+        return np.array([total(weights[particles.species == number]) for number in range(len(names))])
 
     mean = by_species(particles.volume * particles.position[:, 2]) / by_species(particles.volume)
     return {f"{MEAN_HEIGHT}{name}": float(height) for name, height in zip(names, mean)}

@@ -31,16 +31,18 @@ from numpy.typing import NDArray
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import Threaded
 from cfddem.backend.errors import RunFailed
-from cfddem.backend.exact_sums import largest_products, put_together, split_products, unit_of
+from cfddem.backend.exact_sums import put_together, unit_of
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.pressure.multigrid_loops import (
     apply,
     coarsen,
     descend,
+    largest_products,
     prolong,
     residual,
     restrict,
     smooth,
+    split_products,
     take_diagonal,
 )
 from cfddem.fluid.pressure.regions import ClosedRegions
@@ -150,7 +152,7 @@ class PressureEquation:
         self.most_iterations = most_iterations
         self.residual, self.direction = np.zeros(self.finest.shape), np.zeros(self.finest.shape)
         planes = self.finest.shape[0]
-        self._largest, self._parts = np.zeros(planes), np.zeros((planes, 2), np.int64)
+        self._largest, self._parts = np.zeros(planes), np.zeros((planes, 3), np.int64)
 
     def _all_levels(self, grid: Grid) -> list[Level]:
         return [Level(*each, self._outlets) for each in hierarchy(grid)]
@@ -210,7 +212,7 @@ class PressureEquation:
         level.loop(apply)(self.direction, level.ax, level.ay, level.az, level.diagonal, level.image)
 
     def _product(self, a: Array, b: Array) -> float:
-        """Sum of a b over the cells of all ranks."""
+        """Sum of a b over the cells of all ranks; NaN where a product is not finite."""
         finest = self.finest
         finest.loop(largest_products)(a, b, finest.rows, self._largest)
         largest = self.communicator.largest(self._largest)
@@ -218,7 +220,8 @@ class PressureEquation:
             return math.nan
         unit = float(unit_of(largest))
         finest.loop(split_products)(a, b, unit, finest.rows, self._parts)
-        return float(put_together(self.communicator.sum(self._parts, axis=0), unit))
+        whole, fine, missing = self.communicator.sum(self._parts, axis=0)
+        return math.nan if missing else float(put_together(np.array([whole, fine]), unit))
 
     def _cycle(self, depth: int) -> None:
         """One V-cycle: sweep forward, correct from the coarser grid, sweep backward."""
