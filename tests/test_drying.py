@@ -65,6 +65,7 @@ def test_a_wet_bed_dries_at_the_rate_of_the_air_that_leaves_and_at_the_wet_bulb(
     assert now["vapour_from_particles"] == pytest.approx(now["evaporated_mass"], rel=1e-10)
 
 
+@pytest.mark.slow
 def test_a_layer_of_wet_beads_is_dry_when_the_balance_says() -> None:
     """Beads with films: a plateau at the wet bulb, a constant rate, and the end within 2 % of the water over the rate
     by the air that leaves."""

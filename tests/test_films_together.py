@@ -293,7 +293,7 @@ def compare(run: ParticleSolver, step: float, sliding: bool, weak: bool = False)
 
 
 @pytest.mark.parametrize("step", [3e-8, 2.5e-7, 1e-6])
-@pytest.mark.parametrize("motions", ["normal", "full"])
+@pytest.mark.parametrize("motions", ["normal", pytest.param("full", marks=pytest.mark.slow)])
 def test_a_network_is_that_of_a_direct_solution(motions: str, step: float) -> None:
     """300 spheres: dissipation within 1e-6, velocities within 1e-5 at a tolerance of 1e-6."""
     lost, velocity = compare(network(motions, tolerance=TIGHT), step, motions != "normal")
@@ -366,7 +366,9 @@ def test_a_large_sphere_among_small_ones_is_that_of_a_direct_solution(plane: boo
     assert velocity < 1e-5
 
 
-@pytest.mark.parametrize("motions", ["normal", "full", "full_twist"])
+@pytest.mark.parametrize(
+    "motions", ["normal", *(pytest.param(motions, marks=pytest.mark.slow) for motions in ("full", "full_twist"))]
+)
 def test_a_cluster_that_turns_as_a_rigid_body_feels_nothing(motions: str) -> None:
     """Velocities and spins of a rigid body: neither changes."""
     places, radii = ball(40, 2.0, 5, False)

@@ -256,6 +256,7 @@ def test_particles_come_and_go_on_ranks_as_in_one_process() -> None:
     assert_same_bits(joined([each for each, _ in many]), joined([one]))
 
 
+@pytest.mark.slow
 def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
     """From the state by ids."""
     spheres, given = settings(True, True)

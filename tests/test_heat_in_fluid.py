@@ -297,6 +297,7 @@ def schumann(distance: float, time: float) -> float:
     return float(quad(rate, 0.0, max(time, 0.0), limit=200)[0])
 
 
+@pytest.mark.slow
 def test_a_packed_bed_cools_as_schumann_solved_it() -> None:
     """Within 1 % of the driving difference everywhere, with cells of 0.27 transfer units and no filter."""
     layers, spacing, number, speed = 120, 2e-3, 4.0, 1.0

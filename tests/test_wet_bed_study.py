@@ -74,6 +74,7 @@ def test_the_table_of_one_packing_and_two_states_takes_errors_from_time() -> Non
     assert row.value == pytest.approx(math.log(1.5)) and "0.028" in row.note
 
 
+@pytest.mark.slow
 def test_all_states_advance_before_one_goes_further(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One packing in all states first; the whole plan has three packings of 10.1 s in each state, and the ramps."""
     pieces = [(name, until) for name, _, until in plan()]
