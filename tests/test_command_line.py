@@ -116,9 +116,12 @@ ORDER = ("new", "check", "run", "resume", "report", "view", "export", "sweep")
 
 
 def quick(line: str) -> bool:
-    """Whether a command takes seconds: no comparison with the literature, no run of a whole demonstration."""
+    """Whether a command takes seconds: no comparison with the literature, no run of a whole demonstration, and no loops
+    that few others use."""
     verb = line.split()[1]
-    return verb not in ("validate", "bench") and (verb not in ("run", "sweep") or "until=" in line)
+    return verb not in ("validate", "bench", "wet-pair", "wet-wall", "three-spheres") and (
+        verb not in ("run", "sweep") or "until=" in line
+    )
 
 
 def documented() -> list[str]:

@@ -41,6 +41,7 @@ def test_near_slabs_are_those_within_reach() -> None:
     assert slabs.near(4, 0.12, np.array([1.0, 1.0, 1.0])) == [0, 1, 3]
 
 
+@pytest.mark.slow
 def test_planes_follow_the_particles_and_bits_stay() -> None:
     """All particles begin on one rank of three; another has none."""
     spheres, given = settings(True, True)

@@ -302,7 +302,7 @@ def test_a_network_is_that_of_a_direct_solution(motions: str, step: float) -> No
 
 
 @pytest.mark.parametrize("step", [3e-8, 2.5e-7, 1e-6])
-@pytest.mark.parametrize("motions", ["normal", "full"])
+@pytest.mark.parametrize("motions", ["normal", pytest.param("full", marks=pytest.mark.slow)])
 def test_weak_films_that_act_by_themselves_are_nearly_those_of_a_direct_solution(motions: str, step: float) -> None:
     """The same network with its weak films in the direct solution, too."""
     lost, velocity = compare(network(motions, tolerance=TIGHT), step, motions != "normal", weak=True)

@@ -18,7 +18,7 @@ SHARE = 5
 """The plain test takes a fifth of the particles."""
 OWN_LAWS = {
     name: pytest.param(name, marks=pytest.mark.slow)
-    for name in ("coating", "lubrication-study", "drying-bed", "spray-coating-hot")
+    for name in ("coating", "wet-bed", "lubrication-study", "drying-bed", "spray-coating-hot")
 }
 """Cases whose laws no other test compiles."""
 

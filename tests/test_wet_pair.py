@@ -75,6 +75,7 @@ def test_outcomes() -> None:
     assert collide_wet(0.2, 60.0, duration=0.07).outcome == "stick"
 
 
+@pytest.mark.slow
 def test_a_faster_liquid_glass_keeps_the_solids_farther_apart() -> None:
     """h_min grows as the root of the speed and ends at the film."""
     slow, fast = collide_wet(1.0).minimum_gap, collide_wet(4.0).minimum_gap
@@ -92,6 +93,7 @@ def test_a_thin_liquid_without_its_own_pressure_and_a_radius_in_mm_are_warned_of
     assert "is that of silicone oil of 10 Pa s" in found.warnings[0] and "did you mean 0.001 m?" in found.warnings[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", TRANSITION_PRESSURES, ids="-".join)
 def test_films_dissipate_in_the_expected_order(kind: tuple[str, str]) -> None:
     """A constant film below h_min takes more than none at the same pressure; oblique impacts never lose more."""
