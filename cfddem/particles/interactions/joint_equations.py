@@ -334,8 +334,7 @@ def film_residual(e, system, step, renew):
         whole += dot(a, slip) + dot(b, roll)
         by_wanted -= dot(push, slip) + dot(couple, roll)
         by_residual += dot(push, s) + dot(couple, q)
-    mine = 1.0 if own(e, system) else 0.0
-    made = (mine * left, mine * whole, mine * by_wanted, mine * by_residual)
+    made = (left, whole, by_wanted, by_residual) if own(e, system) else (0.0, 0.0, 0.0, 0.0)
     terms, rows = memory.joint_terms, len(system.edges.first)
     terms[e], terms[rows + e], terms[2 * rows + e], terms[3 * rows + e] = made
     return made

@@ -106,9 +106,10 @@ def film_follows(e, system, length, step):
         put_slip_and_roll(memory.joint_shear_residual, e, s, q)
         a, b = by_blocks(four_of(memory.joint_inverse, e), s, q, at(memory.joint_normal, e))
         term += dot(a, s) + dot(b, q)
-    mine = 1.0 if own(e, system) else 0.0
-    memory.joint_terms[e], memory.joint_terms[len(system.edges.first) + e] = mine * term, mine * outdated
-    return mine * term, mine * outdated
+    if not own(e, system):
+        term, outdated = 0.0, 0.0  # not a product: `outdated` is infinite where solids overlap
+    memory.joint_terms[e], memory.joint_terms[len(system.edges.first) + e] = term, outdated
+    return term, outdated
 
 
 @part
