@@ -15,6 +15,11 @@ CORNERS = 8
 """Cells on which a particle deposits, or a piece of it. They are counted along x first, then y, then z."""
 
 
+CROWD_CELLS, CROWD_LARGE = 64.0, 8.0
+"""Most particles that deposit on one cell: as many as fill so many cells, and so many that are larger than cells. These
+lie in the 27 cells around it, and in solid cells whose nearest open cell it is; twice as many, for safety."""
+
+
 @inline
 def cell_and_share(coordinate, linear):
     """First cell of a particle along an axis, and its share in the next cell; coordinate in cells from the low wall."""
@@ -133,12 +138,9 @@ def _mean(weights, cells, fields, m):
 
 @serial
 def largest_deposits(values, volume, cell_volume, largest):
-    """Largest of each of the values (N, m), and how large the sums in a cell can be (2, m); NaN if a value is.
-
-    The particles that deposit on a cell fill little more than the volume of the cells around it.
-    """
+    """Largest of each of the values (N, m), and how large the sums in a cell can be (2, m); NaN if a value is."""
     for n in range(len(values)):
-        crowd = 64.0 * cell_volume / volume[n] + 8.0 if volume[n] > 0.0 else math.inf
+        crowd = CROWD_CELLS * cell_volume / volume[n] + CROWD_LARGE if volume[n] > 0.0 else math.inf
         for m in range(values.shape[1]):
             size = abs(values[n, m])
             if size > largest[0, m] or size != size:

@@ -205,7 +205,7 @@ class HeatExchange(CaseFeature):
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         for name in _KEPT:
-            setattr(self, name, float(state.get(name, 0.0)))  # a checkpoint may be older than a sum
+            setattr(self, name, float(state[name]))
         self.law.outside = int(state["outside"]) if self.communicator.rank == 0 else 0
         if self.cells is not None:
             self.cells.restore(state["cells"])
