@@ -269,24 +269,6 @@ YIN_KOCH = (
 )
 
 
-def between_tabulated(reynolds: float, values: tuple[float, ...]) -> float:
-    """Value at a Reynolds number between those of the table, linear in its logarithm; held beyond its ends.
-
-    reynolds  Re_t [-]
-    values    at `TABLE_REYNOLDS`
-
-    >>> between_tabulated(9.98, TABLE_EXPONENT)
-    3.8
-    """
-    number = min(max(reynolds, TABLE_REYNOLDS[0]), TABLE_REYNOLDS[-1])
-    place = 1
-    while number > TABLE_REYNOLDS[place]:
-        place += 1
-    low, high = TABLE_REYNOLDS[place - 1], TABLE_REYNOLDS[place]
-    part = math.log(number / low) / math.log(high / low)
-    return float(values[place - 1] + part * (values[place] - values[place - 1]))
-
-
 @law("bed", YIN_KOCH, reynolds=(1.02, 20.0))
 def velocity_ratio_two_parameters(reynolds: float) -> float:
     r"""Extrapolated bed velocity at voidage 1 over the terminal velocity (two-parameter law of bed expansion).
@@ -302,7 +284,13 @@ def velocity_ratio_two_parameters(reynolds: float) -> float:
     >>> round(velocity_ratio_two_parameters(9.98), 6), velocity_ratio_two_parameters(2000.0)
     (0.86, 0.8)
     """
-    return between_tabulated(reynolds, TABLE_RATIO)
+    number = min(max(reynolds, TABLE_REYNOLDS[0]), TABLE_REYNOLDS[-1])
+    place = 1
+    while number > TABLE_REYNOLDS[place]:
+        place += 1
+    low, high = TABLE_REYNOLDS[place - 1], TABLE_REYNOLDS[place]
+    part = math.log(number / low) / math.log(high / low)
+    return float(TABLE_RATIO[place - 1] + part * (TABLE_RATIO[place] - TABLE_RATIO[place - 1]))
 
 
 @law("bed", YIN_KOCH, reynolds=(1.02, 20.0))
@@ -319,7 +307,13 @@ def exponent_two_parameters(reynolds: float) -> float:
     >>> round(exponent_two_parameters(9.98), 6), exponent_two_parameters(2000.0)
     (3.8, 2.39)
     """
-    return between_tabulated(reynolds, TABLE_EXPONENT)
+    number = min(max(reynolds, TABLE_REYNOLDS[0]), TABLE_REYNOLDS[-1])
+    place = 1
+    while number > TABLE_REYNOLDS[place]:
+        place += 1
+    low, high = TABLE_REYNOLDS[place - 1], TABLE_REYNOLDS[place]
+    part = math.log(number / low) / math.log(high / low)
+    return float(TABLE_EXPONENT[place - 1] + part * (TABLE_EXPONENT[place] - TABLE_EXPONENT[place - 1]))
 
 
 @law(
