@@ -29,17 +29,18 @@ from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_b
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.beds.spouted_bed import bed as spout
 from scenarios.beds.spouted_bed import profiles
-from scenarios.validation.beds.refinement import (
+from scenarios.validation.beds.study import (
     Means,
     RefinementBed,
     compared,
+    frequency,
     gas,
+    growing,
     instantaneous_drops,
     liquid,
     placed,
     variants,
 )
-from scenarios.validation.beds.study import frequency, growing
 
 
 @pytest.mark.parametrize(

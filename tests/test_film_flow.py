@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import curve_fit
 from scipy.special import j0, jn_zeros
 
-from scenarios.collisions.film_impact import faces, liquid, pressure, viscosity
+from scenarios.collisions.film_impact import liquid, pressure, viscosity
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.pressure import Bead, Solved
 from scenarios.collisions.film_impact.solver import GridImpact, Settings
@@ -28,7 +28,7 @@ class Filled:
         grid.place_bead(bead.radius, bead.gap)
         self.liquid = grid.open_cell > 0.0
         self.u, self.w = np.zeros_like(grid.open_u), np.zeros_like(grid.open_w)
-        wet = faces.cells_to_faces(self.liquid)
+        wet = liquid.cells_to_faces(self.liquid)
         self.wet = [wet[0] & (grid.open_u > 0.0), wet[1] & (grid.open_w > 0.0)]
 
     def step(self, dt: float) -> Solved:

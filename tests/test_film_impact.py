@@ -17,8 +17,7 @@ from closures.bridge import deforming_potential
 from closures.film_impact import film_added_mass, reduced_impact, reversal_restitution, slowest_rebound
 from closures.restitution import davis_sitison, singh
 from scenarios.collisions.film_impact import FilmImpact, Liquid, impact
-from scenarios.collisions.film_impact.film_laws import laws_of
-from scenarios.collisions.film_impact.materials import LIQUIDS
+from scenarios.collisions.film_impact.materials import LIQUIDS, laws_of
 from scenarios.collisions.film_impact.validation import peaks
 
 
@@ -143,7 +142,7 @@ def test_a_movie_ends_when_the_bead_has_left(tmp_path: Path) -> None:
     """A frame for each step after contact, and 30 in the time of a fall through the film."""
     from PIL import Image
 
-    from scenarios.collisions.film_impact.movie import AFTER_CONTACT, FRAMES, MOST, movie
+    from scenarios.collisions.film_impact.figures import AFTER_CONTACT, FRAMES, MOST, movie
 
     result = movie(tmp_path / "rebound.gif", velocity=1.0, cells=5)
     falls = result.p4.time * 1.0 / 0.4e-3

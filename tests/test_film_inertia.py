@@ -14,8 +14,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures.restitution import davis_sitison
-from scenarios.collisions.film_impact.film_laws import laws_of
-from scenarios.collisions.film_impact.materials import GLASS, LIQUIDS
+from scenarios.collisions.film_impact.materials import GLASS, LIQUIDS, laws_of
 
 RESOLVED = {  # diameter, liquid, film, velocity: restitution of the resolved impact with 20 cells in the film
     (8e-3, "water", 0.4e-3, 1.0): 0.856,

@@ -6,8 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from scenarios.validation.fluid.flows import order, rms
-from scenarios.validation.fluid.manufactured import error
+from scenarios.validation.fluid.study import error, order, rms
 
 
 @pytest.mark.parametrize("model", ["A", "B"])

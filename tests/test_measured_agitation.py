@@ -21,8 +21,7 @@ from scenarios.references.resolved_suspension.measures import Series, even_windo
 from scenarios.references.resolved_suspension.study import stored
 from scenarios.references.resolved_suspension.suspension import Point
 from scenarios.validation.agitation import study
-from scenarios.validation.agitation.study import fits, fitted
-from scenarios.validation.agitation.unresolved import case_of
+from scenarios.validation.agitation.study import case_of, fits, fitted
 from scenarios.validation.targets import validate
 
 

@@ -26,7 +26,7 @@ from cfddem.plotting.curves import history
 from cfddem.plotting.pictures import BUBBLE, SCALARS, Stage, _bubbles, movie, picture
 from cfddem.plotting.scene import Look, Scene, scene, window
 from cfddem.plotting.wall_surfaces import _moved, _surface, walls_of
-from scenarios.beds.liquid_bed.movie import side_by_side
+from scenarios.beds.liquid_bed.study import side_by_side
 
 GRID = SimpleNamespace(cells=(10, 4, 20), spacing=(0.01, 0.01, 0.01), origin=(0.0, 0.0, 0.0))
 QUANTITIES = {

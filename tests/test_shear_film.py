@@ -291,7 +291,7 @@ def test_bits_on_threads() -> None:
 @pytest.mark.parametrize("press", [0.0, 20.0])
 def test_films_dissipate_the_work_of_shear(press: float) -> None:
     """Within 0.1 %, at a solid fraction of 0.5 between plates and under a lid; much of it by sliding and rolling."""
-    from scenarios.validation.sheared_films.shear import sheared
+    from scenarios.validation.sheared_films.study import sheared
 
     found = sheared(0.5, "full", press)
     assert found.dissipated == pytest.approx(1.0, abs=1e-3)
@@ -302,7 +302,7 @@ def test_films_dissipate_the_work_of_shear(press: float) -> None:
 @pytest.mark.parametrize("solid_fraction", [0.3, 0.55])
 def test_the_viscosity_of_films_is_the_same_at_four_times_the_step(solid_fraction: float) -> None:
     """Within 3 %, over a strain of 0.1 from rest."""
-    from scenarios.validation.sheared_films.shear import sheared
+    from scenarios.validation.sheared_films.study import sheared
 
     one, four = (sheared(solid_fraction, strain=0.1, steps_in_one=steps).viscosity for steps in (1.0, 4.0))
     assert four == pytest.approx(one, rel=0.03)

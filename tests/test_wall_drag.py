@@ -18,8 +18,8 @@ from closures.lubrication import film_resistance, film_strength
 from closures.tangential_lubrication import film_logarithm, shear_resistance
 from closures.wall_drag import along_wall, film_along_wall, towards_wall
 from scenarios.beds.settling import study as settling
-from scenarios.beds.settling.landing import RADIUS as RADIUS_OF_NYLON
-from scenarios.beds.settling.landing import Walls, land, land_on_grid, landing_ode
+from scenarios.beds.settling.study import RADIUS as RADIUS_OF_NYLON
+from scenarios.beds.settling.study import Walls, land, land_on_grid, landing_ode
 
 RADIUS, VISCOSITY = 1e-3, 0.1
 STOKES = 6.0 * math.pi * VISCOSITY * RADIUS

@@ -13,7 +13,7 @@ from cfddem.cli.scenario_commands import command
 from cfddem.io.files import require_folder
 from scenarios.collisions import film_impact, immersed_pair, three_spheres, wet_pair, wet_wall
 from scenarios.collisions.film_impact.figures import draw_moments
-from scenarios.collisions.film_impact.movie import movie as write_movie
+from scenarios.collisions.film_impact.figures import movie as write_movie
 from scenarios.collisions.immersed_pair.measured import MeasuredCollisions, compare_points
 from scenarios.collisions.immersed_pair.ranges import UNITS, CollisionRange, stokes_numbers, write_csv
 from scenarios.collisions.three_spheres.figures import MEANINGS, draw_map

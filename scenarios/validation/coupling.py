@@ -19,7 +19,7 @@ from cfddem.preflight.expansion import SCATTER, expansions
 from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed import study as liquid_bed
 from scenarios.beds.packed_bed import study as packed_bed
-from scenarios.beds.settling import landing
+from scenarios.beds.settling import study as landing
 from scenarios.beds.settling import study as settling
 from scenarios.validation import history_force
 from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, reference, worst

@@ -7,11 +7,15 @@ Air that leaves the bed saturated, at the temperature of the seeds, gives its he
 The heat that warms the seeds at the start comes from the same air:
 
 .. math:: t\,\rho U A\,c\,(T_{in} - T) = m L(T) + m_s c_s (T - T_0)
+
+`python -m scenarios.beds.drying_bed.study OUTPUT.png` runs the bed, which takes some minutes.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +24,7 @@ from cfddem.case.schema import Case
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.heat_keys import Heat
 from cfddem.features.vapour_keys import VapourTable
+from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from closures.evaporation import latent_heat, saturation_pressure, vapour_fraction
@@ -120,3 +125,27 @@ def drying(described: Case) -> tuple[Drying, Balance]:
         imbalance=max(float(found[f"{name}_imbalance"].max()) for name in ("heat", "vapour", "liquid")),
     )
     return result, balance(described, water, capacity)
+
+
+# ---------------------------------------------------------------- figure of the drying bed
+
+
+def figure(found: Drying, balance: Balance, path: Path) -> None:
+    """Temperature, water and rate of a run, with what the balance says."""
+    drawn, (left, right) = panels(2, width=9.0, height=3.8)
+    left.plot(found.time, found.temperature - 273.15, color=BLUE, label="mean of the seeds")
+    left.axhline(balance.temperature - 273.15, color=GREY, ls="--", label="balance")
+    left.axvline(balance.end, color=GREY, lw=1.0, ls=":", label="end by the balance")
+    label(left, "time", "s", "temperature", "°C")
+    legend(left, loc="upper left")
+    right.plot(found.time, 1e6 * found.rate, color=BLUE, label="from the seeds")
+    right.plot(found.time, 1e6 * found.by_air, color=ORANGE, label="by the air that leaves")
+    right.axhline(1e6 * balance.rate, color=GREY, ls="--", label="balance")
+    right.axvline(balance.end, color=GREY, lw=1.0, ls=":")
+    label(right, "time", "s", "rate of evaporation", "mg/s")
+    legend(right, loc="lower left")
+    save(drawn, path)
+
+
+if __name__ == "__main__":
+    figure(*drying(case()), Path(sys.argv[1] if len(sys.argv) > 1 else "drying_bed.png"))

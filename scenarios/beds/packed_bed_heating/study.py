@@ -6,13 +6,17 @@ and the fluid have
 .. math:: T_s = e^{-y}\int_0^z e^{-s} I_0(2\sqrt{y s})\,ds, \qquad T_f = T_s + e^{-y-z} I_0(2\sqrt{y z})
 
 of the difference between inlet and start.
+
+`python -m scenarios.beds.packed_bed_heating.study OUTPUT.png` takes a few seconds.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +24,7 @@ from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.features.heat import HeatExchange
 from cfddem.features.heat_keys import Heat
+from cfddem.plotting.curves import BLUE, GREY, label, legend, panels, save
 from cfddem.run.simulation import Simulation
 
 
@@ -92,3 +97,30 @@ def heating(described: Case, times: Sequence[float]) -> list[Heating]:
         scaled = (solids - start) / (inlet - start), (heat.cells.value.mean(axis=(1, 2)) - start) / (inlet - start)
         found.append(Heating(time, height, *scaled, exact_solids, exact_fluid))
     return found
+
+
+# ---------------------------------------------------------------- figure of the heated bed
+
+
+TIMES = (0.2, 0.4, 0.6)
+
+
+def figure(path: Path) -> None:
+    """Temperatures of the beads against height, with the exact ones."""
+    drawn, axes = panels(width=6.5, height=4.0)
+    for number, each in enumerate(heating(case(), TIMES)):
+        first = number == 0
+        axes.plot(1e3 * each.height, each.exact_solids, color=GREY, label="exact, beads" if first else None)
+        axes.plot(1e3 * each.height, each.exact_fluid, color=GREY, ls="--", label="exact, water" if first else None)
+        axes.plot(1e3 * each.height, each.solids, "o", color=BLUE, ms=4, label="run, beads" if first else None)
+        axes.plot(
+            1e3 * each.height, each.fluid, "o", color=BLUE, mfc="none", ms=4, label="run, water" if first else None
+        )
+        print(f"t = {each.time} s: largest {each.error:.4f}, mean {each.mean_error:.4f}")
+    label(axes, "height", "mm", "temperature, 0 at the start, 1 at the inlet", "-")
+    legend(axes, loc="upper right")
+    save(drawn, path)
+
+
+if __name__ == "__main__":
+    figure(Path(sys.argv[1] if len(sys.argv) > 1 else "packed_bed_heating.png"))

@@ -8,18 +8,24 @@ and the fluid around it: drag, added mass, history force, and the extra drag bes
 >>> time, gap = bounce(surroundings=())                # film, wall and weight alone
 >>> round(float(gap[time > 0].max()) * 1e3, 1)         # apex [mm]; 2.0 was measured
 2.3
+
+`python -m scenarios.collisions.bouncing_sphere.study OUTPUT.png` computes the collisions and draws them.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.case.materials import Material
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, label, legend, panels, save
 from closures.added_mass import near_wall
 from scenarios.collisions.immersed_pair.study import Collision, collide
+from scenarios.validation.table import numbers
 
 GRAVITY = 9.81
 
@@ -139,3 +145,35 @@ def shares_of_loss(path: Collision, fall: Fall = SLOW) -> dict[str, float]:
 def speed_after_contact(time: np.ndarray, gap: np.ndarray, first: float, second: float) -> float:
     """Mean speed away from the wall between two times after contact, as read off a measured trajectory [m/s]."""
     return float(np.interp(second, time, gap) - np.interp(first, time, gap)) / (second - first)
+
+
+# ---------------------------------------------------------------- figure of the bouncing sphere
+
+
+FORCES = (
+    ((), "film alone", ORANGE, "--"),
+    (("drag", "added_mass"), "with drag and added mass", GREEN, "-."),
+    (ALL, "with all forces of the fluid", BLUE, "-"),
+)
+"""Forces of the fluid beyond the film, their names, colours and lines."""
+
+
+def figure(path: Path) -> None:
+    """Gap between sphere and wall against time."""
+    drawn, axes = panels(width=6.5, height=4.2)
+    for forces, text, colour, line in FORCES:
+        time, gap = bounce(surroundings=forces)
+        axes.plot(1e3 * time, 1e3 * gap, color=colour, ls=line, label=text)
+    measured = numbers("gondret2002_st27_trajectory")
+    axes.plot(
+        1e3 * measured["t"], 1e3 * measured["gap"], "o", color=GREY, ms=5, label="measured, Gondret et al. (2002)"
+    )
+    axes.set_xlim(-4.0, 44.0)
+    axes.set_ylim(0.0, 3.2)
+    label(axes, "time after contact", "ms", "gap between sphere and wall", "mm")
+    legend(axes, loc="upper right")
+    save(drawn, path)
+
+
+if __name__ == "__main__":
+    figure(Path(sys.argv[1] if len(sys.argv) > 1 else "bouncing_sphere.png"))

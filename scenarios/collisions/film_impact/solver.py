@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenarios.collisions.film_impact import faces, ledger, liquid, pressure, surface, viscosity, volume
+from scenarios.collisions.film_impact import ledger, liquid, pressure, surface, viscosity, volume
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.pressure import Bead
 
@@ -123,12 +123,12 @@ class GridImpact:
         """Velocities on the faces, from the particles or, where there is none, from the step before."""
         grid = self.grid
         liquid.to_faces(self.particles, self.volume, grid.dx, self.u, self.w, *self.known)
-        faces.carry(dt, grid.dx, last[0], self.u, self.known[0], last[0], self.wet[0])
-        faces.carry(dt, grid.dx, last[0], self.w, self.known[1], last[1], self.wet[1])
-        wet_u, wet_w = faces.cells_to_faces(self.liquid)
+        liquid.carry(dt, grid.dx, last[0], self.u, self.known[0], last[0], self.wet[0])
+        liquid.carry(dt, grid.dx, last[0], self.w, self.known[1], last[1], self.wet[1])
+        wet_u, wet_w = liquid.cells_to_faces(self.liquid)
         self.wet = [wet_u & (grid.open_u > 0.0), wet_w & (grid.open_w > 0.0)]
-        faces.extend(self.u, self.known[0], faces.AROUND)
-        faces.extend(self.w, self.known[1], faces.AROUND)
+        liquid.extend(self.u, self.known[0], liquid.AROUND)
+        liquid.extend(self.w, self.known[1], liquid.AROUND)
 
     def apply_forces(self, dt: float) -> None:
         """Viscous stress of the liquid, and gravity on liquid and bead."""
@@ -215,8 +215,8 @@ class GridImpact:
     def velocities_to_particles(self, dt: float, before: tuple[np.ndarray, np.ndarray], arrived: float) -> None:
         """Give the particles their new velocities, and extend the grid's around the liquid."""
         gained = self.grid_energy() - arrived
-        self.u = faces.extended_change(self.u, before[0], self.wet[0], 0.0)
-        self.w = faces.extended_change(self.w, before[1], self.wet[1], -self.gravity * dt)
+        self.u = liquid.extended_change(self.u, before[0], self.wet[0], 0.0)
+        self.w = liquid.extended_change(self.w, before[1], self.wet[1], -self.gravity * dt)
         kinetic = self.liquid_energy()[0]
         liquid.to_particles(self.particles, self.grid.dx, self.settings.flip, self.u, self.w, *before)
         self.losses.exchange += gained - (self.liquid_energy()[0] - kinetic)

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfddem.backend.compile import inline, serial
-from scenarios.collisions.film_impact.faces import extend
 from scenarios.collisions.film_impact.grid import Grid
-from scenarios.collisions.film_impact.liquid import sample
+from scenarios.collisions.film_impact.liquid import extend, sample
 
 PASSES = 6
 """How often the share of liquid is smoothed with weights 1/4, 1/2, 1/4 along both axes."""

@@ -23,8 +23,7 @@ from scenarios.collisions.film_impact.figures import (
     draw_restitution,
     draw_tension,
 )
-from scenarios.collisions.film_impact.film_laws import laws_of
-from scenarios.collisions.film_impact.materials import LIQUIDS
+from scenarios.collisions.film_impact.materials import LIQUIDS, laws_of
 from scenarios.collisions.film_impact.result import COLUMNS, FilmImpact
 from scenarios.collisions.film_impact.study import impact, sweep
 from scenarios.references.isph.checks import layer_at_rest, taylor_green

@@ -18,13 +18,20 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError, RunFailed, nearest
 from cfddem.case.materials import Material
+from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import CUTS, TANGENTIALS, BridgeLaws
-from closures import contact
+from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.state import make_particles
+from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, blank, label, legend, panels, shades
+from closures import contact, timescales
+from closures.contact import hertz_stiffness
 from closures.lubrication import film_strength
 from closures.minimum_gap import glass_transition
-from scenarios.collisions.wet_pair.engine import integrate as integrate_in_engine
 from scenarios.references.wet_pair import Motion, Pair, integrate
 
 BRIDGES = ("deforming", "static")
@@ -38,7 +45,7 @@ TRANSITION_PRESSURES = {
 }
 """Glass transition pressure of silicone oil of 10 Pa s, as fitted for each film by Punch et al. (2023, fig. 8) [Pa]."""
 
-SLOWEST, FASTEST = 1e-12, 1e3
+LEAST_SPEED, FASTEST = 1e-12, 1e3
 """Speeds of impact that can be followed [m/s]."""
 
 LEAST_VISCOSITY, LARGE_RADIUS = 1.0, 0.1
@@ -182,8 +189,8 @@ def _pair(given: Mapping[str, Any], laws: BridgeLaws) -> Pair:
     elastic = (given["youngs_modulus"], given["poisson"])
     mass = given["density"] * 4.0 / 3.0 * math.pi * radius**3
     speed = given["stokes"] * film_strength(viscosity, 0.5 * radius) / (0.5 * mass)
-    if not SLOWEST <= speed <= FASTEST:
-        limit = f"that of an impact at {SLOWEST:g} to {FASTEST:g} m/s; it gives {speed:.3g} m/s"
+    if not LEAST_SPEED <= speed <= FASTEST:
+        limit = f"that of an impact at {LEAST_SPEED:g} to {FASTEST:g} m/s; it gives {speed:.3g} m/s"
         raise InputError("stokes", given["stokes"], limit)
     return Pair(
         speed=speed,
@@ -229,3 +236,107 @@ def _history(motion: Motion) -> dict[str, np.ndarray]:
         "turning": motion.turning,
         "spin": motion.spin,
     }
+
+
+# ---------------------------------------------------------------- two wet spheres in the particle engine
+
+
+FILM_STEP = 1e-3
+"""Step where the solids are apart, over the time in which the pair crosses the film at its present speed."""
+
+SLOWEST = 0.02
+"""Speed over that of impact below which the step in the film no longer grows."""
+
+IMPACT_STEP = 0.01
+"""Step in contact over the Hertz time."""
+
+MOST_STEPS = 2_000_000
+
+
+def integrate_in_engine(pair: Pair, liquid: BridgeLaws, solid: Material, angle: float, duration: float) -> Motion:
+    """Integrate in the particle engine until the bridge has ruptured or the time is over.
+
+    liquid    laws of the bridge
+    angle     between velocity and line of centres at impact [deg]
+    duration  [s]
+    """
+    apart = 2.0 * pair.radius + pair.film * (1.0 - 1e-9)
+    velocity = [[pair.speed, -pair.speed * math.tan(math.radians(angle)), 0.0], [0.0, 0.0, 0.0]]
+    two = make_particles(
+        np.array([[0.0, 0.0, 0.0], [apart, 0.0, 0.0]]), pair.radius, solid.density, velocity=np.array(velocity)
+    )
+    coat(two, 0.5 * pair.film)
+    # the steps are chosen here: they follow the film, whose resistance changes as it opens and closes
+    run = ParticleSolver(two, pair_table([solid]), laws=Laws(bridge=liquid), check_steps=False)
+    bridges = run.feature(Bridges)
+    stiffness = hertz_stiffness(pair.modulus, 0.5 * pair.radius)
+    short = IMPACT_STEP * timescales.hertz_time(0.5 * pair.mass, stiffness, pair.speed)
+    times, rows = [0.0], [_look(run)]
+    while bridges.count and run.time < duration:
+        gap, _, approach, *_ = rows[-1]
+        long = FILM_STEP * pair.film / max(abs(approach), SLOWEST * pair.speed)
+        run.advance(short if gap < 2.0 * long * abs(approach) else long)
+        times.append(run.time)
+        rows.append(_look(run))
+        if run.steps > MOST_STEPS:
+            raise RunFailed(f"the pair is still in its film after {MOST_STEPS} steps, at t = {run.time:.6g} s")
+    return Motion(bridges.count == 0, np.array(times), *np.array(rows).T)
+
+
+def _look(run: ParticleSolver) -> tuple[float, float, float, float, float]:
+    """Gap [m], angle turned [rad], approach speed [m/s], rate of turning and spin [rad/s] of the pair."""
+    body = run.particles
+    x, y, _ = body.position[1] - body.position[0]
+    u, v, _ = body.velocity[1] - body.velocity[0]
+    distance = math.hypot(x, y)
+    gap = distance - float(body.radius.sum())
+    return gap, math.atan2(y, x), -(x * u + y * v) / distance, (x * v - y * u) / distance**2, float(body.spin[0, 2])
+
+
+# ---------------------------------------------------------------- figures of the wet pair
+
+
+Curve = dict[float, np.ndarray]
+TITLES = {
+    ("static", "constant"): "static bridge, constant below $h_{min}$",
+    ("static", "zero"): "static bridge, nothing below $h_{min}$",
+    ("deforming", "constant"): "deforming bridge, constant below $h_{min}$",
+    ("deforming", "zero"): "deforming bridge, nothing below $h_{min}$",
+}
+
+
+def films(stokes: np.ndarray, curves: dict[tuple[str, str], Curve]) -> Any:
+    """Restitution of four films at five angles, as in figure 8 of Punch et al. (2023)."""
+    figure, panel = blank(2, 2, width=10.0, height=7.2, sharex=True, sharey=True)
+    for axes, (kind, curve) in zip(panel, curves.items()):
+        for (angle, values), colour in zip(curve.items(), shades(len(curve))):
+            axes.plot(stokes, values, color=colour, label=f"{angle:g} deg")
+        axes.set(xlim=(0, stokes[-1]), ylim=(0, 1))
+        label(axes, "Stokes number  $St_n$", "-", "restitution  $e_n$", "-", TITLES[kind])
+        axes.label_outer()
+    legend(panel[0], loc="upper left")
+    return figure
+
+
+def spins(stokes: np.ndarray, curves: dict[float, Curve]) -> Any:
+    """Spin after the collision without and with friction, as in figure 12 of Punch et al. (2023)."""
+    figure, panel = panels(len(curves), width=9.6, height=4.2, sharey=True)
+    for axes, (friction, curve) in zip(panel, curves.items()):
+        for (angle, values), colour in zip(curve.items(), shades(len(curve))):
+            axes.plot(stokes, values, color=colour, label=f"{angle:g} deg")
+        axes.set(xlim=(0, stokes[-1]), ylim=(0, None))
+        label(axes, "Stokes number  $St_n$", "-", r"spin  $\omega$", "rad/s", rf"friction  $\mu$ = {friction:g}")
+    panel[1].set_ylabel("")
+    legend(panel[0], loc="upper right")
+    return figure
+
+
+def tangential(stokes: np.ndarray, curves: dict[str, np.ndarray]) -> Any:
+    """Restitution at 60 degrees for each film across the line of centres, as in figure 14 of Punch et al. (2023)."""
+    figure, axes = panels(width=8.0, height=4.4)
+    for (name, values), colour in zip(curves.items(), (BLUE, ORANGE, GREY, GREEN, RED)):
+        axes.plot(stokes, values, color=colour, label=name)
+    axes.set(xlim=(0, stokes[-1]), ylim=(0, 0.8))
+    label(axes, "Stokes number  $St_n$", "-", "restitution  $e_n$", "-", "Impact at 60 degrees, watched for 1 s")
+    legend(axes, loc="upper left")
+    return figure

@@ -17,7 +17,7 @@ import numpy as np
 from cfddem.backend.errors import RunFailed
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
 from scenarios.validation.particles import granular_beds, single_sphere, suspensions, two_spheres
-from scenarios.validation.sheared_films.shear import krieger_dougherty, sheared
+from scenarios.validation.sheared_films.study import krieger_dougherty, sheared
 from scenarios.validation.table import Curves, Progress, Row, in_parts, reference, worst
 
 ANGLE = 9.0

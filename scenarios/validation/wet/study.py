@@ -15,7 +15,7 @@ from closures.restitution import singh
 from scenarios.collisions.three_spheres import validation as three_spheres_validation
 from scenarios.collisions.three_spheres.study import simulate_three_spheres
 from scenarios.collisions.three_spheres.validation import first_above, of
-from scenarios.collisions.wet_pair import figures as wet_pair_figures
+from scenarios.collisions.wet_pair import study as wet_pair
 from scenarios.collisions.wet_pair.study import TRANSITION_PRESSURES, collide_wet
 from scenarios.collisions.wet_wall import validation as wet_wall_validation
 from scenarios.validation.table import Columns, Progress, Row, reference, worst, write_histories
@@ -159,12 +159,12 @@ def pair_figures(folder: Path, curves: Curves) -> list[Row]:
         kind: {a: np.array([exact_pair(st, a, *kind).restitution for st in stokes]) for a in angles}
         for kind in TRANSITION_PRESSURES
     }
-    save(wet_pair_figures.films(stokes, by_film), folder / "wet_pair_restitution.png")
+    save(wet_pair.films(stokes, by_film), folder / "wet_pair_restitution.png")
     by_friction = {
         mu: {a: np.array([exact_pair(st, a, friction=mu).spin for st in stokes]) for a in angles[1:]}
         for mu in (0.0, 0.05)
     }
-    save(wet_pair_figures.spins(stokes, by_friction), folder / "wet_pair_spin.png")
+    save(wet_pair.spins(stokes, by_friction), folder / "wet_pair_spin.png")
     options: dict[str, dict[str, Any]] = {
         "Davis": {},
         "Nase": {"tangential": "nase"},
@@ -175,7 +175,7 @@ def pair_figures(folder: Path, curves: Curves) -> list[Row]:
     by_option = {
         name: np.array([exact_pair(st, 60.0, **more).restitution for st in low]) for name, more in options.items()
     }
-    save(wet_pair_figures.tangential(low, by_option), folder / "wet_pair_tangential.png")
+    save(wet_pair.tangential(low, by_option), folder / "wet_pair_tangential.png")
     for kind, curve in by_film.items():
         columns: dict[str, tuple[Any, str]] = {f"restitution_{a:g}_deg": (values, "-") for a, values in curve.items()}
         curves["wet_pair/" + "_".join(kind)] = {"stokes": (stokes, "-"), **columns}
