@@ -25,7 +25,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.coupling.coupling import Coupling as Coupling
     from cfddem.coupling.forces.drag import Drag as Drag
     from cfddem.coupling.forces.pressure import PressureForce as PressureForce
-    from cfddem.coupling.forces.weight import Weight as Weight
+    from cfddem.coupling.forces.pressure import Weight as Weight
     from cfddem.coupling.kernel import FilterKernel as FilterKernel
     from cfddem.data.fields import Field as Field
     from cfddem.fluid.conditions import FreeSlip as FreeSlip
@@ -59,7 +59,7 @@ if TYPE_CHECKING:  # type checkers do not call `__getattr__`
     from cfddem.run.simulation import Simulation as Simulation
     from cfddem.run.time_steps import StepSettings as StepSettings
     from cfddem.studies.notebook import run_case as run_case
-    from cfddem.studies.sweep_table import open_sweep as open_sweep
+    from cfddem.studies.sweep import open_sweep as open_sweep
 
 _MODULES = {
     "Box": "cfddem.particles.walls.shapes",
@@ -91,7 +91,7 @@ _MODULES = {
     "Mesh": "cfddem.particles.walls.shapes",
     "NoSlip": "cfddem.fluid.conditions",
     "open_run": "cfddem.io.reading",
-    "open_sweep": "cfddem.studies.sweep_table",
+    "open_sweep": "cfddem.studies.sweep",
     "Outlet": "cfddem.fluid.conditions",
     "OwnForce": "cfddem.model.feature",
     "pair_table": "cfddem.particles.material_pairs",
@@ -107,7 +107,7 @@ _MODULES = {
     "run_case": "cfddem.studies.notebook",
     "Simulation": "cfddem.run.simulation",
     "StepSettings": "cfddem.run.time_steps",
-    "Weight": "cfddem.coupling.forces.weight",
+    "Weight": "cfddem.coupling.forces.pressure",
 }
 __all__ = ["__version__", *sorted(_MODULES)]
 

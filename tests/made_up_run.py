@@ -9,7 +9,7 @@ import numpy as np
 
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
-from cfddem.io.provenance import provenance
+from cfddem.io.folder import provenance
 from cfddem.io.quantities import Quantity, of_fields
 from cfddem.io.writer import RunFolder
 from cfddem.particles.state import PARTICLE_FIELDS

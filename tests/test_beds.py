@@ -14,8 +14,7 @@ from cfddem.analysis.series import block_average
 from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import cell_counts
-from cfddem.preflight.bed_estimate import estimate_bed
-from cfddem.preflight.mixture import net_downward_forces
+from cfddem.preflight.bed_estimate import estimate_bed, net_downward_forces
 from cfddem.preflight.summary import preflight
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
@@ -29,7 +28,7 @@ from scenarios.beds.sedimentation.study import Settling, exponent, in_periodic_b
 from scenarios.beds.segregation.study import VELOCITIES, balance, mixture, separation, thresholds
 from scenarios.beds.spouted_bed import bed as spout
 from scenarios.beds.spouted_bed import profiles
-from scenarios.validation.beds.study import (
+from scenarios.validation.beds import (
     Means,
     RefinementBed,
     compared,

@@ -11,7 +11,7 @@ from command_line import call, parsed
 
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
-from cfddem.run.branching import branch_state
+from cfddem.run.resuming import branch_state
 from cfddem.run.runner import Run
 
 TINY = ("start=suspended", "bed.count=50", "run.until=0.01", "run.every=0.005", "run.average_from=0")

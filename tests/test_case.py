@@ -10,9 +10,9 @@ import pytest
 from example_case import TEXT
 
 from cfddem.backend.errors import InputError
+from cfddem.case.absent import KEYS
 from cfddem.case.gallery import gallery_files, overrides
 from cfddem.case.input_errors import InputErrors, sections_of
-from cfddem.case.renamed import KEYS
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import DEEPEST_KEY, LONGEST_FILE
 from cfddem.preflight.summary import preflight

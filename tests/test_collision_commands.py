@@ -12,7 +12,7 @@ from command_line import call, parsed
 
 from cfddem.backend.errors import RunFailed
 from cfddem.case.materials import Material
-from scenarios.collisions.film_impact import cavitation, impact
+from scenarios.collisions.film_impact import impact, pressure
 from scenarios.collisions.immersed_pair import MATERIALS, collide
 
 
@@ -69,6 +69,6 @@ def test_a_pressure_without_a_solution_ends_an_impact_with_its_place_and_a_remed
     def singular(*_: Any) -> None:
         raise np.linalg.LinAlgError("the matrix of the pressure is not positive definite")
 
-    monkeypatch.setattr(cavitation, "solve_banded", singular)
+    monkeypatch.setattr(pressure, "solve_banded", singular)
     with pytest.raises(RunFailed, match=r"t = 0 s, with the bead 0.0004 m above .* use a larger domain, or more cells"):
         impact(cells=5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from disturbed_runs import TINY
 
-from cfddem.analysis.regimes import regime_map
+from cfddem.analysis.fluctuations import regime_map
 from cfddem.analysis.report import report
 from cfddem.analysis.report_text import lines
 from cfddem.backend.errors import InputError

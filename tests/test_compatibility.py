@@ -10,7 +10,7 @@ from command_line import call
 
 import cfddem
 from cfddem.backend.errors import CfddemError, InputError, RunFailed, RunStopped
-from cfddem.case.renamed import KEYS
+from cfddem.case.absent import KEYS
 from cfddem.case.schema import Case
 from cfddem.cli.app import app
 from cfddem.preflight.summary import PreflightError

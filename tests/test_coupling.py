@@ -11,8 +11,7 @@ import pytest
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case
-from cfddem.coupling.forces.lift import lift_force
-from cfddem.coupling.forces.torque import turn_with_fluid
+from cfddem.coupling.forces.lift import lift_force, turn_with_fluid
 from cfddem.coupling.kernel import MAPPINGS, FilterKernel
 from cfddem.fluid import budgets
 from cfddem.fluid.grid import Grid, outside_cylinder

@@ -184,11 +184,11 @@ def test_a_liquid_that_cavitates_lets_the_bead_go_sooner() -> None:
 
 def test_cells_that_cavitate_and_are_not_found_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """With one trial a step instead of 50, the last set is taken, and the result says in how many steps."""
-    from scenarios.collisions.film_impact import cavitation
+    from scenarios.collisions.film_impact import pressure
 
     given: dict[str, Any] = {"diameter": 8e-3, "film": 0.4e-3, "velocity": 1.0, "cells": 5, "cavitation": -1e5}
     assert impact(**given).warnings == ()
-    monkeypatch.setattr(cavitation, "EXCHANGES", 1)
+    monkeypatch.setattr(pressure, "EXCHANGES", 1)
     (warning,) = impact(**given).warnings
     assert "cells that cavitate were not found" in warning
 

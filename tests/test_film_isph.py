@@ -9,8 +9,8 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from scenarios.collisions.film_impact import impact
-from scenarios.references.isph import kernel, points
-from scenarios.references.isph.checks import layer_at_rest, taylor_green
+from scenarios.references.isph import kernel, liquid
+from scenarios.references.isph.impact import layer_at_rest, taylor_green
 from scenarios.references.isph.liquid import solid
 
 
@@ -51,7 +51,7 @@ def test_a_solid_is_the_limit_of_its_particles() -> None:
 def test_images_close_the_box() -> None:
     """A particle in a corner of the quarter has three images in the two planes, with the velocity turned."""
     place = np.array([[0.2, 0.3, 0.5]])
-    every, origin, signs = points.images(place, np.array([10.0, 10.0, np.inf]), 1.0)
+    every, origin, signs = liquid.images(place, np.array([10.0, 10.0, np.inf]), 1.0)
     assert sorted(map(tuple, every[:, :2].tolist())) == [(-0.2, -0.3), (-0.2, 0.3), (0.2, -0.3), (0.2, 0.3)]
     assert (origin == 0).all()
     assert (signs[:, 2] == 1.0).all()

@@ -12,10 +12,9 @@ from scipy.optimize import brentq, curve_fit
 
 from cfddem.backend.errors import InputError
 from scenarios.collisions.film_impact import impact
-from scenarios.collisions.film_impact.cavitation import solve_banded
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.ledger import while_turning
-from scenarios.collisions.film_impact.pressure import Bead
+from scenarios.collisions.film_impact.pressure import Bead, solve_banded
 from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.surface import NEUTRAL, Tension
 

@@ -26,7 +26,7 @@ from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import tangential_lubrication as tangential
 from closures.lubrication import film_potential_change, film_resistance
-from scenarios.validation.particles.suspensions import suspension
+from scenarios.validation.particles.granular_beds import suspension
 
 RADIUS, VISCOSITY, GAP = 5e-5, 0.05, 2e-7
 SPHERE = Material(

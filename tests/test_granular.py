@@ -15,8 +15,8 @@ from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
+from scenarios.validation.particles.few_spheres import BALL_RADIUS, DROP_HEIGHT, drop, drop_exactly, slide, strike
 from scenarios.validation.particles.granular_beds import hopper, rest, slope
-from scenarios.validation.particles.single_sphere import BALL_RADIUS, DROP_HEIGHT, drop, drop_exactly, slide, strike
 
 
 @pytest.mark.parametrize("restitution", [0.6, 0.8, 1.0])

@@ -19,8 +19,8 @@ from cfddem.analysis.report_text import lines
 from cfddem.analysis.waves import LayerMap, waves
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.plotting.wave_figures import wave_map
-from cfddem.run.liquid_bed_measures import collisional_pressure, floor_pressure
+from cfddem.plotting.study_figures import wave_map
+from cfddem.run.bed_measures import collisional_pressure, floor_pressure
 from cfddem.run.runner import Run
 from cfddem.run.simulation import Simulation
 

@@ -13,7 +13,7 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
-from scenarios.validation.particles.suspensions import films_alone, shear
+from scenarios.validation.particles.granular_beds import films_alone, shear
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from cfddem.backend.memory import keep_freed_memory
+from cfddem.backend.launch import keep_freed_memory
 
 
 def test_the_memory_of_a_freed_array_is_kept_for_the_next() -> None:

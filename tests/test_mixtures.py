@@ -16,8 +16,7 @@ from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
 from cfddem.case.particle_properties import particle_properties
 from cfddem.case.schema import Case
-from cfddem.preflight.bed_estimate import estimate_bed
-from cfddem.preflight.mixture import net_downward_forces
+from cfddem.preflight.bed_estimate import estimate_bed, net_downward_forces
 from cfddem.preflight.summary import preflight
 from cfddem.run.build import parts_of
 from cfddem.run.runner import Run

@@ -20,8 +20,7 @@ from toy_run import series
 from cfddem.backend.errors import CfddemError, InputError, RunFailed
 from cfddem.io import writer
 from cfddem.io.files import PARTIAL
-from cfddem.io.folder import FORMAT, require_no_foreign_files
-from cfddem.io.provenance import provenance
+from cfddem.io.folder import FORMAT, provenance, require_no_foreign_files
 from cfddem.io.quantities import TIME, Quantity, of_fields
 from cfddem.io.reading import open_run
 from cfddem.io.writer import RunFolder

@@ -7,7 +7,7 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from scenarios.collisions.immersed_pair import MATERIALS, collide
-from scenarios.collisions.immersed_pair.surroundings import FORCES, chosen_forces
+from scenarios.collisions.immersed_pair.motion import FORCES, chosen_forces
 
 WALL = {"material": MATERIALS["delrin"], "against": "wall", "velocity": 0.1, "stokes": 60.0}
 

@@ -10,7 +10,7 @@ from command_line import call
 from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
-from cfddem.run.threads import threads_for
+from cfddem.run.warmup import threads_for
 
 
 @pytest.mark.parametrize(

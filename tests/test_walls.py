@@ -18,7 +18,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
-from cfddem.run.wall_loads import columns, wall_loads
+from cfddem.run.bed_measures import wall_load_columns, wall_loads
 from closures import contact
 
 RADIUS, GRAVITY = 1e-3, 9.81
@@ -255,9 +255,9 @@ def test_the_power_and_torque_of_a_paddle_are_what_the_sphere_gains() -> None:
     run = sphere([0.0, 0.0, RADIUS], [MOVING["paddle"]], solid=solid, gravity=(0.0, 0.0, 0.0))
     case = SimpleNamespace(wall=(CaseWall(shape="cylinder", axis=(0.0, 1.0, 0.0), radius=1.0, spin=(0.0, 5.0, 0.0)),))
     simulation = SimpleNamespace(particle_solver=run, case=case, communicator=SERIAL)
-    assert set(wall_loads(simulation)) == set(columns(case))  # type: ignore[arg-type]
+    assert set(wall_loads(simulation)) == set(wall_load_columns(case))  # type: ignore[arg-type]
     run.advance(STEP, 9900)
-    given = dict.fromkeys(columns(case), 0.0)  # type: ignore[arg-type]
+    given = dict.fromkeys(wall_load_columns(case), 0.0)  # type: ignore[arg-type]
     for _ in range(400):
         run.advance(STEP)
         given = {name: total + wall_loads(simulation)[name] * STEP for name, total in given.items()}  # type: ignore[arg-type]

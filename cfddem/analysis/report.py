@@ -8,16 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cfddem.analysis.bed_laws import compared_with_bed_laws, expansion_note
-from cfddem.analysis.fluctuations import impacts
+from cfddem.analysis.bed_laws import compared_with_bed_laws, compared_with_drag_law, expansion_note
+from cfddem.analysis.fluctuations import RegimeMap, impacts, regime_map
 from cfddem.analysis.key_results import DRIFTING, key_results
 from cfddem.analysis.measured import compared_with_measured, with_files
-from cfddem.analysis.regimes import RegimeMap, regime_map
 from cfddem.analysis.report_text import Report
 from cfddem.analysis.report_values import Citation, EnergyLine, Measure, comparison
 from cfddem.analysis.run_warnings import NOTE, STATE, last_value, warnings_of
 from cfddem.analysis.series import block_average, drift_of, stationarity
-from cfddem.analysis.single_sphere import compared_with_drag_law
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData, open_run

@@ -1,4 +1,4 @@
-"""Errors that say what, where, the number, its limit, and the remedy, in one or two lines."""
+"""Errors that say what, where, the number, its limit, and the remedy, in one or two lines; missing packages."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import reprlib
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from importlib import import_module
 from typing import Any
 
 MANY = 10
@@ -107,3 +108,20 @@ def shown(value: Any) -> Any:
         except ValueError:  # whole numbers in it that are too long to print
             return _Words("a list")
     return value
+
+
+# ---------------------------------------------------------------- packages of extras
+
+
+def library(name: str, user: str, extra: str) -> Any:
+    """A package that may be missing.
+
+    name    of the package
+    user    what needs it
+    extra   of `cfddem` that installs it
+    errors  InputError with the command that installs it
+    """
+    try:
+        return import_module(name)
+    except ImportError:
+        raise InputError(user, None, f"used with {name} installed", f"`pip install 'cfddem[{extra}]'`") from None

@@ -7,9 +7,13 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
+
+from cfddem.backend.errors import shown
 
 MOST_DRAWN = 2000
 """Most spheres of a drawing; of more, those nearest to the viewer are drawn."""
@@ -64,3 +68,40 @@ def spheres(position: np.ndarray, radius: np.ndarray, velocity: np.ndarray, size
         f'style="border: 1px solid #bbb; background: white" stroke="white" stroke-width="0.4">{circles}</svg>'
         f"<br><small>{axes}; dark: at rest, yellow: {fastest:.2g} m/s</small>"
     )
+
+
+# ---------------------------------------------------------------- a case in a notebook
+
+
+def model_html(model: BaseModel) -> str:
+    """A table of a case, or a part of it, as HTML."""
+    return table(getattr(model, "title", "") or type(model).__name__, _rows(model, ""))
+
+
+def _rows(model: BaseModel, before: str) -> Iterator[tuple[str, str, str]]:
+    """Key, value and meaning of every key that differs from its default."""
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if name == "title" or value is None or (not field.is_required() and value == field.get_default()):
+            continue
+        inner = list(_parts(value, f"{before}{name}"))
+        for key, part in inner:
+            yield from _rows(part, f"{key}.")
+        if not inner:
+            yield f"{before}{name}", _text(value), field.description or ""
+
+
+def _parts(value: Any, key: str) -> Iterator[tuple[str, BaseModel]]:
+    """The tables in a value, each with its key."""
+    if isinstance(value, BaseModel):
+        yield key, value
+    elif isinstance(value, Mapping):
+        yield from ((f"{key}.{name}", each) for name, each in value.items() if isinstance(each, BaseModel))
+    elif isinstance(value, tuple):
+        yield from ((f"{key}[{k}]", each) for k, each in enumerate(value) if isinstance(each, BaseModel))
+
+
+def _text(value: Any) -> str:
+    if callable(value):
+        return str(getattr(value, "__name__", "user-defined law"))
+    return f"{value:g}" if isinstance(value, float) else str(shown(value))

@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.case.absent import absent
+from cfddem.case.absent import absent, new_name
 from cfddem.case.input_errors import sections_of
 from cfddem.case.materials import Material
-from cfddem.case.renamed import new_name
 from cfddem.case.schema import Case
 
 

@@ -15,8 +15,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from cfddem.backend.errors import LONGEST, InputError, nearest, shown
-from cfddem.case.absent import absent
-from cfddem.case.renamed import new_key, new_value
+from cfddem.case.absent import absent, new_key, new_value
 
 MOST = 20
 """At most this many input errors are listed."""

@@ -49,7 +49,7 @@ class Checked(BaseModel):
 
     def _repr_html_(self) -> str:
         """The keys that differ from their defaults, in a notebook."""
-        from cfddem.case.display import model_html
+        from cfddem.backend.html import model_html
 
         return model_html(self)
 

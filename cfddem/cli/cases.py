@@ -135,7 +135,7 @@ def stability(
     else:
         print("\n".join(lines(found)))
     if plot is not None:
-        from cfddem.plotting.wave_figures import growth_curves
+        from cfddem.plotting.study_figures import growth_curves
 
         growth_curves(found, plot)
         print(f"figure: {plot}", file=sys.stderr if json else sys.stdout)
@@ -185,8 +185,7 @@ def run(
     from cfddem.backend.compile import use_threads
     from cfddem.run.progress import live_line
     from cfddem.run.runner import Run
-    from cfddem.run.threads import threads_for
-    from cfddem.run.warmup import warmup
+    from cfddem.run.warmup import threads_for, warmup
 
     if communicator.size == 1:
         use_threads(threads_for(described, processors.threads))
@@ -270,7 +269,7 @@ def resume(
     from cfddem.run.progress import live_line
     from cfddem.run.resuming import case_to_continue
     from cfddem.run.runner import Run
-    from cfddem.run.threads import threads_for
+    from cfddem.run.warmup import threads_for
 
     folder = folder or newest_run(Path())
     if set:

@@ -46,7 +46,7 @@ def examine(quick: bool = False) -> Iterator[Answer]:
 
     quick  skip rendering and the test run
     """
-    from cfddem.io.provenance import provenance
+    from cfddem.io.folder import provenance
 
     about = provenance()
     yield Answer("cfddem", True, about["cfddem"])

@@ -148,7 +148,7 @@ def view(
     from cfddem.io.files import require_folder
     from cfddem.io.reading import newest_run, open_run
     from cfddem.plotting import curves as plots
-    from cfddem.plotting import pictures, wave_figures
+    from cfddem.plotting import pictures, study_figures
     from cfddem.plotting.colours import usual
     from cfddem.plotting.scene import window as on_screen
 
@@ -167,7 +167,7 @@ def view(
         elif collisions:
             written = plots.collisions(folder, output)
         elif waves:
-            written = wave_figures.wave_map(folder, output)
+            written = study_figures.wave_map(folder, output)
         elif history:
             written = plots.history(folder, output)
         else:

@@ -56,7 +56,7 @@ def sweep(
     values = chosen_values(over or [], vary or [], sample, runs) if asked is None else asked.runs
     folder = output or Path(f"{path.stem}-sweep")
     if write_jobs:
-        from cfddem.studies.job_array import write_jobs as write
+        from cfddem.studies.sweep import write_jobs as write
 
         lines, script, count = write(path, values, folder, overrides(set or []))
         if json:

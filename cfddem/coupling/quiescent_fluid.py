@@ -18,8 +18,8 @@ from cfddem.backend.errors import InputError
 from cfddem.coupling.force_list import ForceList
 from cfddem.coupling.forces.drag import Drag
 from cfddem.coupling.forces.history import History
+from cfddem.coupling.forces.pressure import Weight
 from cfddem.coupling.forces.wall_drag import WallDrag
-from cfddem.coupling.forces.weight import Weight
 from cfddem.coupling.sampled_flow import SampledFlow
 from cfddem.coupling.terms import ForceTerms, total
 from cfddem.coupling.transfer import after_source, implicit_coefficients

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.agglomerates import AgglomerateSizes, carried_liquid, sizes, summary
 from cfddem.backend.communicator import SERIAL
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
-from cfddem.particles.agglomerates import agglomerates
+from cfddem.particles.agglomerates import AgglomerateSizes, agglomerates, carried_liquid, sizes, summary
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.solver import ParticleSolver
 

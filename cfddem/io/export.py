@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, nearest
-from cfddem.backend.optional import library
+from cfddem.backend.errors import InputError, library, nearest
 from cfddem.io.files import require_no_links
 from cfddem.io.quantities import shown_unit
 from cfddem.io.reading import RunData, open_run

@@ -1,14 +1,20 @@
-"""The rules of a run folder: what makes a folder a run, which formats are read, and who may write it."""
+"""The rules of a run folder: what makes a folder a run, which formats are read, who may write it, its provenance."""
 
 from __future__ import annotations
 
 import json
+import os
+import platform
 import re
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cfddem import __version__
 from cfddem.backend.errors import InputError
 from cfddem.io.damage import damage_named, opened, require_about, require_columns
 from cfddem.io.files import disk_error, lock_file, reason, require_format, require_no_links
@@ -170,3 +176,42 @@ def lock(folder: Path) -> Any:
         file.close()
         raise InputError("folder", str(folder), "unused", "another process is writing this run")
     return file
+
+
+# ---------------------------------------------------------------- provenance
+
+
+def provenance(seed: int | None = None) -> dict[str, Any]:
+    """Versions of cfddem and its dependencies, Python, platform, processors, command and start time.
+
+    seed     of the random numbers of the run
+    returns  dict of plain values
+    """
+    return {
+        "cfddem": __version__,
+        "dependencies": _dependencies(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "processors": os.cpu_count(),
+        "command": [os.path.basename(sys.argv[0]), *sys.argv[1:]] if sys.argv else [],
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seed": seed,
+    }
+
+
+def _dependencies() -> dict[str, str]:
+    """Installed version of each required package."""
+    found = {}
+    try:
+        needed = requires("cfddem") or []
+    except PackageNotFoundError:  # cfddem is used without being installed
+        needed = []
+    for requirement in needed:
+        if "extra ==" in requirement:
+            continue
+        name = requirement.split(";")[0].split(">")[0].split("=")[0].split("<")[0].strip()
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfddem.backend import html
-from cfddem.backend.errors import InputError, RunFailed, nearest
-from cfddem.backend.optional import library
+from cfddem.backend.errors import InputError, RunFailed, library, nearest
 from cfddem.case.toml_text import read_text
 from cfddem.io.damage import ArrayFile, opened, require_cells, require_columns, require_particles
 from cfddem.io.folder import AVERAGES_FROM, NUMBERED, read_about, read_columns, read_snapshot_header

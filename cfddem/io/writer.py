@@ -72,7 +72,7 @@ class RunFolder:
 
         folder      is created; must not hold a run
         case_text   the case in TOML, stored unchanged
-        provenance  plain values, from `cfddem.io.provenance.provenance()`
+        provenance  plain values, from `cfddem.io.folder.provenance()`
         grid        with cells, spacing and origin; None for particles alone
         quantities  unit and meaning of every field and column that will be written, by block
         precision   of real fields in snapshots, single or double; history and checkpoints are always double

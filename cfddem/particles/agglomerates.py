@@ -1,6 +1,11 @@
-"""Agglomerates: which particles liquid bridges join."""
+"""Agglomerates: which particles liquid bridges join, and how large they are.
+
+Every function takes the numbers of the joined particles; a bridge to a wall joins no agglomerate.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,3 +26,67 @@ def agglomerates(first: Numbers, second: Numbers, count: int) -> Numbers:
     """
     joined = coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count))
     return np.asarray(connected_components(joined, directed=False)[1])
+
+
+# ---------------------------------------------------------------- sizes of agglomerates
+
+
+class AgglomerateSizes(NamedTuple):
+    """Sizes of all agglomerates, as numbers of particles; a particle without a bridge is one of size 1."""
+
+    mean_by_particle: float  # size of the agglomerate that a particle belongs to, mean over particles
+    largest: int
+    joined: float  # share of the particles that have a bridge to another
+
+
+def sizes(belongs: Numbers) -> Numbers:
+    """Number of particles in each agglomerate (k,).
+
+    belongs  of :func:`~cfddem.particles.agglomerates.agglomerates`
+    """
+    return np.bincount(belongs)
+
+
+def size_distribution(belongs: Numbers) -> tuple[Numbers, Numbers]:
+    """The sizes that occur, and how many agglomerates have each (k,), (k,).
+
+    belongs  of :func:`~cfddem.particles.agglomerates.agglomerates`, or the field `agglomerate` of a snapshot, whose
+             numbers have gaps
+
+    >>> [each.tolist() for each in size_distribution(np.array([0, 0, 7, 0, 9]))]
+    [[1, 3], [2, 1]]
+    """
+    _, found = np.unique(belongs, return_counts=True)
+    return np.unique(found, return_counts=True)
+
+
+def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:
+    """Sizes of the agglomerates of a state.
+
+    >>> summary(np.array([0, 3]), np.array([1, 1]), 5)
+    AgglomerateSizes(mean_by_particle=2.2, largest=3, joined=0.6)
+    """
+    if count == 0:
+        return AgglomerateSizes(float("nan"), 0, float("nan"))
+    found = sizes(agglomerates(first, second, count)).astype(float)
+    alone = float(np.count_nonzero(found == 1.0))
+    return AgglomerateSizes(
+        mean_by_particle=float((found * found).sum()) / count,
+        largest=int(found.max()),
+        joined=1.0 - alone / count,
+    )
+
+
+def carried_liquid(
+    liquid: NDArray[np.float64], first: Numbers, second: Numbers, volume: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Liquid of each particle: its film, and half of each bridge to another particle (N,) [m3].
+
+    liquid         in the film of each particle (N,) [m3]
+    first, second  rows of the particles that each bridge joins (n,)
+    volume         of the liquid in each bridge (n,) [m3]
+    """
+    carried = liquid.astype(float)
+    np.add.at(carried, first, 0.5 * volume)
+    np.add.at(carried, second, 0.5 * volume)
+    return carried

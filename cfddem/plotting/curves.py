@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from cfddem.analysis.regimes import RegimeMap
+    from cfddem.analysis.fluctuations import RegimeMap
 
 BLUE, SKY, ORANGE, GREEN, RED, GREY = "#0b4f8a", "#66b9e8", "#e08a00", "#12995a", "#8c1020", "#757575"
 """Colours that differ in print and for colour-blind readers, as `tests/test_figures.py` measures."""
@@ -121,7 +121,7 @@ def collisions(folder: str | Path, output: str | Path | None = None) -> Path:
     returns  the file
     errors   InputError if the run has no recorded collisions with films
     """
-    from cfddem.analysis.regimes import regime_map
+    from cfddem.analysis.fluctuations import regime_map
     from cfddem.io.reading import open_run
 
     run = open_run(folder)

@@ -53,7 +53,7 @@ from cfddem.plotting.curves import (
     save,
 )
 from cfddem.plotting.pictures import Stage
-from cfddem.plotting.wave_figures import BED, draw_impacts, draw_map
+from cfddem.plotting.study_figures import BED, draw_impacts, draw_map
 from cfddem.preflight.bed_waves import is_liquid_bed
 
 Rows = list[tuple[str, ...]]

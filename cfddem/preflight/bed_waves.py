@@ -9,10 +9,9 @@ from typing import Any
 
 from cfddem.backend.tables import table
 from cfddem.case.schema import Case
-from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.bed_estimate import BedEstimate, bed_drag
 from cfddem.preflight.issue import Issue, plain
 from cfddem.preflight.law_ranges import outside, state_of
-from cfddem.preflight.mixture import bed_drag
 from closures.agitation import agitated_temperature, free_spheres
 from closures.registry import Law, law_of
 from closures.stability import UniformBed, Wave

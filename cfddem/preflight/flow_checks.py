@@ -10,10 +10,9 @@ import numpy as np
 from cfddem.case.schema import Case
 from cfddem.fluid.cell_counts import suggested_cells
 from cfddem.preflight.bed_estimate import BedEstimate
-from cfddem.preflight.geometry_checks import bed_key
+from cfddem.preflight.geometry_checks import bed_key, unit_of_velocity
 from cfddem.preflight.issue import Issue, plain
 from cfddem.preflight.step_estimate import StepEstimate
-from cfddem.preflight.unit_checks import unit_of_velocity
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
 """Width of a box of the same variance as the kernel, over the diameter.

@@ -12,12 +12,10 @@ from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
-from cfddem.preflight.bed_estimate import BedEstimate, bubbles
+from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
-from cfddem.preflight.cost_estimate import CostEstimate
 from cfddem.preflight.issue import WIDTH
-from cfddem.preflight.mixture import bed_drag, net_downward_forces
-from cfddem.preflight.step_estimate import StepEstimate
+from cfddem.preflight.step_estimate import CostEstimate, StepEstimate
 from cfddem.preflight.wall_checks import closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales

@@ -22,12 +22,11 @@ from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.checks import find_issues
 from cfddem.preflight.collision_estimate import estimate_collision
-from cfddem.preflight.cost_estimate import estimate_cost
 from cfddem.preflight.flow_checks import suggested_cell
 from cfddem.preflight.geometry_checks import fits
 from cfddem.preflight.issue import ORDER, WIDTH, Issue
 from cfddem.preflight.overview import Row, overview
-from cfddem.preflight.step_estimate import estimate_steps
+from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
 from cfddem.preflight.wet_estimate import estimate_wet
 from closures import registry
 from closures.check import check as check_law

@@ -1,10 +1,11 @@
-"""Build the parts of a run from a case: grid, boundaries, walls, materials, particles, solvers and coupling."""
+"""Build the parts of a run from a case: grid, boundaries, walls, materials, solvers, forces and coupling."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -18,13 +19,24 @@ from cfddem.case.particle_properties import SPECIES
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
 from cfddem.coupling.coupling import Coupling
+from cfddem.coupling.forces.added_mass import AddedMass
+from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
+from cfddem.coupling.forces.agitation_terms import Agitation
+from cfddem.coupling.forces.drag import Drag
+from cfddem.coupling.forces.history import History
+from cfddem.coupling.forces.lift import Lift, Torque
+from cfddem.coupling.forces.pressure import PressureForce, ViscousStress, Weight
+from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.self_disturbance import SelfDisturbance
+from cfddem.coupling.velocity_gradient import change_along
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.moving_walls import case_walls
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
+from cfddem.model.feature import FluidForce
 from cfddem.particles.ghosts import Slabs
 from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge_law import BridgeLaws
@@ -33,8 +45,9 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
-from cfddem.run.forces import forces_of, wall_drag_of
 from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
+from closures.added_mass import zuber
+from closures.registry import Law, law_of
 
 
 class Parts(NamedTuple):
@@ -298,3 +311,62 @@ def _hole(jet: Jet, column: Column) -> Region:
     half_x, half_y = 0.5 * jet.width, 0.5 * (jet.depth or depth)
     low = (0.5 * width - half_x, 0.5 * depth - half_y, -height)
     return rectangle(low, (0.5 * width + half_x, 0.5 * depth + half_y, height))
+
+
+# ---------------------------------------------------------------- forces between fluid and particles
+
+
+def forces_of(
+    case: Case, fluid: FluidSolver, kernel: FilterKernel, beside: Sequence[WallDrag] = ()
+) -> list[FluidForce]:
+    """The forces that the laws of a case name, in the order in which they act and are summed within a line.
+
+    beside  drag beside walls, of `wall_drag_of`
+    """
+    laws = case.laws
+    added_mass = [
+        AddedMass(law, fluid.density, partial(change_along, fluid, kernel)) for law in [laws.added_mass_law] if law
+    ]
+    forces: list[FluidForce] = []
+    if laws.viscous_stress and fluid.model == "A":
+        forces.append(ViscousStress(fluid, kernel))
+    if laws.lift:
+        forces.append(Lift(fluid, kernel))
+    if laws.drag_law:
+        forces.append(Drag(laws.drag_law, fluid.model, kernel if laws.surface == "sharp" else None))
+    forces += [*agitation_of(case, fluid, kernel, *added_mass), *beside, *added_mass]
+    if laws.history != "none":
+        forces.append(History(laws.history, fluid.density, fluid.model))
+    if fluid.model == "A":
+        forces.append(PressureForce(fluid, kernel))
+    forces.append(Weight(fluid.density, np.array(laws.gravity)))
+    if laws.torque:
+        forces.append(Torque(fluid, kernel))
+    if laws.self_disturbance_correction:
+        forces.append(SelfDisturbance(fluid, kernel, bool(beside), any(force.sharp for force in forces)))
+    return forces
+
+
+def wall_drag_of(which: Literal["none", "nearest", "all"], walls: Sequence[Wall], laws: Laws) -> list[WallDrag]:
+    """Extra drag beside walls; nothing without."""
+    return [] if which == "none" else [WallDrag(walls, which, film=laws.film, shear=laws.shears)]
+
+
+def agitation_of(case: Case, fluid: FluidSolver, kernel: FilterKernel, *added_mass: AddedMass) -> list[Agitation]:
+    """Agitation of the particles by the disturbed flow around their neighbours; nothing without.
+
+    added_mass  of the run, if it has one
+    """
+    law = case.agitation
+    if law == "none":
+        return []
+    given = case.agitation_factors
+    factors = {"drag_share_along": given.along, "drag_share_across": given.across, "time_share": given.time}
+    if not isinstance(law, Law):
+        return [FluctuatingForce(fluid, kernel, case.bed.seed, **factors)]
+    coefficient = next(iter(added_mass), AddedMass(law_of(zuber), fluid.density))
+    return [
+        PseudoTurbulence(
+            fluid, kernel, case.bed.seed, law, added_mass=coefficient, inertia_share=given.inertia, **factors
+        )
+    ]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.preflight.data_checks import check_quantities
+from cfddem.preflight.checks import check_quantities
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.overview import Row
 from cfddem.preflight.summary import Preflight, preflight

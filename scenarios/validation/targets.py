@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 TARGETS: dict[str, str] = {
     "binary-collision": "scenarios.collisions.immersed_pair.validation",
     "particles": "scenarios.validation.particles.study",
-    "fluid": "scenarios.validation.fluid.study",
+    "fluid": "scenarios.validation.fluid",
     "coupling": "scenarios.validation.coupling",
-    "beds": "scenarios.validation.beds.study",
+    "beds": "scenarios.validation.beds",
     "lubrication": "scenarios.beds.lubrication_study.validation",
     "film-impact": "scenarios.collisions.film_impact.validation",
     "wet-tumbler": "scenarios.collisions.wet_tumbler.validation",
-    "wet": "scenarios.validation.wet.study",
+    "wet": "scenarios.validation.wet",
     "wet-beds": "scenarios.beds.wet_bed.validation",
     "waves": "scenarios.validation.bed_waves.study",
     "agitation": "scenarios.validation.agitation.study",
     "sheared-films": "scenarios.validation.sheared_films.study",
-    "heated-bed": "scenarios.validation.heated_bed.study",
+    "heated-bed": "scenarios.validation.heated_bed",
     "resolved": "scenarios.references.resolved_suspension.study",
 }
 """Name of each target, and the module that holds its `study`."""

@@ -1,11 +1,13 @@
-r"""Force of the fluid's pressure on the volume of a particle, :math:`-V\nabla p'` in model A."""
+r"""Forces on the volume of a particle: pressure, :math:`-V\nabla p'`, and viscous stress in model A, and weight."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap, Stencil
-from cfddem.coupling.terms import CouplingTerms
+from cfddem.coupling.terms import CouplingTerms, ForceTerms
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
@@ -65,3 +67,46 @@ class PressureForce(FluidForce):
         particles, cell_map = terms.particles, terms.cell_map
         particles.earlier_mapped_position = particles.mapped_position
         self._known, self._known_ids = [cell_map, *self._known[:1]], particles.id.copy()
+
+
+# ---------------------------------------------------------------- viscous stress
+
+
+class ViscousStress(FluidForce):
+    """Viscous stress of model A on the volume of every particle.
+
+    fluid   the fluid solver
+    kernel  gathers the stress
+    """
+
+    name, lines = "viscous_stress", ("explicit",)
+
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel) -> None:
+        self.fluid, self.kernel = fluid, kernel
+
+    def act(self, terms: CouplingTerms) -> None:
+        """The force of the stress now."""
+        cell_map = terms.cell_map
+        stress = self.kernel.sample(cell_map.stencil, cell_map.radius, self.fluid.cell_viscous_force())
+        terms.between("explicit", cell_map.volume[:, None] * stress)
+
+
+# ---------------------------------------------------------------- weight less buoyancy
+
+
+class Weight(FluidForce):
+    """Weight, less buoyancy.
+
+    density  of the fluid [kg/m3]
+    gravity  (3,) [m/s2]
+    """
+
+    name, lines = "weight", ("weight",)
+
+    def __init__(self, density: float, gravity: Sequence[float] | Array) -> None:
+        self.density, self.gravity = density, np.array(gravity, float)
+
+    def act(self, terms: ForceTerms) -> None:
+        """The same force in every step; the fluid carries the weight of its own volume."""
+        excess_mass = (terms.particles.density - self.density) * terms.particles.volume
+        terms.push("weight", np.stack([excess_mass * along for along in self.gravity], axis=1))

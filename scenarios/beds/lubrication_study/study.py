@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from cfddem.analysis.fluctuations import regime_map
 from cfddem.analysis.measures import profile
-from cfddem.analysis.regimes import regime_map
 from cfddem.analysis.report import window_of
 from cfddem.case.gallery import gallery
 from cfddem.case.schema import Case

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.analysis.regimes import regime_map
+from cfddem.analysis.fluctuations import regime_map
 from cfddem.io.reading import open_run
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, blank, draw_regimes, label, legend, save
 from scenarios.beds.lubrication_study.study import (

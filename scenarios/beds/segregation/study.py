@@ -17,9 +17,8 @@ from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
 from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
-from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.bed_estimate import estimate_bed, net_downward_forces
 from cfddem.preflight.expansion import expansion_exponents
-from cfddem.preflight.mixture import net_downward_forces
 from cfddem.run.history import MEAN_HEIGHT
 from closures.balance import inversion_velocity
 

@@ -1,4 +1,4 @@
-"""Bead, plate and liquids of Singh, Windows-Yule & Nair (2026), and the gap at which the solids touch."""
+"""Bead, plate and liquids of Singh, Windows-Yule & Nair (2026), the gap of contact, and laws of thin films."""
 
 from __future__ import annotations
 

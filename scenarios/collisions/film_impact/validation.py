@@ -26,7 +26,7 @@ from scenarios.collisions.film_impact.figures import (
 from scenarios.collisions.film_impact.materials import LIQUIDS, laws_of
 from scenarios.collisions.film_impact.result import COLUMNS, FilmImpact
 from scenarios.collisions.film_impact.study import impact, sweep
-from scenarios.references.isph.checks import layer_at_rest, taylor_green
+from scenarios.references.isph.impact import layer_at_rest, taylor_green
 from scenarios.validation.table import Columns, Progress, Row, worst, write_histories
 
 VELOCITIES = (0.2, 0.35, 0.5, 0.75, 1.0, 1.5)

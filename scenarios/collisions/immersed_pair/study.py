@@ -30,8 +30,7 @@ from closures import contact, lubrication, timescales
 from closures.friction import dry_or_lubricated
 from closures.kinds import GAP_ARGUMENTS
 from closures.minimum_gap import elastohydrodynamic
-from scenarios.collisions.immersed_pair.motion import Setting, integrate, stage
-from scenarios.collisions.immersed_pair.surroundings import chosen_forces, fluid_around
+from scenarios.collisions.immersed_pair.motion import Setting, chosen_forces, fluid_around, integrate, stage
 from scenarios.collisions.results import plain
 
 SLOWEST, FASTEST = 1e-12, 1e3

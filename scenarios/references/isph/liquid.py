@@ -19,7 +19,7 @@ from scipy.sparse.linalg import LinearOperator, bicgstab
 
 from cfddem.backend.errors import RunFailed
 from scenarios.collisions.film_impact.pressure import Bead
-from scenarios.references.isph import kernel, points
+from scenarios.references.isph import kernel
 from scenarios.references.isph.kernel import REACH, SMOOTHING
 
 TOLERANCE = 1e-9
@@ -56,7 +56,7 @@ class SmoothedLiquid:
                  gravity: float = 9.81, bead: Bead | None = None, plate: bool = True) -> None:  # fmt: skip
         self.dx, self.density, self.viscosity, self.gravity, self.bead = dx, density, viscosity, gravity, bead
         self.size = np.array([counts[0] * dx, counts[1] * dx, np.inf if plate else counts[2] * dx])
-        self.place = points.lattice(counts, dx)
+        self.place = lattice(counts, dx)
         self.velocity, self.pressure = np.zeros_like(self.place), np.zeros(len(self.place))
         self.plate = solid(dx) if plate else None
         self.cap = solid(dx, bead.radius) if bead is not None else None
@@ -78,7 +78,7 @@ class SmoothedLiquid:
 
     def find_neighbours(self) -> None:
         """Pairs of the liquid, and what each particle sees of the solids."""
-        self.every, self.origin, self.signs = points.images(self.place, self.size, kernel.REACH * self.dx)
+        self.every, self.origin, self.signs = images(self.place, self.size, kernel.REACH * self.dx)
         self.start, self.found = kernel.neighbours(self.every, len(self.place), kernel.REACH * self.dx)
         if len(self.found) == kernel.MOST * len(self.place):
             raise RunFailed(f"particles have more than {kernel.MOST} neighbours on average; the liquid has collapsed")
@@ -347,3 +347,41 @@ def solid(dx: float, radius: float = np.inf) -> Solid:
         (steep * s * shell * three).sum(axis=1),
         (0.5 * steep * s * shell * (one - three)).sum(axis=1),
     )
+
+
+# ---------------------------------------------------------------- points of a lattice
+
+
+def lattice(counts: tuple[int, int, int], dx: float) -> np.ndarray:
+    """Points at the centres of a block of cells, corner at the origin (n, 3) [m]."""
+    x, y, z = ((np.arange(count) + 0.5) * dx for count in counts)
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def images(points: np.ndarray, size: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Images in the mirror planes at 0 and at the size along each axis, and at their edges.
+
+    points   (n, 3) [m]
+    size     of the box; infinite along an axis without mirrors (3,) [m]
+    reach    distance from a plane up to which a point has an image [m]
+    returns  all places, those of the points first (m, 3) [m]; the point of each (m,); signs of its velocity (m, 3)
+    """
+    places, origin, signs = points, np.arange(len(points)), np.ones_like(points)
+    for axis in np.flatnonzero(np.isfinite(size)):
+        near = (places[:, axis] < reach, places[:, axis] > size[axis] - reach)
+        copies = []
+        for close, plane in zip(near, (0.0, size[axis])):
+            copy, turned = places[close].copy(), signs[close].copy()
+            copy[:, axis] = 2.0 * plane - copy[:, axis]
+            turned[:, axis] *= -1.0
+            copies.append((copy, origin[close], turned))
+        places = np.concatenate([places, *(each[0] for each in copies)])
+        origin = np.concatenate([origin, *(each[1] for each in copies)])
+        signs = np.concatenate([signs, *(each[2] for each in copies)])
+    return places, origin, signs
+
+
+def reflected(points: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """The points, those that have crossed a mirror plane back inside (n, 3) [m]."""
+    inside = np.abs(points)
+    return np.where(inside > size, 2.0 * np.where(np.isfinite(size), size, 0.0) - inside, inside)

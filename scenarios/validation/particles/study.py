@@ -16,7 +16,7 @@ import numpy as np
 
 from cfddem.backend.errors import RunFailed
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation.particles import granular_beds, single_sphere, suspensions, two_spheres
+from scenarios.validation.particles import few_spheres, granular_beds
 from scenarios.validation.sheared_films.study import krieger_dougherty, sheared
 from scenarios.validation.table import Curves, Progress, Row, in_parts, reference, worst
 
@@ -31,20 +31,20 @@ def study(folder: Path, progress: Progress) -> list[Row]:
 
 def falling(curves: Curves) -> list[Row]:
     """DEM01 and DEM02: a sphere falls on a spring."""
-    fall = single_sphere.DROP_HEIGHT - single_sphere.BALL_RADIUS
+    fall = few_spheres.DROP_HEIGHT - few_spheres.BALL_RADIUS
     points = []
     for stiffness in (1e4, 2.5e4, 5e4, 1e5):
         for restitution in (0.6, 0.8, 1.0):
-            time, height = single_sphere.drop(stiffness, restitution, 0.6)
-            exact = single_sphere.drop_exactly(stiffness, restitution, time)
+            time, height = few_spheres.drop(stiffness, restitution, 0.6)
+            exact = few_spheres.drop_exactly(stiffness, restitution, time)
             points.append((stiffness, float(np.abs(height - exact).max()) / fall, 0.0))
     apexes = []
     for restitution, until in ((0.6, 0.93), (0.9, 1.8)):
-        time, height = single_sphere.drop(5e6, restitution, until, samples=2000)
+        time, height = few_spheres.drop(5e6, restitution, until, samples=2000)
         curves[f"dem02/restitution_{restitution}"] = {"time": (time, "s"), "height": (height, "m")}
         top = (height[1:-1] > height[:-2]) & (height[1:-1] >= height[2:])
         for bounce, apex in enumerate(height[1:-1][top][:3], 1):
-            hard = single_sphere.BALL_RADIUS + fall * restitution ** (2 * bounce)
+            hard = few_spheres.BALL_RADIUS + fall * restitution ** (2 * bounce)
             apexes.append((restitution, apex / hard, 1.0))
     return [
         worst("DEM01: error of the path over the fall", points, 1e-3),
@@ -54,9 +54,7 @@ def falling(curves: Curves) -> list[Row]:
 
 def rolling(curves: Curves) -> list[Row]:
     """DEM04: a sliding sphere begins to roll."""
-    runs = {
-        (mu, linear): single_sphere.slide(mu, linear) for mu in (0.2, 0.4, 0.6, 0.8, 1.0) for linear in (False, True)
-    }
+    runs = {(mu, linear): few_spheres.slide(mu, linear) for mu in (0.2, 0.4, 0.6, 0.8, 1.0) for linear in (False, True)}
     ends = [(mu, run["time"], 2.0 / 7.0) for (mu, _), run in runs.items()]
 
     def kept(when: str) -> list[tuple[float, float, float]]:
@@ -78,7 +76,7 @@ def oblique(curves: Curves) -> list[Row]:
     limits = {"e_t": 0.05, "com_rebound_angle [deg]": 0.05, "omega_out [rad/s]": 0.08}
     for observable, span in spans.items():
         points = [
-            (angle, single_sphere.strike(angle)[observable], value)
+            (angle, few_spheres.strike(angle)[observable], value)
             for name, angle, value in measured
             if name == observable
         ]
@@ -142,11 +140,11 @@ def hopper(curves: Curves) -> list[Row]:
 
 def films(curves: Curves) -> list[Row]:
     """Many films at once."""
-    alone = {step: suspensions.films_alone(0.5, 60, step, count=400) for step in (5e-9, 1e-7, 5e-7, 5e-6)}
+    alone = {step: granular_beds.films_alone(0.5, 60, step, count=400) for step in (5e-9, 1e-7, 5e-7, 5e-6)}
     gains = [
         (step, max(0.0, float(np.max(run.energy[1:] / run.energy[:-1])) - 1.0), 0.0) for step, run in alone.items()
     ]
-    crowd, under_lid = suspensions.shear(0.5, 10_000), suspensions.shear(0.6, 20_000, press=20.0)
+    crowd, under_lid = granular_beds.shear(0.5, 10_000), granular_beds.shear(0.6, 20_000, press=20.0)
     curves["shear"] = {"energy": (crowd.energy, "J")}
     return [
         worst("films alone: rise of kinetic energy, to 20 film times", [p for p in gains if p[0] < 2e-7], 0.0),
@@ -169,10 +167,10 @@ def sliding_films(curves: Curves) -> list[Row]:
     gaps, ratios = (1e-4, 1e-3), (1.0, 0.5, 2.0)
     slopes = []
     for ratio in ratios:
-        near, far = (np.array(two_spheres.resistance(gap, ratio)) for gap in gaps)
-        lead = np.array(two_spheres.leading(ratio))
+        near, far = (np.array(few_spheres.resistance(gap, ratio)) for gap in gaps)
+        lead = np.array(few_spheres.leading(ratio))
         slopes += [(ratio, slope, 1.0) for slope in (near - far) / math.log(10.0) / lead]
-    exact, lead = np.array(two_spheres.resistance(0.05)), np.array(two_spheres.leading(1.0))
+    exact, lead = np.array(few_spheres.resistance(0.05)), np.array(few_spheres.leading(1.0))
     left = exact - [1.0, 0.0, 0.0, 0.0, 1.0, 0.0] - lead * math.log(20.0)
     names = ("Y^A_11", "-Y^A_12", "-Y^B_11", "Y^B_12", "Y^C_11", "Y^C_12")
     rows = [worst("slope of the exact resistance against ln(1/xi) over that of the law, 1e-4 to 1e-3 R", slopes, 0.01)]

@@ -23,7 +23,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
-from scenarios.validation.particles.suspensions import SUSPENDED, suspension
+from scenarios.validation.particles.granular_beds import SUSPENDED, suspension
 from scenarios.validation.table import Curves, Progress, Row, in_parts, worst
 
 SOLID_FRACTIONS = (0.3, 0.4, 0.5, 0.55)

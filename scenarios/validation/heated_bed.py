@@ -5,7 +5,7 @@ within two diameters of the axis of the box. The packing is not known but for it
 hot plate, 0.46 of its area here, matters most. Before the bed was turned they cover 0.53, and the largest differences
 are 1.03, 0.54 and 0.32 K. The curves of the measurement's error in the thesis are 2.2 K away.
 
-`python -m scenarios.validation.heated_bed.study FILE` makes `scenarios/data/heated_bed_8849.npz` anew, in minutes.
+`python -m scenarios.validation.heated_bed FILE` makes `scenarios/data/heated_bed_8849.npz` anew, in minutes.
 The box was filled from the side: z is up while it is filled. Friction is low in this part, 0.2, which gives the
 measured porosity of 42 %; with the friction of the inputs, 0.7, a slow filling is too loose. A lid comes down and
 levels the surface at the height of that porosity. Then gravity acts along -x, with the friction of the inputs.

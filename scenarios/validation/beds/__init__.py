@@ -1,1 +1,0 @@
-"""Fluidised, packed and settling beds."""

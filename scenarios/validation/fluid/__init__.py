@@ -1,1 +1,0 @@
-"""Fluid alone: flows with a known solution."""

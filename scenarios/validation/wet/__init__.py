@@ -1,1 +1,0 @@
-"""Wet collisions of a few spheres."""
