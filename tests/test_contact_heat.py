@@ -23,7 +23,7 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.build import require_parallel
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
-from scenarios.validation.heated_bed import study as heated_bed
+from scenarios.validation import heated_bed
 
 PAGE = Path(__file__).parents[1] / "docs/how-to/contact-heat.md"
 CALORIE = 4.1868

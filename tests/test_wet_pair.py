@@ -14,7 +14,7 @@ from closures.bridge import deforming_potential, deforming_share, static_potenti
 from closures.registry import law_of
 from closures.restitution import davis_sitison, singh
 from scenarios.collisions.wet_pair import TRANSITION_PRESSURES, collide_wet
-from scenarios.validation.wet import study
+from scenarios.validation import wet as study
 
 
 @pytest.mark.parametrize(

@@ -31,8 +31,7 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
     measures  of the report
     """
     if (
-        case.fluid is None
-        or case.column.ends != "flow"
+        case.column.ends != "flow"
         or not isinstance(case.bed.inlet_velocity, float)
         or case.bed.inlet_velocity <= 0.0
         or case.bed.jet is not None
@@ -57,9 +56,10 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
 
 def _of_a_fixed_bed(case: Case, measures: Mapping[str, Measure], drop: float) -> Iterator[LawComparison]:
     """The pressure drop by the drag law of the case, and by Ergun, over the length that all particles fill."""
-    assert case.fluid is not None and isinstance(case.bed.inlet_velocity, float)
+    assert isinstance(case.bed.inlet_velocity, float)
+    fluid = case.required_fluid
     length, voidage = measures["bed_height"].mean / OF_THE_BED, measures["bed_voidage"].mean
-    flow = case.bed.inlet_velocity, case.bed.diameter, case.fluid.density, case.fluid.viscosity, voidage
+    flow = case.bed.inlet_velocity, case.bed.diameter, fluid.density, fluid.viscosity, voidage
     drag = bed_drag(case)
     if drag is not ergun:
         expected = length * pressure_gradient(*flow, drag)
@@ -108,9 +108,8 @@ def expansion_laws(case: Case) -> dict[str, float]:
 
 def buoyant_weight(case: Case) -> float:
     """Weight of the particles minus that of the displaced fluid [N]."""
-    assert case.fluid is not None
     particles = particle_properties(case)
-    excess = float((math.pi / 6.0 * particles.diameter**3 * (particles.density - case.fluid.density)).sum())
+    excess = float((math.pi / 6.0 * particles.diameter**3 * (particles.density - case.around.density)).sum())
     return excess * abs(case.laws.gravity[2])
 
 
@@ -152,8 +151,8 @@ def compared_with_drag_law(run: RunData, case: Case) -> Iterator[tuple[str, floa
     The first row is the last speed against the terminal velocity; the second the speed at the time of the largest
     deviation from the equation of motion. Speeds are relative to the mean of the fluid, up to the first contact.
     """
-    drag, fluid, law = case.laws.drag_function(), case.fluid, case.laws.drag_law
-    if not case.is_one_sphere or case.bed.fixed or fluid is None or law is None or drag is None:
+    drag, fluid, law = case.laws.drag_function(), case.around, case.laws.drag_law
+    if not case.is_one_sphere or case.bed.fixed or law is None or drag is None:
         return
     density, gravity = case.solid_density, np.array(case.laws.gravity)
     strength = math.hypot(*gravity)

@@ -258,9 +258,8 @@ def _bed_at_end(case: Case, measure: Measure) -> BedEstimate:
 
 def _of_a_bed(case: Case, bed: BedEstimate, carried: float) -> str:
     """The regime of a bed whose flow carries a share of its weight."""
-    assert case.fluid is not None
     if carried < CARRIED:
         return "packed" if bed.inlet <= bed.onset else "not fully fluidised"
     if case.bed.jet is not None:
         return "fluidised with a jet"
-    return "fluidised, expanded" if case.fluid.is_liquid else "fluidised, bubbling"
+    return "fluidised, expanded" if case.in_liquid else "fluidised, bubbling"

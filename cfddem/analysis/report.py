@@ -54,7 +54,7 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
         status=run.status,
         message=run.message,
         window=(begin, end),
-        films="" if case.bed.fixed else case.laws.film_in_words(case.fluid),
+        films="" if case.bed.fixed else case.laws.film_in_words(case.around),
         key_results=key_results(run, case, measures, laws, STATE in actions),
         measures=measures,
         measured=[each.score() for each in compared_with_measured(run, case, begin)],
@@ -273,7 +273,7 @@ def _used(case: Case) -> Iterator[Law]:
         yield from (REGISTRY["lift"][name] for name in ("torque",) if laws.torque)
         yield from (REGISTRY["wall_drag"][name] for name in ("towards_wall", "along_wall") if laws.wall_drag != "none")
     if case.has_films and not case.bed.fixed:
-        yield from (REGISTRY["lubrication"][name] for name in FILM.get(str(laws.film_in(case.fluid)), ()))
+        yield from (REGISTRY["lubrication"][name] for name in FILM.get(str(laws.film_in(case.around)), ()))
         yield laws.pair_laws.get("minimum_gap", REGISTRY["minimum_gap"]["elastohydrodynamic"])
         yield from (law for kind, law in laws.pair_laws.items() if kind == "lubrication")
     if case.liquid is not None:

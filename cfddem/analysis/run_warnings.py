@@ -150,7 +150,7 @@ def _range_warnings(run: RunData, case: Case) -> Found:
 def _effect(case: Case) -> str:
     """What a drag law outside of its range changes in the mean state of the bed, as estimated before the run."""
     law = case.laws.drag_law
-    if law is None or case.fluid is None or case.fluid.viscosity == 0.0:
+    if law is None or not case.resists:
         return ""
     try:
         bed = estimate_bed(case)

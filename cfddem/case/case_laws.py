@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import NotInstalled, chosen, drag_by_name
 from cfddem.case.bed import NonNegative, Point
-from cfddem.case.materials import Checked, Fluid
+from cfddem.case.materials import NO_FLUID, Checked, Fluid
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from closures.agitation import INERTIA_SHARE
 from closures.kinds import BUILT_IN
@@ -178,7 +178,7 @@ class CaseLaws(Checked):
         """Contact law with the parameters of the case."""
         return contact_named(self.contact).with_parameters(**self.contact_parameters)
 
-    def film_in(self, fluid: Fluid | None) -> str | Callable[..., float]:
+    def film_in(self, fluid: Fluid) -> str | Callable[..., float]:
         """The film law between close spheres in a fluid; "none" without viscosity, and by default in a gas.
 
         Films of a gas are thinner than the asperities of most solids.
@@ -186,15 +186,15 @@ class CaseLaws(Checked):
         >>> [CaseLaws().film_in(Fluid(density=density, viscosity=1e-4)) for density in (1.2, 998.0)]
         ['none', 'nijssen']
         """
-        if fluid is None or fluid.viscosity == 0.0:
+        if fluid.viscosity == 0.0:
             return "none"
         if self.lubrication == "auto":
             return "nijssen" if fluid.is_liquid else "none"
         return self.lubrication
 
-    def film_in_words(self, fluid: Fluid | None) -> str:
+    def film_in_words(self, fluid: Fluid) -> str:
         """The film law in a fluid, and whether it is the default; empty without a fluid."""
-        if fluid is None or "lubrication" in self.missing:
+        if fluid is NO_FLUID or "lubrication" in self.missing:
             return ""
         film = self.film_in(fluid)
         name = film if isinstance(film, str) else getattr(film, "__name__", "user-defined law")

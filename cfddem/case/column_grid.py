@@ -16,13 +16,13 @@ from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
 
 def grid_of(case: Case) -> Grid:
     """Cells of the column; those outside a cylinder, and those whose centres walls close to the fluid, are solid."""
-    walls = () if case.fluid is None else case.wall
+    walls = tuple(filter(case.closes_cells, case.wall))
     return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
 
 
 @lru_cache(maxsize=8)
 def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int], ...]) -> Grid:
-    closing = [_closed_by(wall) for wall in walls if wall.solid != "none"]
+    closing = [_closed_by(wall) for wall in walls]
     if column.shape == "cylinder":
         closing.append(outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width))
     if not closing:

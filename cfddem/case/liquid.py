@@ -200,7 +200,7 @@ class Spray(Checked):
         return np.array([corner, corner + np.array(self.size)])
 
 
-def check_wet(liquid: Liquid | None, spray: Spray | None, fluid: Fluid | None, size: Point, round_column: bool) -> None:
+def check_wet(liquid: Liquid | None, spray: Spray | None, fluid: Fluid, size: Point, round_column: bool) -> None:
     """Refuse a liquid, or a spray, that does not go with the rest of the case.
 
     size          of the column [m]
@@ -213,7 +213,7 @@ def check_wet(liquid: Liquid | None, spray: Spray | None, fluid: Fluid | None, s
     if spray is None and all(getattr(liquid, name) is None for name in AMOUNTS):
         limit = f"given, or {' or '.join(AMOUNTS[1:])}"
         raise InputError("liquid.thickness", None, limit, "only a case with [spray] may begin dry")
-    if fluid is not None and fluid.is_liquid and _alike(fluid.viscosity, liquid.viscosity):
+    if fluid.is_liquid and _alike(fluid.viscosity, liquid.viscosity):
         raise InputError(
             "liquid.viscosity", liquid.viscosity, f"other than that of the fluid, {fluid.viscosity:g} Pa s",
             "particles in a liquid have no bridges of the same liquid; leave out [liquid]",

@@ -217,3 +217,7 @@ class Fluid(Checked):
             return np.full(np.shape(height), self.viscosity)
         heights, values = np.array(self.viscosity_profile).T
         return np.interp(height, heights, values)
+
+
+NO_FLUID = Fluid.model_construct(density=0.0, viscosity=0.0)
+"""What is around dry particles: it weighs nothing, resists nothing, and is no liquid."""

@@ -69,7 +69,7 @@ class Case(CaseTables):
 
     @model_validator(mode="after")
     def _liquid_goes_with_the_rest(self) -> Case:
-        check_wet(self.liquid, self.spray, self.fluid, self.column.size, self.column.shape == "cylinder")
+        check_wet(self.liquid, self.spray, self.around, self.column.size, self.column.shape == "cylinder")
         if self.liquid and self.liquid.bond and not getattr(self, "evaporation", None):
             raise InputError("liquid.bond", None, "left out without [evaporation]", "bridges leave bonds as they dry")
         return self
@@ -123,7 +123,7 @@ class Case(CaseTables):
     @property
     def has_films(self) -> bool:
         """Whether lubrication films form between close spheres."""
-        return self.laws.film_in(self.fluid) != "none"
+        return self.laws.film_in(self.around) != "none"
 
     @property
     def agitation(self) -> str | Law:

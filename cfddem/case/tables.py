@@ -12,7 +12,7 @@ from cfddem.case.bed import Bed, CaseFeed, CaseOutlet, Name, Point, Positive, Sp
 from cfddem.case.case_laws import CaseLaws
 from cfddem.case.compare import CaseData
 from cfddem.case.liquid import Liquid, Spray
-from cfddem.case.materials import Checked, Fluid, Material, Materials, Pairs
+from cfddem.case.materials import NO_FLUID, Checked, Fluid, Material, Materials, Pairs
 from cfddem.case.walls import CaseWall
 
 
@@ -139,14 +139,19 @@ class CaseTables(Checked):
         return self.fluid
 
     @property
+    def around(self) -> Fluid:
+        """What is around the particles: the fluid, or :data:`~cfddem.case.materials.NO_FLUID` around dry ones."""
+        return self.fluid or NO_FLUID
+
+    @property
     def in_liquid(self) -> bool:
         """Whether a liquid is around the particles."""
-        return self.fluid is not None and self.fluid.is_liquid
+        return self.around.is_liquid
 
     @property
     def resists(self) -> bool:
         """Whether the fluid resists the particles: it has a viscosity and a law of drag."""
-        return self.fluid is not None and self.fluid.viscosity > 0.0 and self.laws.drag_law is not None
+        return self.around.viscosity > 0.0 and self.laws.drag_law is not None
 
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""

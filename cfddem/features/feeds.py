@@ -139,7 +139,7 @@ def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
         case.material_of(species).density,
         velocity=given.velocity,
         material=list(case.material).index(case.material_name_of(species)),
-        viscosity=0.0 if case.fluid is None else float(case.fluid.viscosity_at(np.array([middle]))[0]),
+        viscosity=float(case.around.viscosity_at(np.array([middle]))[0]),
         seed=(case.bed.seed, number, _FED),
         begin=given.begin,
         end=math.inf if given.end is None else given.end,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import wraps
 
 from cfddem.case.bed import POURED_SOLID_FRACTION
+from cfddem.case.materials import NO_FLUID
 from cfddem.case.schema import Case
 from cfddem.case.vessel import Vessel, vessel_of
 from closures import balance, drag_single, numbers
@@ -64,10 +65,7 @@ def _estimate(case: Case, floor: float, vessel: Vessel | None) -> BedEstimate:
     count, solids, density = case.particle_count, sum(case.volumes.values()), case.solid_density
     packed, nan = 1.0 - POURED_SOLID_FRACTION, math.nan
     poured = _height(solids, POURED_SOLID_FRACTION, floor, vessel)
-    gravity, fluid = math.hypot(*case.laws.gravity), case.fluid
-    if fluid is None:
-        weight = solids * density * gravity / floor
-        return BedEstimate(count, solids, weight, nan, 0.0, nan, nan, nan, nan, packed, poured, nan, nan, poured, 0.0)
+    gravity, fluid = math.hypot(*case.laws.gravity), case.around
     weight = solids * abs(density - fluid.density) * gravity / floor
     opening = floor if vessel is None else vessel.floor
     inflow = mean_inlet_velocity(case) * opening
@@ -141,8 +139,8 @@ def bubbles(case: Case, bed: BedEstimate) -> bool:
 
 def _terminal_by_law(case: Case, gravity: float) -> float:
     """Terminal velocity of the slowest species alone by the drag law of the case; NaN if it has none for voidage 1."""
-    law, fluid, found = case.laws.drag_law, case.fluid, []
-    if law is None or fluid is None or law.ranges.get("voidage", (0.0, 1.0))[1] < 1.0:
+    law, fluid, found = case.laws.drag_law, case.around, []
+    if law is None or law.ranges.get("voidage", (0.0, 1.0))[1] < 1.0:
         return math.nan
     for each in case.species.values():
         drag = case.laws.drag_function(each.sauter_diameter / case.bed.diameter)
@@ -156,7 +154,7 @@ def _terminal_by_law(case: Case, gravity: float) -> float:
 def mean_inlet_velocity(case: Case) -> float:
     """Mean superficial velocity over the floor including the jet, highest in time [m/s]."""
     column, jet = case.column, case.bed.jet
-    if column.ends != "flow":
+    if column.ends != "flow" or case.around is NO_FLUID:
         return 0.0
     inlet = case.bed.highest_inlet_velocity
     if jet is None:
@@ -216,9 +214,9 @@ def net_downward_forces(case: Case, inlet: float, voidage: float) -> dict[str, f
     voidage  at which the flow carries the mixture [-]
     returns  by name: above 0 the species sinks, below 0 it rises; empty without drag
     """
-    fluid, gravity = case.fluid, math.hypot(*case.laws.gravity)
+    fluid, gravity = case.around, math.hypot(*case.laws.gravity)
     forces: dict[str, float] = {}
-    if fluid is None or fluid.viscosity == 0.0 or gravity == 0.0:
+    if fluid.viscosity == 0.0 or gravity == 0.0:
         return forces
     bulk = (1.0 - voidage) * (case.solid_density - fluid.density)
     for name, each in case.species.items():

@@ -157,17 +157,15 @@ def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:
 
     In a periodic column the bed fills the column evenly.
     """
-    fluid, column = case.fluid, case.column
-    if fluid is None or not fluid.is_liquid or fluid.viscosity == 0.0:
-        return None
-    if case.bed.fixed or case.laws.drag_law is None:
+    column = case.column
+    if not case.in_liquid or not case.resists or case.bed.fixed:
         return None
     height, voidage = bed.height, bed.voidage
     if column.ends == "periodic":
         height, voidage = math.inf, 1.0 - bed.solid_volume / (column.floor_area * column.height)
     elif not bed.inlet > bed.onset:
         return None
-    if not (0.0 < voidage < 1.0 and case.solid_density > fluid.density and case.laws.gravity[2] < 0.0):
+    if not (0.0 < voidage < 1.0 and case.solid_density > case.around.density and case.laws.gravity[2] < 0.0):
         return None
     uniform = uniform_bed(case, voidage)
     cell = column.cell if isinstance(column.cell, float) else column.cell[2]

@@ -68,7 +68,7 @@ def _of_species(case: Case, bed: BedEstimate, name: str, species: Species) -> Co
     law, hard = case.laws.contact_law, row.copy()
     hard["contact_modulus"] = real
     load = bed.weight * species.diameter**2
-    viscosity = 0.0 if case.fluid is None else case.fluid.viscosity
+    viscosity = case.around.viscosity
     roughness_gap = float(row["roughness_gap"])
     films = case.has_films
     return CollisionEstimate(

@@ -201,14 +201,14 @@ def check_scales(case: Case) -> Iterator[Issue]:
 
 def check_units(case: Case) -> Iterator[Issue]:
     """Check that densities, viscosities and moduli are plausible in SI units."""
-    fluid = case.fluid
-    if fluid is not None and fluid.density < LIGHT_GAS and fluid.viscosity > VISCOUS_GAS:
+    fluid = case.around
+    if fluid.density < LIGHT_GAS and fluid.viscosity > VISCOUS_GAS:
         yield Issue(
             "warning", "fluid.density",
             f"{fluid.density:.3g} kg/m3 is that of a gas, but {fluid.viscosity:.3g} Pa s is not",
             "water has 1000 kg/m3 and 1e-3 Pa s, air 1.2 kg/m3 and 1.8e-5 Pa s",
         )  # fmt: skip
-    if fluid is not None and fluid.is_liquid and 0.0 < fluid.viscosity < THIN_LIQUID:
+    if fluid.is_liquid and 0.0 < fluid.viscosity < THIN_LIQUID:
         yield Issue(
             "warning", "fluid.viscosity", f"{fluid.viscosity:.3g} Pa s is below that of any common liquid",
             "give the dynamic viscosity, the kinematic one times the density; water has 1e-3 Pa s",

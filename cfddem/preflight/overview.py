@@ -106,7 +106,7 @@ def _collisions_and_film(case: Case, collision: CollisionEstimate, step: float) 
     group, diameter = "collisions and film", case.species[collision.species].diameter
     note = f"between particles of {collision.species}" if case.bed.species else ""
     yield Row(group, "collision speed", collision.speed, "m/s", note)
-    if films := case.laws.film_in_words(case.fluid):
+    if films := case.laws.film_in_words(case.around):
         yield Row(group, "lubrication films", math.nan, "", films)
     if collision.gap > 0.0:
         law = case.laws.pair_laws.get("minimum_gap")
@@ -159,11 +159,8 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
     for number, feed in enumerate(case.feed):
         note = f"about {largest_rate(case, feed):.2g} fit through its box"
         yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
-    if case.fluid is not None and case.wall:
-        for number, mask in closed_cells(case).items():
-            yield Row(
-                group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid"
-            )
+    for number, mask in closed_cells(case).items():
+        yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
     if (vessel := vessel_of(case)) is not None:
         yield Row(group, "cross-section at the floor", vessel.floor, "m2", "that walls leave open")
         yield Row(group, "cross-section at the bed surface", vessel.area_at(bed.height), "m2")

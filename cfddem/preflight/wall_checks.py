@@ -171,8 +171,6 @@ def _check_place(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
 
 def _check_cells(case: Case) -> Iterator[Issue]:
     """Check which cells the walls close to the fluid."""
-    if case.fluid is None or not case.wall:
-        return
     closed = closed_cells(case)
     for number, mask in closed.items():
         if not mask.any():
@@ -195,17 +193,17 @@ def _check_cells(case: Case) -> Iterator[Issue]:
 
 def closed_cells(case: Case) -> dict[int, np.ndarray]:
     """Cells that each wall closes to the fluid (nz, ny, nx) bool, by its number."""
+    closing = {number: wall for number, wall in enumerate(case.wall) if case.closes_cells(wall)}
     counts = cell_counts(case.column.size, case.column.cell)
-    if math.prod(counts) > MOST_CELLS:
+    if not closing or math.prod(counts) > MOST_CELLS:
         return {}
     lines = [(np.arange(n) + 0.5) * length / n for n, length in zip(counts, case.column.size)]
     z, y, x = np.meshgrid(lines[2], lines[1], lines[0], indexing="ij")
     centres = np.stack([x, y, z], axis=-1)
     closed = {}
-    for number, wall in enumerate(case.wall):
-        if wall.solid != "none":
-            with suppress(InputError, OSError):  # a surface that cannot be read, or is open, is reported elsewhere
-                closed[number] = solid_part(wall, centres.reshape(-1, 3)).reshape(x.shape)
+    for number, wall in closing.items():
+        with suppress(InputError, OSError):  # a surface that cannot be read, or is open, is reported elsewhere
+            closed[number] = solid_part(wall, centres.reshape(-1, 3)).reshape(x.shape)
     return closed
 
 

@@ -217,7 +217,7 @@ def laws_of(case: Case) -> Laws:
         rolling=laws.rolling_resistance,
         rolling_damping=laws.rolling_damping,
         bridge=bridge_laws_of(case),
-        film_motions=FILM_MOTIONS.get(laws.film_in(case.fluid), "normal"),
+        film_motions=FILM_MOTIONS.get(laws.film_in(case.around), "normal"),
         **own,
     )
 

@@ -145,7 +145,7 @@ def _is_fluid_bed(case: Case) -> bool:
 
 
 def _is_agitated(case: Case) -> bool:
-    return case.fluid is not None and case.agitation != "none"
+    return _has_fluid(case) and case.agitation != "none"
 
 
 def _has_moving_films(case: Case) -> bool:

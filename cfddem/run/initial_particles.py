@@ -67,7 +67,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     made = make_bodies(
         places, 0.5 * diameters, properties.density, velocity=np.array(bed.initial_velocity),
         material=properties.material,
-        viscosity=case.fluid.viscosity_at(places[:, 2]) if case.fluid else 0.0, fixed=bed.fixed,
+        viscosity=case.around.viscosity_at(places[:, 2]), fixed=bed.fixed,
     )  # fmt: skip
     if bed.species:
         made.declare(SPECIES, properties.species)

@@ -19,7 +19,6 @@ from cfddem.preflight.expansion import SCATTER, expansions
 from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed import study as liquid_bed
 from scenarios.beds.packed_bed import study as packed_bed
-from scenarios.beds.settling import study as landing
 from scenarios.beds.settling import study as settling
 from scenarios.validation import history_force
 from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, reference, worst
@@ -125,10 +124,10 @@ def landings(curves: Curves) -> list[Row]:
     """The sphere of ten Cate et al. falls to the floor of their box, with the extra drag beside walls."""
     rows = []
     for case, oil in _oils().items():
-        for walls in landing.WALLS:
+        for walls in settling.WALLS:
             name = f"ten Cate {case}, drag beside walls: {walls}"
-            gaps, speeds = landing.land(oil.density, oil.viscosity, walls, 1e-4)
-            exact = landing.landing_ode(oil.density, oil.viscosity, walls, gaps)
+            gaps, speeds = settling.land(oil.density, oil.viscosity, walls, 1e-4)
+            exact = settling.landing_ode(oil.density, oil.viscosity, walls, gaps)
             curves[f"landing/{case}_{walls}"] = {
                 "gap": (gaps, "m"), "speed": (speeds, "m/s"), "equation": (exact, "m/s"),
             }  # fmt: skip
@@ -136,13 +135,13 @@ def landings(curves: Curves) -> list[Row]:
             rows.append(
                 Row(f"{name}: largest deviation from the equation of motion, over u_inf", away.max(), 0.0, 0.01)
             )
-            last = away[gaps < 2.0 * landing.RADIUS].max()
+            last = away[gaps < 2.0 * settling.RADIUS].max()
             rows.append(Row(f"{name}: the same in the last diameter over the floor", last, 0.0, 0.05))
             rows.append(Row(f"{name}: largest speed over measured", speeds.max() / oil.fastest, 1.0))
         for cell in (4.0, 2.0) if case in COUPLED else ():
             name = f"ten Cate {case} over a floor, coupled run, cells of {cell:g} d"
-            gaps, speeds = landing.land_on_grid(oil.density, oil.viscosity, cell)
-            exact = landing.landing_ode(oil.density, oil.viscosity, "nearest", gaps, floor_alone=True)
+            gaps, speeds = settling.land_on_grid(oil.density, oil.viscosity, cell)
+            exact = settling.landing_ode(oil.density, oil.viscosity, "nearest", gaps, floor_alone=True)
             away = float(np.abs(speeds - exact).max()) / oil.endless
             rows.append(Row(f"{name}: largest deviation from the equation of motion, over u_inf", away, 0.0, 0.01))
     return rows
