@@ -11,6 +11,7 @@ laws of the kind `fluctuation` are its parts.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from closures.kinetic_theory import radial_distribution
 from closures.registry import law
@@ -32,6 +33,16 @@ et al. is the middle of the range of Osnes et al. (2023).
 
 TIMES = {"pseudo_turbulence": 1.29, "free_spheres": 1.27}
 """Correlation time over d/w, fitted to the same simulations; 1 for other laws. It is the sum of the process's two."""
+
+
+class AgitationFactors(NamedTuple):
+    """Factors of a law of agitation."""
+
+    along: float = 1.0  # part of the fluctuation along the mean slip that enters the drag [-]
+    across: float = 1.0  # the same across it [-]
+    inertia: float = INERTIA_SHARE  # part of the response to du''/dt, an average over eddies as small as a particle [-]
+    time: float = 1.0  # of the correlation time, d/w [-]
+
 
 SHORT = 0.2
 """Shorter of the two correlation times of the fluctuation that a particle sees, over their sum [-]."""

@@ -239,11 +239,11 @@ def test_a_law_of_the_user_agitates() -> None:
 )
 def test_factors_of_the_drag_are_those_of_the_law_unless_given(law: object, factors: tuple[float, float]) -> None:
     made = suspension(laws__agitation=law).forces["agitation"]
-    assert (made.drag_share_along, made.drag_share_across) == factors
+    assert made.factors[:2] == factors
     made = suspension(laws__agitation=law, laws__agitation_drag_across=0.0, laws__agitation_time=3.0).forces[
         "agitation"
     ]
-    assert (made.drag_share_along, made.drag_share_across, made.time_share) == (factors[0], 0.0, 3.0)
+    assert (made.factors.along, made.factors.across, made.factors.time) == (factors[0], 0.0, 3.0)
 
 
 def test_a_law_with_unknown_arguments_is_refused() -> None:

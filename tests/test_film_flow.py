@@ -11,7 +11,7 @@ from scipy.optimize import curve_fit
 from scipy.special import j0, jn_zeros
 
 from scenarios.collisions.film_impact import liquid, pressure, viscosity
-from scenarios.collisions.film_impact.grid import Grid
+from scenarios.collisions.film_impact.grid import Cells, Faces, Grid, Underside
 from scenarios.collisions.film_impact.pressure import Bead, Solved
 from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.volume import overfilled
@@ -36,10 +36,11 @@ class Filled:
         grid, bead, nu = self.grid, self.bead, self.kinematic
         shape, rate = (bead.radius, bead.gap), nu * dt / grid.dx**2
         if nu:
-            viscosity.diffuse(self.u, self.w, *self.wet, grid.open_u, grid.open_w, rate, grid.dx, *shape, bead.velocity)
+            under = Underside(*shape, bead.velocity, grid.dx)
+            viscosity.diffuse(Faces(self.u, self.w), Faces(*self.wet), grid.open, rate, under)
         mobility = viscosity.mobility_of_gaps(grid, *shape, nu, dt)
-        cells = self.liquid, np.where(self.liquid, 1.0, 0.0)
-        return pressure.solve(grid, bead, (self.u, self.w), cells, mobility, self.density, dt)
+        cells = Cells(self.liquid, np.where(self.liquid, 1.0, 0.0), grid.dx, grid.outer_open, self.density)
+        return pressure.solve(grid, bead, Faces(self.u, self.w), cells, mobility, dt)
 
 
 def added_mass(filled: Filled) -> float:
@@ -122,7 +123,8 @@ def test_flow_between_plates_is_of_second_order() -> None:
         rate = 0.2
         for _ in range(40 * cells**2 // 8):
             flow.u += rate * grid.dx**2
-            viscosity.diffuse(flow.u, flow.w, *flow.wet, grid.open_u, grid.open_w, rate, grid.dx, FLAT, 1.0, 0.0)
+            under = Underside(FLAT, 1.0, 0.0, grid.dx)
+            viscosity.diffuse(Faces(flow.u, flow.w), Faces(*flow.wet), grid.open, rate, under)
         return abs(12.0 * float(flow.u[300, :cells].mean()) - 1.0)
 
     assert math.log2(error(4) / error(8)) > 1.9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -16,15 +16,6 @@ from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from closures.agitation import INERTIA_SHARE
 from closures.kinds import BUILT_IN
 from closures.registry import Law, is_built_in
-
-
-class AgitationFactors(NamedTuple):
-    """Factors of a law of agitation."""
-
-    along: float  # of the fluctuation along the mean slip in the drag
-    across: float  # across it
-    inertia: float  # of the force by the acceleration of the fluctuation
-    time: float  # of the correlation time
 
 
 class CaseLaws(Checked):

@@ -16,7 +16,6 @@ from pydantic import ValidationError, model_validator
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_choice import chosen
 from cfddem.case.bed import AT_RANDOM, POURED_SOLID_FRACTION
-from cfddem.case.case_laws import AgitationFactors
 from cfddem.case.compare import data_in
 from cfddem.case.feature_table import FeatureTable, with_feature_tables
 from cfddem.case.feeds import refuse_wrong_equipment
@@ -27,7 +26,7 @@ from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.vessel import vessel_of
 from cfddem.case.walls import walls_in
-from closures.agitation import SHARES, TIMES, free_spheres
+from closures.agitation import SHARES, TIMES, AgitationFactors, free_spheres
 from closures.kinds import BUILT_IN
 from closures.registry import Law, law_of, load_package_laws
 

@@ -12,7 +12,8 @@ Resistance is implicit on both sides, see :mod:`cfddem.coupling.transfer`; all o
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -21,13 +22,16 @@ from cfddem.coupling.force_list import ForceList
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
 from cfddem.coupling.sampled_flow import FlowSampler
 from cfddem.coupling.sharp_flow import SharpFlowSampler
-from cfddem.coupling.terms import CouplingTerms, inertia, total
+from cfddem.coupling.terms import CouplingTerms, ForceTerms, inertia, total
 from cfddem.coupling.transfer import Transfer
 from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
+
+Part = Callable[[str], AbstractContextManager[None]]
 
 SAME_STEP = 1e-6
 """Fluid steps that differ by less than this part are equal."""
@@ -90,11 +94,34 @@ class Coupling:
                     force.begin(terms)
 
     @property
+    def gravity(self) -> Array:
+        """Acceleration of gravity (3,) [m/s2]."""
+        return np.array(self.fluid.gravity)
+
+    @property
     def sets_inertia(self) -> bool:
         """Whether a force changes the inertia of particles."""
         return any(force.sets_inertia for force in self.forces)
 
     # ------------------------------------------------------------ around one fluid step
+
+    def advance(self, particles: Particles, step: float, _: float, part: Part) -> CouplingTerms:
+        """Make one step of the fluid [s] with its forces on the particles.
+
+        particles  of this rank, without ghosts
+        part       measures the wall time of a part
+        """
+        with part("voidage and drag"):
+            terms = self.prepare(particles, step)
+        with part("fluid"):
+            self.fluid.step(step, *terms.fields)
+        with part("forces of the fluid"):
+            self.apply(particles, terms)
+        return terms
+
+    def exchange(self, before: Particles, after: Particles) -> None:
+        """Let particles that enter replace fluid of their own volume, and those that leave make room for it."""
+        self.fluid.add_voidage(self.solid_fraction(before) - self.solid_fraction(after))
 
     def prepare(self, particles: Particles, step: float) -> CouplingTerms:
         """What the particles send into the coming fluid step [s]: volume, drag, momentum and explicit forces.
@@ -140,6 +167,15 @@ class Coupling:
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.momentum.last_step, self._mean_step = float(state["last_step"]), float(state["mean_step"])
+
+    def state(self) -> dict[str, Any]:
+        """Entries of the checkpoint of a simulation, with the fluid."""
+        return {"fluid": self.fluid.checkpoint(), "coupling": self.checkpoint()}
+
+    def take_over(self, state: dict[str, Any]) -> None:
+        """Continue from a checkpoint of a simulation."""
+        self.fluid.restore(state["fluid"])
+        self.restore(state["coupling"])
 
     # ------------------------------------------------------------ terms
 
@@ -197,3 +233,32 @@ class Coupling:
         """Explicit force on the fluid, deposited on cells (nz, ny, nx, 3) [N/m3]."""
         source = self.kernel.spread(cell_map, force) / self.fluid.grid.cell_volume
         return np.ascontiguousarray(np.moveaxis(source, 0, -1))
+
+
+class Uncoupled:
+    """What stands in for the coupling of dry particles: forces of a user, and no fluid.
+
+    solver  of the particles
+    """
+
+    fluid = None
+
+    def __init__(self, solver: ParticleSolver) -> None:
+        self.forces, self.gravity = ForceList(solver.particles), np.array(solver.gravity)
+
+    def advance(self, particles: Particles, step: float, last_step: float, _: Part) -> ForceTerms:
+        """Set the forces on the particles over a step [s]."""
+        terms = ForceTerms(particles, step, last_step)
+        self.forces.act(terms)
+        self.forces.finish(terms)
+        return terms
+
+    def exchange(self, before: Particles, after: Particles) -> None:
+        """No fluid makes room."""
+
+    def state(self) -> dict[str, Any]:
+        """Nothing."""
+        return {}
+
+    def take_over(self, state: dict[str, Any]) -> None:
+        """Nothing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ _TRIES = 20
 _NOWHERE_BELOW, _NOWHERE_ABOVE = (-np.inf, -np.inf, -np.inf), (np.inf, np.inf, np.inf)
 
 
+@dataclass(eq=False)
 class Feed:
     """Inserts particles in a box at a constant rate.
 
@@ -44,38 +46,33 @@ class Feed:
     finish        called with new particles before they are inserted, for instance to declare fields
     """
 
-    def __init__(
-        self,
-        rate: float,
-        corner: Vector,
-        size: Vector,
-        diameters: Callable[[int, np.random.Generator], np.ndarray],
-        density: float,
-        *,
-        velocity: Vector = (0.0, 0.0, 0.0),
-        material: int = 0,
-        viscosity: float = 0.0,
-        seed: Seed,
-        begin: float = math.nan,
-        end: float = math.inf,
-        finish: Callable[[Particles], None] | None = None,
-    ) -> None:
-        if not 0.0 <= rate < np.inf:
-            raise InputError("rate", rate, "at least 0")
-        self.rate, self.corner, self.size = rate, np.array(corner, float), np.array(size, float)
-        self.diameters, self.density = diameters, density
-        self.velocity, self.material, self.viscosity = velocity, material, viscosity
+    rate: float
+    corner: Vector
+    size: Vector
+    diameters: Callable[[int, np.random.Generator], np.ndarray]
+    density: float
+    _: KW_ONLY
+    velocity: Vector = (0.0, 0.0, 0.0)
+    material: int = 0
+    viscosity: float = 0.0
+    seed: Seed
+    begin: float = math.nan  # or time of the first call
+    end: float = math.inf
+    finish: Callable[[Particles], None] = lambda _: None
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.rate < np.inf:
+            raise InputError("rate", self.rate, "at least 0")
+        self._corner, self._size = np.array(self.corner, float), np.array(self.size, float)
         self.entered = 0
         self.waiting = np.zeros(0)  # diameters of particles that are due [m]
-        self.end, self.finish = end, finish
-        self._begin = begin  # or time of the first call [s]
-        self._generator = np.random.default_rng(seed)
+        self._generator = np.random.default_rng(self.seed)
 
     def __call__(self, run: ParticleSolver) -> int:
         """Insert the particles that are due; returns their number."""
-        if math.isnan(self._begin):
-            self._begin = run.time
-        active = max(min(run.time, self.end) - self._begin, 0.0)
+        if math.isnan(self.begin):
+            self.begin = run.time
+        active = max(min(run.time, self.end) - self.begin, 0.0)
         due = int(self.rate * active * (1.0 + 1e-12)) - self.entered - len(self.waiting)
         if due > 0:
             self.waiting = np.append(self.waiting, self.diameters(due, self._generator))
@@ -94,8 +91,7 @@ class Feed:
                 material=self.material,
                 viscosity=self.viscosity,
             )
-            if self.finish is not None:
-                self.finish(fresh)
+            self.finish(fresh)
             run.insert(fresh)
         self.waiting = self.waiting[~free]
         self.entered += entered
@@ -104,14 +100,14 @@ class Feed:
     def _places(self, run: ParticleSolver, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """A position for each sphere, and whether it is free; the same on all ranks."""
         largest = run.communicator.largest(np.append(run.particles.radius, radius))
-        low, high = self.corner - 2.0 * largest, self.corner + self.size + 2.0 * largest
+        low, high = self._corner - 2.0 * largest, self._corner + self._size + 2.0 * largest
         near = _inside(run.particles.position, low, high)
         there, sizes = run.particles.position[near], run.particles.radius[near]
         place, free = np.zeros((len(radius), 3)), np.zeros(len(radius), bool)
         tree = cKDTree(there) if len(there) else None
         for n in range(len(radius)):
             for _ in range(_TRIES):
-                spot = self.corner + self._generator.uniform(0.0, 1.0, 3) * self.size
+                spot = self._corner + self._generator.uniform(0.0, 1.0, 3) * self._size
                 near_by = [] if tree is None else tree.query_ball_point(spot, radius[n] + largest)
                 others = np.concatenate([there[near_by], place[:n][free[:n]]])
                 reach = np.concatenate([sizes[near_by], radius[:n][free[:n]]]) + radius[n]
@@ -125,14 +121,14 @@ class Feed:
         return {
             "entered": self.entered,
             "waiting": self.waiting.copy(),
-            "begin": self._begin,
+            "begin": self.begin,
             "generator": self._generator.bit_generator.state,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()` of the same feed."""
         self.entered, self.waiting = int(state["entered"]), np.array(state["waiting"])
-        self._begin = float(state["begin"])
+        self.begin = float(state["begin"])
         self._generator.bit_generator.state = state["generator"]
 
 

@@ -51,10 +51,9 @@ from closures.registry import Law, law_of
 
 
 class Parts(NamedTuple):
-    """The solvers of a run and their coupling; no fluid and no coupling for a case of particles only."""
+    """The particles of a run and their coupling with its fluid; none for a case of particles only."""
 
     particle_solver: ParticleSolver
-    fluid: FluidSolver | None
     coupling: Coupling | None
 
 
@@ -96,11 +95,11 @@ def parts_of(
         balance=dry,
     )
     if dry:
-        return Parts(solver, None, None)
-    fluid, coupling = flow_of(case, solver.particles, communicator, cells)
+        return Parts(solver, None)
+    _, coupling = flow_of(case, solver.particles, communicator, cells)
     if coupling.sets_inertia:
         solver.refresh()  # the forces of films depend on the inertia
-    return Parts(solver, fluid, coupling)
+    return Parts(solver, coupling)
 
 
 def require_parallel(case: Case, ranks: int) -> None:
@@ -360,13 +359,8 @@ def agitation_of(case: Case, fluid: FluidSolver, kernel: FilterKernel, *added_ma
     law = case.agitation
     if law == "none":
         return []
-    given = case.agitation_factors
-    factors = {"drag_share_along": given.along, "drag_share_across": given.across, "time_share": given.time}
+    of_run, factors = (fluid, kernel, case.bed.seed), case.agitation_factors
     if not isinstance(law, Law):
-        return [FluctuatingForce(fluid, kernel, case.bed.seed, **factors)]
+        return [FluctuatingForce(*of_run, factors)]
     coefficient = next(iter(added_mass), AddedMass(law_of(zuber), fluid.density))
-    return [
-        PseudoTurbulence(
-            fluid, kernel, case.bed.seed, law, added_mass=coefficient, inertia_share=given.inertia, **factors
-        )
-    ]
+    return [PseudoTurbulence(*of_run, law, added_mass=coefficient, factors=factors)]

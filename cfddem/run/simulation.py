@@ -14,8 +14,8 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.backend.launch import keep_freed_memory
 from cfddem.case.schema import Case
-from cfddem.coupling.coupling import Coupling
-from cfddem.coupling.force_list import ForceList, require_features
+from cfddem.coupling.coupling import Coupling, Uncoupled
+from cfddem.coupling.force_list import require_features
 from cfddem.coupling.terms import ForceTerms
 from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
@@ -89,8 +89,7 @@ class Simulation:
             remedy = "a coupled particle has the force Weight(density of the fluid, gravity)"
             raise InputError("gravity", tuple(particle_solver.gravity), "0 in a particle solver with a fluid", remedy)
         made = cls.__new__(cls)
-        parts = Parts(particle_solver, None if coupling is None else coupling.fluid, coupling)
-        made._begin(None, parts, steps, fields, callbacks, features, state)
+        made._begin(None, Parts(particle_solver, coupling), steps, fields, callbacks, features, state)
         return made
 
     def _begin(
@@ -104,15 +103,15 @@ class Simulation:
         state: dict[str, Any] | None,
     ) -> None:
         """Put the parts together, and continue from a state."""
-        self._case, self.particle_solver, self.fluid, self.coupling = case, *parts
+        self._case, self.particle_solver, self.coupling = case, *parts
+        self._around = self.coupling or Uncoupled(self.particle_solver)
+        self.fluid, self.forces, self.gravity = self._around.fluid, self._around.forces, self._around.gravity
         self.communicator, self.wall = self.particle_solver.communicator, self.particle_solver.wall
-        self.gravity = np.array(self.particle_solver.gravity if self.fluid is None else self.fluid.gravity)
         kinds = [] if case is None else [each for each in FEATURES if each.is_in(case)]
         if case is not None:
             fields = [*fields, *(field for each in kinds for field in each.fields_of(case))]
         self.callbacks, fields = list(callbacks), list(fields)
         self.terms: ForceTerms | None = None  # of the last step between fluid and particles
-        self.forces = ForceList(self.particles) if self.coupling is None else self.coupling.forces
         self.features: list[Equipment] = []
         self._own = 0  # number of them that a user has added
         for feature in features:
@@ -224,19 +223,7 @@ class Simulation:
         part = self.wall.part
         with part("time steps"):
             step, substeps = self.time_steps.choose(until, self.steps)
-        if self.fluid is not None and self.coupling is not None:
-            owned = self.owned
-            with part("voidage and drag"):
-                terms = self.coupling.prepare(owned, step)
-            with part("fluid"):
-                self.fluid.step(step, *terms.fields)
-            with part("forces of the fluid"):
-                self.coupling.apply(owned, terms)
-            self.terms = terms
-        else:
-            self.terms = ForceTerms(self.owned, step, self.last_step)
-            self.forces.act(self.terms)
-            self.forces.finish(self.terms)
+        self.terms = self._around.advance(self.owned, step, self.last_step, part)
         for feature in self.features:
             with part(feature.name):
                 feature.before(self, step)
@@ -262,9 +249,8 @@ class Simulation:
         yield self.particle_solver
         after = self.owned
         same = np.array_equal(before.id, after.id)  # local: of this rank
-        if self.fluid is not None and self.coupling is not None and self.communicator.any(not same):
-            solids = self.coupling.solid_fraction
-            self.fluid.add_voidage(solids(before) - solids(after))
+        if self.communicator.any(not same):
+            self._around.exchange(before, after)
 
     def until(self, time: float) -> None:
         """Continue until a time [s]."""
@@ -294,8 +280,7 @@ class Simulation:
             "particle_step": self.time_steps.particle_step,
             "particles": self.particle_solver.checkpoint(),
         }
-        if self.fluid is not None and self.coupling is not None:
-            parts |= {"fluid": self.fluid.checkpoint(), "coupling": self.coupling.checkpoint()}
+        parts |= self._around.state()
         if forces := self.forces.checkpoint(self.communicator):
             parts |= {"forces": forces}
         if kept := {each.name: state for each in self.features if (state := each.checkpoint())}:
@@ -322,9 +307,7 @@ class Simulation:
             if field.name in state["particles"]["particles"]:
                 self.particles.declare(field)
         self.particle_solver.restore(state["particles"])
-        if self.fluid is not None and self.coupling is not None:
-            self.fluid.restore(state["fluid"])
-            self.coupling.restore(state["coupling"])
+        self._around.take_over(state)
         self.forces.restore(state.get("forces", {}), self.communicator)
         self.steps, self.last_step = int(state["steps"]), float(state.get("last_step", 0.0))
         return None if state["particle_step"] is None else float(state["particle_step"])

@@ -43,7 +43,7 @@ from cfddem.data.fields import Field
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.particles.state import Particles
-from closures.agitation import SHORT, force_deviation, force_rate, isolated_drag_factor
+from closures.agitation import SHORT, AgitationFactors, force_deviation, force_rate, isolated_drag_factor
 from closures.kinds import AGITATION_ARGUMENTS
 from closures.registry import Law, law_of
 
@@ -69,10 +69,7 @@ class PseudoTurbulence(Agitation):
     seed               of the random numbers
     law                variance of the fluctuation over the square of the mean slip, of the kind `agitation`
     added_mass         whose coefficient the response to du''/dt takes
-    drag_share_along   a_d along the mean slip: part of the fluctuation that enters the drag [-]
-    drag_share_across  a_d across the mean slip [-]
-    inertia_share      a_i, part of the response to du''/dt, an average over eddies as small as a particle [-]
-    time_share         correlation time over d / w [-]
+    factors            of the fluctuation in the drag, of the response to du''/dt, and of the correlation time
 
     outside  how often the law was evaluated outside its range
     """
@@ -85,14 +82,10 @@ class PseudoTurbulence(Agitation):
         law: Law,
         *,
         added_mass: AddedMass,
-        drag_share_along: float = 1.0,
-        drag_share_across: float = 1.0,
-        inertia_share: float = 0.0,
-        time_share: float = 1.0,
+        factors: AgitationFactors,
     ) -> None:
         super().__init__(fluid, kernel, seed)
-        self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
-        self.inertia_share, self.time_share, self.pushes = inertia_share, time_share, inertia_share > 0.0
+        self.factors, self.pushes = factors, factors.inertia > 0.0
         self.fields = (PROCESS, FLUCTUATION) if self.pushes else (PROCESS,)
         self.added_mass = added_mass
         called = adapted(law.function, ", ".join(AGITATION_ARGUMENTS), {name: name for name in AGITATION_ARGUMENTS})
@@ -103,12 +96,12 @@ class PseudoTurbulence(Agitation):
         """Fluctuation and force in the coming fluid step [s]."""
         flow, density = around.flow, self.fluid.density
         seen = np.empty((2, particles.count, 3))  # in the drag, and without the factors of the drag
-        shares = np.array([self.drag_share_along, self.drag_share_across])
+        shares = np.array(self.factors[:2])
         counter = np.array([self.seed, self.steps])
         self.outside += int(
             self._loop(
                 particles[PROCESS.name], particles.id, around.mean_slip, flow.voidage, particles.radius,
-                particles.viscosity, particles.density / density, density, shares, self.time_share, step, counter,
+                particles.viscosity, particles.density / density, density, shares, self.factors.time, step, counter,
                 self._ranges, seen,
             )
         )  # fmt: skip
@@ -128,37 +121,25 @@ class PseudoTurbulence(Agitation):
         with np.errstate(divide="ignore"):
             free = np.where(particles.inverse_mass > 0.0, 1.0 / particles.inverse_mass, 0.0)
         inertia = free * (1.0 + coefficient) * displaced / (mass + coefficient * displaced)
-        force: Array = self.inertia_share / step * inertia[:, None]
+        force: Array = self.factors.inertia / step * inertia[:, None]
         return force * without_mean(self.kernel, around.cell_map, inertia, change)
 
 
 class FluctuatingForce(Agitation):
     """Fluctuating force of Lattanzi et al. (2022).
 
-    fluid, kernel      of the run
-    seed               of the random numbers
-    drag_share_along   factor of the deviation of the force along the mean slip [-]
-    drag_share_across  factor across the mean slip [-]
-    time_share         factor of the correlation time [-]
+    fluid, kernel  of the run
+    seed           of the random numbers
+    factors        of the deviation of the force along and across the mean slip, and of the correlation time
 
     outside  how often the law was evaluated outside its range
     """
 
     fields = (FORCE_PROCESS,)
 
-    def __init__(
-        self,
-        fluid: FluidSolver,
-        kernel: FilterKernel,
-        seed: int,
-        *,
-        drag_share_along: float = 1.0,
-        drag_share_across: float = 0.6,
-        time_share: float = 1.0,
-    ) -> None:
+    def __init__(self, fluid: FluidSolver, kernel: FilterKernel, seed: int, factors: AgitationFactors) -> None:
         super().__init__(fluid, kernel, seed)
-        self.drag_share_along, self.drag_share_across = drag_share_along, drag_share_across
-        self.time_share = time_share
+        self.factors = factors
         self._range = law_of(force_deviation).ranges["solid_fraction"]
 
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
@@ -169,11 +150,11 @@ class FluctuatingForce(Agitation):
         mean = neighbourhood_mean(self.kernel, around.cell_map, around.solid, moments)
         speed = (mean[:, :3] ** 2).sum(axis=1)  # local: components of a row
         temperature, force = np.maximum(mean[:, 3] - speed, 0.0) / 3.0, np.empty_like(velocity)
-        shares, counter = np.array([self.drag_share_along, self.drag_share_across]), np.array([self.seed, self.steps])
+        shares, counter = np.array(self.factors[:2]), np.array([self.seed, self.steps])
         self.outside += int(
             _fluctuate_force(
                 particles[FORCE_PROCESS.name], particles.id, around.mean_slip, around.flow.voidage, temperature,
-                particles.radius, particles.viscosity, self.fluid.density, shares, step / self.time_share, counter,
+                particles.radius, particles.viscosity, self.fluid.density, shares, step / self.factors.time, counter,
                 self._range, force,
             )
         )  # fmt: skip

@@ -93,7 +93,7 @@ class Drag(FluidForce):
         r"""Drag over slip of every particle (N,) [kg/s]: :math:`3\pi\eta d\,\varepsilon F`, in model B over eps."""
         conductance = np.empty(particles.count)
         outside, wrong = self._loop(
-            particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, *self._ranges,
+            particles.viscosity, particles.radius, flow.reynolds, flow.voidage, flow.diameter_ratio, self._ranges,
             self._model_b, conductance,
         )  # fmt: skip
         self.outside += int(outside)
@@ -113,9 +113,10 @@ class Drag(FluidForce):
 
 
 @threaded
-def _conductances(viscosity, radius, reynolds, voidage, ratio, numbers, voidages, ratios, model_b, conductance):
+def _conductances(viscosity, radius, reynolds, voidage, ratio, ranges, model_b, conductance):
     """Drag over slip of every particle; returns how many flows are outside the range of the law, and how many numbers
     are negative or not finite."""
+    numbers, voidages, ratios = ranges
     slowest, fastest = numbers
     densest, loosest = voidages
     smallest, largest = ratios

@@ -60,7 +60,8 @@ class WallDrag(FluidForce):
         for wall in walls:
             if isinstance(wall, Mesh) or wall.sweep() != 0.0:
                 raise InputError("wall_drag", type(wall).__name__, "walls at rest that are no meshes")
-        self._walls, self._options = flat(wall_arrays(walls)), (which == "all", film, shear)
+        flat_walls = flat(wall_arrays(walls))
+        self._surfaces, self._options = (flat_walls.kind, flat_walls.shape), (which == "all", film, shear)
 
     def act(self, terms: ForceTerms) -> None:
         """Resist the slip, and turn it."""
@@ -72,8 +73,7 @@ class WallDrag(FluidForce):
         """Extra drag at the slip u - v (N, 3) [m/s]."""
         terms = WallTerms(np.empty(particles.count), np.empty((particles.count, 3)))
         _beside(
-            particles.position, particles.radius, particles.viscosity, slip, self._walls.kind, self._walls.shape,
-            self._options, terms,
+            particles.position, particles.radius, particles.viscosity, slip, self._surfaces, self._options, terms,
         )  # fmt: skip
         return terms
 
@@ -98,7 +98,8 @@ def _force(normal, gap, slip, options):
 
 
 @inline
-def _beside_one(place, radius, viscosity, slip, kind, shape, options, n, terms):
+def _beside_one(place, radius, viscosity, slip, surfaces, options, n, terms):
+    kind, shape = surfaces
     force, largest, closest = NOTHING, 0.0, math.inf
     for w in range(len(kind)):
         normal, distance, _, _, _, _ = nearest(kind, shape, w, place)
@@ -117,7 +118,7 @@ def _beside_one(place, radius, viscosity, slip, kind, shape, options, n, terms):
 
 
 @threaded
-def _beside(position, radius, viscosity, slip, kind, shape, options, terms):
+def _beside(position, radius, viscosity, slip, surfaces, options, terms):
     """Conductance and explicit force of every particle."""
     for n in prange(len(radius)):
-        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(slip, n), kind, shape, options, n, terms)
+        _beside_one(of_row(position, n), radius[n], viscosity[n], of_row(slip, n), surfaces, options, n, terms)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,32 @@ FAR = 1e30
 
 TINY = 1e-6
 """Open share of a cell that the bead fills but for a corner: liquid passes through it, and pressure too."""
+
+
+class Faces(NamedTuple):
+    """A number on every face, for loops."""
+
+    u: np.ndarray  # on radial faces (radial + 1, vertical)
+    w: np.ndarray  # on horizontal faces (radial, vertical + 1)
+
+
+class Cells(NamedTuple):
+    """The liquid in the cells, for loops."""
+
+    liquid: np.ndarray  # which cells are liquid (radial, vertical)
+    filled: np.ndarray  # share of each that is filled [-]
+    dx: float  # width of a cell [m]
+    outer_open: bool  # whether the side lets liquid out
+    density: float  # of the liquid [kg/m3]
+
+
+class Underside(NamedTuple):
+    """The bead as a boundary of the flow, for loops."""
+
+    radius: float  # [m]
+    gap: float  # height of the lowest point [m]
+    velocity: float  # [m/s]
+    dx: float  # width of a cell [m]
 
 
 @dataclass
@@ -41,6 +68,11 @@ class Grid:
     def place_bead(self, radius: float, gap: float) -> None:
         """Compute the open fractions for a bead whose lowest point is at a height `gap`."""
         cut(radius, gap, self.dx, self.open_u, self.open_w, self.open_cell)
+
+    @property
+    def open(self) -> Faces:
+        """Open fractions of the faces."""
+        return Faces(self.open_u, self.open_w)
 
     @property
     def ring(self) -> np.ndarray:

@@ -36,8 +36,13 @@ class Losses:
 
 
 @serial
-def kinetic_energy(u, w, liquid, filled, open_u, open_w, dx, density, outer_open):
-    """Kinetic energy of the flow on the faces of liquid cells [J]."""
+def kinetic_energy(flow, cells, opening):
+    """Kinetic energy of the flow on the faces of liquid cells [J].
+
+    flow, opening  velocity and open fraction of faces, each `Faces`
+    cells          `Cells`
+    """
+    (u, w), (open_u, open_w), (liquid, filled, dx, outer_open, density) = flow, opening, cells
     radial, vertical = liquid.shape
     energy = 0.0
     for i in range(1, radial + (1 if outer_open else 0)):
@@ -62,8 +67,10 @@ def _length(filled, liquid, i, j, k, m):
 
 
 @serial
-def pressure_losses(u, w, before_u, before_w, mobility, liquid, filled, open_u, open_w, dx, density, outer_open):
-    """Losses of the pressure step: of impulses, and of thin gaps [J]."""
+def pressure_losses(flow, before, mobility, cells, opening):
+    """Losses of the pressure step: of impulses, and of thin gaps [J]. `before` is the flow before it."""
+    (u, w), (before_u, before_w), (open_u, open_w) = flow, before, opening
+    liquid, filled, dx, outer_open, density = cells
     radial, vertical = liquid.shape
     impulsive, viscous = 0.0, 0.0
     for i in range(1, radial + (1 if outer_open else 0)):

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfddem.backend.compile import inline, serial
-from scenarios.collisions.film_impact.grid import Grid
+from scenarios.collisions.film_impact.grid import Cells, Faces, Grid
 
 SHORTEST = 0.1
 """Least distance from the centre of a liquid cell to the surface, in cells."""
@@ -79,16 +79,17 @@ def number_cells(liquid, number):
 
 
 @serial
-def assemble(
-    number, filled, liquid, open_u, open_w, mobility_u, edge_u, edge_w, u, w, dx, rate, outer_open,
-    matrix, outflow, projected,
-):  # fmt: skip
-    """Rows of the pressure equation: lower bands of the matrix, outflow of each cell, projected area of the bead.
+def assemble(number, cells, opening, mobility_u, edges, flow, rate, system):
+    """Rows of the pressure equation.
 
-    mobility_u      factor of velocity and pressure gradient by the resistance of thin gaps
-    edge_u, edge_w  pressure at the surface, where it crosses between the cells of a face
-    rate            time step over density
+    opening     open fraction of faces, as `Faces`; flow and edges likewise
+    mobility_u  factor of velocity and pressure gradient by the resistance of thin gaps
+    edges       pressure at the surface, where it crosses between the cells of a face
+    rate        time step over density
+    system      lower bands of the matrix, outflow of each cell, projected area of the bead; all are filled
     """
+    (liquid, filled, dx, outer_open, _), (open_u, open_w), (u, w), (edge_u, edge_w) = cells, opening, flow, edges
+    matrix, outflow, projected = system
     radial, vertical = liquid.shape
     for i in range(radial):
         ring = math.pi * dx * dx * (2.0 * i + 1.0)
@@ -122,8 +123,9 @@ def assemble(
 
 
 @serial
-def correct(number, filled, liquid, open_u, open_w, mobility_u, edge_u, edge_w, u, w, p, dx, rate, outer_open):
+def correct(number, cells, opening, mobility_u, edges, flow, rate, p):
     """Subtract the pressure gradient on every open face of a liquid cell; closed faces have no flow."""
+    (liquid, filled, dx, outer_open, _), (open_u, open_w), (u, w), (edge_u, edge_w) = cells, opening, flow, edges
     radial, vertical = liquid.shape
     for i in range(radial + 1):
         for j in range(vertical):
@@ -163,19 +165,17 @@ class Solved:
 
 
 def solve(
-    grid: Grid, bead: Bead, flow: tuple[np.ndarray, np.ndarray], cells: tuple[np.ndarray, np.ndarray],
-    mobility: np.ndarray, density: float, dt: float, voids: Voids | None = None,
-    *, edges: tuple[np.ndarray, np.ndarray] | None = None,
+    grid: Grid, bead: Bead, flow: Faces, cells: Cells, mobility: np.ndarray, dt: float, voids: Voids | None = None,
+    *, edges: Faces | None = None,
 ) -> Solved:  # fmt: skip
     """Make velocities and bead satisfy continuity; changes both.
 
     flow      radial and vertical velocity on the faces, before the pressure [m/s]
-    cells     which cells are liquid, and their filled share
     mobility  factor of the radial faces by the resistance of thin gaps [-]
     voids     of a liquid that cavitates; their volume is updated
     edges     pressure of the surface on radial and horizontal faces [Pa]; without it 0
     """
-    (u, w), (liquid, filled) = flow, cells
+    liquid = cells.liquid
     number = np.empty(liquid.shape, dtype=np.int64)
     count, band = number_cells(liquid, number)
     pressure = np.zeros(liquid.shape)
@@ -183,10 +183,9 @@ def solve(
         bead.force = 0.0
         return Solved(pressure, 0.0, 0.0)
     matrix, outflow, projected = np.zeros((band + 1, count)), np.zeros(count), np.zeros(count)
-    edges = (np.zeros_like(u), np.zeros_like(w)) if edges is None else edges
-    open_faces = (grid.open_u, grid.open_w, mobility, *edges)
-    rate = dt / density
-    assemble(number, filled, liquid, *open_faces, u, w, grid.dx, rate, grid.outer_open, matrix, outflow, projected)
+    edges = Faces(*map(np.zeros_like, flow)) if edges is None else edges
+    given = (number, cells, grid.open, mobility, edges, flow, dt / cells.density)
+    assemble(*given, (matrix, outflow, projected))
     matrix[0, matrix[0] == 0.0] = 1.0
     share = dt / bead.mass
     if voids is None:
@@ -201,7 +200,7 @@ def solve(
         voids.volume[~liquid] = 0.0
         voids.work -= float(p @ growth) * dt
     bead.force = float(projected @ p)
-    correct(number, filled, liquid, *open_faces, u, w, p, grid.dx, rate, grid.outer_open)
+    correct(*given, p)
     pressure[liquid] = p
     return Solved(pressure, bead.force, float(grid.ring @ pressure[:, 0]))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenarios.collisions.film_impact import ledger, liquid, pressure, surface, viscosity, volume
-from scenarios.collisions.film_impact.grid import Grid
+from scenarios.collisions.film_impact.grid import Cells, Faces, Grid, Underside
 from scenarios.collisions.film_impact.pressure import Bead
 
 FALL = 0.02
@@ -62,6 +62,16 @@ class GridImpact:
         self.solved = pressure.Solved(np.zeros(grid.open_cell.shape), 0.0, 0.0)
         self.losses, self.turning = ledger.Losses(), (np.nan, np.nan)
         self.impulses = np.zeros(3)  # on the bead by the liquid, on the liquid by the plate, and of its weight [N s]
+
+    @property
+    def flow(self) -> Faces:
+        """Velocity on the faces [m/s]."""
+        return Faces(self.u, self.w)
+
+    @property
+    def cells(self) -> Cells:
+        """Liquid in the cells."""
+        return Cells(self.liquid, self.filled, self.grid.dx, self.grid.outer_open, self.density)
 
     @property
     def kinematic(self) -> float:
@@ -134,9 +144,8 @@ class GridImpact:
         """Viscous stress of the liquid, and gravity on liquid and bead."""
         grid, bead = self.grid, self.bead
         rate, resting = self.kinematic * dt / grid.dx**2, self.grid_energy()
-        viscosity.diffuse(
-            self.u, self.w, *self.wet, grid.open_u, grid.open_w, rate, grid.dx, bead.radius, bead.gap, bead.velocity
-        )
+        under = Underside(bead.radius, bead.gap, bead.velocity, grid.dx)
+        viscosity.diffuse(self.flow, Faces(*self.wet), grid.open, rate, under)
         self.losses.viscous += resting - self.grid_energy()
         self.w[:, 1:] -= self.gravity * dt
         if np.isfinite(bead.mass):
@@ -156,31 +165,16 @@ class GridImpact:
 
     def grid_energy(self) -> float:
         """Kinetic energy of the flow on the grid [J]."""
-        grid = self.grid
-        return float(
-            ledger.kinetic_energy(
-                self.u,
-                self.w,
-                self.liquid,
-                self.filled,
-                grid.open_u,
-                grid.open_w,
-                grid.dx,
-                self.density,
-                grid.outer_open,
-            )
-        )
+        return float(ledger.kinetic_energy(self.flow, self.cells, self.grid.open))
 
     def solve_pressure(self, dt: float) -> None:
         """Make velocities and bead satisfy continuity."""
         grid, bead, tension = self.grid, self.bead, self.settings.tension
         mobility = viscosity.mobility_of_gaps(grid, bead.radius, bead.gap, self.kinematic, dt)
         edges = None if tension is None else tension.pressure(grid, self.filled, self.liquid, bead.radius, bead.gap)
-        cells, before = (self.liquid, self.filled), (self.u.copy(), self.w.copy())
+        before = Faces(self.u.copy(), self.w.copy())
         arrived, moving = bead.velocity, self.grid_energy()
-        self.solved = pressure.solve(
-            grid, bead, (self.u, self.w), cells, mobility, self.density, dt, self.voids, edges=edges
-        )
+        self.solved = pressure.solve(grid, bead, self.flow, self.cells, mobility, dt, self.voids, edges=edges)
         if edges is not None:
             power = surface.work(*edges, self.liquid, self.u, self.w, grid.open_u, grid.open_w, grid.dx)
             self.losses.surface += float(power) * dt
@@ -188,9 +182,7 @@ class GridImpact:
         weight = self.density * self.gravity * float(self.volume.sum())
         self.impulses += dt * np.array([self.solved.force, self.solved.plate, -weight])
 
-    def count_pressure_losses(
-        self, mobility: np.ndarray, before: tuple[np.ndarray, np.ndarray], arrived: float, moving: float
-    ) -> None:
+    def count_pressure_losses(self, mobility: np.ndarray, before: Faces, arrived: float, moving: float) -> None:
         """Add what the pressure step took from liquid and bead to the losses.
 
         mobility  of the radial faces
@@ -198,11 +190,8 @@ class GridImpact:
         arrived   speed of the bead before it [m/s]
         moving    kinetic energy of the flow before it [J]
         """
-        grid, bead, losses = self.grid, self.bead, self.losses
-        cells = self.liquid, self.filled
-        impulsive, viscous = ledger.pressure_losses(
-            self.u, self.w, *before, mobility, *cells, grid.open_u, grid.open_w, grid.dx, self.density, grid.outer_open
-        )
+        bead, losses = self.bead, self.losses
+        impulsive, viscous = ledger.pressure_losses(self.flow, before, mobility, self.cells, self.grid.open)
         losses.viscous += viscous
         losses.impulsive += impulsive
         if np.isfinite(bead.mass):

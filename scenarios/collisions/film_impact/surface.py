@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cfddem.backend.compile import inline, serial
-from scenarios.collisions.film_impact.grid import Grid
+from scenarios.collisions.film_impact.grid import Faces, Grid
 from scenarios.collisions.film_impact.liquid import extend, sample
 
 PASSES = 6
@@ -50,9 +50,7 @@ class Tension:
         """Largest stable step, in which the shortest wave of the grid does not cross a cell [s]."""
         return math.sqrt(density * dx**3 / (4.0 * math.pi * self.sigma))
 
-    def pressure(
-        self, grid: Grid, filled: np.ndarray, liquid: np.ndarray, radius: float, gap: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def pressure(self, grid: Grid, filled: np.ndarray, liquid: np.ndarray, radius: float, gap: float) -> Faces:
         """Pressure of the surface where it crosses between the cells of radial and horizontal faces [Pa].
 
         filled  share of liquid
@@ -72,7 +70,7 @@ class Tension:
         curvature(continued, grid.open_u, grid.open_w, grid.open_cell, grid.dx, radius, cosines, kappa)
         edges = np.zeros_like(grid.open_u), np.zeros_like(grid.open_w)
         at_faces(kappa, share, liquid, grid.open_cell, *edges)
-        return self.sigma * edges[0], self.sigma * edges[1]
+        return Faces(self.sigma * edges[0], self.sigma * edges[1])
 
     def pull(self, contact: float, radius: float) -> float:
         r"""Vertical force on the bead along its contact line [N].

@@ -45,21 +45,27 @@ def heights(grid: Grid, radius: float, gap: float) -> np.ndarray:
 
 
 @serial
-def diffuse(u, w, wet_u, wet_w, open_u, open_w, rate, dx, radius, gap, velocity):
-    """Add the viscous stress of a step; `rate` is nu dt/dx^2."""
+def diffuse(flow, wet, opening, rate, bead):
+    """Add the viscous stress of a step; `rate` is nu dt/dx^2.
+
+    flow, wet, opening  velocity, whether it is beside liquid, and open fraction of faces, each `Faces`
+    bead                `Underside`
+    """
+    (u, w), (wet_u, wet_w), (open_u, open_w) = flow, wet, opening
     old_u, old_w = u.copy(), w.copy()
+    radius, gap, dx = bead.radius, bead.gap, bead.dx
     for i in range(1, u.shape[0] - 1):
         if surface_height(radius, gap, i * dx) < THIN * dx:
             continue
         for j in range(u.shape[1]):
             if wet_u[i, j] and open_u[i, j] > 0.0:
-                u[i, j] = radial_face(old_u, wet_u, open_u, i, j, rate, dx, radius, gap)
+                u[i, j] = radial_face(old_u, wet_u, open_u, i, j, rate, bead)
     for i in range(w.shape[0]):
         if surface_height(radius, gap, (i + 0.5) * dx) < THIN * dx:
             continue
         for j in range(1, w.shape[1] - 1):
             if wet_w[i, j] and open_w[i, j] > 0.0:
-                w[i, j] = horizontal_face(old_w, wet_w, open_w, i, j, rate, dx, radius, gap, velocity)
+                w[i, j] = horizontal_face(old_w, wet_w, open_w, i, j, rate, bead)
 
 
 @inline
@@ -73,7 +79,7 @@ def reach_above(wet, open_u, i, j):
 
 
 @inline
-def radial_face(u, wet, open_u, i, j, rate, dx, radius, gap):
+def radial_face(u, wet, open_u, i, j, rate, bead):
     """Radial velocity of a face after a step; second differences to the walls' true distance, exact for a parabola."""
     value, flux, wall = u[i, j], 0.0, 1.0 / (i * i)
     near = reach_above(wet, open_u, i, j)
@@ -90,18 +96,18 @@ def radial_face(u, wet, open_u, i, j, rate, dx, radius, gap):
         if k == 0 or (k < u.shape[0] and open_u[k, j] > 0.0 and wet[k, j]):
             flux += middle / i * (u[k, j] - value)
         elif k < i and open_u[k, j] == 0.0:
-            near = i - math.sqrt(surface_radius_squared(radius, gap, (j + 0.5) * dx)) / dx
+            near = i - math.sqrt(surface_radius_squared(bead.radius, bead.gap, (j + 0.5) * bead.dx)) / bead.dx
             wall += middle / (i * min(max(near, 0.5), 1.0))
     return past_walls(value, flux, wall, 0.0, rate)
 
 
 @inline
-def horizontal_face(w, wet, open_w, i, j, rate, dx, radius, gap, velocity):
+def horizontal_face(w, wet, open_w, i, j, rate, bead):
     """Vertical velocity of a face after a step; the bead moves with its velocity."""
     value, flux, wall = w[i, j], 0.0, 0.0
     flux += (w[i, j - 1] if j > 1 else 0.0) - value
     if open_w[i, j + 1] == 0.0:
-        near = surface_height(radius, gap, (i + 0.5) * dx) / dx - j
+        near = surface_height(bead.radius, bead.gap, (i + 0.5) * bead.dx) / bead.dx - j
         wall += 1.0 / min(max(near, 0.25), 1.0)
     elif wet[i, j + 1]:
         flux += w[i, j + 1] - value
@@ -109,9 +115,9 @@ def horizontal_face(w, wet, open_w, i, j, rate, dx, radius, gap, velocity):
         if 0 <= k < w.shape[0] and open_w[k, j] > 0.0 and wet[k, j]:
             flux += middle / (i + 0.5) * (w[k, j] - value)
         elif 0 <= k < i and open_w[k, j] == 0.0:
-            near = i + 0.5 - math.sqrt(surface_radius_squared(radius, gap, j * dx)) / dx
+            near = i + 0.5 - math.sqrt(surface_radius_squared(bead.radius, bead.gap, j * bead.dx)) / bead.dx
             wall += middle / ((i + 0.5) * min(max(near, 0.5), 1.0))
-    return past_walls(value, flux, wall, velocity, rate)
+    return past_walls(value, flux, wall, bead.velocity, rate)
 
 
 @inline
