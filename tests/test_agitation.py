@@ -11,8 +11,7 @@ import closures
 from cfddem.backend.compile import serial, use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.coupling.forces.agitation import _advanced, _transition
-from cfddem.coupling.forces.agitation_terms import AgitationTerms
+from cfddem.coupling.forces.agitation import AgitationTerms, _advanced, _transition
 from cfddem.features.energy import EnergyLedger
 from cfddem.fluid import budgets
 from cfddem.preflight.bed_waves import uniform_bed, with_agitation

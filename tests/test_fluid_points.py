@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.coupling.velocity_gradient import velocity_gradient
+from cfddem.coupling.sampled_flow import velocity_gradient
 from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid, outside_cone, outside_cylinder
 from cfddem.fluid.solver import FluidSolver

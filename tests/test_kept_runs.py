@@ -9,7 +9,7 @@ import pytest
 from disturbed_runs import TINY
 
 from cfddem.case.schema import Case
-from cfddem.io.kept_files import holds_surfaces_of, keep_files
+from cfddem.io.folder import holds_surfaces_of, keep_files
 from cfddem.run import runner
 from cfddem.run.runner import Run
 from scenarios.beds.wet_bed.validation import reached

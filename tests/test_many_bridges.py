@@ -9,7 +9,7 @@ from wet_spheres import RADIUS, SYRUP, TENSION, THIN, bridged, swarm
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
-from cfddem.features.drops import Spray, box
+from cfddem.features.spray import Spray, box
 from cfddem.particles import listing
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges

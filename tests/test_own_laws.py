@@ -28,7 +28,7 @@ from cfddem.plotting.report_page import page
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.law_ranges import effect_of_drag
 from cfddem.preflight.summary import preflight
-from cfddem.run.own_laws import record_of, warn_of_changes
+from cfddem.run.resuming import record_of, warn_of_changes
 from cfddem.run.runner import Run
 from closures import check, registry
 from closures.check import first_cause

@@ -20,8 +20,7 @@ import numpy as np
 
 from cfddem.coupling.force_list import ForceList
 from cfddem.coupling.kernel import FilterKernel, ParticleCellMap
-from cfddem.coupling.sampled_flow import FlowSampler
-from cfddem.coupling.sharp_flow import SharpFlowSampler
+from cfddem.coupling.sampled_flow import FlowSampler, SharpFlowSampler
 from cfddem.coupling.terms import CouplingTerms, ForceTerms, inertia, total
 from cfddem.coupling.transfer import Transfer
 from cfddem.data.fields import Field

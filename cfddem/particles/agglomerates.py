@@ -44,7 +44,7 @@ def sizes(belongs: Numbers) -> Numbers:
 
     belongs  of :func:`~cfddem.particles.agglomerates.agglomerates`
     """
-    return np.bincount(belongs)
+    return np.bincount(belongs)  # local: numbers of all ranks
 
 
 def size_distribution(belongs: Numbers) -> tuple[Numbers, Numbers]:
@@ -69,10 +69,10 @@ def summary(first: Numbers, second: Numbers, count: int) -> AgglomerateSizes:
     if count == 0:
         return AgglomerateSizes(float("nan"), 0, float("nan"))
     found = sizes(agglomerates(first, second, count)).astype(float)
-    alone = float(np.count_nonzero(found == 1.0))
+    alone = float(np.count_nonzero(found == 1.0))  # local: likewise
     return AgglomerateSizes(
-        mean_by_particle=float((found * found).sum()) / count,
-        largest=int(found.max()),
+        mean_by_particle=float((found * found).sum()) / count,  # local: likewise
+        largest=int(found.max()),  # local: likewise
         joined=1.0 - alone / count,
     )
 

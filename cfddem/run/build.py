@@ -20,16 +20,15 @@ from cfddem.case.schema import Case
 from cfddem.case.tables import Column
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.forces.added_mass import AddedMass
-from cfddem.coupling.forces.agitation import FluctuatingForce, PseudoTurbulence
-from cfddem.coupling.forces.agitation_terms import Agitation
+from cfddem.coupling.forces.agitation import Agitation, FluctuatingForce, PseudoTurbulence
 from cfddem.coupling.forces.drag import Drag
 from cfddem.coupling.forces.history import History
 from cfddem.coupling.forces.lift import Lift, Torque
 from cfddem.coupling.forces.pressure import PressureForce, ViscousStress, Weight
 from cfddem.coupling.forces.wall_drag import WallDrag
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.sampled_flow import change_along
 from cfddem.coupling.self_disturbance import SelfDisturbance
-from cfddem.coupling.velocity_gradient import change_along
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.moving_walls import case_walls
 from cfddem.fluid.block import Block, Division, divide

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ import numpy as np
 from cfddem.analysis.comparison import changed
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
+from cfddem.backend.law_set import check_compiles, fingerprint
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.case.toml_text import parse, read_text
@@ -20,7 +23,7 @@ from cfddem.io import checkpoint
 from cfddem.io.writer import RunFolder
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
-from closures.registry import REGISTRY, load_package_laws
+from closures.registry import GROUP, REGISTRY, load_package_laws
 
 
 def require_forward(until: float | None, state: Mapping[str, Any] | None) -> None:
@@ -156,3 +159,70 @@ def _adapt(parts: dict[str, Any], case: Case, before: Case) -> None:
         fluid = case.required_fluid
         cells[:] = np.broadcast_to(fluid.viscosity_at(grid_of(case).centres()[2]), cells.shape)
         particles["viscosity"][:] = fluid.viscosity_at(particles["position"][:, 2])
+
+
+# ---------------------------------------------------------------- laws of a user
+
+
+RECORD = "laws"
+"""Entry of the provenance in `run.json` with the laws of a run that are not built in."""
+
+THEN = ", then "
+"""Between the fingerprints of a law that was changed during the run."""
+
+
+def require_compiled(case: Case) -> None:
+    """Refuse a user's law that cannot be compiled, by its key.
+
+    errors  InputError
+    """
+    for kind, law in case.laws.own_laws.items():
+        check_compiles(f"laws.{kind}", law.function)
+
+
+def record_of(case: Case) -> dict[str, Any]:
+    """Entry of the provenance: name, module, package, version and fingerprint of every law that is not built in.
+
+    returns  empty if all laws are built in
+    """
+    found = {kind: _described(law.name, law.function) for kind, law in case.laws.own_laws.items()}
+    contact = case.laws.contact_law
+    if not contact.force.__module__.startswith(("cfddem.", "closures.")):
+        functions = tuple(each for each in vars(contact).values() if callable(each))
+        found["contact"] = {**_described(contact.name, contact.force), "fingerprint": fingerprint(functions)}
+    return {RECORD: found} if found else {}
+
+
+def warn_of_changes(folder: RunFolder, case: Case) -> None:
+    """Warn, in one line for each, of laws whose source has changed since the run was written; record the new ones."""
+    about = folder.about["provenance"]
+    before, now = about.get(RECORD, {}), record_of(case).get(RECORD, {})
+    for kind in before.keys() & now.keys():
+        old = str(before[kind]["fingerprint"])
+        if old.rpartition(THEN)[2] == now[kind]["fingerprint"]:
+            now[kind] = before[kind]
+            continue
+        warnings.warn(
+            f"laws.{kind} = {now[kind]['name']!r}: its source has changed since the run began; the result is not that "
+            "of an uninterrupted run. For that, restore the source and resume a copy of the folder made before",
+            stacklevel=2,
+        )
+        now[kind]["fingerprint"] = f"{old}{THEN}{now[kind]['fingerprint']}"
+    if now != before:
+        folder.note("provenance", {**about, RECORD: now})
+
+
+def _described(name: str, function: Callable[..., float]) -> Mapping[str, str]:
+    """A law as plain values; package and version are empty for a function of a script."""
+    module = function.__module__
+    package = version = ""
+    for point in entry_points(group=GROUP):
+        if point.dist is not None and point.module.partition(".")[0] == module.partition(".")[0]:
+            package, version = point.dist.name, point.dist.version
+    return {
+        "name": name,
+        "module": module,
+        "package": package,
+        "version": version,
+        "fingerprint": fingerprint(function),
+    }

@@ -22,22 +22,30 @@ from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
-from cfddem.io.folder import AVERAGES_FROM, provenance, read_about
-from cfddem.io.kept_files import prepare_folder, text_with_kept_files, with_kept_files
+from cfddem.io.folder import (
+    AVERAGES_FROM,
+    prepare_folder,
+    provenance,
+    read_about,
+    text_with_kept_files,
+    with_kept_files,
+)
 from cfddem.io.quantities import Quantities, Quantity, of_fields
 from cfddem.io.writer import RunFolder, folder_of_ranks
 from cfddem.model.feature import Feature, Function
 from cfddem.particles.guard import guard
 from cfddem.run import history
-from cfddem.run.own_laws import record_of, require_compiled, warn_of_changes
 from cfddem.run.progress import Status
 from cfddem.run.resuming import (
     branch_state,
     case_to_continue,
+    record_of,
+    require_compiled,
     require_forward,
     require_measures,
     restored,
     status_restored_on_refusal,
+    warn_of_changes,
 )
 from cfddem.run.simulation import Callback, Simulation
 from cfddem.run.stopping import StopRequest, averages_from, require_measures_of

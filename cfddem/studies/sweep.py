@@ -27,7 +27,7 @@ from cfddem.case.gallery import full_key, read_value
 from cfddem.case.input_errors import field_of
 from cfddem.case.schema import Case
 from cfddem.io.files import require_no_links
-from cfddem.io.kept_files import holds_surfaces_of, text_with_kept_files
+from cfddem.io.folder import holds_surfaces_of, text_with_kept_files
 from cfddem.io.quantities import shown_unit
 from cfddem.preflight.summary import preflight
 

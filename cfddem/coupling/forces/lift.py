@@ -17,8 +17,8 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import prange, threaded
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.sampled_flow import vorticity_at
 from cfddem.coupling.terms import CouplingTerms
-from cfddem.coupling.velocity_gradient import vorticity_at
 from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
