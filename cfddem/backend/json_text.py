@@ -18,17 +18,21 @@ def as_json(value: Any, indent: int | None = None) -> str:
     >>> as_json({"height": 0.04, "error": math.nan, "window": (0.0, math.inf)})
     '{"height": 0.04, "error": null, "window": [0.0, null]}'
     """
-    return json.dumps(_plain(value), allow_nan=False, indent=indent)
+    return json.dumps(plain(value), allow_nan=False, indent=indent)
 
 
-def _plain(value: Any) -> Any:
-    """The value in the types of JSON."""
+def plain(value: Any) -> Any:
+    """The value in the types of JSON, with None for NaN and infinity.
+
+    >>> plain({"spin": (1.0, math.nan), "outcome": "stick"})
+    {'spin': [1.0, None], 'outcome': 'stick'}
+    """
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, Mapping):
-        return {str(name): _plain(each) for name, each in value.items()}
+        return {str(name): plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(each) for each in value]
+        return [plain(each) for each in value]
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):

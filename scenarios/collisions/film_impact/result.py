@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cfddem.backend.json_text import plain
 from closures.restitution import singh_crossover
 from scenarios.collisions.film_impact.solver import GridImpact
-from scenarios.collisions.results import plain
 from scenarios.references.isph.impact import SmoothedImpact
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, UnstableStep, nearest
 from cfddem.backend.html import table
+from cfddem.backend.json_text import plain
 from cfddem.backend.law_choice import called_by_name, chosen
 from cfddem.case.materials import Material
 from cfddem.particles.collision_record import CollisionRecord
@@ -31,7 +32,6 @@ from closures.friction import dry_or_lubricated
 from closures.kinds import GAP_ARGUMENTS
 from closures.minimum_gap import elastohydrodynamic
 from scenarios.collisions.immersed_pair.motion import Setting, chosen_forces, fluid_around, integrate, stage
-from scenarios.collisions.results import plain
 
 SLOWEST, FASTEST = 1e-12, 1e3
 """Speeds of approach that are computed [m/s]."""

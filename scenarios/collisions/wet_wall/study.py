@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.json_text import plain
 from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
 from closures import capillary, contact, timescales
-from scenarios.collisions.results import plain
 from scenarios.collisions.wet_wall.engine import integrate as integrate_in_engine
 from scenarios.collisions.wet_wall.materials import BALLS, GLASS, LIQUIDS, Ball, Liquid, half_filling, sliding_friction
 from scenarios.references.wet_wall import motion
