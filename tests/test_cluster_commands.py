@@ -17,7 +17,7 @@ from cluster import HERE, environment, needs_mpi
 from command_line import cfddem
 
 from cfddem.backend.launch import launch_command
-from cfddem.cli.doctor import _processes
+from cfddem.cli.information import _processes
 from cfddem.io import checkpoint
 from cfddem.io.reading import open_run
 

@@ -98,7 +98,7 @@ def test_the_doctor_lists_versions_and_machine(tmp_path: Path, monkeypatch: pyte
 
 
 def test_the_test_run_of_the_doctor_balances() -> None:
-    from cfddem.cli.doctor import _test_run
+    from cfddem.cli.information import _test_run
 
     answer = _test_run()
     assert answer.ok, answer.text

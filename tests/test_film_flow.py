@@ -12,9 +12,9 @@ from scipy.special import j0, jn_zeros
 
 from scenarios.collisions.film_impact import liquid, pressure, viscosity
 from scenarios.collisions.film_impact.grid import Cells, Faces, Grid, Underside
+from scenarios.collisions.film_impact.liquid import overfilled
 from scenarios.collisions.film_impact.pressure import Bead, Solved
 from scenarios.collisions.film_impact.solver import GridImpact, Settings
-from scenarios.collisions.film_impact.volume import overfilled
 
 FLAT = 1e25
 """Radius of a bead that is flat [m]."""

@@ -17,7 +17,7 @@ from made_up_run import made_up
 from wheel import wheel_environment
 
 from cfddem.backend.launch import python_command, safe_workers
-from cfddem.cli.doctor import TEST_CASE
+from cfddem.cli.information import TEST_CASE
 from closures.compiled import cache_folder
 
 OPTIONAL = (

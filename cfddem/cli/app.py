@@ -15,7 +15,7 @@ from cfddem import __version__
 from cfddem.backend.errors import CfddemError
 from cfddem.backend.launch import several_ranks
 from cfddem.backend.working_folder import ignore_settings_files
-from cfddem.cli import calibration, cases, information, results, sweeps, validation
+from cfddem.cli import cases, information, results, sweeps, validation
 from cfddem.cli.json_output import asked_for_json, begin, print_failure
 from cfddem.cli.ranks import end_together
 
@@ -38,7 +38,7 @@ Exit codes: 0 success. 1 a limit is exceeded (validate), warnings with --strict 
 )
 
 COMMANDS = {
-    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, sweeps.sweep, calibration.calibrate),
+    "Cases": (cases.new, cases.check, cases.stability, cases.run, cases.resume, sweeps.sweep, sweeps.calibrate),
     "Results": (results.report, results.compare, results.view, results.export),
     "Collisions of a few spheres": ("collide", "wet-wall", "film-impact", "three-spheres", "wet-pair"),
     "Validation": (validation.validate, validation.bench),

@@ -1,16 +1,25 @@
-"""The command `sweep`."""
+"""The commands `sweep` and `calibrate`."""
 
 from __future__ import annotations
 
 import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cfddem.cli.cases import CASE, JSON, SET
+from cfddem.backend.errors import InputError
+from cfddem.cli.cases import CASE, JSON, SET, print_warnings
 from cfddem.cli.json_output import print_json
 from cfddem.cli.printing import announce_compilation
+from cfddem.preflight.issue import WIDTH
+
+if TYPE_CHECKING:
+    from cfddem.studies.calibration import Calibration, Trial
+
 
 SENSITIVITY = "how much each key matters: sobol (shares of variance) or morris (effects over the ranges; fewer runs)"
 
@@ -91,3 +100,119 @@ def sweep(
         print("\n".join([*(found.lines() if found else ()), f"table and figure written to {folder}"]))
     if failed:
         sys.exit(3)
+
+
+# ---------------------------------------------------------------- calibration
+
+
+COLLIDE = "material of measured collisions, instead of a case: delrin, glass, steel_smooth or steel_rough"
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Effort:
+    """How many runs a search makes; its fields are options."""
+
+    trials: Annotated[int, Parameter(help="number of runs, with those of earlier calls")] = 30
+    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1
+
+
+USUAL = Effort()
+
+
+def calibrate(
+    case: Annotated[Path | None, Parameter(help=CASE)] = None,
+    *,
+    vary: Annotated[list[str], Parameter(help="KEY=LOW..HIGH; may be repeated; 'KEY=LOW..HIGH log'", negative="")],
+    match: Annotated[
+        list[Path] | None,
+        Parameter(help="CSV file of measured points with errors, beside those of the case", negative=""),
+    ] = None,
+    collide: Annotated[str | None, Parameter(help=COLLIDE)] = None,
+    effort: Effort = USUAL,
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-calibration")] = None,
+    json: Annotated[bool, Parameter(help="print the result as JSON", negative="")] = False,
+) -> None:
+    """Find values of a case for which it agrees with measured data, with errors; say which the data do not identify.
+
+    After a stop, the same command continues. Trials that fail are recorded, and the search goes on.
+    Exit code: 3 if every trial fails.
+
+    With --collide the data are collisions of two spheres or a sphere and a wall; keys are values of the material and
+    options of the command collide. The data need a column of errors. See the page "Calibration".
+
+    Example: cfddem calibrate box.toml --match measured.csv --vary material.glass.restitution=0.6..1
+    """
+    from cfddem.case.gallery import find_case, overrides
+    from cfddem.case.schema import Case
+    from cfddem.preflight.summary import preflight
+    from cfddem.studies.calibration import calibrate as search
+    from cfddem.studies.calibration import write_results
+    from cfddem.studies.samples import variables
+    from cfddem.studies.sweep import make_output
+
+    def progress(trial: Trial) -> None:
+        values = ", ".join(f"{key.split('.')[-1]} {value:.4g}" for key, value in trial.values.items())
+        result = f"mean square difference {trial.chi2:.4g}" if trial.computed else trial.status[:60]
+        print(f"{trial.number:>4}  {values:<40}  {result}", file=sys.stderr if json else sys.stdout, flush=True)
+
+    if effort.jobs == 1 and not json:
+        announce_compilation()
+    if collide is not None:
+        if case is not None or effort.jobs != 1:
+            raise InputError("--collide", collide, "used without a case and without --jobs")
+        folder = output or Path("collide-calibration")
+        made = _of_collisions(collide, match or (), vary, set or (), effort.trials, progress)
+        make_output(folder)
+        write_results(made, folder)
+        _print(made, folder, json)
+        return
+    path = find_case(case)
+    print_warnings(preflight(Case.from_toml(path, overrides(set or []))))
+    folder = output or Path(f"{path.stem}-calibration")
+
+    found = search(
+        path, match or (), variables(vary), folder, trials=effort.trials, jobs=effort.jobs,
+        overrides=overrides(set or []),
+        progress=progress,
+    )  # fmt: skip
+    _print(found, folder, json)
+
+
+def _of_collisions(
+    material: str, match: Sequence[Path], vary: Sequence[str], given: Sequence[str], trials: int,
+    progress: Callable[[Trial], None],
+) -> Calibration:  # fmt: skip
+    """The calibration of collisions."""
+    from cfddem.studies.samples import variables
+    from scenarios.collisions.immersed_pair.calibration import fit, key_of, settings
+
+    varied = variables(vary, key_of)
+    return fit(material, match, varied, settings(given), trials=trials, progress=progress)
+
+
+def _print(found: Calibration, folder: Path, json: bool) -> None:
+    """Print a result; ends with code 3 where every trial has failed."""
+    if json:
+        print_json("calibrate", {"folder": folder, **found.summary()})
+    else:
+        print("\n".join(lines(found.summary(), folder)))
+    if not found.finished:
+        sys.exit(3)
+
+
+def lines(result: dict, folder: Path) -> list[str]:  # type: ignore[type-arg]
+    """The result of a calibration as text."""
+    out = [""]
+    for each in result["estimates"]:
+        value = f"{each['value']:.4g} +- {each['error']:.2g}"
+        out += [f"{each['key']:<34} {value:<22} of {each['low']:g} to {each['high']:g}", f"  {each['verdict']}"]
+    if not result["estimates"]:
+        out.append("too few finished trials for an estimate; repeat the command with more --trials")
+    if result["best"] is not None:
+        chi2 = "" if result["chi2"] is None else f"; {result['chi2']:.2g} with the scatter of the runs"
+        out += ["", *textwrap.wrap(result["verdict"], WIDTH)]
+        out += [f"reduced chi-squared of the best trial: {result['best']['chi2']:.3g}{chi2}"]
+    out += [f"{result['trials']} trials, {result['failed']} failed; table and figure in {folder}"]
+    return out

@@ -21,8 +21,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.case.schema import Case
-from cfddem.coupling.exchange import ExchangeLaw
-from cfddem.coupling.transfer import Transfer, memory_of
+from cfddem.coupling.transfer import ExchangeLaw, Transfer, memory_of
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.case.schema import Case
-from cfddem.coupling.exchange import ExchangeLaw
+from cfddem.coupling.transfer import ExchangeLaw
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.vapour_keys import VapourTable
 from cfddem.fluid.fields import CellField

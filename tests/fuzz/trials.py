@@ -290,7 +290,7 @@ def called(words: list[str]) -> tuple[int, str, str]:
         "cfddem.cli.validation.measure": stop,
         "cfddem.plotting.scene.window": stop, "scenarios.benchmarks.fluid_box.bench": stop,
         "scenarios.beds.wet_bed.study.bench": stop, "scenarios.benchmarks.scaling.bench": stop,
-        "scenarios.benchmarks.table.bench": stop, "cfddem.cli.doctor.subprocess.run": stop,
+        "scenarios.benchmarks.table.bench": stop, "cfddem.cli.information.subprocess.run": stop,
         "scenarios.benchmarks.dense_bed.bench": stop, "scenarios.beds.gas_bed.study.bench": stop,
         "sys.argv": ["cfddem", *words],
     }  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scenarios.collisions.film_impact import ledger, liquid, pressure, surface, viscosity, volume
+from scenarios.collisions.film_impact import ledger, liquid, pressure, surface, viscosity
 from scenarios.collisions.film_impact.grid import Cells, Faces, Grid, Underside
 from scenarios.collisions.film_impact.pressure import Bead
 
@@ -224,7 +224,7 @@ class GridImpact:
             bead.velocity *= -self.restitution
             self.contacts += 1
         thin = viscosity.heights(self.grid, bead.radius, bead.gap) < viscosity.THIN * self.grid.dx
-        volume.spread_out(self.particles, self.grid.dx, self.filled, self.grid.open_cell, int(thin.sum()))
+        liquid.spread_out(self.particles, self.grid.dx, self.filled, self.grid.open_cell, int(thin.sum()))
         liquid.move(self.particles, self.grid.dx, dt, self.u, self.w, bead.radius, bead.gap)
 
 

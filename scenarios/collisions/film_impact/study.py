@@ -22,12 +22,12 @@ from cfddem.backend.errors import InputError, RunFailed, nearest
 from cfddem.case.materials import Material
 from closures.film_impact import film_added_mass
 from scenarios.collisions.film_impact.grid import Grid
+from scenarios.collisions.film_impact.liquid import overfilled
 from scenarios.collisions.film_impact.materials import GLASS, Liquid, liquid_named, touching_gap
 from scenarios.collisions.film_impact.pressure import EXCHANGES, Bead
 from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact, Record
 from scenarios.collisions.film_impact.solver import GridImpact, Settings
 from scenarios.collisions.film_impact.surface import Tension
-from scenarios.collisions.film_impact.volume import overfilled
 from scenarios.references.isph.impact import SmoothedImpact
 
 METHODS = {"grid": 20, "isph": 5}

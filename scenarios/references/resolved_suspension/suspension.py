@@ -20,9 +20,8 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from closures.drag_resolved import tenneti
-from scenarios.references.resolved_suspension.film import GRID_GAP, unresolved_film
+from scenarios.references.resolved_suspension.film import GRID_GAP, new_impacts, unresolved_film
 from scenarios.references.resolved_suspension.flow import Flow, sphere_volume
-from scenarios.references.resolved_suspension.impacts import new_impacts
 from scenarios.references.resolved_suspension.spheres import exchange
 
 OVERLAP = 0.005

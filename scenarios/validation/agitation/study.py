@@ -33,8 +33,8 @@ from closures.agitation import SHARES, TIMES, free_spheres
 from closures.drag_resolved import tenneti
 from scenarios.beds.liquid_bed.study import STUDIES, FluidisedBed, Study, coarse_glass, fluidise
 from scenarios.references.resolved_suspension import matrix
+from scenarios.references.resolved_suspension.film import new_impacts
 from scenarios.references.resolved_suspension.fitting import fit_levels, fit_shares
-from scenarios.references.resolved_suspension.impacts import new_impacts
 from scenarios.references.resolved_suspension.measures import Series, measure
 from scenarios.references.resolved_suspension.study import stored
 from scenarios.references.resolved_suspension.suspension import OVERLAP, Point, random_arrangement
