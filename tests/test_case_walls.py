@@ -15,8 +15,8 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.case.wall_geometry import distance, extent, inside_surface
 from cfddem.case.walls import CaseWall
-from cfddem.features.moving_walls import Motion
 from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.walls.motion import Motion
 from cfddem.particles.walls.stl import read_stl
 from cfddem.preflight.summary import Preflight, preflight
 from cfddem.run.initial_particles import particles_of

@@ -1,17 +1,8 @@
-r"""The walls of a case beside those of its column, and their motion.
-
-Walls move at a constant velocity over each call. That is chosen so that a wall ends each call exactly at
-
-.. math:: x(t) = v\,\tau + a \sin(2\pi f \tau), \qquad \tau = \min(\max(t, t_0), t_1) - t_0
-
-and has turned by its spin times :math:`\tau`, however long the steps are.
-"""
+"""The walls of a case beside those of its column, and their motion."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +11,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.case.walls import CaseWall
 from cfddem.features.case_feature import CaseFeature
-from cfddem.particles.solver import ParticleSolver
+from cfddem.particles.walls.motion import Motion, WallMotions
 from cfddem.particles.walls.shapes import Cone, Cylinder, Mesh, Plane, Wall
 
 
@@ -88,71 +79,3 @@ def wall_of(given: CaseWall, material: int, key: str) -> Wall:
         return Mesh.from_stl(given.file or "", scale=given.scale, place=given.point, **common)
     except InputError as failure:
         raise InputError(f"{key}.{failure.field}", failure.value, failure.limit, failure.remedy) from None
-
-
-# ---------------------------------------------------------------- velocities that change
-
-
-STEPS_PER_PERIOD = 50
-"""Fewest intervals of constant velocity in a period of an oscillation."""
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Motion of one wall. The wall must have been made with a velocity at least as high, which bounds its way.
-
-    wall        its number
-    velocity    v [m/s]
-    spin        [rad/s]
-    amplitude   a [m]
-    frequency   f [Hz]
-    begin, end  t_0, t_1 [s]
-    """
-
-    wall: int
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    spin: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    amplitude: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    frequency: float = 0.0
-    begin: float = 0.0
-    end: float = math.inf
-
-    def active(self, time: float) -> float:
-        """Time for which the wall has moved [s]."""
-        return min(max(time, self.begin), self.end) - self.begin
-
-    def displacement(self, time: float) -> np.ndarray:
-        """Displacement since the start (3,) [m].
-
-        >>> Motion(0, amplitude=(0.0, 0.0, 1e-3), frequency=10.0, begin=1.0).displacement(1.025)
-        array([0.   , 0.   , 0.001])
-        """
-        active = self.active(time)
-        return np.array(self.velocity) * active + np.array(self.amplitude) * math.sin(
-            2.0 * math.pi * self.frequency * active
-        )
-
-
-class WallMotions:
-    """Sets the velocities of walls before every call of `ParticleSolver.advance`.
-
-    motions  of the walls that begin, end or oscillate
-    """
-
-    def __init__(self, motions: Sequence[Motion]) -> None:
-        self.motions = tuple(motions)
-
-    @property
-    def largest_step(self) -> float:
-        """Longest time over which velocities may be constant [s]."""
-        fastest = max((each.frequency for each in self.motions), default=0.0)
-        return 1.0 / (STEPS_PER_PERIOD * fastest) if fastest > 0.0 else math.inf
-
-    def __call__(self, run: ParticleSolver, step: float) -> None:
-        """Set the velocities for the coming step [s]."""
-        if not step > 0.0:
-            raise InputError("step", step, "above 0")
-        for each in self.motions:
-            begin, end = run.time, run.time + step
-            run.walls.velocity[each.wall] = (each.displacement(end) - each.displacement(begin)) / step
-            run.walls.spin[each.wall] = np.array(each.spin) * ((each.active(end) - each.active(begin)) / step)

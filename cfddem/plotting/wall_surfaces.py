@@ -12,8 +12,8 @@ from cfddem.analysis.report import case_of
 from cfddem.backend.errors import CfddemError
 from cfddem.case.wall_geometry import extent, triangles
 from cfddem.case.walls import CaseWall
-from cfddem.features.moving_walls import Motion
 from cfddem.io.reading import RunData
+from cfddem.particles.walls.motion import Motion
 
 COLOUR, OPACITY, EDGE = "#6b6b6b", 0.18, "#3c3c3c"
 """Colour of a wall, its opacity, and the colour of its edges."""
