@@ -33,6 +33,7 @@ from cfddem.fluid.conditions import Condition
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, on_faces, sample
 from cfddem.fluid.momentum import drag_seen, in_cells, predict, transport
+from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
 from cfddem.fluid.stability import FlowRates
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
@@ -121,6 +122,7 @@ class FluidSolver:
         self._every_face = np.ones_like(self.faces.solved)
         self._effective = EffectiveViscosity(grid, sides.halo, self.density, float(smagorinsky))
         self._projection = Projection(sides, self.fields, communicator)
+        self.walls = near_walls(sides, self.fields, self.faces.solved)
         self._rates = FlowRates(sides, self.density, communicator)
         self.set_viscosity(viscosity)
         self.set_voidage(voidage)
@@ -218,6 +220,7 @@ class FluidSolver:
             velocity, voidage, fields.effective_viscosity, self.faces.buried, density, self.inverse_spacing, central,
             fields.flux, fields.expansion, force,
         )  # fmt: skip
+        self.walls.replace(velocity, fields.effective_viscosity, density, central, force)
 
     def _project(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
         """Correct a velocity and the pressure so that continuity holds; returns the iterations it took."""
@@ -233,6 +236,7 @@ class FluidSolver:
             self.boundaries.driving, self.faces.solved, self.density, step, self.inverse_spacing, self.model_b,
             new, fields.mobility,
         )  # fmt: skip
+        self.walls.hold(fields, self.density, self.model_b, step, new)
         self.boundaries.set_faces(new)
 
     def _flux_scale(self, step: float) -> float:

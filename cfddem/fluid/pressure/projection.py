@@ -53,8 +53,9 @@ class Projection:
             self.grid, self.boundaries, self.fields, self._equation, self._missing,
         )  # fmt: skip
         ax, ay, az, anchor = equation.coefficients
+        cut = boundaries.cut
         assemble(
-            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, fresh, boundaries.halo.ends,
+            cut.open_part(velocity), cut.open_part(fields.mobility), voidage, cut.held(fields.new_voidage_rate), self._open, fresh, boundaries.halo.ends,
             self._areas, self._inverse, ax, ay, az, anchor, missing,
         )  # fmt: skip
         if fresh:
