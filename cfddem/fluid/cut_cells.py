@@ -46,6 +46,7 @@ class Section(NamedTuple):
     share: Array  # of the rectangle that is open [-]
     distance: Array  # mean over the open part, from the wall [m]
     square: Array  # mean of the square of the distance [m2]
+    sliding: Array  # mean velocity of the nearest wall along the normal of the rectangle [m/s]
 
 
 def within(grid: Grid, surface: Surface) -> Grid:
@@ -117,15 +118,15 @@ def section(surface: Surface, points: Sequence[Array], axis: int, spacing: Seque
     spacing  hx, hy, hz [m]
     """
     centre = surface.distance(*points)
-    share, mean, square = (centre > 0.0).astype(float), centre.copy(), centre**2
+    whole = (centre > 0.0).astype(float), centre.copy(), centre**2, np.array(surface.velocity(*points)[axis])
     near = np.flatnonzero(np.abs(centre) < REACH * float(np.linalg.norm(spacing)))
     flat = [np.ravel(each) for each in points]
     for begin in range(0, near.size, AT_ONCE):
         here = near[begin : begin + AT_ONCE]
         cut = _cut(surface, [each[here] for each in flat], axis, spacing)
-        for whole, of_these in zip((share, mean, square), cut):
-            whole.ravel()[here] = of_these
-    return Section(share, mean, square)
+        for values, of_these in zip(whole, cut):
+            values.ravel()[here] = of_these
+    return Section(*whole)
 
 
 def _cut(surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence[float]) -> Section:
@@ -135,29 +136,38 @@ def _cut(surface: Surface, points: Sequence[Array], axis: int, spacing: Sequence
     at: list[Array] = [each[:, None, None] for each in points]
     at[first] = at[first] + spacing[first] * lattice[:, None]
     at[second] = at[second] + spacing[second] * lattice
-    d = np.broadcast_to(surface.distance(*np.broadcast_arrays(*at)), (points[0].size, PARTS + 1, PARTS + 1))
-    a, b, c, e = d[:, :-1, :-1], d[:, 1:, :-1], d[:, :-1, 1:], d[:, 1:, 1:]
+    shape = (points[0].size, PARTS + 1, PARTS + 1)
+    at = list(np.broadcast_arrays(*at))
+    fields = np.stack([np.broadcast_to(each, shape) for each in (surface.distance(*at), surface.velocity(*at)[axis])])
+    a, b, c, e = fields[..., :-1, :-1], fields[..., 1:, :-1], fields[..., :-1, 1:], fields[..., 1:, 1:]
     halves = [_triangle(a, b, e), _triangle(a, c, e)]
-    share, mean, square = (0.5 * (p + q).mean(axis=(1, 2)) for p, q in zip(*halves))
+    share, mean, square, sliding = (0.5 * (p + q).mean(axis=(1, 2)) for p, q in zip(*halves))
     some = np.maximum(share, 1e-300)
     share = np.where(share > 1.0 - 1e-12, 1.0, np.where(share < SMALLEST_APERTURE, 0.0, share))
-    return Section(share, mean / some, square / some)
+    return Section(share, mean / some, square / some, sliding / some)
 
 
-def _triangle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array]:
-    """Share of triangles in which a linear function of these corners is positive, its integral and that of its square
-    over this part; areas are 1."""
-    low, middle, high = np.sort(np.stack([a, b, c]), axis=0)
-    mean = (low + middle + high) / 3.0
+def _triangle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array, Array]:
+    """Part of triangles where a linear function is positive: its share, and the integrals over it of the function, of
+    its square and of another linear function. Corners are (2, ...), with both functions; areas are 1."""
+    corners = np.stack([a, b, c])
+    order = np.argsort(corners[:, 0], axis=0)
+    (low, other_low), (middle, other_middle), (high, other_high) = np.take_along_axis(corners, order[:, None], axis=0)
+    mean, other = (low + middle + high) / 3.0, (other_low + other_middle + other_high) / 3.0
     square = (low * low + middle * middle + high * high + low * middle + low * high + middle * high) / 6.0
     with np.errstate(all="ignore"):
-        tip = high * high / ((high - middle) * (high - low))
-        missing = low * low / ((middle - low) * (high - low))
+        to_low, to_middle = high / (high - low), high / (high - middle)
+        tip = to_low * to_middle
+        other_tip = other_high + (to_low * (other_low - other_high) + to_middle * (other_middle - other_high)) / 3.0
+        to_high, to_middle = low / (low - high), low / (low - middle)
+        missing = to_high * to_middle
+        other_missing = other_low + (to_high * (other_high - other_low) + to_middle * (other_middle - other_low)) / 3.0
     kinds = [low > 0.0, middle > 0.0, high > 0.0]
     return (
         np.select(kinds, [np.ones_like(mean), 1.0 - missing, tip], 0.0),
         np.select(kinds, [mean, mean - missing * low / 3.0, tip * high / 3.0], 0.0),
         np.select(kinds, [square, square - missing * low * low / 6.0, tip * high * high / 6.0], 0.0),
+        np.select(kinds, [other, other - missing * other_missing, tip * other_tip], 0.0),
     )
 
 
@@ -191,6 +201,7 @@ class WholeCells:
 
     volume: Array | float = 1.0
     aperture: Array | float = 1.0
+    beyond: Array | float = 0.0
 
     def close(self, solved: Array, blocked: NDArray[np.bool_]) -> None:
         """Mark the faces that walls close, as of :class:`cfddem.fluid.boundaries.Faces`."""
@@ -217,7 +228,9 @@ class CutCells(WholeCells):
     distance  (3, ...) mean distance from the wall over the open part of a face, 0 on closed faces [m]
     shift     (3, ...) that distance less the one of the centre of the face [m]
     depth     (3, ...) mean square of the distance over its mean [m]
-    sliding   (3, ...) velocity of the nearest wall, the component normal to the face [m/s]
+    sliding   (3, ...) mean velocity of the nearest wall over the open part, the component normal to the face [m/s]
+    beyond    (3, ...) velocity of closed faces, which is that of the wall near by [m/s]
+    swerve    (3, ...) that velocity less the one at the centre of the face [m/s]
     """
 
     def __init__(self, grid: Grid, halo: Halo) -> None:
@@ -226,7 +239,9 @@ class CutCells(WholeCells):
         shape = grid.padded_shape
         is_open = halo.padded(grid.open)
         self.volume = volumes(surface, h, *self.points((0.5, 0.5, 0.5))) * is_open
-        self.aperture, self.distance, self.shift, self.depth, self.sliding = np.zeros((5, 3, *shape))
+        self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve = np.zeros(
+            (6, 3, *shape)
+        )
         for d in range(3):
             offset = [0.5, 0.5, 0.5]
             offset[d] = 0.0
@@ -238,9 +253,13 @@ class CutCells(WholeCells):
             self.distance[d] = np.where(some, np.where(whole, centre, cut.distance), 0.0)
             self.shift[d] = np.where(whole, 0.0, self.distance[d] - centre)
             self.depth[d] = np.where(some, cut.square / np.where(some, self.distance[d], 1.0), 0.0)
-            self.sliding[d] = surface.velocity(*points)[d]
+            at_centre = surface.velocity(*points)[d]
+            self.sliding[d] = np.where(some & ~whole, cut.sliding, at_centre)
+            self.swerve[d] = self.sliding[d] - at_centre
+        near = self.distance - self.shift > -REACH * float(np.linalg.norm(h))
+        self.beyond = np.where(near, self.sliding, 0.0)
         halo.fill(self.volume, extend=False)
-        for field in (self.aperture, self.distance, self.shift, self.depth, self.sliding):
+        for field in (self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve, self.beyond):
             halo.fill_faces(field)
 
     def points(self, offset: Sequence[float]) -> list[Array]:

@@ -45,13 +45,17 @@ class Faces(NamedTuple):
     wall_weight: Array  # (n, 2) [1/m2]
     wall_constant: Array  # (n,) [1/m/s]
     stiff: Array  # (n,) weight of the own velocity in the stress, over that in a whole cell [1/m2]
-    wall_area: Array  # (n,) per open volume [1/m]
     aperture: Array  # (3, ...) of all faces
     inverse: Array  # (3,) 1/spacing [1/m]
 
 
 class NoWalls:
-    """Of a fluid without smooth walls: nothing to do."""
+    """Of a fluid without smooth walls: nothing to do.
+
+    profiles  how the velocity along x, y, z varies away from walls
+    """
+
+    profiles: Sequence[Profiles] = ()
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """Write convection and viscous stress near walls."""
@@ -70,7 +74,8 @@ class NearWalls(NoWalls):
 
     def __init__(self, boundaries: Boundaries, fields: CellFields, solved: Array) -> None:
         self.cut, self.fields = boundaries.cut, fields
-        self.components = [_faces_of(self.cut, d, solved[d] > 0.0) for d in range(3)]
+        self.profiles = [_profiles(self.cut, d) for d in range(3)]
+        self.components = [_faces_of(self.cut, d, solved[d] > 0.0, self.profiles[d]) for d in range(3)]
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """See `NoWalls.replace`; `fields.flux` is that of the velocity."""
@@ -94,7 +99,7 @@ def near_walls(boundaries: Boundaries, fields: CellFields, solved: Array) -> NoW
 # ---------------------------------------------------------------- gradients as weights of velocities
 
 
-def _faces_of(cut: CutCells, d: int, solved: Any) -> Faces:
+def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles) -> Faces:
     """The faces of a component near walls, and the weights of their gradients."""
     spacing, shape = cut.grid.spacing, cut.volume.shape
     steps = (1, shape[2], shape[1] * shape[2])
@@ -111,7 +116,6 @@ def _faces_of(cut: CutCells, d: int, solved: Any) -> Faces:
     at = np.flatnonzero(near & solved)
     open_share = share.ravel()[at]
     wall_area = np.linalg.norm(missing.reshape(3, -1)[:, at], axis=0) / open_share
-    near_one = _profiles(cut, d, steps)
 
     area, weight, constant = np.zeros((at.size, 6)), np.zeros((at.size, 6, 4)), np.zeros((at.size, 6))
     index = np.zeros((at.size, 6, 4), np.int64)
@@ -122,16 +126,16 @@ def _faces_of(cut: CutCells, d: int, solved: Any) -> Faces:
             cross = sections[e][side]
             area[:, m] = cross.share.ravel()[at] * inverse[e] / open_share
             distance = cross.distance.ravel()[at]
-            index[:, m], weight[:, m], constant[:, m] = _gradient(near_one, high - steps[e], high, distance, inverse[e])
+            index[:, m], weight[:, m], constant[:, m] = _gradient(profiles, high - steps[e], high, distance, inverse[e])
             stiff -= (2 * side - 1) * area[:, m] * weight[:, m, 1 - side]
         whole += 2.0 * inverse[e] ** 2
-    pull = near_one.shear[:, at].T * wall_area[:, None]
-    wall_index = np.stack([at, near_one.next[at]], axis=-1)
-    wall_constant = -(pull * near_one.sliding[wall_index]).sum(axis=1)
+    pull = profiles.shear[:, at].T * wall_area[:, None]
+    wall_index = np.stack([at, profiles.next[at]], axis=-1)
+    wall_constant = -(pull * profiles.sliding[wall_index]).sum(axis=1)
     stiff = np.maximum(stiff + pull[:, 0] - whole, 0.0)
     return Faces(
-        d, at, open_share, area, index, weight, constant, wall_index, pull, wall_constant, stiff, wall_area,
-        cut.aperture, inverse,
+        d, at, open_share, area, index, weight, constant, wall_index, pull, wall_constant, stiff, cut.aperture,
+        inverse,
     )  # fmt: skip
 
 
@@ -145,26 +149,28 @@ def _sections(cut: CutCells, d: int, e: int) -> list[Any]:
     return [moved, made] if e == d else [made, moved]
 
 
-class _Profiles(NamedTuple):
+class Profiles(NamedTuple):
     """How the velocity of every face of a component varies away from the wall; flat arrays."""
 
     is_open: Any
     distance: Array
     shift: Array
     sliding: Array
+    swerve: Array
     next: Any  # flat index of the next face away from the wall
     shear: Array  # (2, ...) weights of both in the shear rate at the wall [1/m]
     curvature: Array  # (2, ...) weights in the curvature [1/m2]
 
 
-def _profiles(cut: CutCells, d: int, steps: Sequence[int]) -> _Profiles:
+def _profiles(cut: CutCells, d: int) -> Profiles:
     """Profiles of all faces of a component."""
     distance, depth = cut.distance[d], cut.depth[d]
     centre, spacing = distance - cut.shift[d], cut.grid.spacing
     rise = np.stack([(np.roll(centre, -1, 2 - e) - np.roll(centre, 1, 2 - e)) / spacing[e] for e in range(3)])
     steepest = np.argmax(np.abs(rise), axis=0)
     upward = np.take_along_axis(rise, steepest[None], axis=0)[0] > 0.0
-    step = np.array(steps)[steepest]
+    shape = cut.volume.shape
+    step = np.array((1, shape[2], shape[1] * shape[2]))[steepest]
     farther = np.clip(np.arange(distance.size) + np.where(upward, step, -step).ravel(), 0, distance.size - 1)
     near_d, far_d = distance.ravel(), distance.ravel()[farther]
     near_e, far_e = depth.ravel(), depth.ravel()[farther]
@@ -175,13 +181,13 @@ def _profiles(cut: CutCells, d: int, steps: Sequence[int]) -> _Profiles:
     other = np.where(known, 1.0 / np.where(known, far_d, 1.0), 0.0)
     shear = np.stack([(1.0 + k * near_e) * own, -k * near_e * other])
     curvature = np.stack([k * own, -k * other])
-    return _Profiles(
-        is_open, near_d, cut.shift[d].ravel(), cut.sliding[d].ravel(), np.where(known, farther, np.arange(near_d.size)),
-        shear, curvature,
+    return Profiles(
+        is_open, near_d, cut.shift[d].ravel(), cut.sliding[d].ravel(), cut.swerve[d].ravel(),
+        np.where(known, farther, np.arange(near_d.size)), shear, curvature,
     )  # fmt: skip
 
 
-def _gradient(of: _Profiles, low: Any, high: Any, distance: Array, inverse: float) -> tuple[Any, Array, Array]:
+def _gradient(of: Profiles, low: Any, high: Any, distance: Array, inverse: float) -> tuple[Any, Array, Array]:
     """Velocities, weights and a constant that make the gradient between faces.
 
     low, high  flat indices of the faces
@@ -199,7 +205,7 @@ def _gradient(of: _Profiles, low: Any, high: Any, distance: Array, inverse: floa
         trust = np.where(some, of.distance[face] / np.where(some, both, 1.0), 0.0)
         for own, column in ((0, place), (1, place + 2)):
             weight[:, column] += trust * (bend * of.curvature[own][face] - shift * of.shear[own][face])
-    constant = -(weight * sliding).sum(axis=1)
+    constant = -(weight * sliding).sum(axis=1) - (of.swerve[high] - of.swerve[low])
     for column, sign in ((0, -1.0), (1, 1.0)):
         is_open = of.is_open[index[:, column]]
         weight[:, column] += np.where(is_open, sign, 0.0)

@@ -345,7 +345,7 @@ class FluidSolver:
         for d in range(3):
             given = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
             self.face_velocity(d)[:] = given
-        fields.velocity[self.faces.blocked] = 0.0
+        np.copyto(fields.velocity, self.boundaries.cut.beyond, where=self.faces.blocked)
         np.copyto(fields.other_voidage, fields.mean_voidage)
         np.copyto(fields.new_voidage_rate, fields.voidage_rate)
         self.boundaries.set_inlets(self.time, fields.mean_voidage)
