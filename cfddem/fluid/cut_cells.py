@@ -24,7 +24,7 @@ from cfddem.fluid.grid import HIGH, LOW, Array, Grid
 from cfddem.fluid.halo import Halo
 from cfddem.fluid.surfaces import Surface
 
-SMALLEST_VOLUME = 1e-3
+SMALLEST_VOLUME = 1e-6
 """Share of a cell below which it is solid [-]."""
 
 SMALLEST_APERTURE = 1e-5
