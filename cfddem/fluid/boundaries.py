@@ -136,13 +136,12 @@ class Boundaries:
         side.mirror, side.wall = self.halo.extended(mirror, side.axis), self.halo.extended(wall, side.axis)
         side.outlet, side.pressure = self.halo.extended(outlet, side.axis), self.halo.extended(pressure, side.axis)
 
-    @staticmethod
-    def _refuse_blocked(side: Side, here: Any, solid: Any) -> None:
-        """Raise `InputError` for an inlet that covers no face, or the face of a solid cell."""
+    def _refuse_blocked(self, side: Side, here: Any, solid: Any) -> None:
+        """Raise `InputError` for an inlet that covers no face, or the face of a solid cell; smooth walls cut inlets."""
         if not here.any():
             raise InputError(f"boundaries.{side.name}", None, "an inlet that covers the centre of some cell")
         blocked = int((here & solid).sum())
-        if blocked:
+        if blocked and not (self.grid.walls and (here & ~solid).any()):
             raise InputError(
                 f"boundaries.{side.name}", None, "an inlet whose cells are all open",
                 f"{blocked} of its {int(here.sum())} cells are solid; narrow it with `where`",

@@ -54,10 +54,11 @@ def within(grid: Grid, surface: Surface) -> Grid:
 
     errors  InputError where no fluid is left, or where the wall separates fluid within a cell
     """
+    if grid.solid is not None:
+        remedy = "draw the solid cells as walls, or all walls as solid cells"
+        raise InputError("walls", None, "in a grid without solid cells", remedy)
     volume = volumes(surface, grid.spacing, *np.broadcast_arrays(*grid.centres()))
     solid = volume < SMALLEST_VOLUME
-    if grid.solid is not None:
-        solid |= grid.solid
     if solid.all():
         raise InputError("walls", None, "around some of the fluid", "no cell holds fluid; check centre and radius")
     made: Any = replace(grid, solid=solid, walls=surface)
@@ -214,6 +215,18 @@ class WholeCells:
         """A padded cell field times the volumes."""
         return cells
 
+    def of_faces(self, d: int) -> Array | float:
+        """Apertures of the faces normal to d, padded."""
+        return 1.0
+
+    def momentum_share(self, d: int) -> Array | float:
+        """Share of the momentum cells of component d that is open, padded."""
+        return 1.0
+
+    def own_volume(self) -> Array | float:
+        """Share of the cells without ghosts that is open (nz, ny, nx)."""
+        return 1.0
+
 
 def cut_cells(grid: Grid, halo: Halo) -> WholeCells:
     """The cut cells of a grid with smooth walls, or its whole cells."""
@@ -284,3 +297,15 @@ class CutCells(WholeCells):
     def held(self, cells: Array) -> Array:
         """See `WholeCells.held`."""
         return np.asarray(cells * self.volume)
+
+    def of_faces(self, d: int) -> Array:
+        """See `WholeCells.of_faces`."""
+        return np.asarray(self.aperture[d])
+
+    def momentum_share(self, d: int) -> Array:
+        """See `WholeCells.momentum_share`: half of both cells."""
+        return np.asarray(0.5 * (self.volume + np.roll(self.volume, 1, axis=2 - d)))
+
+    def own_volume(self) -> Array:
+        """See `WholeCells.own_volume`."""
+        return self.grid.inner(self.volume)

@@ -60,8 +60,9 @@ class NoWalls:
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """Write convection and viscous stress near walls."""
 
-    def hold(self, fields: CellFields, density: float, model_b: float, step: float, new: Array) -> None:
-        """Take the stiff part of the stress into a predicted velocity and its mobility."""
+    def hold(self, new: Array, density: float, model_b: float, step: float, weight: float) -> None:
+        """Take the stiff part of the stress into a predicted velocity and its mobility; the stress of the stage before
+        has this weight."""
 
 
 class NearWalls(NoWalls):
@@ -75,6 +76,7 @@ class NearWalls(NoWalls):
     def __init__(self, boundaries: Boundaries, fields: CellFields, solved: Array) -> None:
         self.cut, self.fields = boundaries.cut, fields
         self.profiles = [_profiles(self.cut, d) for d in range(3)]
+        self._resistance = [np.zeros(0)] * 3
         self.components = [_faces_of(self.cut, d, solved[d] > 0.0, self.profiles[d]) for d in range(3)]
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
@@ -82,13 +84,23 @@ class NearWalls(NoWalls):
         for d, faces in enumerate(self.components):
             cut_transport(faces, velocity[d], self.fields.flux, viscosity, density, central, force[d])
 
-    def hold(self, fields: CellFields, density: float, model_b: float, step: float, new: Array) -> None:
+    def hold(self, new: Array, density: float, model_b: float, step: float, weight: float) -> None:
         """See `NoWalls.hold`."""
+        fields = self.fields
         for d, faces in enumerate(self.components):
-            hold_near_walls(
-                faces, fields.velocity[d], fields.effective_viscosity, fields.centred_voidage, density, model_b, step,
-                new[d], fields.mobility[d],
-            )  # fmt: skip
+            if weight == 0.0:  # both stages have the same mobility, and with it the same pressure equation
+                self._resistance[d] = faces.stiff * _on_faces(fields.effective_viscosity, faces)
+            voidage, old = _on_faces(fields.centred_voidage, faces), fields.velocity[d]
+            inertia = np.stack([density * voidage, voidage + model_b * (1.0 - voidage)])
+            explicit = (1.0 - weight) * old + weight * fields.stage_velocity[d] if weight else old
+            hold_near_walls(faces, old, explicit, inertia, self._resistance[d], step, new[d], fields.mobility[d])
+
+
+def _on_faces(cells: Array, faces: Faces) -> Array:
+    """Mean of the two cells of every face near walls (n,)."""
+    back = (1, cells.shape[2], cells.shape[1] * cells.shape[2])[faces.axis]
+    flat = cells.ravel()
+    return np.asarray(0.5 * (flat[faces.at] + flat[faces.at - back]))
 
 
 def near_walls(boundaries: Boundaries, fields: CellFields, solved: Array) -> NoWalls:
@@ -106,7 +118,7 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles) -> Faces:
     inverse = 1.0 / np.array(spacing)
     sections = [_sections(cut, d, e) for e in range(3)]
     aperture = cut.aperture[d]
-    share = 0.5 * (cut.volume + np.roll(cut.volume, 1, 2 - d))
+    share = cut.momentum_share(d)
     near, missing = (aperture < 1.0) | (share < 1.0), np.zeros((3, *shape))
     for e in range(3):
         for side in range(2):

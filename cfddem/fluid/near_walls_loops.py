@@ -18,7 +18,7 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
 
     faces      `cfddem.fluid.near_walls.Faces` of the component
     velocity   padded component; flux (3, ...) eps u, times the aperture that `faces` has; viscosity eps mu of cells
-    rate       written; without the part of the stress that :func:`hold_near_walls` takes
+    rate       written
     """
     shape, d = viscosity.shape, faces.axis
     steps = (1, shape[2], shape[1] * shape[2])
@@ -55,26 +55,23 @@ def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
             pull += faces.wall_weight[n, each] * u[faces.wall_index[n, each]]
         share = faces.share[n]
         convection = carried_away / max(share, FULL) + here * growth / max(share, EMPTY)
-        out[p] = stress - at_face * pull + at_face * faces.stiff[n] * here - density * convection
+        out[p] = stress - at_face * pull - density * convection
 
 
 @threaded
-def hold_near_walls(faces, old, viscosity, voidage, density, model_b, step, new, mobility):
+def hold_near_walls(faces, velocity, stage, inertia, resistance, step, new, mobility):
     """Take the stiff part of the stress near walls into a predicted component, implicitly, as `predict` takes drag.
 
-    old, new, mobility  padded component; viscosity eps mu; voidage that of the middle of the step
+    velocity    at the start of the step; stage: the mean of those whose stress was taken explicitly; padded components
+    inertia     (2, n) of the faces: rho eps, and how much of a pressure gradient acts on the fluid
+    resistance  (n,) stiff part of the stress over the velocity [kg/m3/s]
+    new, mobility  padded component
     """
-    back = (1, viscosity.shape[2], viscosity.shape[1] * viscosity.shape[2])[faces.axis]
-    mu, eps = viscosity.reshape(-1), voidage.reshape(-1)
-    old, new, mobility = old.reshape(-1), new.reshape(-1), mobility.reshape(-1)
+    old, explicit, new, mobility = velocity.reshape(-1), stage.reshape(-1), new.reshape(-1), mobility.reshape(-1)
     for n in prange(faces.at.size):
         p = faces.at[n]
-        face = 0.5 * (eps[p] + eps[p - back])
-        stiff = 0.5 * (mu[p] + mu[p - back]) * faces.stiff[n]
-        theta = implicitness(stiff * step / (density * face))
-        inertia = step * (face + model_b * (1.0 - face)) / mobility[p]
-        held = inertia + step * theta * stiff
-        new[p] = (inertia * new[p] - step * (1.0 - theta) * stiff * old[p]) / held
-        mobility[p] *= inertia / held
-
-
+        theta = implicitness(resistance[n] * step / inertia[0, n])
+        loose = step * inertia[1, n] / mobility[p]
+        held = loose + step * theta * resistance[n]
+        new[p] = (loose * new[p] + step * resistance[n] * (explicit[p] - (1.0 - theta) * old[p])) / held
+        mobility[p] *= loose / held

@@ -236,7 +236,7 @@ class FluidSolver:
             self.boundaries.driving, self.faces.solved, self.density, step, self.inverse_spacing, self.model_b,
             new, fields.mobility,
         )  # fmt: skip
-        self.walls.hold(fields, self.density, self.model_b, step, new)
+        self.walls.hold(new, self.density, self.model_b, step, weight)
         self.boundaries.set_faces(new)
 
     def _flux_scale(self, step: float) -> float:
@@ -424,9 +424,9 @@ class FluidSolver:
         return self.grid.inner_faces(self.fields.velocity[axis], axis)
 
     def volume_flux(self, axis: int) -> Array:
-        """eps u through the faces normal to `axis`, per area [m/s]; shape as `face_velocity`."""
-        voidage = on_faces(self.fields.mean_voidage, axis)
-        return self.face_velocity(axis) * self.grid.inner_faces(voidage, axis)
+        """eps u through the faces normal to `axis`, per area of a whole face [m/s]; shape as `face_velocity`."""
+        flux = on_faces(self.fields.mean_voidage, axis) * self.boundaries.cut.of_faces(axis)
+        return self.face_velocity(axis) * self.grid.inner_faces(flux, axis)
 
     # ------------------------------------------------------------ checkpoint
 
