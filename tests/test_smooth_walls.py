@@ -69,6 +69,7 @@ def couette(n: int, inner: float, outer: float) -> tuple[float, float, float]:
     return -float(torque[radius < 0.75].sum()) / exact, float(torque[radius > 0.75].sum()) / exact, float(wrong)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("inner", "outer"), [(1.0, 0.0), (0.0, 1.0)])
 def test_turning_cylinders_drag_the_fluid(inner, outer):
     assert couette(4, inner, outer)[2] < 0.003
@@ -101,9 +102,20 @@ walls = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=5, deadline=None, derandomize=True)
+@given(st.lists(walls, min_size=1, max_size=3))
+def test_mass_is_kept_within_a_few_walls(drawn):
+    keeps_mass(drawn)
+
+
+@pytest.mark.slow
+@settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.lists(walls, min_size=1, max_size=3))
 def test_mass_is_kept_within_any_walls(drawn):
+    keeps_mass(drawn)
+
+
+def keeps_mass(drawn: list[Surface]) -> None:
     """Cell by cell, in a moving voidage, over the largest flux."""
     try:
         grid = within(Grid((7, 8, 9), (1.0 / 7, 1.0 / 8, 1.0 / 9)), together(*drawn))
@@ -114,12 +126,11 @@ def test_mass_is_kept_within_any_walls(drawn):
     fluid.set_voidage(before)
     fluid.set_velocity((0.3, 0.2, 1.0))
     connected = fluid.boundaries.cut.own_volume() * grid.open > 0.0
-    if fluid._projection._equation.closed_regions is not None:  # noqa: SLF001 - fluid without a way out
+    if fluid._projection._equation.closed_regions is not None:  # fluid without a way out
         return
     fluid.step(1e-3, after)
     largest = max(float(np.abs(fluid.volume_flux(d)).max()) * grid.face_area(d) for d in range(3))
     residual = np.abs(continuity_residual(fluid))[connected]
-    print("RATIO", residual.max() / largest)
     assert residual.max() < 1e-12 * max(largest, 1e-300)
 
 
@@ -154,7 +165,7 @@ def iterations(grid: Grid) -> float:
 
 
 def test_the_pressure_needs_few_more_iterations_than_in_the_box():
-    grid = Grid((16, 16, 32), (1.0 / 16,) * 3)
+    grid = Grid((12, 12, 24), (1.0 / 12,) * 3)
     assert iterations(within(grid, cylinder((0.51, 0.49, 0.0), 0.47))) < iterations(grid) + 3.0
 
 

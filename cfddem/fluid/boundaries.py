@@ -19,8 +19,8 @@ import numpy as np
 
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
-from cfddem.fluid.cut_cells import cut_cells
 from cfddem.fluid.conditions import SIDES, Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.cut_cells import cut_cells
 from cfddem.fluid.grid import HIGH, LOW, Array, Grid, layers
 from cfddem.fluid.halo import Halo, place
 

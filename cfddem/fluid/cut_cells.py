@@ -200,9 +200,9 @@ def volumes(surface: Surface, spacing: Sequence[float], *centres: Array) -> Arra
 class WholeCells:
     """Of a grid without smooth walls: all cells and faces are whole."""
 
-    volume: Array | float = 1.0
-    aperture: Array | float = 1.0
-    beyond: Array | float = 0.0
+    volume: Any = 1.0
+    aperture: Any = 1.0
+    beyond: Any = 0.0
 
     def close(self, solved: Array, blocked: NDArray[np.bool_]) -> None:
         """Mark the faces that walls close, as of :class:`cfddem.fluid.boundaries.Faces`."""
@@ -252,9 +252,7 @@ class CutCells(WholeCells):
         shape = grid.padded_shape
         is_open = halo.padded(grid.open)
         self.volume = volumes(surface, h, *self.points((0.5, 0.5, 0.5))) * is_open
-        self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve = np.zeros(
-            (6, 3, *shape)
-        )
+        self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve = np.zeros((6, 3, *shape))
         for d in range(3):
             offset = [0.5, 0.5, 0.5]
             offset[d] = 0.0

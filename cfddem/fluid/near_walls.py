@@ -11,7 +11,8 @@ and from that of the next one away from the wall; both are means over open parts
 over the spacing, corrected for the places of their open parts, so that this u has its exact gradient.
 
 The stress is :math:`\varepsilon\mu\nabla u`: its transposed part, whose divergence vanishes at a uniform viscosity, is
-left out beside walls. What is stiffer than in a whole cell is implicit, as the drag is: small cells do not limit a step.
+left out beside walls. What is stiffer than in a whole cell is implicit, as the drag is: small cells do not limit the
+step.
 """
 
 from __future__ import annotations
@@ -74,10 +75,11 @@ class NearWalls(NoWalls):
     """
 
     def __init__(self, boundaries: Boundaries, fields: CellFields, solved: Array) -> None:
-        self.cut, self.fields = boundaries.cut, fields
-        self.profiles = [_profiles(self.cut, d) for d in range(3)]
+        self.fields, cut = fields, boundaries.cut
+        assert isinstance(cut, CutCells)
+        self.profiles = [_profiles(cut, d) for d in range(3)]
         self._resistance = [np.zeros(0)] * 3
-        self.components = [_faces_of(self.cut, d, solved[d] > 0.0, self.profiles[d]) for d in range(3)]
+        self.components = [_faces_of(cut, d, solved[d] > 0.0, self.profiles[d]) for d in range(3)]
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """See `NoWalls.replace`; `fields.flux` is that of the velocity."""

@@ -245,8 +245,7 @@ class FluidSolver:
         fields, rate = self.fields, self.fields.owned("new_voidage_rate")
         old = self._rates.of(fields.velocity, fields.mean_voidage, fields.effective_viscosity).flux
         predicted = self._rates.of(fields.stage_velocity, fields.other_voidage, fields.effective_viscosity).flux
-        fastest = max(self.communicator.largest(rate), -self.communicator.smallest(rate))
-        displaced = self.grid.cell_volume * fastest
+        displaced = self.grid.cell_volume * max(self.communicator.largest(rate), -self.communicator.smallest(rate))
         # a voidage is known to its last digits only, and so is its rate
         displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * math.prod(self.grid.whole.cells) ** 0.5 / step)
         return max(float(max(self.face_areas)) * max(old, 0.01 * predicted), displaced)
@@ -343,8 +342,7 @@ class FluidSolver:
         """
         fields = self.fields
         for d in range(3):
-            given = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
-            self.face_velocity(d)[:] = given
+            self.face_velocity(d)[:] = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
         np.copyto(fields.velocity, self.boundaries.cut.beyond, where=self.faces.blocked)
         np.copyto(fields.other_voidage, fields.mean_voidage)
         np.copyto(fields.new_voidage_rate, fields.voidage_rate)
@@ -411,8 +409,7 @@ class FluidSolver:
         values = getattr(self, name)
         if values.ndim == 3:
             return self.grid.joined(values)
-        joined: Array = np.moveaxis(self.grid.joined(np.moveaxis(values, -1, 0)), 0, -1)
-        return joined
+        return np.asarray(np.moveaxis(self.grid.joined(np.moveaxis(values, -1, 0)), 0, -1))
 
     def set_viscosity(self, viscosity: Array | float) -> None:
         """Viscosity from now on: of every cell (nz, ny, nx), or a number [Pa s]; all positive, or all zero."""
@@ -487,8 +484,7 @@ class FluidSolver:
     def viscous_force(self, velocity: Array, voidage: Array) -> Array:
         """div(eps tau) on the faces (3, ...) of a padded velocity with a padded voidage [N/m3]."""
         force = np.zeros_like(velocity)
-        no_density, limited = 0.0, 0.0  # without density no convection is left
-        self._find_explicit_force(velocity, voidage, force, no_density, limited)
+        self._find_explicit_force(velocity, voidage, force, density=0.0, central=0.0)  # no convection is left
         return force
 
     # ------------------------------------------------------------ values at points

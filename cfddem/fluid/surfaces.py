@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -101,23 +102,7 @@ class Turned:
     def distance(self, x: Array, y: Array, z: Array) -> Array:
         """See `Surface.distance`: that of the nearest piece of the line, with the side on which the point lies."""
         along, first, second = np.broadcast_arrays(*self._across(x, y, z))
-        radius = np.hypot(first, second)
-        points, last = np.asarray(self.line, dtype=float), len(self.line) - 2
-        nearest, side = np.full(along.shape, np.inf), np.ones(along.shape)
-        for number, (a, b) in enumerate(zip(points[:-1], points[1:])):
-            step = b - a
-            length = float(np.hypot(*step))
-            share = ((along - a[0]) * step[0] + (radius - a[1]) * step[1]) / length**2
-            share = np.clip(share, -np.inf if number == 0 else 0.0, np.inf if number == last else 1.0)
-            away = np.hypot(along - a[0] - share * step[0], radius - a[1] - share * step[1])
-            # signed across the straight line through the piece; at a corner the one farther across decides
-            across = (step[1] * (along - a[0]) - step[0] * (radius - a[1])) / length
-            closer = away < nearest * (1.0 - 1e-12)
-            tied = ~closer & (away <= nearest * (1.0 + 1e-12)) & (np.abs(across) > np.abs(side))
-            side = np.where(closer | tied, across, side)
-            nearest = np.minimum(nearest, away)
-        signed = np.copysign(nearest, side)
-        return signed if self.inside else -signed
+        return self._nearest(along, np.hypot(first, second))[0]
 
     def velocity(self, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
         """See `Surface.velocity`: spin times the radius of the nearest point of the wall."""
@@ -125,23 +110,28 @@ class Turned:
         made: list[Array] = [np.zeros(along.shape) for _ in range(3)]
         if self.spin != 0.0:
             radius = np.hypot(first, second)
-            at_wall = self._radius_of_the_nearest(along, radius)
-            share = self.spin * at_wall / np.maximum(radius, 1e-300)
+            share = self.spin * self._nearest(along, radius)[1] / np.maximum(radius, 1e-300)
             made[(self.axis + 1) % 3], made[(self.axis + 2) % 3] = -share * second, share * first
         return made[0], made[1], made[2]
 
-    def _radius_of_the_nearest(self, along: Array, radius: Array) -> Array:
-        """Radius of the nearest point of the line [m]."""
+    def _nearest(self, along: Array, radius: Array) -> tuple[Array, Array]:
+        """Signed distance from the line, and the radius of its nearest point [m]."""
         points, last = np.asarray(self.line, dtype=float), len(self.line) - 2
-        nearest, at_wall = np.full(along.shape, np.inf), np.zeros(along.shape)
-        for number, (a, b) in enumerate(zip(points[:-1], points[1:])):
+        nearest, side, at_wall = np.full(along.shape, np.inf), np.ones(along.shape), np.zeros(along.shape)
+        for number, (a, b) in enumerate(pairwise(points)):
             step = b - a
-            share = ((along - a[0]) * step[0] + (radius - a[1]) * step[1]) / float(np.dot(step, step))
+            length = float(np.hypot(*step))
+            share = ((along - a[0]) * step[0] + (radius - a[1]) * step[1]) / length**2
             share = np.clip(share, -np.inf if number == 0 else 0.0, np.inf if number == last else 1.0)
             away = np.hypot(along - a[0] - share * step[0], radius - a[1] - share * step[1])
-            at_wall = np.where(away < nearest, a[1] + share * step[1], at_wall)
+            # signed across the straight line through the piece; at a corner the one farther across decides
+            across = (step[1] * (along - a[0]) - step[0] * (radius - a[1])) / length
+            tied = (np.abs(away - nearest) <= 1e-12 * nearest) & (np.abs(across) > np.abs(side))
+            closer = (away < nearest * (1.0 - 1e-12)) | tied
+            side, at_wall = np.where(closer, across, side), np.where(closer, a[1] + share * step[1], at_wall)
             nearest = np.minimum(nearest, away)
-        return at_wall
+        signed = np.copysign(nearest, side)
+        return signed if self.inside else -signed, at_wall
 
 
 @dataclass(frozen=True)

@@ -38,9 +38,8 @@ def _shear(fluid: FluidSolver, cut: CutCells, d: int) -> Array:
     profiles = fluid.walls.profiles[d]
     relative = fluid.fields.velocity[d].ravel() - profiles.sliding
     rate = profiles.shear[0] * relative + profiles.shear[1] * relative[profiles.next]
-    weight, moment = (
-        fluid.grid.inner_faces(each.reshape(cut.volume.shape), d) for each in (profiles.distance, profiles.distance * rate)
-    )  # fmt: skip
+    moments = profiles.distance, profiles.distance * rate
+    weight, moment = (fluid.grid.inner_faces(each.reshape(cut.volume.shape), d) for each in moments)
     low, high = layers(d, slice(None, -1)), layers(d, slice(1, None))
     return np.asarray((moment[low] + moment[high]) / np.maximum(weight[low] + weight[high], 1e-300))
 
