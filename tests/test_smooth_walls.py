@@ -35,7 +35,7 @@ def pipe(n: int, shift: tuple[float, float]) -> float:
 
 
 def test_the_flux_through_a_pipe_of_8_cells_is_met():
-    """Steps of whole cells are 7 % off at 16 cells."""
+    """Solid cells are up to 7 % off at 16 cells."""
     assert pipe(8, (0.27, 0.13)) < 0.015
 
 

@@ -127,7 +127,9 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles) -> Faces:
             near |= np.roll(aperture, 1 - 2 * side, 2 - e) < 1.0
             near |= sections[e][side].share < 1.0
         missing[e] = (sections[e][0].share - sections[e][1].share) * inverse[e]
-    at = np.flatnonzero(near & solved)
+    own = np.zeros(shape, bool)
+    cut.grid.inner_faces(own, d)[:] = True
+    at = np.flatnonzero(near & solved & own)
     open_share = share.ravel()[at]
     wall_area = np.linalg.norm(missing.reshape(3, -1)[:, at], axis=0) / open_share
 
