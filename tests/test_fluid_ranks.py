@@ -19,11 +19,13 @@ from cfddem.backend.errors import InputError
 from cfddem.fluid import budgets
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs
+from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, outside_cylinder
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.regions import ClosedRegions
 from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.surfaces import turned
 
 
 @pytest.fixture(autouse=True)
@@ -120,6 +122,11 @@ FLOWS: dict[str, tuple[Grid, dict[str, Any], dict[str, Any]]] = {
         Grid((10, 9, 10), SIZES),
         {"x_low": Inlet(0.2), "x_high": Outlet(), "y_low": Outlet(1.0)},
         {"convection": "central"},
+    ),
+    "cone that turns": (
+        within(Grid((10, 9, 10), SIZES), turned([(0.0, 0.3), (1.2, 0.43)], (0.52, 0.44, 0.0), spin=0.5)),
+        {"z_low": Inlet(0.2), "z_high": Outlet()},
+        {},
     ),
 }  # fmt: skip
 

@@ -95,7 +95,7 @@ class Block(Grid):
         for name, value in known.items():
             object.__setattr__(self, name, value)
         solid = None if whole.solid is None else self.part(whole.solid)
-        super().__init__(tuple(cells), whole.spacing, tuple(origin), solid)  # type: ignore[arg-type]
+        super().__init__(tuple(cells), whole.spacing, tuple(origin), solid, whole.walls)  # type: ignore[arg-type]
 
     division: Division
     communicator: Communicator

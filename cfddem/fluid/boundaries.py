@@ -20,6 +20,7 @@ import numpy as np
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.fluid.conditions import SIDES, Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.cut_cells import cut_cells
 from cfddem.fluid.grid import HIGH, LOW, Array, Grid, layers
 from cfddem.fluid.halo import Halo, place
 
@@ -37,6 +38,7 @@ class Boundaries:
 
     Sides not named are no-slip walls, or free-slip walls where the box is one cell thick.
 
+    cut       shares of cells and faces that smooth walls leave open
     halo      fills ghosts from the cells themselves, or from those of other ranks
     box       the conditions on the whole box; others if the grid is the block of a rank
     sides     sides that the grid touches
@@ -69,6 +71,7 @@ class Boundaries:
                 pair.append(Side(name, axis, high, several))
             self._pair_up(axis, pair)
         self.halo = Halo(grid.cells, self.periodic)
+        self.cut = cut_cells(grid, self.halo)
         for side in self.sides:
             self._lay_out(side)
         self.has_outlet = any(bool(side.outlet.any()) for side in self.sides)
@@ -78,6 +81,7 @@ class Boundaries:
         grid, self.box = self.grid, box
         self.periodic, self.driving, self.has_outlet = box.periodic, box.driving, box.has_outlet
         self.halo = Halo(grid.cells, self.periodic, borders=grid.borders(self.periodic))
+        self.cut = cut_cells(grid, self.halo)
         here = [slice(first, first + n) for first, n in zip(grid.first, grid.cells)][::-1]
         self.sides = [side.cut(here) for side in box.sides if grid.touches(side.axis, side.high)]
 
@@ -132,13 +136,12 @@ class Boundaries:
         side.mirror, side.wall = self.halo.extended(mirror, side.axis), self.halo.extended(wall, side.axis)
         side.outlet, side.pressure = self.halo.extended(outlet, side.axis), self.halo.extended(pressure, side.axis)
 
-    @staticmethod
-    def _refuse_blocked(side: Side, here: Any, solid: Any) -> None:
-        """Raise `InputError` for an inlet that covers no face, or the face of a solid cell."""
+    def _refuse_blocked(self, side: Side, here: Any, solid: Any) -> None:
+        """Raise `InputError` for an inlet that covers no face, or the face of a solid cell; smooth walls cut inlets."""
         if not here.any():
             raise InputError(f"boundaries.{side.name}", None, "an inlet that covers the centre of some cell")
         blocked = int((here & solid).sum())
-        if blocked:
+        if blocked and not (self.grid.walls and (here & ~solid).any()):
             raise InputError(
                 f"boundaries.{side.name}", None, "an inlet whose cells are all open",
                 f"{blocked} of its {int(here.sum())} cells are solid; narrow it with `where`",
@@ -250,6 +253,7 @@ class Boundaries:
             inside = side.layer(fluid, face - 1 if side.high else face)
             side.layer(solved[side.axis], face)[:] = side.outlet * inside
         self.halo.fill_borders(solved)
+        self.cut.close(solved, blocked)
         return Faces(solved, buried, blocked)
 
     # ------------------------------------------------------------ ghosts

@@ -38,7 +38,7 @@ def drag_exchange(fluid: FluidSolver) -> Array:
     """
     fields, (weight, seen) = fluid.fields, fluid.drag_response()
     push = np.moveaxis(fields.owned("drag_momentum"), 0, -1) - fields.owned("drag")[..., None] * seen
-    moved: Array = fluid.last_step * fluid.grid.cell_volume * weight * push
+    moved: Array = fluid.last_step * fluid.grid.cell_volume * weight * push * _held(fluid)[..., None]
     return moved
 
 
@@ -60,23 +60,30 @@ def momentum_ledger(fluid: FluidSolver) -> dict[str, Array]:
     fields, total = fluid.fields, fluid.communicator.sum
     h, volume = fluid.last_step, fluid.grid.cell_volume
     before = _momentum(fluid, fields.other_velocity, fields.other_voidage)
-    share = fluid.open_cells if fluid.model == "B" else fluid.open_cells * fields.owned("centred_voidage")
+    held = _held(fluid)
+    share = held if fluid.model == "B" else held * fields.owned("centred_voidage")
     lines = {
         "change": momentum(fluid) - before,
         "drag": total(drag_exchange(fluid), axis=(0, 1, 2)),
         "particles": np.zeros(3) if fluid.model == "B" else _pressure_on_particles(fluid),
-        "source": h * volume * total(fields.owned("source"), axis=(1, 2, 3)),
+        "source": h * volume * total(fields.owned("source") * held, axis=(1, 2, 3)),
         "driving": h * volume * total(share) * fluid.boundaries.driving,
     }
     lines["boundaries"] = lines["change"] - sum(lines[name] for name in lines if name != "change")
     return lines
 
 
+def _held(fluid: FluidSolver) -> Array:
+    """Share of every cell that is open (nz, ny, nx)."""
+    return np.asarray(fluid.open_cells * fluid.boundaries.cut.own_volume())
+
+
 def _momentum(fluid: FluidSolver, velocity: Array, voidage: Array) -> Array:
     """Momentum (3,) of a padded velocity with a padded voidage [N s]."""
     grid, total = fluid.grid, np.zeros(3)
     for d in range(3):
-        faces = grid.inner_faces(on_faces(voidage, d) * velocity[d] * fluid.faces.solved[d], d)
+        share = fluid.faces.solved[d] * fluid.boundaries.cut.momentum_share(d)
+        faces = grid.inner_faces(on_faces(voidage, d) * velocity[d] * share, d)
         unique = np.moveaxis(faces, 2 - d, 0)[: fluid.boundaries.owned_faces(d)]
         total[d] = fluid.density * grid.cell_volume * fluid.communicator.sum(unique)
     return total
@@ -96,7 +103,7 @@ def _pressure_on_particles(fluid: FluidSolver) -> Array:
 
 def continuity_residual(fluid: FluidSolver) -> Array:
     """V d(eps)/dt + outflow of every open cell (nz, ny, nx) [m3/s], summed face by face, not by the solver."""
-    total: Array = fluid.fields.owned("voidage_rate") * fluid.grid.cell_volume
+    total: Array = fluid.fields.owned("voidage_rate") * fluid.grid.cell_volume * fluid.boundaries.cut.own_volume()
     for d in range(3):
         total = total + np.diff(fluid.volume_flux(d), axis=2 - d) * fluid.face_areas[d]
     residual: Array = total * fluid.open_cells
@@ -165,6 +172,7 @@ def face_volumes(fluid: FluidSolver) -> Array:
         ends[fluid.boundaries.owned_faces(d) :] = 0.0
         ends[0] *= 0.5 if low else 1.0
         ends[-1] *= 0.5 if high else 1.0
+        volumes[d] *= fluid.boundaries.cut.momentum_share(d)
     return np.asarray(volumes * fluid.faces.solved)
 
 

@@ -51,12 +51,14 @@ class Grid:
     spacing  hx, hy, hz of a cell [m]; need not be equal
     origin   corner of the box with the lowest x, y, z [m]
     solid    (nz, ny, nx) true where a cell is solid, or None
+    walls    smooth walls, which cut cells (:func:`cfddem.fluid.cut_cells.within`), or None
     """
 
     cells: tuple[int, int, int]
     spacing: tuple[float, float, float]
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     solid: NDArray[np.bool_] | None = field(default=None, repr=False)
+    walls: Any = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if len(self.cells) != 3 or any(int(n) != n or n < 1 for n in self.cells):

@@ -25,7 +25,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cfddem.backend.errors import RunFailed
+from cfddem.backend.errors import InputError, RunFailed
 from cfddem.fluid.fields import CellField, CellFields
 from cfddem.fluid.grid import Array
 from cfddem.fluid.scalar_conditions import ScalarSides
@@ -83,6 +83,9 @@ class Scalar:
 
     def __init__(self, fluid: FluidSolver, kind: ScalarKind, sides: ScalarSides) -> None:
         self.fluid, self.kind, self.grid = fluid, kind, fluid.grid
+        if self.grid.walls:
+            remedy = "take Grid.with_solid instead of smooth walls"
+            raise InputError("walls", None, "solid cells where the fluid has a temperature or a vapour", remedy)
         cells = ("value", "stored", "next", "growth", "rate", "lost", "diffusivity", "coefficient", "target", "missed")
         roles: Mapping[str, Any] = {"value": "state", "stored": "state"}
         initial = {"value": kind.start, "next": kind.start, "stored": 1.0}

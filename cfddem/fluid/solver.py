@@ -33,6 +33,7 @@ from cfddem.fluid.conditions import Condition
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, on_faces, sample
 from cfddem.fluid.momentum import drag_seen, in_cells, predict, transport
+from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
 from cfddem.fluid.stability import FlowRates
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
@@ -121,6 +122,7 @@ class FluidSolver:
         self._every_face = np.ones_like(self.faces.solved)
         self._effective = EffectiveViscosity(grid, sides.halo, self.density, float(smagorinsky))
         self._projection = Projection(sides, self.fields, communicator)
+        self.walls = near_walls(sides, self.fields, self.faces.solved)
         self._rates = FlowRates(sides, self.density, communicator)
         self.set_viscosity(viscosity)
         self.set_voidage(voidage)
@@ -218,6 +220,7 @@ class FluidSolver:
             velocity, voidage, fields.effective_viscosity, self.faces.buried, density, self.inverse_spacing, central,
             fields.flux, fields.expansion, force,
         )  # fmt: skip
+        self.walls.replace(velocity, fields.effective_viscosity, density, central, force)
 
     def _project(self, velocity: Array, voidage: Array, limit: float, scale: float, fresh: bool) -> int:
         """Correct a velocity and the pressure so that continuity holds; returns the iterations it took."""
@@ -233,6 +236,7 @@ class FluidSolver:
             self.boundaries.driving, self.faces.solved, self.density, step, self.inverse_spacing, self.model_b,
             new, fields.mobility,
         )  # fmt: skip
+        self.walls.hold(new, self.density, self.model_b, step, weight)
         self.boundaries.set_faces(new)
 
     def _flux_scale(self, step: float) -> float:
@@ -241,8 +245,7 @@ class FluidSolver:
         fields, rate = self.fields, self.fields.owned("new_voidage_rate")
         old = self._rates.of(fields.velocity, fields.mean_voidage, fields.effective_viscosity).flux
         predicted = self._rates.of(fields.stage_velocity, fields.other_voidage, fields.effective_viscosity).flux
-        fastest = max(self.communicator.largest(rate), -self.communicator.smallest(rate))
-        displaced = self.grid.cell_volume * fastest
+        displaced = self.grid.cell_volume * max(self.communicator.largest(rate), -self.communicator.smallest(rate))
         # a voidage is known to its last digits only, and so is its rate
         displaced = max(displaced, ROUND_OFF * self.grid.cell_volume * math.prod(self.grid.whole.cells) ** 0.5 / step)
         return max(float(max(self.face_areas)) * max(old, 0.01 * predicted), displaced)
@@ -339,9 +342,8 @@ class FluidSolver:
         """
         fields = self.fields
         for d in range(3):
-            given = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
-            self.face_velocity(d)[:] = given
-        fields.velocity[self.faces.blocked] = 0.0
+            self.face_velocity(d)[:] = velocity[d](*self.grid.faces(d)) if callable(velocity[d]) else velocity[d]
+        np.copyto(fields.velocity, self.boundaries.cut.beyond, where=self.faces.blocked)
         np.copyto(fields.other_voidage, fields.mean_voidage)
         np.copyto(fields.new_voidage_rate, fields.voidage_rate)
         self.boundaries.set_inlets(self.time, fields.mean_voidage)
@@ -407,8 +409,7 @@ class FluidSolver:
         values = getattr(self, name)
         if values.ndim == 3:
             return self.grid.joined(values)
-        joined: Array = np.moveaxis(self.grid.joined(np.moveaxis(values, -1, 0)), 0, -1)
-        return joined
+        return np.asarray(np.moveaxis(self.grid.joined(np.moveaxis(values, -1, 0)), 0, -1))
 
     def set_viscosity(self, viscosity: Array | float) -> None:
         """Viscosity from now on: of every cell (nz, ny, nx), or a number [Pa s]; all positive, or all zero."""
@@ -420,9 +421,9 @@ class FluidSolver:
         return self.grid.inner_faces(self.fields.velocity[axis], axis)
 
     def volume_flux(self, axis: int) -> Array:
-        """eps u through the faces normal to `axis`, per area [m/s]; shape as `face_velocity`."""
-        voidage = on_faces(self.fields.mean_voidage, axis)
-        return self.face_velocity(axis) * self.grid.inner_faces(voidage, axis)
+        """eps u through the faces normal to `axis`, per area of a whole face [m/s]; shape as `face_velocity`."""
+        flux = on_faces(self.fields.mean_voidage, axis) * self.boundaries.cut.of_faces(axis)
+        return self.face_velocity(axis) * self.grid.inner_faces(flux, axis)
 
     # ------------------------------------------------------------ checkpoint
 
@@ -483,8 +484,7 @@ class FluidSolver:
     def viscous_force(self, velocity: Array, voidage: Array) -> Array:
         """div(eps tau) on the faces (3, ...) of a padded velocity with a padded voidage [N/m3]."""
         force = np.zeros_like(velocity)
-        no_density, limited = 0.0, 0.0  # without density no convection is left
-        self._find_explicit_force(velocity, voidage, force, no_density, limited)
+        self._find_explicit_force(velocity, voidage, force, density=0.0, central=0.0)  # no convection is left
         return force
 
     # ------------------------------------------------------------ values at points

@@ -53,9 +53,10 @@ class Projection:
             self.grid, self.boundaries, self.fields, self._equation, self._missing,
         )  # fmt: skip
         ax, ay, az, anchor = equation.coefficients
+        cut, rate = boundaries.cut, boundaries.cut.held(fields.new_voidage_rate)
         assemble(
-            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, fresh, boundaries.halo.ends,
-            self._areas, self._inverse, ax, ay, az, anchor, missing,
+            cut.open_part(velocity), cut.open_part(fields.mobility), voidage, rate, self._open, fresh,
+            boundaries.halo.ends, self._areas, self._inverse, ax, ay, az, anchor, missing,
         )  # fmt: skip
         if fresh:
             equation.prepare()
