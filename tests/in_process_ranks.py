@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import pickle
+import queue
 import threading
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from cfddem.backend.communicator import Communicator, Value
+
+PATIENCE = 300
+"""How long a rank waits for another [s]."""
 
 
 class Board:
@@ -17,6 +24,7 @@ class Board:
         self.size, self.turn = size, threading.Lock()
         self._values: list[Any] = [None] * size
         self._barrier = threading.Barrier(size)
+        self._mail: dict[tuple[int, int], queue.SimpleQueue[bytes]] = defaultdict(queue.SimpleQueue)
 
     def gather(self, rank: int, value: Any) -> list[Any]:
         """The values of all ranks, in their order."""
@@ -26,10 +34,30 @@ class Board:
         self._wait()
         return values
 
+    def send(self, sender: int, receiver: int, value: Any) -> None:
+        """Leave a value for another rank."""
+        self._mail[sender, receiver].put(pickle.dumps(value))  # as between processes
+
+    def receive(self, sender: int, receiver: int) -> Any:
+        """The next value that a rank has left for this one."""
+        mail = self._mail[sender, receiver]
+        for _ in range(PATIENCE):
+            if not mail.empty():
+                return pickle.loads(mail.get())
+            self.turn.release()
+            try:
+                return pickle.loads(mail.get(timeout=1.0))
+            except queue.Empty:
+                if self._barrier.broken:
+                    break
+            finally:
+                self.turn.acquire()
+        raise threading.BrokenBarrierError
+
     def _wait(self) -> None:
         self.turn.release()
         try:
-            self._barrier.wait(timeout=300.0)
+            self._barrier.wait(timeout=PATIENCE)
         finally:
             self.turn.acquire()
 
@@ -51,6 +79,17 @@ class Rank(Communicator):
         assert len(parcels) == self.size
         given = self.board.gather(self.rank, [pickle.dumps(parcel) for parcel in parcels])  # as between processes
         return [pickle.loads(parcels[self.rank]) for parcels in given]
+
+    def exchange_with(self, parcels: Mapping[int, Value]) -> dict[int, Value]:
+        for rank, parcel in parcels.items():
+            self.board.send(self.rank, rank, parcel)
+        return {rank: self.board.receive(rank, self.rank) for rank in parcels}
+
+    def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
+        for rank, values in outgoing.items():
+            self.board.send(self.rank, rank, values)
+        for rank, into in incoming.items():
+            into[...] = self.board.receive(rank, self.rank)
 
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         total, *others = self.board.gather(self.rank, local)

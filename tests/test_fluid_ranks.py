@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -42,10 +43,21 @@ def cut(cells: int, ranks: int) -> tuple[int, ...]:
 # ---------------------------------------------------------------- pressure
 
 
-def solved_on_ranks(case: dict[str, Any], axis: int, ranks: int) -> tuple[tuple[Array, int], tuple[Array, int]]:
+def bricks(cells: Sequence[int], *shape: int) -> Division:
+    """Unequal bricks, so many along x, y, z."""
+    x, y, z = (cut(count, ranks) for count, ranks in zip(cells, shape))
+    return Division((x, y, z))
+
+
+def along(axis: int, ranks: int) -> list[int]:
+    """The shape of slabs."""
+    return [ranks if axis == each else 1 for each in range(3)]
+
+
+def solved_on_ranks(case: dict[str, Any], shape: Sequence[int]) -> tuple[tuple[Array, int], tuple[Array, int]]:
     """Pressure and iterations of one process, and of several ranks."""
     grid, system, b = equation(**case)
-    limit, division = 1e-10 * np.abs(b).max(), Division(axis, cut(grid.cells[axis], ranks))
+    limit, division, ranks = 1e-10 * np.abs(b).max(), bricks(grid.cells, *shape), int(np.prod(shape))
     periodic = np.array(case.get("periodic", (False, False, False)))
 
     def program(communicator: Communicator) -> tuple[Array, int]:
@@ -69,9 +81,19 @@ def test_pressure_and_iterations_are_those_of_one_process(case: dict[str, Any], 
     """For cuts along each axis that has enough cells."""
     for axis, cells in enumerate(case["cells"]):
         if cells >= 4 * ranks:
-            (alone, iterations), (x, others) = solved_on_ranks(case, axis, ranks)
+            (alone, iterations), (x, others) = solved_on_ranks(case, along(axis, ranks))
             assert others == iterations
             assert np.array_equal(x, alone)
+
+
+@pytest.mark.parametrize("shape", [(2, 2, 1), (1, 2, 2), (2, 3, 2), (2, 2, 2)])
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+def test_pressure_of_bricks_is_that_of_one_process(case: dict[str, Any], shape: tuple[int, ...]) -> None:
+    """Where each axis has enough cells; coarse cells lie in up to eight bricks."""
+    if all(cells >= 4 * ranks or ranks == 1 for cells, ranks in zip(case["cells"], shape)):
+        (alone, iterations), (x, others) = solved_on_ranks(case, shape)
+        assert others == iterations
+        assert np.array_equal(x, alone)
 
 
 def test_without_messages_the_pressure_needs_more_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -84,10 +106,10 @@ def test_without_messages_the_pressure_needs_more_iterations(monkeypatch: pytest
             fill(self, *arguments)
 
     fill = Borders.fill
-    (_, iterations), _ = solved_on_ranks(CASES["box"], 2, 1)
+    (_, iterations), _ = solved_on_ranks(CASES["box"], (1, 1, 1))
     monkeypatch.setattr(Borders, "fill", seldom)
     try:
-        _, (_, others) = solved_on_ranks(CASES["box"], 2, 2)
+        _, (_, others) = solved_on_ranks(CASES["box"], (1, 1, 2))
     except Exception:  # it may not converge at all
         others = 10 * iterations
     assert others > iterations
@@ -163,8 +185,8 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
     points = np.random.default_rng(2).uniform(0.0, 1.0, (100, 3)) * np.array(grid.whole.size)
     mine = np.ones(len(points), bool)
     if division is not None:
-        planes = division.planes(grid.whole)
-        mine = np.searchsorted(planes, points[:, division.axis], side="right") == fluid.communicator.rank
+        inside = [np.searchsorted(planes, x, side="right") for planes, x in zip(division.planes(grid.whole), points.T)]
+        mine = np.ravel_multi_index(inside, division.shape) == fluid.communicator.rank
     velocity = np.zeros((len(points), 3))
     velocity[mine] = fluid.velocity_at(points[mine])
     return fluid.checkpoint() | {
@@ -179,11 +201,11 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
     }
 
 
-@pytest.mark.parametrize(("axis", "ranks"), [(0, 3), (1, 2), (2, 3)])
+@pytest.mark.parametrize("shape", [(3, 1, 1), (1, 2, 1), (1, 1, 3), (2, 2, 1), (3, 1, 2), (2, 2, 2)])
 @pytest.mark.parametrize("name", FLOWS)
-def test_a_divided_fluid_is_the_whole_one(name: str, axis: int, ranks: int) -> None:
+def test_a_divided_fluid_is_the_whole_one(name: str, shape: tuple[int, ...]) -> None:
     """Fields, forces, budgets and values at points after two steps, bit for bit."""
-    division = Division(axis, cut(FLOWS[name][0].cells[axis], ranks))
+    division = bricks(FLOWS[name][0].cells, *shape)
 
     def program(communicator: Communicator) -> dict[str, Array]:
         part = fluid_of(name, communicator, division)
@@ -192,7 +214,7 @@ def test_a_divided_fluid_is_the_whole_one(name: str, axis: int, ranks: int) -> N
 
     alone = fluid_of(name)
     advanced(alone)
-    expected, found = everything(alone), on_ranks(ranks, program)
+    expected, found = everything(alone), on_ranks(int(np.prod(shape)), program)
     for state in found:
         for each, value in expected.items():
             assert np.array_equal(np.asarray(state[each]), value), each
@@ -204,14 +226,14 @@ def test_a_checkpoint_of_three_ranks_goes_on_with_fewer(ranks: int) -> None:
     name = "driven along x, with eddies"
 
     def half(communicator: Communicator) -> dict[str, Any]:
-        part = fluid_of(name, communicator, Division(0, cut(13, 3)))
+        part = fluid_of(name, communicator, bricks((13, 9, 12), 3, 1, 1))
         advanced(part)
         return part.checkpoint()
 
     state = on_ranks(3, half)[1]
 
     def rest(communicator: Communicator) -> dict[str, Any]:
-        part = fluid_of(name, communicator, Division(0, cut(13, ranks)) if ranks > 1 else None)
+        part = fluid_of(name, communicator, bricks((13, 9, 12), ranks, 1, 1) if ranks > 1 else None)
         part.restore(state)
         advanced(part)
         return part.checkpoint()
@@ -227,13 +249,21 @@ def test_a_checkpoint_of_three_ranks_goes_on_with_fewer(ranks: int) -> None:
 # ---------------------------------------------------------------- division
 
 
-def test_a_grid_is_divided_across_the_bed_by_particles() -> None:
-    """Equal numbers of particles, at least three layers of cells, the longer horizontal axis first."""
+def test_a_grid_is_divided_into_the_bricks_with_least_work() -> None:
+    """Equal numbers of particles, at least three layers of cells, small surfaces; or the shape that is given."""
     grid = Grid((20, 8, 40), (0.1, 0.1, 0.1))
-    assert divide(grid, 4) == Division(0, (0, 5, 10, 15, 20))
-    assert divide(grid, 10) == Division(2, tuple(range(0, 41, 4)))
+    whole = {0: (0, 20), 1: (0, 8), 2: (0, 40)}
+    assert divide(grid, 4) == Division((whole[0], whole[1], (0, 10, 20, 30, 40)))
+    assert divide(grid, 4, shape=(4, 1, 1)) == Division(((0, 5, 10, 15, 20), whole[1], whole[2]))
+    assert divide(Grid((64, 64, 256), (0.1, 0.1, 0.1)), 1000).shape == (5, 10, 20)
+    deep = np.random.default_rng(1).uniform(0.0, (2.0, 0.8, 1.0), (1000, 3))  # below a freeboard
+    assert divide(grid, 2, deep).shape == (2, 1, 1) and divide(grid, 4, deep).shape == (4, 1, 1)
     crowded = np.array([[0.95, 0.4, 0.1]] * 90 + [[1.95, 0.4, 0.1]] * 10)
-    assert divide(grid, 2, crowded).starts[1] in (9, 10)
-    assert divide(grid, 2, crowded).planes(grid)[0] <= 1.0
-    with pytest.raises(InputError, match="at most 13"):
-        divide(grid, 14)
+    assert divide(grid, 2, crowded, (2, 1, 1)).starts[0][1] in (9, 10)
+    assert divide(grid, 2, crowded, (2, 1, 1)).planes(grid)[0][0] <= 1.0
+    with pytest.raises(InputError, match="at most 6 x 2 x 13.*take 156 ranks"):
+        divide(grid, 157)
+    with pytest.raises(InputError, match="ranks = 7x1x1"):
+        divide(grid, 7, shape=(7, 1, 1))
+    with pytest.raises(InputError, match="4 ranks in all"):
+        divide(grid, 4, shape=(2, 1, 1))

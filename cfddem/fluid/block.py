@@ -1,76 +1,153 @@
 """Division of a grid among ranks, and the cells that a rank owns.
 
-Cells are divided into slabs across one axis. The owner of a face is the owner of the cell above it; the last slab owns
-the high side of the box too. A rank computes on its own cells and on ghosts, which neighbours fill
+Cells are divided by planes across x, y and z. The owner of a face is the owner of the cell above it; the last rank along
+an axis owns the high side of the box too. A rank computes on its own cells and on ghosts, which neighbours fill
 (:class:`cfddem.fluid.halo.Borders`).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cfddem.backend.bricks import Shape, place_of, shapes
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
-from cfddem.fluid.grid import HIGH, Array, Grid, layers
+from cfddem.fluid.grid import HIGH, Array, Grid
 from cfddem.fluid.halo import Borders
 
 THINNEST = HIGH
-"""Layers of cells that a rank owns at least: its neighbours have so many as ghosts."""
+"""Layers of cells that a rank owns at least along a divided axis: its neighbours have so many as ghosts."""
+
+ENOUGH = 100_000
+"""Particles among which the work of the ranks is compared."""
+
+Starts = Sequence[Sequence[int] | NDArray[np.int64]]
+"""First layer of each rank along x, y, z and, at the end of each, the number of layers."""
 
 
 @dataclass(frozen=True)
 class Division:
-    """Division of the cells among ranks: rank n owns the layers starts[n] to starts[n + 1] - 1 along an axis.
+    """Division of the cells among ranks: planes across x, y and z.
 
-    axis    0, 1, 2 for x, y, z
-    starts  first layer of each rank and, at the end, the number of layers
+    starts  first layer of each rank along x, y, z and, at the end of each, the number of layers
     """
 
-    axis: int
-    starts: tuple[int, ...]
+    starts: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
 
     def __post_init__(self) -> None:
-        thinnest = min(np.diff(self.starts))  # local: known to every rank
-        if self.starts[0] != 0 or (thinnest < THINNEST and len(self.starts) > 2):
-            raise InputError("layers of cells of a rank", int(thinnest), f"at least {THINNEST}", "take fewer ranks")
+        for starts in self.starts:
+            thinnest = min(np.diff(starts))  # local: known to every rank
+            if starts[0] != 0 or (thinnest < THINNEST and len(starts) > 2):
+                raise InputError("layers of cells of a rank", int(thinnest), f"at least {THINNEST}", "take fewer ranks")
 
-    def planes(self, grid: Grid) -> list[float]:
-        """Positions of the borders between ranks along the axis [m]."""
-        return [grid.origin[self.axis] + grid.spacing[self.axis] * first for first in self.starts[1:-1]]
+    @property
+    def shape(self) -> Shape:
+        """Ranks along x, y, z."""
+        x, y, z = (len(starts) - 1 for starts in self.starts)
+        return x, y, z
+
+    def planes(self, grid: Grid) -> tuple[list[float], ...]:
+        """Positions of the borders between ranks along x, y, z [m]."""
+        return tuple(
+            [x0 + h * first for first in starts[1:-1]]
+            for x0, h, starts in zip(grid.origin, grid.spacing, self.starts)
+        )
+
+    def work(self, grid: Grid, position: Array) -> float:
+        """Work of the busiest rank over the mean: its shares of particles and cells, and of the layer around them.
+
+        position  of some of the particles (N, 3) [m]
+        """
+        wide = [np.diff(starts).astype(float) for starts in self.starts]
+        cells = np.multiply.outer(np.multiply.outer(wide[0], wide[1]), wide[2])
+        load = cells / cells.mean()  # local: all ranks
+        if len(position):
+            at = [
+                np.searchsorted(planes, position[:, axis], side="right")
+                for axis, planes in enumerate(self.planes(grid))
+            ]
+            owner = np.ravel_multi_index(at, self.shape)
+            found = np.bincount(owner, minlength=cells.size).reshape(self.shape)  # local: the same on all ranks
+            load = 0.5 * (load + found * (cells.size / len(position)))
+        around = [1.0 + 2.0 * (len(width) > 1) / width for width in wide]
+        load *= np.multiply.outer(np.multiply.outer(around[0], around[1]), around[2])
+        return float(load.max())  # local: all ranks
 
 
-def divide(grid: Grid, ranks: int, position: Array | None = None) -> Division:
-    """Divide a grid so that ranks own equally many particles, or equally many cells without particles.
-
-    The bed is cut along the longer horizontal axis if it has enough layers, else along the axis with most layers; along
-    y rather than x if both are as long, because loops run along x.
+def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape | None = None) -> Division:
+    """Divide a grid so that along each axis ranks own equally many particles, or equally many cells without particles.
 
     position  of the particles (N, 3) [m]
+    shape     ranks along x, y, z; those with the least work of the busiest rank if None
     errors    InputError if the grid has too few layers for so many ranks
     """
-    x, y, z = grid.cells
-    axis = 0 if x > y else 1
-    if max(x, y) < THINNEST * ranks and z > max(x, y):
-        axis = 2
-    count = grid.cells[axis]
-    if count < THINNEST * ranks:
-        most = max(count // THINNEST, 1)
-        raise InputError("ranks", ranks, f"at most {most} for {x} x {y} x {z} cells", "take fewer ranks or more cells")
-    load = np.full(count, 1.0)
-    if position is not None and len(position):
-        layer = ((position[:, axis] - grid.origin[axis]) / grid.spacing[axis]).astype(np.int64)
-        load = np.bincount(np.clip(layer, 0, count - 1), minlength=count) + 1e-3  # local: all particles
-    wanted = np.cumsum(load) / load.sum()  # local: all layers
-    starts = [0]
-    for rank in range(1, ranks):
-        nearest = int(np.argmin(np.abs(wanted - rank / ranks))) + 1  # local: all layers
-        starts.append(min(max(nearest, starts[-1] + THINNEST), count - THINNEST * (ranks - rank)))
-    return Division(axis, (*starts, count))
+    places = np.zeros((0, 3)) if position is None else position[:: max(len(position) // ENOUGH, 1)]
+    most = [max(count // THINNEST, 1) for count in grid.cells]
+    if shape is not None and math.prod(shape) != ranks:
+        raise InputError("--division", "x".join(map(str, shape)), f"{ranks} ranks in all, one for each process")
+    options = [each for each in [shape] if each] or shapes(ranks, most)
+    if not options or any(n > limit for n, limit in zip(options[0], most)):
+        x, y, z = grid.cells
+        fewer = next(n for n in range(ranks, 0, -1) if shapes(n, most))
+        limit = f"at most {most[0]} x {most[1]} x {most[2]} for {x} x {y} x {z} cells"
+        raise InputError("ranks", "x".join(map(str, shape or (ranks,))), limit, f"take {fewer} ranks or more cells")
+    divisions = [_cut(grid, each, places) for each in options]
+    return min(divisions, key=lambda each: each.work(grid, places))  # local: known to every rank
+
+
+def _cut(grid: Grid, shape: Shape, position: Array) -> Division:
+    """The division with so many ranks along x, y, z."""
+    found = []
+    for axis, (ranks, count) in enumerate(zip(shape, grid.cells)):
+        load = np.full(count, 1.0)
+        if len(position):
+            layer = ((position[:, axis] - grid.origin[axis]) / grid.spacing[axis]).astype(np.int64)
+            load = np.bincount(np.clip(layer, 0, count - 1), minlength=count) + 1e-3  # local: all particles
+        wanted = np.cumsum(load) / load.sum()  # local: all layers
+        starts = [0]
+        for rank in range(1, ranks):
+            nearest = int(np.argmin(np.abs(wanted - rank / ranks))) + 1  # local: all layers
+            starts.append(min(max(nearest, starts[-1] + THINNEST), count - THINNEST * (ranks - rank)))
+        found.append((*starts, count))
+    return Division((found[0], found[1], found[2]))
+
+
+def region_of(starts: Starts, place: Sequence[int], more: Sequence[int] = (0, 0, 0)) -> tuple[Any, ...]:
+    """Index of the cells of a rank in the last three axes (nz, ny, nx) of an array over the whole grid.
+
+    place  of the rank along x, y, z
+    more   layers beyond its cells along x, y, z
+    """
+    cuts = [slice(int(each[n]), int(each[n + 1]) + beyond) for each, n, beyond in zip(starts, place, more)]
+    return (Ellipsis, *cuts[::-1])
+
+
+def put_together(values: np.ndarray, starts: Starts, communicator: Communicator, faces: bool = False) -> np.ndarray:
+    """The array over the whole grid of which every rank has a part (..., nz, ny, nx).
+
+    faces  whether the array has one layer more than cells along each axis; that between ranks is taken from the upper
+    """
+    shape = len(starts[0]) - 1, len(starts[1]) - 1, len(starts[2]) - 1
+    whole = np.empty((*values.shape[:-3], *(int(each[-1]) + faces for each in starts[::-1])), values.dtype)
+    parts = []
+    for rank in range(communicator.size):
+        place = place_of(rank, shape)
+        last = [int(faces and n + 1 == ranks) for n, ranks in zip(place, shape)]
+        parts.append(whole[region_of(starts, place, last)])
+    nz, ny, nx = parts[communicator.rank].shape[-3:]
+    given = communicator.joined(values[..., :nz, :ny, :nx].reshape(-1))
+    end = 0
+    for part in parts:
+        begin, end = end, end + part.size
+        part[...] = given[begin:end].reshape(part.shape)
+    return whole
 
 
 class Block(Grid):
@@ -82,25 +159,25 @@ class Block(Grid):
     """
 
     def __init__(self, whole: Grid, division: Division, communicator: Communicator) -> None:
-        if len(division.starts) != communicator.size + 1:
-            raise InputError("ranks", communicator.size, f"{len(division.starts) - 1}, as in the division of the cells")
-        axis, rank = division.axis, communicator.rank
-        first, cells, origin = [0, 0, 0], list(whole.cells), list(whole.origin)
-        first[axis] = division.starts[rank]
-        cells[axis] = division.starts[rank + 1] - first[axis]
-        origin[axis] += first[axis] * whole.spacing[axis]
+        if math.prod(division.shape) != communicator.size:
+            raise InputError("ranks", communicator.size, f"{math.prod(division.shape)}, as in the division of the cells")
+        place = place_of(communicator.rank, division.shape)
+        first = tuple(starts[n] for starts, n in zip(division.starts, place))
+        cells: Any = tuple(starts[n + 1] - starts[n] for starts, n in zip(division.starts, place))
+        origin: Any = tuple(x0 + n * h for x0, n, h in zip(whole.origin, first, whole.spacing))
         known: Mapping[str, Any] = {
-            "_whole": whole, "_first": tuple(first), "division": division, "communicator": communicator,
+            "_whole": whole, "_first": first, "_place": place, "division": division, "communicator": communicator,
         }  # fmt: skip
         for name, value in known.items():
             object.__setattr__(self, name, value)
         solid = None if whole.solid is None else self.part(whole.solid)
-        super().__init__(tuple(cells), whole.spacing, tuple(origin), solid, whole.walls)  # type: ignore[arg-type]
+        super().__init__(cells, whole.spacing, origin, solid, whole.walls)
 
     division: Division
     communicator: Communicator
     _whole: Grid
     _first: tuple[int, int, int]
+    _place: tuple[int, int, int]
 
     @property
     def whole(self) -> Grid:
@@ -114,38 +191,35 @@ class Block(Grid):
 
     def divided(self, parts: tuple[int, int, int]) -> Block:
         """See `Grid.divided`; the rank owns the same part of the box."""
-        starts = tuple(first * parts[self.division.axis] for first in self.division.starts)
-        return Block(self.whole.divided(parts), Division(self.division.axis, starts), self.communicator)
+        x, y, z = (tuple(first * count for first in starts) for starts, count in zip(self.division.starts, parts))
+        return Block(self.whole.divided(parts), Division((x, y, z)), self.communicator)
 
     def touches(self, axis: int, high: bool) -> bool:
         """See `Grid.touches`."""
-        if axis != self.division.axis:
-            return True
-        return self.communicator.rank == (self.communicator.size - 1 if high else 0)
+        return self._place[axis] == (self.division.shape[axis] - 1 if high else 0)
 
     def borders(self, periodic: Sequence[bool] | NDArray[np.bool_]) -> tuple[Borders, ...]:
         """See `Grid.borders`."""
-        axis, rank, ranks = self.division.axis, self.communicator.rank, self.communicator.size
-        if ranks == 1:
-            return ()
-        below, above = (step % ranks if periodic[axis] or 0 <= step < ranks else None for step in (rank - 1, rank + 1))
-        return (Borders(self.communicator, axis, below, above),)
+        made = []
+        for axis, ranks in enumerate(self.division.shape):
+            beside: list[int | None] = []
+            for step in (self._place[axis] - 1, self._place[axis] + 1):
+                place = list(self._place)
+                place[axis] = step % ranks
+                inside = periodic[axis] or 0 <= step < ranks
+                beside.append(int(np.ravel_multi_index(place, self.division.shape)) if inside else None)
+            if ranks > 1:
+                made.append(Borders(self.communicator, axis, *beside))
+        return tuple(made)
 
     def part(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
         """The part of this rank in an array over the whole grid (..., nz, ny, nx).
 
-        faces  whether the array has one layer more than cells; the part has it too
+        faces  whether the array has one layer more than cells along each axis; the part has it too
         """
-        starts, rank = self.division.starts, self.communicator.rank
-        return values[layers(self.division.axis, slice(starts[rank], starts[rank + 1] + faces))]
+        found: np.ndarray = values[region_of(self.division.starts, self._place, (faces,) * 3)]
+        return found
 
     def joined(self, values: np.ndarray, faces: bool = False) -> np.ndarray:
         """The array over the whole grid of which every rank has a part (..., nz, ny, nx); the opposite of `part`."""
-        own = values[layers(self.division.axis, slice(None, -1))] if faces and not self._is_last else values
-        at = values.ndim - 1 - self.division.axis
-        rows = self.communicator.joined(np.ascontiguousarray(np.moveaxis(own, at, 0)))
-        return np.ascontiguousarray(np.moveaxis(rows, 0, at))
-
-    @property
-    def _is_last(self) -> bool:
-        return self.communicator.rank == self.communicator.size - 1
+        return put_together(values, self.division.starts, self.communicator, faces)

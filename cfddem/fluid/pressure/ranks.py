@@ -1,21 +1,23 @@
 """The pressure equation of several ranks: the iteration of one process, with the cells divided among the ranks.
 
-Arrays of a rank have a layer of ghosts below and above its cells along the divided axis. Ghosts are filled after each
+Arrays of a rank have a layer of ghosts below and above its cells along each divided axis. Ghosts are filled after each
 colour of a sweep, so that sweeps, residuals and transfers are those of one process, and with them the number of
 iterations and all bits. Coarse cells belong to the rank of their first fine cell. From the first small level down,
 every rank computes the whole level: waiting for messages would take longer than the work. So it does from the first
-level with an odd number of periodic layers, of which the last and the first have one colour.
+level with an odd number of periodic layers along a divided axis, of which the last and the first have one colour.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cfddem.backend.bricks import place_of
 from cfddem.backend.communicator import Communicator
-from cfddem.fluid.block import Block
+from cfddem.fluid.block import Block, put_together
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure.multigrid import Level, PressureEquation, hierarchy
@@ -38,19 +40,17 @@ def pressure_equation(
     others    as of `PressureEquation`
     """
     if isinstance(grid, Block) and communicator.size > 1:
-        borders = grid.borders(periodic)[0]
-        repeats = bool(periodic[borders.axis])
-        return SharedPressureEquation(grid, borders, repeats, closed_regions, communicator, outlets)
+        return SharedPressureEquation(grid, periodic, closed_regions, communicator, outlets)
     return PressureEquation(grid, closed_regions, communicator, outlets=outlets)
 
 
 class SharedLevel(Level):
-    """The cells of one rank in one grid of the hierarchy, with a layer of ghosts below and above.
+    """The cells of one rank in one grid of the hierarchy, with a layer of ghosts below and above along divided axes.
 
     whole    shape of the grid of all ranks
     factors  cells merged along x, y, z
     outlets  whether a side normal to x, y, z has a known pressure
-    starts   first layer of each rank along the divided axis and, at the end, the number of layers
+    starts   first layer of each rank along x, y, z and, at the end of each, the number of layers
     borders  with the cells of other ranks
     """
 
@@ -59,38 +59,49 @@ class SharedLevel(Level):
         whole: tuple[int, int, int],
         factors: NDArray[np.int64],
         outlets: NDArray[np.bool_],
-        starts: NDArray[np.int64],
-        borders: Borders,
+        starts: Sequence[NDArray[np.int64]],
+        borders: Sequence[Borders],
     ) -> None:
-        self.whole, self.starts, self.borders, self.axis = whole, starts, borders, borders.axis
-        rank = borders.communicator.rank
-        self.first, self.stop = int(starts[rank]), int(starts[rank + 1])
-        shape = list(whole)
-        shape[2 - self.axis] = self.stop - self.first + 2
+        self.whole, self.starts, self.borders = whole, starts, borders
+        self.axes, self.communicator = [each.axis for each in borders], borders[0].communicator
+        x, y, z = (len(each) - 1 for each in starts)
+        place = place_of(self.communicator.rank, (x, y, z))
+        self.first = np.array([each[n] for each, n in zip(starts, place)])
+        self.stop = np.array([each[n + 1] for each, n in zip(starts, place)])
+        self.ghosts = np.isin(range(3), self.axes).astype(np.int64)  # layers below and above along x, y, z
+        shape = (self.stop - self.first + 2 * self.ghosts)[::-1].tolist()
         super().__init__((shape[0], shape[1], shape[2]), factors, outlets)
-        merged = factors[self.axis] == 2
-        self.shift[self.axis] = int(merged and self.first % 2 == 0)
-        self.straddled = bool(merged and (starts[1:-1] % 2).any())  # local: all ranks know all starts
-        self.next_starts = -(-starts // factors[self.axis])
+        merged = factors == 2
+        self.shift[:] = merged * self.ghosts * (self.first % 2 == 0)
+        straddled = [merged[axis] and (each[1:-1] % 2).any() for axis, each in enumerate(starts)]
+        self.straddled = [each for each in borders if straddled[each.axis]]  # a coarse cell has cells of two ranks
+        self.next_starts = [-(-each // factor) for each, factor in zip(starts, factors)]
+        self._own = self._inside(self.first, self.stop)
+
+    def _inside(self, begin: NDArray[np.int64], end: NDArray[np.int64]) -> tuple[slice, ...]:
+        """Index of the layers begin to end - 1 along x, y, z of the whole grid, in an array of this level."""
+        offset = self.ghosts - self.first
+        return tuple(slice(int(low), int(high)) for low, high in zip(begin + offset, end + offset))[::-1]
 
     def own(self, values: Array) -> Array:
         """View of an array of this level without its ghosts."""
-        return values[layers(self.axis, slice(1, -1))]
+        return values[self._own]
 
     def fill(self, values: Array) -> None:
         """Fill the ghosts of an array of this level."""
-        self.borders.fill(values, 1, 1)
+        for each in self.borders:
+            each.fill(values, 1, 1)
 
     def without_ghosts(self, values: Array) -> None:
         """Set the ghosts of an array of this level to zero."""
-        values[layers(self.axis, 0)] = values[layers(self.axis, -1)] = 0.0
+        for axis in self.axes:
+            values[layers(axis, 0)] = values[layers(axis, -1)] = 0.0
 
     def coarsen_from(self, fine: Level) -> None:
         """See `Level.coarsen_from`; a coarse cell at the border may contain a cell of the rank above."""
         assert isinstance(fine, SharedLevel)
-        factor = int(fine.factors[self.axis])
-        begin, end = self.first * factor, min(self.stop * factor, int(fine.starts[-1]))
-        inside = layers(self.axis, slice(begin - fine.first + 1, end - fine.first + 1))
+        end = np.minimum(self.stop * fine.factors, fine.whole[::-1])
+        inside = fine._inside(self.first * fine.factors, end)
         below = [values[inside] for values in fine.coefficients]
         self._coarsen(fine, below, [self.own(values) for values in self.coefficients], self.whole)
         for values in self.coefficients:
@@ -103,67 +114,62 @@ class SharedLevel(Level):
 
     def sweep(self, sweeps: int, backward: bool) -> None:
         """Relax all cells of all ranks so many times."""
+        corner = int((self.first - self.ghosts).sum())  # local: cell where arrays begin
         for half in range(2 * sweeps):
-            # arrays begin at the layer before the first
-            self.relax(int(backward) + half + self.first + 1, 1, backward)
+            self.relax((int(backward) + half + corner) & 1, 1, backward)
             self.fill(self.x)
 
     def take_residual(self) -> None:
-        """Compute the residual; that of ghosts too, for coarse cells that hold cells of two ranks."""
+        """Compute the residual; that of ghosts too, for coarse cells that hold cells of several ranks."""
         super().take_residual()
         self.without_ghosts(self.image)
-        if not self.straddled:
-            return
-        ends, above = self.image[layers(self.axis, [0, 1, -2, -1])], layers(self.axis, -1)
-        self.fill(ends)
-        self.image[layers(self.axis, 0)] = ends[layers(self.axis, 0)]
-        if self.stop < self.starts[-1]:  # the last coarse cell may have one fine cell only
-            self.image[above] = ends[above]
+        for each in self.straddled:
+            each.fill(self.image, 1, 1)
 
     def gather_to(self, whole: Level, values: Array, target: Array) -> None:
         """Copy the cells of all ranks into an array of the same grid that every rank has."""
-        at = 2 - self.axis
-        rows = self.borders.communicator.joined(np.ascontiguousarray(np.moveaxis(self.own(values), at, 0)))
-        target[:] = np.moveaxis(rows, 0, at)
+        target[:] = put_together(self.own(values), self.starts, self.communicator)
 
     def take_from(self, whole: Level) -> None:
         """Take over the unknown, with ghosts, from the same grid that every rank has."""
-        places = np.arange(self.first - 1, self.stop + 1) % int(self.starts[-1])
-        np.take(whole.x, places, axis=2 - self.axis, out=self.x)
+        x, y, z = (
+            np.arange(first - ghosts, stop + ghosts) % int(starts[-1])
+            for first, stop, ghosts, starts in zip(self.first, self.stop, self.ghosts, self.starts)
+        )
+        self.x[:] = whole.x[np.ix_(z, y, x)]
 
 
 class SharedPressureEquation(PressureEquation):
     """The pressure equation of one rank of several.
 
-    grid     cells of this rank
-    borders  with the cells of other ranks
-    repeats  whether the divided axis is periodic
+    grid      cells of this rank
+    periodic  whether x, y, z are periodic
     other arguments as of `PressureEquation`
     """
 
     def __init__(
         self,
         grid: Block,
-        borders: Borders,
-        repeats: bool,
+        periodic: NDArray[np.bool_],
         closed_regions: ClosedRegions | None,
         communicator: Communicator,
         outlets: NDArray[np.bool_],
     ) -> None:
-        self._borders, self._repeats = borders, repeats
+        self._periodic = periodic
         self._given = tuple(np.zeros(grid.shape) for _ in range(4))
         super().__init__(grid, closed_regions, communicator, outlets=outlets)
 
     def _all_levels(self, grid: Grid) -> list[Level]:
         """Levels of which each rank has a part, the last of them again as a whole, and the coarser ones as a whole."""
         assert isinstance(grid, Block)
-        starts, shared, whole = np.array(grid.division.starts), list[SharedLevel](), list[Level]()
+        borders, shared, whole = grid.borders(self._periodic), list[SharedLevel](), list[Level]()
+        starts = [np.array(each) for each in grid.division.starts]
         for shape, factors in hierarchy(grid.whole):
             if not whole:
-                shared.append(SharedLevel(shape, factors, self._outlets, starts, self._borders))
+                shared.append(SharedLevel(shape, factors, self._outlets, starts, borders))
                 starts = shared[-1].next_starts
-            too_thin = (np.diff(starts) < 1).any()  # local: all ranks know all starts
-            seam = self._repeats and shape[2 - self._borders.axis] % 2 == 1
+            too_thin = any((np.diff(each) < 1).any() for each in starts)  # local: all ranks know all starts
+            seam = any(self._periodic[each.axis] and shape[2 - each.axis] % 2 == 1 for each in borders)
             if whole or math.prod(shape) <= SMALL or too_thin or seam:
                 whole.append(Level(shape, factors, self._outlets))
         if not whole:

@@ -1,0 +1,50 @@
+"""Ranks that share a box: how many along x, y and z, and where in it each of them is.
+
+Space and cells are divided by planes across x, y and z, the same for all ranks, so that each rank has a *brick*. Bricks
+of one rank along two axes are slabs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cfddem.backend.errors import InputError
+
+Shape = tuple[int, int, int]
+"""Ranks along x, y, z."""
+
+
+def shapes(ranks: int, most: Sequence[int]) -> list[Shape]:
+    """All ways to arrange ranks along x, y, z; along y rather than x and x rather than z first.
+
+    most  largest number along x, y, z
+    """
+    found = [
+        (x, y, ranks // (x * y))
+        for z_left in range(1, ranks + 1) if ranks % z_left == 0
+        for x in range(1, z_left + 1) if z_left % x == 0
+        for y in (z_left // x,)
+    ]  # fmt: skip
+    fitting = [shape for shape in found if all(n <= limit for n, limit in zip(shape, most))]
+    return sorted(fitting, key=lambda shape: (shape[2], shape[0]))
+
+
+def place_of(rank: int, shape: Shape) -> tuple[int, int, int]:
+    """Place of a rank along x, y, z."""
+    x, y, z = (int(n) for n in np.unravel_index(rank, shape))
+    return x, y, z
+
+
+def parsed(text: str) -> Shape:
+    """The shape that a text such as "2x2x1" names.
+
+    >>> parsed("2x2x1")
+    (2, 2, 1)
+    """
+    parts = text.lower().split("x")
+    if len(parts) != 3 or not all(part.isdecimal() and int(part) > 0 for part in parts):
+        raise InputError("--division", text, "ranks along x, y and z, such as 2x2x1")
+    x, y, z = map(int, parts)
+    return x, y, z
