@@ -9,7 +9,8 @@ from test_ghosts import DRY, GLASS, STEEL, WET, state
 
 from cfddem.backend.communicator import Communicator
 from cfddem.data.fields import Field
-from cfddem.particles.ghosts import Divided, Slabs
+from cfddem.particles.bricks import Bricks
+from cfddem.particles.ghosts import Divided
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -61,7 +62,7 @@ def bed(communicator: Communicator, kind: str, count: int, steps: int, without: 
         given["box"] = tuple(box)
     if communicator.size > 1:
         planes = [box[0] * n / communicator.size for n in range(1, communicator.size)]
-        given |= {"communicator": communicator, "division": Slabs(0, planes)}
+        given |= {"communicator": communicator, "division": Bricks.slabs(0, planes)}
     run = ParticleSolver(spheres, pair_table([GLASS, STEEL]), check_steps=False, **given)
     leave_out(run.lists.ghosts, without)
     arrived, parts = 0, 10

@@ -229,7 +229,7 @@ def test_a_particle_beyond_the_ghosts_is_reported() -> None:
     grid = Grid((12, 2, 2), (0.1, 0.1, 0.1))
 
     def program(communicator: Communicator) -> None:
-        reach = Reach(Block(grid, Division(0, (0, 6, 12)), communicator), (False, False, False))
+        reach = Reach(Block(grid, Division(((0, 6, 12), (0, 2), (0, 2))), communicator), (False, False, False))
         reach.refuse_beyond(np.array([[0.6 + 0.24 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
         with pytest.raises(RunFailed, match=r"2\.6 cells beyond"):
             reach.refuse_beyond(np.array([[0.6 + 0.26 * (1 - 2 * communicator.rank), 0.1, 0.1]]))

@@ -17,7 +17,7 @@ from test_ghosts import assert_same_bits, joined, state
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import use_threads
 from cfddem.case.materials import Material
-from cfddem.particles.ghosts import Slabs
+from cfddem.particles.bricks import Bricks
 from cfddem.particles.interactions.film import WEAK
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
@@ -100,7 +100,7 @@ def test_impulses_that_are_lost_beside_the_new_ones_do_no_harm(ranks: int) -> No
     """
 
     def speeds(last: float, communicator: Communicator) -> np.ndarray:
-        division = Slabs(0, [3.0 * RADIUS]) if communicator.size > 1 else None
+        division = Bricks.slabs(0, [3.0 * RADIUS]) if communicator.size > 1 else None
         run = row_of(4, [], tolerance=1e-3, communicator=communicator, division=division)
         run.particles.velocity[:, 0] = np.where(run.particles.id == 3, 1e-3, 0.0)
         run.edges.impulse[:, 0] = last
@@ -434,7 +434,7 @@ def test_films_and_what_a_report_says_of_them_are_the_same_on_any_number_of_rank
     def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], tuple[float, float, float], float]:
         length = float(suspension(900, 0.5, fixed=False, viscosity=VISCOSITY)[0].box[0])
         planes = [length * n / ranks for n in range(1, ranks)]
-        division = Slabs(0, planes) if communicator.size > 1 else None
+        division = Bricks.slabs(0, planes) if communicator.size > 1 else None
         run = network("full", 900, 1e-3, communicator=communicator, division=division)
         for _ in range(3):
             run.advance(2.5e-7, 4)

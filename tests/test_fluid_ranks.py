@@ -255,7 +255,7 @@ def test_a_grid_is_divided_into_the_bricks_with_least_work() -> None:
     whole = {0: (0, 20), 1: (0, 8), 2: (0, 40)}
     assert divide(grid, 4) == Division((whole[0], whole[1], (0, 10, 20, 30, 40)))
     assert divide(grid, 4, shape=(4, 1, 1)) == Division(((0, 5, 10, 15, 20), whole[1], whole[2]))
-    assert divide(Grid((64, 64, 256), (0.1, 0.1, 0.1)), 1000).shape == (5, 10, 20)
+    assert divide(Grid((64, 64, 64), (0.1, 0.1, 0.1)), 8).shape == (2, 2, 2)
     deep = np.random.default_rng(1).uniform(0.0, (2.0, 0.8, 1.0), (1000, 3))  # below a freeboard
     assert divide(grid, 2, deep).shape == (2, 1, 1) and divide(grid, 4, deep).shape == (4, 1, 1)
     crowded = np.array([[0.95, 0.4, 0.1]] * 90 + [[1.95, 0.4, 0.1]] * 10)

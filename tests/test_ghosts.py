@@ -21,8 +21,8 @@ from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.particles import listing
+from cfddem.particles.bricks import Bricks
 from cfddem.particles.feeding import Feed, ParticleOutlet
-from cfddem.particles.ghosts import Slabs
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
@@ -157,24 +157,33 @@ def test_bridges_do_not_depend_on_the_order_of_rows(film: bool, walls: bool) -> 
 # ---------------------------------------------------------------- ranks
 
 
-def divided(size: int, axis: int, length: float) -> Slabs:
+def divided(size: int, axis: int, length: float) -> Bricks:
     """Equal slabs."""
-    return Slabs(axis, [length * n / size for n in range(1, size)])
+    return Bricks.slabs(axis, [length * n / size for n in range(1, size)])
 
 
-@pytest.mark.parametrize("ranks", [2, 3])
+def bricks(shape: Sequence[int], position: np.ndarray) -> Bricks:
+    """Equal bricks between the lowest and the highest place."""
+    low, high = position.min(axis=0), position.max(axis=0)
+    x, y, z = ((low[d] + (high - low)[d] * np.arange(1, n) / n).tolist() for d, n in enumerate(shape))
+    return Bricks((x, y, z))
+
+
+@pytest.mark.parametrize("shape", [(2, 1, 1), (3, 1, 1), (2, 2, 1), (2, 2, 2)])
 @pytest.mark.parametrize(
     ("film", "walls", "liquid"),
     [slow(False, False, False), slow(True, False, False), (False, True, False), slow(True, True, False),
      slow(False, False, True), slow(True, True, True)],
 )  # fmt: skip
-def test_a_divided_box_has_the_bits_of_the_whole_one(film: bool, walls: bool, liquid: bool, ranks: int) -> None:
+def test_a_divided_box_has_the_bits_of_the_whole_one(
+    film: bool, walls: bool, liquid: bool, shape: tuple[int, int, int]
+) -> None:
     """Over several lists, with particles that change their rank and pairs across the planes and the periodic border."""
     spheres, given = settings(film, walls, liquid)
-    length = float(spheres.position[:, 0].max())
+    ranks = int(np.prod(shape))
 
     def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int, tuple[float, ...]]:
-        division = divided(ranks, 0, length)
+        division = bricks(shape, spheres.position)
         run = finished(spheres.copy(), given, 0, communicator=communicator, division=division)
         before, most = set(run.particles.id[: run.particles.owned].tolist()), 0
         for _ in range(3):
@@ -232,7 +241,7 @@ def test_particles_come_and_go_on_ranks_as_in_one_process() -> None:
 
     def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], list[float]]:
         first = make_particles([[1e-3, 2e-3, 5e-3], [4e-3, 2e-3, 5e-3]], 0.5e-3, GLASS.density)
-        division = Slabs(0, [2.5e-3]) if communicator.size == 2 else None
+        division = Bricks.slabs(0, [2.5e-3]) if communicator.size == 2 else None
         run = ParticleSolver(
             first, pair_table([GLASS]), walls=[Plane()], gravity=(0.0, 0.0, -9.81), skin=2e-4,
             communicator=communicator, division=division,
@@ -330,12 +339,14 @@ def test_what_ranks_cannot_share_is_refused() -> None:
     before = finished(spheres, given, 0)
 
     def program(communicator: Communicator) -> None:
-        with pytest.raises(InputError, match="planes"):
-            finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, []))
+        with pytest.raises(InputError, match="bricks"):
+            finished(spheres.copy(), given, 0, communicator=communicator, division=Bricks.slabs(0, []))
         with pytest.raises(InputError, match="division"):
             finished(spheres.copy(), given, 0, communicator=communicator)
         with pytest.raises(InputError, match="after"):
-            finished(spheres.copy(), given, 0, communicator=communicator, division=Slabs(0, [1e-3]), after=before)
+            finished(
+                spheres.copy(), given, 0, communicator=communicator, division=Bricks.slabs(0, [1e-3]), after=before
+            )
 
     on_ranks(2, program)
 

@@ -20,6 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cfddem.backend.brick_shapes import Shape
 from cfddem.backend.errors import CfddemError, failure_elsewhere
 from cfddem.backend.exact_sums import put_together, split, unit_of
 
@@ -32,6 +33,7 @@ class Communicator:
 
     rank  number of this process among all, from 0
     size  number of processes
+    shape  of them along x, y, z, where the user gives it
 
     >>> one = Communicator()
     >>> one.sum([1.0, 2.0]), one.largest([1.0, float("nan")]), one.any([False, True])
@@ -40,6 +42,7 @@ class Communicator:
 
     rank: int = 0
     size: int = 1
+    shape: Shape | None = None
 
     def sum(self, values: ArrayLike, axis: Axis = None) -> Any:
         """Sum over all elements, or over some axes, of the arrays of all ranks; NaN where an element is not finite.

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.backend.bricks import Shape, place_of, shapes
+from cfddem.backend.brick_shapes import Shape, place_of, shapes, with_ghosts
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
 from cfddem.fluid.grid import HIGH, Array, Grid
@@ -53,12 +52,12 @@ class Division:
         x, y, z = (len(starts) - 1 for starts in self.starts)
         return x, y, z
 
-    def planes(self, grid: Grid) -> tuple[list[float], ...]:
+    def planes(self, grid: Grid) -> tuple[list[float], list[float], list[float]]:
         """Positions of the borders between ranks along x, y, z [m]."""
-        return tuple(
-            [x0 + h * first for first in starts[1:-1]]
-            for x0, h, starts in zip(grid.origin, grid.spacing, self.starts)
+        x, y, z = (
+            [x0 + h * first for first in starts[1:-1]] for x0, h, starts in zip(grid.origin, grid.spacing, self.starts)
         )
+        return x, y, z
 
     def work(self, grid: Grid, position: Array) -> float:
         """Work of the busiest rank over the mean: its shares of particles and cells, and of the layer around them.
@@ -66,7 +65,7 @@ class Division:
         position  of some of the particles (N, 3) [m]
         """
         wide = [np.diff(starts).astype(float) for starts in self.starts]
-        cells = np.multiply.outer(np.multiply.outer(wide[0], wide[1]), wide[2])
+        cells = np.einsum("x,y,z->xyz", *wide)
         load = cells / cells.mean()  # local: all ranks
         if len(position):
             at = [
@@ -76,9 +75,7 @@ class Division:
             owner = np.ravel_multi_index(at, self.shape)
             found = np.bincount(owner, minlength=cells.size).reshape(self.shape)  # local: the same on all ranks
             load = 0.5 * (load + found * (cells.size / len(position)))
-        around = [1.0 + 2.0 * (len(width) > 1) / width for width in wide]
-        load *= np.multiply.outer(np.multiply.outer(around[0], around[1]), around[2])
-        return float(load.max())  # local: all ranks
+        return float((load * with_ghosts(wide, 1.0)).max())  # local: all ranks
 
 
 def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape | None = None) -> Division:
@@ -99,7 +96,8 @@ def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape |
         limit = f"at most {most[0]} x {most[1]} x {most[2]} for {x} x {y} x {z} cells"
         raise InputError("ranks", "x".join(map(str, shape or (ranks,))), limit, f"take {fewer} ranks or more cells")
     divisions = [_cut(grid, each, places) for each in options]
-    return min(divisions, key=lambda each: each.work(grid, places))  # local: known to every rank
+    # of shapes that take equally long the first: loops run along x, which is divided last but for z
+    return min(divisions, key=lambda each: round(each.work(grid, places), 2))  # local: known to every rank
 
 
 def _cut(grid: Grid, shape: Shape, position: Array) -> Division:
@@ -160,7 +158,9 @@ class Block(Grid):
 
     def __init__(self, whole: Grid, division: Division, communicator: Communicator) -> None:
         if math.prod(division.shape) != communicator.size:
-            raise InputError("ranks", communicator.size, f"{math.prod(division.shape)}, as in the division of the cells")
+            raise InputError(
+                "ranks", communicator.size, f"{math.prod(division.shape)}, as in the division of the cells"
+            )
         place = place_of(communicator.rank, division.shape)
         first = tuple(starts[n] for starts, n in zip(division.starts, place))
         cells: Any = tuple(starts[n + 1] - starts[n] for starts, n in zip(division.starts, place))

@@ -11,98 +11,26 @@ division of space.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.data.fields import Phase
+from cfddem.particles.bricks import Bricks
 from cfddem.particles.films_with_ghosts import FilmsWithGhosts
 from cfddem.particles.integrate import find_bridge_changes, finish_step, move, start_step, start_steps
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 from cfddem.particles.system import System
 
-BINS = 1000
-"""Places among which a plane between two ranks is chosen."""
-
-FAR = 1e300
-"""Where the space of the first and the last rank ends along an open axis: a number, since differences are taken [m]."""
-
 IMBALANCE = 1.1
-"""Largest number of particles of a rank over the mean; where it is exceeded the planes are moved."""
-
-
-@dataclass(frozen=True)
-class Slabs:
-    """Space divided by planes across one axis: rank n owns what lies between plane n - 1 and plane n.
-
-    axis    0, 1 or 2
-    planes  positions along the axis, in ascending order, one fewer than ranks [m]
-    """
-
-    axis: int
-    planes: Sequence[float]
-
-    @classmethod
-    def balanced(cls, axis: int, position: np.ndarray, ranks: int, communicator: Communicator = SERIAL) -> Slabs:
-        """Slabs that hold equally many particles, within a thousandth of the length that these take up.
-
-        axis          0, 1 or 2
-        position      of the particles (N, 3); those of this rank where several share them [m]
-        ranks         number of slabs
-        communicator  of these ranks
-        """
-        place = position[:, axis]
-        low, high = communicator.smallest(place), communicator.largest(place)
-        borders = np.linspace(low, high, BINS + 1)[1:-1]
-        counts = np.bincount(np.searchsorted(borders, place, side="right"), minlength=BINS)  # local: summed below
-        below = np.cumsum(communicator.sum(counts, axis=()))
-        wanted = below[-1] * np.arange(1, ranks) / ranks
-        return cls(axis, borders[np.minimum(np.searchsorted(below, wanted), BINS - 2)].tolist())
-
-    def owner(self, position: np.ndarray) -> np.ndarray:
-        """Rank that owns each position (N,)."""
-        return np.searchsorted(np.asarray(self.planes), position[:, self.axis], side="right")
-
-    def near(self, rank: int, reach: float, box: np.ndarray) -> list[int]:
-        """Other ranks whose space is closer than `reach` [m] to that of a rank.
-
-        box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
-        """
-        low, high = self._ranges(box)
-        ends, length = np.array([low[rank], high[rank]])[:, None], box[self.axis]
-        from_here = _gap(ends, low, high, length)
-        from_there = _gap(np.stack([low, high]), low[rank], high[rank], length)  # what the other rank finds from here
-        gaps = np.concatenate([from_here, from_there]).min(axis=0)  # local: borders
-        return [other for other in np.flatnonzero(gaps < reach).tolist() if other != rank]
-
-    def distance(self, position: np.ndarray, rank: int, box: np.ndarray) -> np.ndarray:
-        """Distance of each position from the space of a rank, over the borders of a periodic box too (N,) [m].
-
-        box  (3,) length of the periodic box, which begins at 0; infinite along open axes [m]
-        """
-        low, high = self._ranges(box)
-        return _gap(position[:, self.axis], low[rank], high[rank], box[self.axis])
-
-    def _ranges(self, box: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Lower and upper end of the space of every rank along the axis, within a periodic box [m]."""
-        low, high = np.array([-FAR, *self.planes]), np.array([*self.planes, FAR])
-        if np.isfinite(box[self.axis]):
-            low, high = np.maximum(low, 0.0), np.minimum(high, box[self.axis])
-        return low, high
-
-
-def _gap(place: Any, low: Any, high: Any, length: float) -> np.ndarray:
-    """Distance of places from ranges, over the borders of a periodic box of finite length, too; arrays [m]."""
-    images = (-length, 0.0, length) if np.isfinite(length) else (0.0,)
-    gaps = [np.maximum(low - place - shift, place + shift - high) for shift in images]
-    return np.maximum(np.minimum.reduce(gaps), 0.0)  # local: images
+"""Largest number of particles of a rank over the mean, or over what the last move has left; where it is exceeded the
+planes are moved."""
 
 
 class Whole:
@@ -140,9 +68,9 @@ class Divided(Whole):
     balance       move the planes when particles become unequally many
     """
 
-    def __init__(self, division: Slabs, communicator: Communicator, balance: bool = False) -> None:
-        if len(division.planes) + 1 != communicator.size:
-            raise InputError("planes", len(division.planes), f"{communicator.size - 1}, one fewer than ranks")
+    def __init__(self, division: Bricks, communicator: Communicator, balance: bool = False) -> None:
+        if math.prod(division.shape) != communicator.size:
+            raise InputError("bricks", math.prod(division.shape), f"{communicator.size}, one for each rank")
         self.division, self.communicator, self.balance = division, communicator, balance
         self._sent: dict[int, np.ndarray] = {}  # owned rows that a rank has as ghosts
         self._received: dict[int, slice] = {}  # rows of the ghosts from a rank
@@ -150,6 +78,7 @@ class Divided(Whole):
         self._order = np.zeros(0, np.int64)  # rows in the order of these ids
         self._arrived: list[dict[str, np.ndarray]] = []
         self._particles: Any = None
+        self._uneven = 1.0  # most particles of a rank over the mean, after the planes were moved
         self._near: list[int] | None = None  # ranks to which particles go between lists; all ranks if None
 
     def own(self, particles: Particles) -> Particles:
@@ -184,8 +113,7 @@ class Divided(Whole):
         self._sent, self._received = {}, {}
         self._near = self.division.near(self.communicator.rank, reach, box)
         parcels: dict[int, Any] = dict.fromkeys(self._near)
-        for other in self._near:
-            rows = np.flatnonzero(self.division.distance(particles.position, other, box) < reach)
+        for other, rows in zip(self._near, self.division.rows_near(self._near, particles.position, reach, box)):
             if len(rows):
                 self._sent[other], parcels[other] = rows, particles.copy(rows).arrays
         for other, ghosts in self.communicator.exchange_with(parcels).items():
@@ -232,9 +160,11 @@ class Divided(Whole):
     def _move_planes(self, particles: Particles) -> None:
         """Divide space anew if a rank has many more particles than the mean."""
         most, total = self.communicator.largest([particles.count]), self.communicator.sum([particles.count])
-        if most > IMBALANCE * total / self.communicator.size:
-            ranks = self.communicator.size
-            self.division = Slabs.balanced(self.division.axis, particles.position, ranks, self.communicator)
+        ranks = self.communicator.size
+        if most > IMBALANCE * self._uneven * total / ranks:
+            self.division = Bricks.balanced(self.division.shape, particles.position, self.communicator)
+            counts = np.bincount(self.division.owner(particles.position), minlength=ranks)  # local: summed below
+            self._uneven = max(max(self.communicator.sum(counts, axis=())) * ranks / total, 1.0)
 
     def _known(self, ids: np.ndarray) -> np.ndarray:
         """Row that each id had in the last list; -1 if it was not in it (k,) int32."""

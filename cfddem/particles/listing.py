@@ -11,7 +11,8 @@ import numpy as np
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
 from cfddem.data.fields import Field
-from cfddem.particles.ghosts import Divided, Slabs, Whole
+from cfddem.particles.bricks import Bricks
+from cfddem.particles.ghosts import Divided, Whole
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.neighbours import list_edges, locality_order, pair_reach, wrap
 from cfddem.particles.pair_graph import Edges
@@ -55,7 +56,7 @@ class NeighbourLists:
         box: np.ndarray,
         *,
         communicator: Communicator,
-        division: Slabs | None,
+        division: Bricks | None,
         balance: bool = False,
         skin: float | None,
         sort_every: int,

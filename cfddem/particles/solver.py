@@ -12,11 +12,12 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
 from cfddem.backend.stopwatch import Stopwatch
+from cfddem.particles.bricks import Bricks
 from cfddem.particles.collision_events import COLLISION, collision_row
 from cfddem.particles.collision_events import FIELDS as RECORD_FIELDS
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.energy_count import Energies
-from cfddem.particles.ghosts import Slabs, StepsWithGhosts
+from cfddem.particles.ghosts import StepsWithGhosts
 from cfddem.particles.guard import guard
 from cfddem.particles.integrate import integrate
 from cfddem.particles.interactions.bridge_view import Bridges
@@ -90,7 +91,7 @@ class ParticleSolver:
         check_steps: bool = True,
         after: ParticleSolver | None = None,
         communicator: Communicator = SERIAL,
-        division: Slabs | None = None,
+        division: Bricks | None = None,
         balance: bool = False,
     ) -> None:
         self.table, self.communicator = table, communicator

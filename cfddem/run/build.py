@@ -36,7 +36,7 @@ from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, 
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
-from cfddem.particles.ghosts import Slabs
+from cfddem.particles.bricks import Bricks
 from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
@@ -78,7 +78,7 @@ def parts_of(
         spheres.declare(SPECIES)
     cells, dry = None, case.fluid is None
     if communicator.size > 1 and not dry:
-        cells = divide(grid_of(case), communicator.size, spheres.position)
+        cells = divide(grid_of(case), communicator.size, spheres.position, communicator.shape)
     solver = ParticleSolver(
         spheres,
         table,
@@ -90,7 +90,7 @@ def parts_of(
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
         communicator=communicator,
-        division=division_of(case, spheres, communicator.size, cells),
+        division=division_of(case, spheres, communicator, cells),
         balance=dry,
     )
     if dry:
@@ -113,14 +113,15 @@ def require_parallel(case: Case, ranks: int) -> None:
         divide(grid_of(case), ranks)
 
 
-def division_of(case: Case, spheres: Particles, ranks: int, cells: Division | None) -> Slabs | None:
-    """Space divided among ranks: as the cells, else across the longer side with equally many particles each."""
-    if ranks == 1:
+def division_of(case: Case, spheres: Particles, communicator: Communicator, cells: Division | None) -> Bricks | None:
+    """Space divided among ranks: as the cells, else by the particles."""
+    if communicator.size == 1:
         return None
     if cells is not None:
-        return Slabs(cells.axis, cells.planes(grid_of(case)))
-    width, depth, _ = case.column.size
-    return Slabs.balanced(0 if width >= depth else 1, spheres.position, ranks)
+        return Bricks(cells.planes(grid_of(case)))
+    if communicator.shape is not None:
+        return Bricks.balanced(communicator.shape, spheres.position)
+    return Bricks.of_least_work(communicator.size, spheres.position, GHOSTS * case.bed.largest_diameter)
 
 
 def flow_of(
@@ -156,6 +157,9 @@ def flow_of(
     forces = forces_of(case, fluid, kernel, beside)
     return fluid, Coupling(spheres, fluid, kernel, forces)
 
+
+GHOSTS = 1.1
+"""About how far from a brick its ghosts lie, in diameters."""
 
 APART = 1.25
 """Particles whose diameters differ by less than this factor have the same kernel, that of the largest of them."""

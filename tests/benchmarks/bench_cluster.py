@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from test_ghosts import DRY, GLASS, WET
 
 from cfddem.backend.launch import communicator as started
-from cfddem.particles.ghosts import Slabs
+from cfddem.particles.bricks import Bricks
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
@@ -63,7 +63,7 @@ def main(a_rank: int, film: bool) -> None:
     spheres = make_particles(
         positions, 0.5 * DIAMETER, GLASS.density, velocity=draw.normal(0.0, 0.1, positions.shape), viscosity=1e-3
     )
-    division = Slabs(0, [n * box[0] for n in range(1, size)]) if size > 1 else None
+    division = Bricks.slabs(0, [n * box[0] for n in range(1, size)]) if size > 1 else None
     run = ParticleSolver(
         spheres, pair_table([GLASS]), box=(box[0] * size, box[1], box[2]), laws=WET if film else DRY,
         communicator=communicator, division=division, check_steps=False,

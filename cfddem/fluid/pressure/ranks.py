@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.backend.bricks import place_of
+from cfddem.backend.brick_shapes import place_of
 from cfddem.backend.communicator import Communicator
 from cfddem.fluid.block import Block, put_together
 from cfddem.fluid.grid import Array, Grid, layers

@@ -37,6 +37,22 @@ def place_of(rank: int, shape: Shape) -> tuple[int, int, int]:
     return x, y, z
 
 
+def with_ghosts(widths: Sequence[np.ndarray], reach: float) -> np.ndarray:
+    """Volume of each brick of an open box, with what lies within reach of it in other bricks, over its own volume.
+
+    widths  of the bricks along x, y, z
+    reach   in the unit of the widths
+    returns of the shape of the ranks
+    """
+    lines = []
+    for width in widths:
+        sides = np.full(len(width), 2.0)
+        sides[0] -= 1.0
+        sides[-1] -= 1.0
+        lines.append(1.0 + sides * reach / width)
+    return np.einsum("x,y,z->xyz", *lines)
+
+
 def parsed(text: str) -> Shape:
     """The shape that a text such as "2x2x1" names.
 
