@@ -20,7 +20,7 @@ from cfddem.case.schema import Case
 from cfddem.features.contact_heat import HeatExchangeOfContacts, contact_heat_imbalance
 from cfddem.features.contact_heat_keys import wall_names
 from cfddem.preflight.summary import preflight
-from cfddem.run.build import require_parallel
+from cfddem.run.division import require_parallel
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from scenarios.validation import heated_bed

@@ -16,14 +16,17 @@ from example_case import MIXTURE
 from golden.beds import BEADS, SEEDS
 from in_process_ranks import on_ranks
 
+from cfddem.backend.brick_shapes import place_of
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
 from cfddem.case.schema import Case
+from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.reach import Reach
-from cfddem.fluid.block import Block, Division
+from cfddem.fluid.block import Block, Division, divide, region_of
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.particles.bricks import Bricks
 from cfddem.run import history
 from cfddem.run.simulation import Simulation
 
@@ -50,8 +53,8 @@ BEDS = {
         **ALL_FORCES
     ),
     "crossing a periodic border": case_of(
-        BEADS, column__sides="periodic", column__ends="periodic", bed__inlet_velocity=0.0,
-        bed__initial_velocity=[0.5, 0.3, 1.0],
+        BEADS, column__cell=0.004, column__sides="periodic", column__ends="periodic", bed__inlet_velocity=0.0,
+        bed__initial_velocity=[1.0, 0.9, 1.0],
     ),
     "mixture, pieces of spheres": case_of(MIXTURE, column__cell=0.002, laws__mapping="divided"),
 }  # fmt: skip
@@ -104,18 +107,20 @@ def differing(found: dict[str, Array], expected: dict[str, Array]) -> list[str]:
     return [name for name in expected if not np.array_equal(found[name], expected[name], equal_nan=True)]
 
 
+@pytest.mark.parametrize("shape", [(1, 2, 1), (2, 2, 1), (1, 2, 2)])
 @pytest.mark.parametrize("name", BEDS)
-def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str) -> None:
-    """Particles, fluid and history of two ranks; volume and momentum are conserved across the border."""
-    steps = 5
+def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int, int, int]) -> None:
+    """Particles, fluid and history of slabs and bricks; volume and momentum are conserved across the borders."""
+    steps, ranks = 5, int(np.prod(shape))
 
     def program(communicator: Communicator) -> tuple[dict[str, Array], set[int]]:
+        communicator.shape = shape
         simulation = begun(BEDS[name], communicator)
         before = set(simulation.owned.id.tolist())
         return advanced(simulation, steps), before ^ set(simulation.owned.id.tolist())
 
     alone = advanced(begun(BEDS[name]), steps)
-    for found, moved in on_ranks(2, program):
+    for found, moved in on_ranks(ranks, program):
         assert not differing(found, alone)
         assert np.abs(found["imbalance"]).max() < 1e-10
         assert len(moved) > 20 or "periodic" not in name
@@ -222,6 +227,32 @@ def test_a_large_bed_under_mpi_has_the_bits_of_one_process(name: str) -> None:
         for _, imbalance, found in on_mpi(ranks, "test_coupling_ranks:bed_over_time", *given, timeout=3000.0):
             assert not differing(found, alone)
             assert imbalance.max() < 1e-10
+
+
+@pytest.mark.parametrize(("shape", "periodic"), [((2, 2, 1), (False, False, False)), ((2, 1, 2), (True, True, True))])
+def test_the_flux_of_solids_has_the_bits_of_one_process(
+    shape: tuple[int, int, int], periodic: tuple[bool, bool, bool]
+) -> None:
+    """Every face of all ranks, of particles that cross the borders."""
+    grid, draw = Grid((10, 9, 12), (0.01, 0.01, 0.01)), np.random.default_rng(4)
+    places, ways = draw.uniform(0.006, 0.084, (150, 3)), draw.uniform(-0.006, 0.006, (150, 3))
+    radius = draw.uniform(1e-3, 2e-3, 150)
+
+    def program(communicator: Communicator) -> list[Array]:
+        cells, mine = grid, np.ones(150, bool)
+        if communicator.size > 1:
+            cells = Block(grid, divide(grid, communicator.size, shape=shape), communicator)
+            mine = Bricks(cells.division.planes(grid)).owner(places) == communicator.rank
+        kernel = FilterKernel(cells, periodic, smoothing=0.012, communicator=communicator)
+        before, after = (kernel.map_particles(each[mine], radius[mine]) for each in (places, places + ways))
+        return kernel.solid_flux(before, after, 1e-3)
+
+    alone = program(SERIAL)
+    division = divide(grid, 4, shape=shape)
+    for rank, found in enumerate(on_ranks(4, program)):
+        for axis, flux in enumerate(found):
+            more = [int(axis == each) for each in range(3)]
+            assert np.array_equal(flux, alone[axis][region_of(division.starts, place_of(rank, shape), more)])
 
 
 def test_a_particle_beyond_the_ghosts_is_reported() -> None:

@@ -261,7 +261,7 @@ def test_a_grid_is_divided_into_the_bricks_with_least_work() -> None:
     crowded = np.array([[0.95, 0.4, 0.1]] * 90 + [[1.95, 0.4, 0.1]] * 10)
     assert divide(grid, 2, crowded, (2, 1, 1)).starts[0][1] in (9, 10)
     assert divide(grid, 2, crowded, (2, 1, 1)).planes(grid)[0][0] <= 1.0
-    with pytest.raises(InputError, match="at most 6 x 2 x 13.*take 156 ranks"):
+    with pytest.raises(InputError, match=r"at most 6 x 2 x 13.*take 156 ranks"):
         divide(grid, 157)
     with pytest.raises(InputError, match="ranks = 7x1x1"):
         divide(grid, 7, shape=(7, 1, 1))

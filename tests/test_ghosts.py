@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -334,21 +335,79 @@ def test_a_failure_on_one_rank_stops_all() -> None:
 
 
 def test_what_ranks_cannot_share_is_refused() -> None:
-    """An earlier run, space that is not divided, and a number of planes that does not fit."""
+    """Space that is not divided, a number of bricks that does not fit, and an earlier run over other particles."""
     spheres, given = settings(False, False)
-    before = finished(spheres, given, 0)
 
     def program(communicator: Communicator) -> None:
         with pytest.raises(InputError, match="bricks"):
             finished(spheres.copy(), given, 0, communicator=communicator, division=Bricks.slabs(0, []))
         with pytest.raises(InputError, match="division"):
             finished(spheres.copy(), given, 0, communicator=communicator)
-        with pytest.raises(InputError, match="after"):
-            finished(
-                spheres.copy(), given, 0, communicator=communicator, division=Bricks.slabs(0, [1e-3]), after=before
-            )
+        shared: dict[str, Any] = {"communicator": communicator, "division": Bricks.slabs(0, [1e-3])}
+        before = finished(spheres.copy(), given, 0, **shared)
+        with pytest.raises(InputError, match="ids differ"):
+            finished(spheres.copy(slice(10, None)), given, 0, after=before, **shared)
 
     on_ranks(2, program)
+
+
+@pytest.mark.parametrize(
+    ("film", "walls", "liquid"), [(False, True, False), slow(True, False, False), slow(True, True, True)]
+)
+def test_a_run_after_another_takes_over_its_pairs_on_ranks(film: bool, walls: bool, liquid: bool) -> None:
+    """From four bricks to three slabs; the bits of two runs in one process. Without the memory they would differ."""
+    spheres, given = settings(film, walls, liquid)
+
+    def program(communicator: Communicator, remember: bool = True) -> dict[str, np.ndarray]:
+        shared: list[dict[str, Any]] = [{}, {}]
+        if communicator.size > 1:
+            shared = [
+                {"communicator": communicator, "division": bricks(shape, spheres.position)}
+                for shape in ((2, 1, 2), (1, 4, 1))
+            ]
+        run = finished(spheres.copy(), given, 150, **shared[0])
+        owned = run.particles.without_ghosts().lasting()
+        order = np.argsort(communicator.joined(owned["id"]))
+        between = spheres.copy()
+        for field in run.laws.particle_fields():
+            between.declare(field)
+        between.restore({name: communicator.joined(each)[order] for name, each in owned.items()})
+        return state(finished(between, given, 100, after=run if remember else None, **shared[1]))
+
+    alone = joined([program(SERIAL)])
+    assert_same_bits(joined(on_ranks(4, program)), alone)
+    assert not np.array_equal(joined([program(SERIAL, remember=False)])["velocity"], alone["velocity"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", [(3, 1, 1), (2, 2, 1), (2, 2, 2)])
+def test_liquid_on_walls_is_shared(shape: tuple[int, int, int]) -> None:
+    """Particles, bridges and patches of one process; bridges of several ranks draw from one patch."""
+    spheres, given = settings(False, True, True)
+    laws = given["laws"]._replace(
+        bridge=replace(BRIDGES, wall_share=0.5, wall_film=1e-5, wall_patch=4.0 * DIAMETER, contact_angle=0.3)
+    )
+    floor = replace(given["walls"][1], velocity=(0.1, 0.0, 0.3))
+    given |= {"laws": laws, "walls": [given["walls"][0], floor]}
+
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], np.ndarray, list[float]]:
+        shared: dict[str, Any] = {}
+        if communicator.size > 1:
+            shared = {"communicator": communicator, "division": bricks(shape, spheres.position)}
+        run = finished(spheres.copy(), given, 0, **shared)
+        for _ in range(3):
+            run.advance(STEP, 100)
+        count, bridges = int(run.walls.patch_count[0]), run.bridges
+        assert bridges is not None
+        patches = np.stack([run.walls.patch_key[:count].astype(float), run.walls.patch_liquid[:count]])
+        return state(run), patches, [bridges.formed, bridges.broken, bridges.liquid, bridges.gained_by_walls]
+
+    alone, patches, liquid = program(SERIAL)
+    assert patches.shape[1] > 5 and liquid[1] > 10
+    found = on_ranks(int(np.prod(shape)), program)
+    for _, others, counted in found:
+        assert np.array_equal(others, patches) and counted == liquid
+    assert_same_bits(joined([each for each, *_ in found]), joined([alone]))
 
 
 def test_a_measure_of_one_process_is_refused_on_ranks() -> None:

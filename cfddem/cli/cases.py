@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from cfddem.backend.brick_shapes import parsed
 from cfddem.backend.errors import InputError
 from cfddem.backend.json_text import as_json
 from cfddem.backend.tables import table
@@ -28,6 +30,7 @@ THREADS = "number of threads; default: all processors, one for small cases"
 RANKS = "number of processes that share the run; default: as started by mpiexec, else 1"
 CONTINUE = "resume the run if the folder holds one"
 FROM = "run folder whose end is the beginning of this run"
+DIVISION = "ranks along x, y and z, such as 2x2x1; default: the shape with the least work of the busiest rank"
 REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
@@ -41,6 +44,7 @@ class Processors:
 
     threads: Annotated[int | None, Parameter(help=THREADS)] = None
     ranks: Annotated[int | None, Parameter(help=RANKS)] = None
+    division: Annotated[str | None, Parameter(help=DIVISION)] = None
 
 
 WHOLE_MACHINE = Processors()
@@ -83,6 +87,7 @@ def check(
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
     strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
     ranks: Annotated[int | None, Parameter(help="number of processes that are to share the run")] = None,
+    division: Annotated[str | None, Parameter(help=DIVISION)] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
     """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run or written.
@@ -95,7 +100,9 @@ def check(
     from cfddem.case.schema import Case
     from cfddem.run.check import check as checked
 
-    result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks)
+    shape = None if division is None else parsed(division)
+    ranks = math.prod(shape) if shape and ranks is None else ranks
+    result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks, shape)
     if json:
         print_json("check", result.summary())
     else:
@@ -175,7 +182,7 @@ def run(
         read_about(origin)
         path, folder = origin / "case.toml", output or Path(f"{origin.absolute().name}-run")
         described = Case.from_toml(path, overrides(set or []))
-    communicator = on_ranks(processors.ranks, processors.threads, folder)
+    communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
             _warn_of_another_case(described, folder)
@@ -221,9 +228,9 @@ def _refuse_or_warn(described: Case, communicator: Communicator) -> None:
     from cfddem.preflight.summary import refuse_errors
 
     if communicator.size > 1:
-        from cfddem.run.build import require_parallel
+        from cfddem.run.division import require_parallel
 
-        require_parallel(described, communicator.size)
+        require_parallel(described, communicator.size, communicator.shape)
     result = refuse_errors(described)
     if communicator.rank == 0:
         print_warnings(result)
@@ -275,7 +282,7 @@ def resume(
     if set:
         remedy = f"a changed case is a new run: cfddem run {folder}/case.toml --set {set[0]} -o NEW"
         raise InputError("--set", set[0], "left out: resume goes on with the case of the run and takes --until", remedy)
-    communicator = on_ranks(processors.ranks, processors.threads, folder)
+    communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
     if laws is not None:
         import_laws(laws)
     if until is None and (before := open_run(folder)).status == "finished":

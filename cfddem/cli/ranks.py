@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import signal
@@ -13,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO, NoReturn
 
+from cfddem.backend.brick_shapes import parsed
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, failure_elsewhere
 from cfddem.backend.launch import TERMINAL, communicator, launch_command, launched, python_command, require_mpi4py
@@ -33,17 +35,23 @@ PROCESSES = "CFDDEM_PROCESSES"
 """Names a folder in which every rank leaves its number, in a file named by its process."""
 
 
-def on_ranks(ranks: int | None, threads: int | None, folder: Path) -> Communicator:
+def on_ranks(ranks: int | None, threads: int | None, folder: Path, division: str | None = None) -> Communicator:
     """The communicator of a command; starts the command again on several ranks if they are asked for.
 
     ranks    as given to the command; None leaves the number to the launcher
     threads  as given to the command, for each rank; one if there are several ranks and it is None
     folder   of the run, which the message names if a rank is killed
+    division  ranks along x, y and z, as given to the command
     errors   InputError if ranks cannot be started, or a launcher has started another number
     """
     started = launched()
     if ranks is not None and ranks < 1:
         raise InputError("--ranks", ranks, "at least 1")
+    shape = None if division is None else parsed(division)
+    if shape is not None and math.prod(shape) != (ranks or max(started, math.prod(shape))):
+        raise InputError("--division", division, f"of {ranks or started} ranks in all")
+    if shape is not None and ranks is None:
+        ranks = math.prod(shape)
     if started == 1 and ranks is not None and ranks > 1:
         _start(ranks, threads, folder)
     if ranks is not None and ranks != started:
@@ -53,6 +61,8 @@ def on_ranks(ranks: int | None, threads: int | None, folder: Path) -> Communicat
 
         use_threads(threads or 1)
     found = communicator()
+    if started > 1:
+        found.shape = shape
     if PROCESSES in os.environ:
         (Path(os.environ[PROCESSES]) / str(os.getpid())).write_text(str(found.rank), encoding="utf-8")
     return found

@@ -341,26 +341,20 @@ class FilterKernel:
         returns   along x, y, z: (nz, ny, nx+1), (nz, ny+1, nx), (nz+1, ny, nx) [m/s]
         errors    InputError for solid cells, or a particle that moves by a cell or more
         """
-        grid = self.grid
-        if grid.whole is not grid:
-            raise InputError("solid_flux", None, "computed in a run of one process")
+        grid, size = self.grid, np.array(self.grid.whole.size)
         moved = new.position - old.position
-        moved -= self.periodic * np.array(grid.size) * np.rint(moved / np.array(grid.size))
+        moved -= self.periodic * size * np.rint(moved / size)
         farthest = self.communicator.largest(np.abs(moved * self._axes.inverse), default=0.0)
         if farthest >= 1.0:
             raise InputError(
                 "distance moved by the fastest particle", farthest, "below one cell", "take a smaller fluid step"
             )
-        if grid.solid is not None:
+        if grid.whole.solid is not None:
             raise InputError("solid_flux", None, "computed on a grid without solid cells")
         if self.unequal:
             raise InputError("solid_flux", None, "computed for particles with one width of the kernel")
-        flux = [np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(grid.shape))) for axis in range(3)]
         volume = new.volume
-        loops.carry_all(
-            old.position, moved, new.radius, volume, self._offsets, self._linear, self._axes.origin,
-            self._axes.inverse, self.periodic, *flux,
-        )  # fmt: skip
+        flux = self._carried(old, moved, volume)
         change = self.halo.padded(self.deposit(new, volume[:, None]) - self.deposit(old, volume[:, None]))
         other, passed = np.empty_like(change), np.zeros_like(change)
         for _ in range(self.sweeps):
@@ -373,6 +367,30 @@ class FilterKernel:
             flux[axis] /= grid.face_area(axis) * step
         return flux
 
+    def _carried(self, old: ParticleCellMap, moved: Array, volume: Array) -> list[Array]:
+        """Volume that the particles of all ranks carry through the faces of this grid, without the second stage [m3].
+
+        moved, volume  displacement (N, 3) [m] and volume (N,) [m3] of the particles
+        """
+        whole, first, cells = self.grid.whole, self.grid.first, self.grid.cells
+        most = old.number * self.communicator.largest(volume, default=0.0)
+        unit, found = unit_of(most, 62), list[Array]()
+        carried = [
+            np.zeros(tuple(n + (2 - axis == d) for d, n in enumerate(whole.shape)), np.int64) for axis in range(3)
+        ]
+        loops.carry_all(
+            old.position, moved, old.radius, volume, unit, self._offsets, self._linear, self._axes.origin,
+            self._axes.inverse, self.periodic, *carried,
+        )  # fmt: skip
+        for axis, own in enumerate(carried):
+            total = np.asarray(self.communicator.sum(own, axis=()))
+            ends = np.moveaxis(total, 2 - axis, 0)
+            if self.periodic[axis]:
+                ends[-1] = ends[0]
+            here = [slice(low, low + n + (axis == d)) for d, (low, n) in enumerate(zip(first, cells))]
+            found.append(total[*here[::-1]] / unit)
+        return found
+
     def _add_diffused(self, flux: Array, passed: Array, axis: int) -> None:
         """Add the flux of the second stage through the faces normal to an axis: strength times difference.
 
@@ -380,9 +398,9 @@ class FilterKernel:
         """
         at = 2 - axis
         through = self.strength[axis] * self._gates[axis] * (np.roll(passed, 1, axis=at) - passed)
-        out = np.moveaxis(flux, at, 0)
-        out[:-1] += np.moveaxis(self.halo.inner(through), at, 0)
-        out[-1] = out[0] if self.periodic[axis] else out[-1]
+        here = [slice(1, n + 1) for n in self.grid.shape]
+        here[at] = slice(1, self.grid.shape[at] + 2)  # the last face is closed, or in a layer of ghosts
+        flux += through[*here]
 
 
 def _pieces(count: int) -> Array:

@@ -306,8 +306,10 @@ def _window(coordinate, linear, first, cells, periodic, weights):
 
 
 @serial
-def carry_all(position, moved, radius, volume, offsets, linear, origin, inverse, periodic, flux_x, flux_y, flux_z):
-    """Volume [m3] that every particle carries through every face along a straight path.
+def carry_all(
+    position, moved, radius, volume, unit, offsets, linear, origin, inverse, periodic, flux_x, flux_y, flux_z
+):
+    """Volume, in whole numbers of 1/unit [m3], that every particle carries through every face along a straight path.
 
     Esirkepov's split: along each axis the change of the one-dimensional weights, times the mean of the weights of the
     two other axes at both ends. The three fluxes together give exactly the change of the product.
@@ -328,13 +330,15 @@ def carry_all(position, moved, radius, volume, offsets, linear, origin, inverse,
             _window(z, linear, k, nz, periodic[2], old_z)
             _window(z + moved[n, 2] * inverse[2], linear, k, nz, periodic[2], new_z)
             part = volume[n] / len(offsets)
-            _carry(part, i, j, k, nx, ny, nz, old_x, new_x, old_y, new_y, old_z, new_z, 0, flux_x)
-            _carry(part, j, i, k, ny, nx, nz, old_y, new_y, old_x, new_x, old_z, new_z, 1, flux_y)
-            _carry(part, k, i, j, nz, nx, ny, old_z, new_z, old_x, new_x, old_y, new_y, 2, flux_z)
+            _carry(unit, part, i, j, k, nx, ny, nz, old_x, new_x, old_y, new_y, old_z, new_z, 0, flux_x)
+            _carry(unit, part, j, i, k, ny, nx, nz, old_y, new_y, old_x, new_x, old_z, new_z, 1, flux_y)
+            _carry(unit, part, k, i, j, nz, nx, ny, old_z, new_z, old_x, new_x, old_y, new_y, 2, flux_z)
 
 
 @serial
-def _carry(part, first, first_b, first_c, cells, cells_b, cells_c, old, new, old_b, new_b, old_c, new_c, axis, flux):
+def _carry(
+    unit, part, first, first_b, first_c, cells, cells_b, cells_c, old, new, old_b, new_b, old_c, new_c, axis, flux
+):
     """Add the volume that one piece carries through the faces normal to one axis."""
     for c in range(6):
         for b in range(6):
@@ -349,8 +353,8 @@ def _carry(part, first, first_b, first_c, cells, cells_b, cells_c, old, new, old
                     continue
                 face, other, third = (first + a + 1) % cells, (first_b + b) % cells_b, (first_c + c) % cells_c
                 if axis == 0:
-                    flux[third, other, face] += passed
+                    flux[third, other, face] += np.int64(np.rint(passed * unit))
                 elif axis == 1:
-                    flux[third, face, other] += passed
+                    flux[third, face, other] += np.int64(np.rint(passed * unit))
                 else:
-                    flux[face, third, other] += passed
+                    flux[face, third, other] += np.int64(np.rint(passed * unit))

@@ -34,7 +34,7 @@ class WallFilms:
         there = walls.patch_liquid[:count]
         lost = np.minimum(there, rate * step * self.area)
         there -= lost
-        gone += float(lost.sum())  # local: liquid on walls is for one process
+        gone += float(lost.sum())  # local: every rank has all patches
         self._known = count
         self._thin(max(self.film - rate * step, 0.0))
         self.heat += gone * self.density * latent_heat(self.temperature)

@@ -1,7 +1,7 @@
 """Division of a grid among ranks, and the cells that a rank owns.
 
-Cells are divided by planes across x, y and z. The owner of a face is the owner of the cell above it; the last rank along
-an axis owns the high side of the box too. A rank computes on its own cells and on ghosts, which neighbours fill
+Cells are divided by planes across x, y and z. The owner of a face is the owner of the cell above it; the last rank
+along an axis owns the high side of the box too. A rank computes on its own cells and on ghosts, which neighbours fill
 (:class:`cfddem.fluid.halo.Borders`).
 """
 

@@ -24,6 +24,8 @@ from cfddem.data.fields import Phase
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.films_with_ghosts import FilmsWithGhosts
 from cfddem.particles.integrate import find_bridge_changes, finish_step, move, start_step, start_steps
+from cfddem.particles.interactions.bridge_changes import share_wall_liquid
+from cfddem.particles.interactions.wall_liquid import wall_requests
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 from cfddem.particles.system import System
@@ -207,7 +209,9 @@ class StepsWithGhosts:
         )
         self.films = FilmsWithGhosts(choices, threads, ghosts, communicator) if choices["JOINT"] else None
         self.bridges, self.recording = choices["BRIDGE"], choices["RECORD"]
-        self.inertia = choices["BRIDGE_INERTIA"]
+        self.inertia, self.wet_walls = choices["BRIDGE_INERTIA"], choices["WALL_LIQUID"] and choices["WALLS"]
+        if self.wet_walls:
+            self.requests, self.share = (specialise(each, choices) for each in (wall_requests, share_wall_liquid))
         self.ghosts, self.communicator = ghosts, communicator
 
     def __call__(
@@ -240,4 +244,16 @@ class StepsWithGhosts:
             return -1
         changes: int = self.find_bridge_changes(system)
         self.ghosts.refresh("liquid")
+        if self.wet_walls and self.communicator.any(changes):
+            return self._share_wall_liquid(system)
         return changes
+
+    def _share_wall_liquid(self, system: System) -> int:
+        """Let bridges form and break, those of all ranks at walls; returns that no changes are left."""
+        requesting, names, amounts = self.requests(system)
+        counts = self.communicator.joined(np.array([len(requesting)]))
+        rank, edges = self.communicator.rank, np.full(counts.sum(), -1)  # local: all ranks
+        edges[counts[:rank].sum() :][: len(requesting)] = requesting  # local: ranks before
+        joined = self.communicator.joined
+        self.share(system, edges, joined(names), joined(amounts))
+        return 0

@@ -16,7 +16,7 @@ from cfddem.particles.ghosts import Divided, Whole
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.neighbours import list_edges, locality_order, pair_reach, wrap
 from cfddem.particles.pair_graph import Edges
-from cfddem.particles.state import Particles
+from cfddem.particles.state import Particles, rows_of
 from cfddem.particles.walls.nearest_point import Walls
 
 THREADING_PAYS = 1000
@@ -81,14 +81,22 @@ class NeighbourLists:
         self._mean_radius = float(f"{self.communicator.mean(radius):.6g}")
         self.many = self.communicator.sum(len(radius)) >= THREADING_PAYS
 
-    def first(
-        self, particles: Particles, walls: Walls, reach_ratio: float, old_row: np.ndarray, old: Edges | None
-    ) -> Edges:
-        """The first list of a run; arguments as of `renewed`."""
+    def first(self, particles: Particles, walls: Walls, reach_ratio: float, earlier: Any, laws: Laws) -> Edges:
+        """The first list of a run.
+
+        earlier  run whose pair memory is taken over, or None
+        laws     of this run
+        others   as of `renewed`
+        """
         self.count(particles)
         if self._is_tuned:
             self.skin = FIRST_SKIN[self.many] * self._mean_radius
-        return self.renewed(particles, walls, reach_ratio, old_row, old, steps=0)
+        if earlier is not None:
+            refuse_other(particles, earlier, laws, self.communicator)
+        edges = self.renewed(particles, walls, reach_ratio, np.full(particles.count, -1, np.int32), None, steps=0)
+        if earlier is not None:
+            remember_earlier(edges, particles, earlier, self.communicator)
+        return edges
 
     def renewed(
         self,
@@ -147,23 +155,28 @@ class NeighbourLists:
         self.listed_at = int(state["listed_at"])
 
 
-def rows_before(particles: Particles, earlier: Any, laws: Laws) -> tuple[np.ndarray, Edges | None]:
-    """Row of each particle in an earlier run (N,), and the list of that run; -1 and None without one.
+def refuse_other(particles: Particles, earlier: Any, laws: Laws, communicator: Communicator) -> None:
+    """Refuse an earlier run over other particles, without films where this run has them, or with other bridges.
 
-    laws  of this run: the earlier one must have films if this has, and the same liquid bridges
+    particles  of this rank, as those of the earlier run are
+    laws       of this run
     """
-    if earlier is None:
-        return np.full(particles.count, -1, np.int32), None
-    then, now = np.argsort(earlier.particles.id), np.argsort(particles.id)
-    if earlier.particles.id[then].tolist() != particles.id[now].tolist():
+    then, now = earlier.particles.id[: earlier.particles.owned], particles.id[: particles.owned]
+    if not np.array_equal(np.sort(communicator.joined(then)), np.sort(communicator.joined(now))):
         raise InputError("after", None, "a run over the same particles", "ids differ")
     if "resistance" not in earlier.edges and laws.film:
         raise InputError("after", None, "a run with films, as this one")
     if laws.bridge not in (None, earlier.laws.bridge):
         raise InputError("after", None, "a run with the same liquid bridges", "what bridges remember depends on them")
-    old_row = np.empty(len(now), np.int32)
-    old_row[now] = then
-    return old_row, earlier.edges
+
+
+def remember_earlier(edges: Edges, particles: Particles, earlier: Any, communicator: Communicator) -> None:
+    """Let the pairs of this rank take over what they remember from an earlier run, where other ranks may own them."""
+    mine = np.flatnonzero(earlier.edges.first < earlier.particles.owned)
+    bodies = communicator.joined(earlier.edges.ends(earlier.particles.id, mine))
+    kept = {name: communicator.joined(array[mine]) for name, array in earlier.edges.lasting().items()}
+    rows = rows_of(bodies.reshape(-1), particles.id, np.argsort(particles.id)).reshape(-1, 2)
+    edges.recall(kept | {"bodies": bodies}, rows)
 
 
 def tuned(skin: float, age: int, radius: float, room: float) -> float:

@@ -135,7 +135,8 @@ class Edges(Table):
         found = self.between(rows, pairs["bodies"])
         known = np.flatnonzero(found >= 0)
         for name, array in self.lasting().items():
-            array[found[known]] = pairs[name][known]
+            if name in pairs:  # an earlier run may remember less
+                array[found[known]] = pairs[name][known]
 
     def between(self, rows: np.ndarray, bodies: np.ndarray) -> np.ndarray:
         """Edges of pairs; -1 where there is none (n,).

@@ -23,7 +23,7 @@ from cfddem.particles.integrate import integrate
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.interactions.pair_loops import loop_choices
-from cfddem.particles.listing import NeighbourLists, rows_before
+from cfddem.particles.listing import NeighbourLists
 from cfddem.particles.named_state import named_state, restored_list
 from cfddem.particles.pair_graph import Edges, gaps, shifts
 from cfddem.particles.particle_feature import ParticleFeature
@@ -98,9 +98,6 @@ class ParticleSolver:
         self.walls = wall_arrays(walls)
         self.laws = laws or Laws()
         self.laws.check()
-        for name, each in (("after", after), ("wall_share", self.laws.bridges.wall_share or None)):
-            if communicator.size > 1 and each is not None:
-                raise InputError(name, None, "absent in a run of several processes")
         recorded = (*RECORD_FIELDS, *self.laws.bridges.collision_memory) if record else ()
         self.pair_fields = [*self.laws.fields(), *recorded]
         kept_apart = self.laws.kept_apart | {field.name for field in recorded}
@@ -132,9 +129,7 @@ class ParticleSolver:
             particles.declare(field)
         self.particles = self.lists.own(particles)
         self._reach = self._find_reach()  # of the list, over R* [-]
-        self._take_list(
-            self.lists.first(self.particles, self.walls, self._reach, *rows_before(self.particles, after, self.laws))
-        )
+        self._take_list(self.lists.first(self.particles, self.walls, self._reach, after, self.laws))
         self._outside = 0
         self.refresh()
         self.features += [Energies(self)] if energies else []

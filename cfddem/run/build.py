@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
-from cfddem.backend.errors import InputError
 from cfddem.case.bed import Jet
 from cfddem.case.column_grid import grid_of, open_floor
 from cfddem.case.liquid import Bond
@@ -31,12 +30,11 @@ from cfddem.coupling.sampled_flow import change_along
 from cfddem.coupling.self_disturbance import SelfDisturbance
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.moving_walls import case_walls
-from cfddem.fluid.block import Block, Division, divide
+from cfddem.fluid.block import Block, Division
 from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs, rectangle
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
-from cfddem.particles.bricks import Bricks
 from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
@@ -44,6 +42,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
+from cfddem.run.division import cells_of, space_of
 from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
 from closures.added_mass import zuber
 from closures.registry import Law, law_of
@@ -76,9 +75,7 @@ def parts_of(
         spheres = communicator.by_first(lambda: particles_of(case, table, walls, laws))
     if case.bed.species:
         spheres.declare(SPECIES)
-    cells, dry = None, case.fluid is None
-    if communicator.size > 1 and not dry:
-        cells = divide(grid_of(case), communicator.size, spheres.position, communicator.shape)
+    dry, cells = case.fluid is None, cells_of(case, spheres.position, communicator)
     solver = ParticleSolver(
         spheres,
         table,
@@ -90,7 +87,7 @@ def parts_of(
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
         communicator=communicator,
-        division=division_of(case, spheres, communicator, cells),
+        division=space_of(case, spheres.position, communicator, cells),
         balance=dry,
     )
     if dry:
@@ -99,29 +96,6 @@ def parts_of(
     if coupling.sets_inertia:
         solver.refresh()  # the forces of films depend on the inertia
     return Parts(solver, coupling)
-
-
-def require_parallel(case: Case, ranks: int) -> None:
-    """Refuse what several ranks cannot share, by its key, before anything is prepared."""
-    if ranks > 1 and case.liquid is not None and case.liquid.wall_share > 0.0:
-        limit = "0 in a run of several processes"
-        raise InputError("liquid.wall_share", case.liquid.wall_share, limit, "liquid on walls is for one process")
-    for table in case.feature_tables:
-        if ranks > 1 and table.one_process:
-            raise InputError(table.table, None, "left out in a run of several processes", "take one process")
-    if ranks > 1 and case.fluid is not None:
-        divide(grid_of(case), ranks)
-
-
-def division_of(case: Case, spheres: Particles, communicator: Communicator, cells: Division | None) -> Bricks | None:
-    """Space divided among ranks: as the cells, else by the particles."""
-    if communicator.size == 1:
-        return None
-    if cells is not None:
-        return Bricks(cells.planes(grid_of(case)))
-    if communicator.shape is not None:
-        return Bricks.balanced(communicator.shape, spheres.position)
-    return Bricks.of_least_work(communicator.size, spheres.position, GHOSTS * case.bed.largest_diameter)
 
 
 def flow_of(
@@ -157,9 +131,6 @@ def flow_of(
     forces = forces_of(case, fluid, kernel, beside)
     return fluid, Coupling(spheres, fluid, kernel, forces)
 
-
-GHOSTS = 1.1
-"""About how far from a brick its ghosts lie, in diameters."""
 
 APART = 1.25
 """Particles whose diameters differ by less than this factor have the same kernel, that of the largest of them."""

@@ -4,40 +4,47 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from cfddem.backend.brick_shapes import Shape
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.preflight.checks import check_quantities
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.overview import Row
 from cfddem.preflight.summary import Preflight, preflight
-from cfddem.run.build import require_parallel
+from cfddem.run.division import expected_division, require_parallel
 from cfddem.run.history import units_of
 
 
-def check(case: Case, ranks: int | None = None) -> Preflight:
+def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> Preflight:
     """Check a case before it runs. Nothing is run or written.
 
     ranks    number of processes that are to share the run
+    shape    of them along x, y, z; that with the least work if None
     returns  `status` ("ok", "warning" or "error"), `issues` (severity, key, reason, remedy) and `rows` (name, value,
              unit, note); `print` shows all as `cfddem check` does
     """
     result = preflight(case)
     if case.compare:
         result = result.with_errors(check_quantities(case, units_of(case)))
-    return result if ranks is None or not result.rows else _with_ranks(result, case, ranks)
+    return result if ranks is None or not result.rows else _with_ranks(result, case, ranks, shape)
 
 
-def _with_ranks(result: Preflight, case: Case, ranks: int) -> Preflight:
+def _with_ranks(result: Preflight, case: Case, ranks: int, shape: Shape | None) -> Preflight:
     """The result of a check, and whether several processes can share the case."""
     if ranks < 1:
         raise InputError("ranks", ranks, "at least 1")
     try:
-        require_parallel(case, ranks)
+        require_parallel(case, ranks, shape)
     except InputError as failure:
         return result.with_errors(
             [Issue("error", failure.field, f"{failure.value} must be {failure.limit}", failure.remedy)]
         )
     count = case.particle_count
     share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
-    row = Row("several processes", "ranks", ranks, "", f"can share the case{share}")
-    return replace(result, rows=(*result.rows, row))
+    (x, y, z), work = expected_division(case, ranks, shape)
+    chosen = "least of all shapes" if shape is None else "shape as given"
+    rows = (
+        Row("several processes", "ranks", ranks, "", f"can share the case{share}"),
+        Row("several processes", "busiest rank", work, "", f"work over the mean, as {x} x {y} x {z} bricks; {chosen}"),
+    )
+    return replace(result, rows=(*result.rows, *rows))

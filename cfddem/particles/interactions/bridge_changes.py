@@ -36,9 +36,10 @@ from cfddem.particles.interactions.slots import (
     returned_share,
 )
 from cfddem.particles.interactions.wall_liquid import (
+    settle_wall_liquid,
     share_left_by_wall,
     thickest_wall,
-    transfer_wall_liquid,
+    wall_requests,
     wall_thickness,
 )
 from cfddem.particles.pair_graph import edge_role, geometry
@@ -112,7 +113,22 @@ def exchange_liquid(system):
 def return_liquid(system):
     """Give the liquid of marked bridges to their bodies and back, and forget the broken ones."""
     if WALLS and WALL_LIQUID:
-        transfer_wall_liquid(system)
+        requesting, names, amounts = wall_requests(system)
+        settle_wall_liquid(system, requesting, names, amounts)
+    _give_liquid(system)
+
+
+@serial
+def share_wall_liquid(system, requesting, names, amounts):
+    """As `exchange_liquid`, with the requests of all ranks; see `settle_wall_liquid`."""
+    fill_bridges(system)
+    settle_wall_liquid(system, requesting, names, amounts)
+    _give_liquid(system)
+
+
+@serial
+def _give_liquid(system):
+    """Let particles have what broken bridges return, and new ones draw, and forget the broken ones."""
     transfer_liquid(system)
     if BOND:
         form_bonds(system)

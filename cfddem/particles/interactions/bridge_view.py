@@ -203,7 +203,9 @@ class Bridges(ParticleFeature):
 
     def with_room(self, walls: Walls, edges: Edges) -> Walls:
         """The walls with room for the patches of liquid that may be made until the next list."""
-        return with_room(walls, len(edges.first) - edges.between_particles) if self._laws.wall_share > 0.0 else walls
+        if self._laws.wall_share == 0.0:
+            return walls
+        return with_room(walls, int(self._solver.communicator.sum([len(edges.first) - edges.between_particles])))
 
     def _sum(self, name: str, rows: Any = slice(None)) -> int:
         """Sum of a count over the owned particles, or some of them."""

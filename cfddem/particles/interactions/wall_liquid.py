@@ -48,7 +48,7 @@ def gained_by_walls(walls: Walls, film: float, size: float) -> float:
     size  edge of a patch [m]
     """
     count = int(walls.patch_count[0])
-    return float(walls.patch_liquid[:count].sum()) - count * film * size**2  # local: liquid on walls is for one process
+    return float(walls.patch_liquid[:count].sum()) - count * film * size**2  # local: every rank has all patches
 
 
 @inline
@@ -104,9 +104,8 @@ def thickest_wall(walls, p):
 
 
 @inline
-def _touched_patch(k, edges, walls, n):
-    """Row of the patch of edge k, made if there is none; -1 without room for another."""
-    key = _key(k, edges, walls, n.wall_patch)
+def _touched_patch(key, walls, n):
+    """Row of a patch, made if there is none; -1 without room for another."""
     row, count = _place(walls, key), walls.patch_count[0]
     if row == count or walls.patch_key[row] != key:
         if count == len(walls.patch_key):
@@ -119,25 +118,54 @@ def _touched_patch(k, edges, walls, n):
 
 
 @serial
-def transfer_wall_liquid(system):
-    """Draw liquid for new bridges at walls, and return that of broken ones, in the order of the ids of particles."""
+def wall_requests(system):
+    """What bridges that form and break ask of patches: edges (n,), ids and patches (n, 2), amounts (n, 2).
+
+    An amount is the area over which a new bridge draws [m2], and the volume that a broken one returns [m3].
+    """
     particles, edges, memory, walls, p = system.particles, system.edges, system.memory, system.walls, system.parameters
     n, begin, number = p.bridge, edges.between_particles, len(edges.first)
-    area = n.wall_patch * n.wall_patch
     changed = begin + np.flatnonzero(memory.bridge_change[begin:number])
-    order = np.argsort(particles.id[edges.first[changed]], kind="mergesort")
-    for place in order:
+    names, amounts = np.empty((len(changed), 2), np.int64), np.zeros((len(changed), 2))
+    for place in range(len(changed)):
         k = changed[place]
-        row, radius = _touched_patch(k, edges, walls, n), particles.radius[edges.first[k]]
-        if row < 0 or n.wall_patch < SMALLEST_PATCH * radius:
-            raise InputError("wall_patch", None, "about a particle diameter", "the patches are too small or too many")
-        there = walls.patch_liquid[row]
+        i = edges.first[k]
+        radius = particles.radius[i]
+        if n.wall_patch < SMALLEST_PATCH * radius:
+            raise InputError("wall_patch", None, "about a particle diameter", "the patches are too small")
+        names[place, 0], names[place, 1] = particles.id[i], _key(k, edges, walls, n.wall_patch)
         if memory.bridge_change[k] > 0:
-            drawn = min(n.wall_share * math.pi * radius * radius * there / area, there)
-            memory.bridge_volume[k] += drawn
-            find_closed(k, radius, memory, p)  # of the whole volume; the reduced radius is the particle's
-            walls.patch_liquid[row] = there - drawn
+            amounts[place, 0] = n.wall_share * math.pi * radius * radius
         else:
             volume = memory.bridge_volume[k]
-            walls.patch_liquid[row] = there + (volume - share_left_by_wall(radius, p) * volume)
+            amounts[place, 1] = volume - share_left_by_wall(radius, p) * volume
+    return changed, names, amounts
+
+
+@serial
+def settle_wall_liquid(system, requesting, names, amounts):
+    """Draw liquid for new bridges at walls, and return that of broken ones, in the order of the ids of particles.
+
+    Where ranks share the particles, each has all patches and settles the requests of all ranks.
+
+    requesting  (n,) edges of the requests; -1 for those of other ranks
+    others      see `wall_requests`
+    """
+    particles, edges, memory, walls, p = system.particles, system.edges, system.memory, system.walls, system.parameters
+    n = p.bridge
+    area = n.wall_patch * n.wall_patch
+    for place in np.argsort(names[:, 0], kind="mergesort"):
+        row = _touched_patch(names[place, 1], walls, n)
+        if row < 0:
+            raise InputError("wall_patch", None, "about a particle diameter", "the patches are too many")
+        k, there = requesting[place], walls.patch_liquid[row]
+        if amounts[place, 0] > 0.0:
+            drawn = min(amounts[place, 0] * there / area, there)
+            if k >= 0:
+                memory.bridge_volume[k] += drawn
+                # of the whole volume; the reduced radius is the particle's
+                find_closed(k, particles.radius[edges.first[k]], memory, p)
+            walls.patch_liquid[row] = there - drawn
+        else:
+            walls.patch_liquid[row] = there + amounts[place, 1]
         walls.patch_thickest[0] = max(walls.patch_thickest[0], walls.patch_liquid[row] / area)
