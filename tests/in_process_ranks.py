@@ -71,6 +71,7 @@ class Rank(Communicator):
 
     def __init__(self, rank: int, board: Board) -> None:
         self.rank, self.size, self.board = rank, board.size, board
+        self.partners: set[int] = set()  # ranks with which it has exchanged arrays or parcels
 
     def broadcast(self, value: Value, root: int = 0) -> Value:
         return self.board.gather(self.rank, value)[root]  # type: ignore[no-any-return]
@@ -81,11 +82,13 @@ class Rank(Communicator):
         return [pickle.loads(parcels[self.rank]) for parcels in given]
 
     def exchange_with(self, parcels: Mapping[int, Value]) -> dict[int, Value]:
+        self.partners |= set(parcels)
         for rank, parcel in parcels.items():
             self.board.send(self.rank, rank, parcel)
         return {rank: self.board.receive(rank, self.rank) for rank in parcels}
 
     def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
+        self.partners |= set(outgoing) | set(incoming)
         for rank, values in outgoing.items():
             self.board.send(self.rank, rank, values)
         for rank, into in incoming.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from cfddem.backend.errors import RunFailed
 from cfddem.case.schema import Case
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.reach import Reach
+from cfddem.features.heat import HeatExchange
 from cfddem.fluid.block import Block, Division, divide, region_of
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.pressure import ranks as shared
@@ -76,6 +78,10 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
     names = ("position", "velocity", "spin", "applied", "drag_impulse")
     order = np.argsort(simulation.whole("id"))
     particles = {name: simulation.whole(name)[order] for name in names}
+    particles["temperature"] = np.zeros(0)
+    if heat := [each for each in simulation.features if isinstance(each, HeatExchange)]:
+        cells = list(heat[0].cells_for_snapshot().values())
+        particles["temperature"] = np.append(simulation.whole("temperature")[order], cells)
     row = history.row(simulation)
     measured = ("bed_height", "pressure_drop", "bed_voidage_from_pressure", "out_of_range_count")
     solids = simulation.communicator.sum(1.0 - simulation.fluid.voidage) * simulation.fluid.grid.cell_volume
@@ -144,11 +150,18 @@ MANY = {
         BEADS, **TALL, laws__agitation="pseudo_turbulence", laws__history="basset", run__energy_budget=True
     ),
     "sharp surfaces": case_of(BEADS, **TALL, laws__surface="sharp"),
-    "gas, beside walls": case_of(
+    "hot gas, beside walls": case_of(
         SEEDS, column__height=0.072, column__cell=0.0024, bed__count=1500, laws__wall_drag="nearest",
         laws__self_disturbance_correction=True,
+        heat={
+            "particle_temperature": 400.0, "fluid_temperature": 300.0, "conductivity": 0.026,
+            "fluid_heat_capacity": 1000.0, "heat_capacity": {"seed": 100.0},
+        },
     ),
 }  # fmt: skip
+
+MANY_SHAPES = ((1, 2, 1), (1, 1, 3), (2, 2, 1), (2, 1, 3), (2, 2, 2), (1, 2, 4), (1, 1, 8))
+"""2, 3, 4, 6 and 8 ranks, eight of them in three ways."""
 
 
 @pytest.mark.slow
@@ -156,15 +169,18 @@ MANY = {
 def test_any_number_of_ranks_has_the_bits_of_one(name: str) -> None:
     """500 fluid steps at the default tolerance of the pressure, in one process and on 2, 3, 4, 6 and 8 ranks."""
 
-    def program(communicator: Communicator) -> dict[str, Array]:
+    def program(communicator: Communicator, shape: tuple[int, int, int] | None = None) -> dict[str, Array]:
+        if shape is not None:
+            communicator.shape = shape
         return advanced(Simulation(MANY[name], communicator=communicator), 500)
 
     alone = program(SERIAL)
     assert np.abs(alone["drag_impulse"]).max() > 0.0
+    assert "hot" not in name or np.ptp(alone["temperature"]) > 10.0
     counted = alone.pop("energy")  # by each rank in turn
-    for ranks in (2, 3, 4, 6, 8):
-        for found in on_ranks(ranks, program):
-            assert not differing(found, alone), ranks
+    for shape in MANY_SHAPES:
+        for found in on_ranks(int(np.prod(shape)), partial(program, shape=shape)):
+            assert not differing(found, alone), shape
             assert found["energy"] == pytest.approx(counted, rel=1e-12)
 
 

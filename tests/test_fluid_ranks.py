@@ -12,7 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from in_process_ranks import on_ranks
+from in_process_ranks import Rank, on_ranks
 from test_fluid_pressure import CASES, equation
 
 from cfddem.backend.communicator import SERIAL, Communicator
@@ -201,7 +201,10 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
     }
 
 
-@pytest.mark.parametrize("shape", [(3, 1, 1), (1, 2, 1), (1, 1, 3), (2, 2, 1), (3, 1, 2), (2, 2, 2)])
+CUBE = pytest.param((3, 3, 3), marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("shape", [(3, 1, 1), (1, 2, 1), (1, 1, 3), (2, 2, 1), (3, 1, 2), (2, 2, 2), CUBE])
 @pytest.mark.parametrize("name", FLOWS)
 def test_a_divided_fluid_is_the_whole_one(name: str, shape: tuple[int, ...]) -> None:
     """Fields, forces, budgets and values at points after two steps, bit for bit."""
@@ -210,6 +213,7 @@ def test_a_divided_fluid_is_the_whole_one(name: str, shape: tuple[int, ...]) -> 
     def program(communicator: Communicator) -> dict[str, Array]:
         part = fluid_of(name, communicator, division)
         advanced(part)
+        assert isinstance(communicator, Rank) and len(communicator.partners) <= 6
         return everything(part, division)
 
     alone = fluid_of(name)

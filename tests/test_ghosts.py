@@ -15,8 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import in_process_ranks
 from example_case import TEXT as EXAMPLE
-from in_process_ranks import Board, Rank, on_ranks
+from in_process_ranks import Rank, on_ranks
 
+from cfddem.backend.brick_shapes import place_of
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.materials import Material
@@ -432,50 +433,43 @@ def test_a_measure_of_one_process_is_refused_on_ranks() -> None:
 # ---------------------------------------------------------------- many ranks
 
 
-class Counted(Rank):
-    """A rank that counts to whom it gives parcels, and how often all ranks write to all."""
+def many(shape: tuple[int, int, int]) -> Any:
+    """A shape of a test that takes long."""
+    return pytest.param(shape, marks=pytest.mark.slow)
 
-    def __init__(self, rank: int, board: Board) -> None:
-        super().__init__(rank, board)
-        self.partners: set[int] = set()
-        self.to_all, self.between = 0, False
+
+class Counted(Rank):
+    """A rank that counts how often all ranks write to all."""
+
+    to_all = 0
 
     def exchange(self, parcels: Any) -> Any:
-        self.to_all += not self.between
+        self.to_all += 1
         return super().exchange(parcels)
 
-    def exchange_with(self, parcels: Any) -> Any:
-        self.partners |= set(parcels)
-        self.between = True
-        given = super().exchange_with(parcels)
-        self.between = False
-        return given
 
-    def swap(self, outgoing: Any, incoming: Any) -> None:
-        self.partners |= set(outgoing) | set(incoming)
-        self.between = True
-        super().swap(outgoing, incoming)
-        self.between = False
-
-
-@pytest.mark.parametrize("ranks", [27, slow(64)])
-def test_many_ranks_write_to_their_neighbours_only(ranks: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bits of one process over several lists in a long box of walls; all write to all at the first list alone."""
+@pytest.mark.parametrize("shape", [(3, 3, 3), *map(many, [(27, 1, 1), (64, 1, 1), (4, 4, 4)])])
+def test_many_ranks_write_to_their_neighbours_only(
+    shape: tuple[int, int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bits of one process over several lists in a box of walls; all write to all at the first list alone."""
     monkeypatch.setattr(in_process_ranks, "Rank", Counted)
-    box = np.array([4.0 * ranks * DIAMETER, 4.0 * DIAMETER, 4.0 * DIAMETER])
-    places = (np.indices((3 * ranks, 3, 3)).reshape(3, -1).T + 0.5) * (box / (3 * ranks, 3, 3))
+    box, ranks = 4.0 * DIAMETER * np.array(shape), int(np.prod(shape))
+    places = (np.indices(3 * np.array(shape)).reshape(3, -1).T + 0.5) * (4.0 / 3.0 * DIAMETER)
     velocity = np.random.default_rng(5).normal(0.0, 1.0, places.shape)
     spheres = make_particles(places, 0.5 * DIAMETER, GLASS.density, velocity=velocity)
     walls: list[Wall] = [Box(low=(0.0, 0.0, -DIAMETER), high=tuple(box)), floor_of_triangles(box)]
     given: dict[str, Any] = {"laws": DRY, "gravity": (0.0, 0.0, -9.81), "walls": walls}
 
-    def program(communicator: Any) -> tuple[dict[str, np.ndarray], int, int, int]:
-        division = divided(ranks, 0, box[0])
-        run = finished(spheres.copy(), given, 400, communicator=communicator, division=division)
-        most = max(abs(other - communicator.rank) for other in communicator.partners)
-        return state(run), run.lists.made, communicator.to_all, most
+    def program(communicator: Any) -> tuple[dict[str, np.ndarray], int, int, int, int]:
+        x, y, z = ((box[d] * np.arange(1, n) / n).tolist() for d, n in enumerate(shape))
+        run = finished(spheres.copy(), given, 400, communicator=communicator, division=Bricks((x, y, z)))
+        here, partners = np.array(place_of(communicator.rank, shape)), communicator.partners
+        farthest = max(int(np.abs(np.subtract(place_of(other, shape), here)).max()) for other in partners)
+        return state(run), run.lists.made, communicator.to_all, farthest, len(partners)
 
     results, alone = on_ranks(ranks, program), finished(spheres.copy(), given, 400)
     assert alone.lists.made > 3
-    assert [result[1:] for result in results] == [(alone.lists.made, 1, 1)] * ranks
+    assert [result[1:4] for result in results] == [(alone.lists.made, 1, 1)] * ranks
+    assert max(result[4] for result in results) == np.prod(np.minimum(shape, 3)) - 1
     assert_same_bits(joined([each for each, *_ in results]), joined([state(alone)]))

@@ -100,8 +100,8 @@ def check(
     from cfddem.case.schema import Case
     from cfddem.run.check import check as checked
 
-    shape = None if division is None else parsed(division)
-    ranks = math.prod(shape) if shape and ranks is None else ranks
+    shape = parsed(division) if division else None
+    ranks = math.prod(shape) if shape and not ranks else ranks
     result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks, shape)
     if json:
         print_json("check", result.summary())

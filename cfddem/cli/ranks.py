@@ -47,10 +47,10 @@ def on_ranks(ranks: int | None, threads: int | None, folder: Path, division: str
     started = launched()
     if ranks is not None and ranks < 1:
         raise InputError("--ranks", ranks, "at least 1")
-    shape = None if division is None else parsed(division)
-    if shape is not None and math.prod(shape) != (ranks or max(started, math.prod(shape))):
-        raise InputError("--division", division, f"of {ranks or started} ranks in all")
-    if shape is not None and ranks is None:
+    shape = parsed(division) if division else None
+    if shape:
+        if ranks and ranks != math.prod(shape):
+            raise InputError("--division", division, f"of {ranks} ranks in all, as --ranks says")
         ranks = math.prod(shape)
     if started == 1 and ranks is not None and ranks > 1:
         _start(ranks, threads, folder)

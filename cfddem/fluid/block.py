@@ -87,7 +87,7 @@ def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape |
     """
     places = np.zeros((0, 3)) if position is None else position[:: max(len(position) // ENOUGH, 1)]
     most = [max(count // THINNEST, 1) for count in grid.cells]
-    if shape is not None and math.prod(shape) != ranks:
+    if shape and math.prod(shape) != ranks:
         raise InputError("--division", "x".join(map(str, shape)), f"{ranks} ranks in all, one for each process")
     options = [each for each in [shape] if each] or shapes(ranks, most)
     if not options or any(n > limit for n, limit in zip(options[0], most)):

@@ -68,10 +68,10 @@ class Bricks:
         """
         if not len(position):
             return 1.0
-        counts = np.bincount(self.owner(position), minlength=math.prod(self.shape)).reshape(self.shape)
+        counts = np.bincount(self.owner(position), minlength=math.prod(self.shape))  # local: all particles
         ends = [[*position.min(axis=0)], [*position.max(axis=0)]]  # local: all particles
         widths = [np.diff([low, *planes, high]) for low, planes, high in zip(ends[0], self.planes, ends[1])]
-        busy = counts * with_ghosts([np.maximum(each, 1e-3 * reach) for each in widths], reach)
+        busy = counts.reshape(self.shape) * with_ghosts([np.maximum(each, 1e-3 * reach) for each in widths], reach)
         return float(busy.max() * busy.size / len(position))  # local: all ranks
 
     @property

@@ -162,7 +162,7 @@ def refuse_other(particles: Particles, earlier: Any, laws: Laws, communicator: C
     laws       of this run
     """
     then, now = earlier.particles.id[: earlier.particles.owned], particles.id[: particles.owned]
-    if not np.array_equal(np.sort(communicator.joined(then)), np.sort(communicator.joined(now))):
+    if sorted(communicator.joined(then).tolist()) != sorted(communicator.joined(now).tolist()):
         raise InputError("after", None, "a run over the same particles", "ids differ")
     if "resistance" not in earlier.edges and laws.film:
         raise InputError("after", None, "a run with films, as this one")

@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from cfddem.backend.brick_shapes import Shape, shapes
+
 RANDOM_PACKING = 0.6
 """Solid fraction of a bed, for its length in diameters."""
 
@@ -42,6 +46,7 @@ class Scaling:
     owned       particles of a rank
     ghosts      of a rank
     memory      of a rank, without cells [byte]
+    shape       ranks along x, y, z
     """
 
     step: float
@@ -50,40 +55,53 @@ class Scaling:
     owned: float
     ghosts: float
     memory: float
+    shape: Shape
 
 
 def weak_scaling(
-    particles: float, ranks: int, machine: Machine | None = None, *, aspect: float = 1.0, reach: float = 1.1
-) -> Scaling:
-    """Time of a particle step on many ranks that divide a bed into slabs.
+    particles: float, ranks: int, machine: Machine | None = None, *, aspect: float = 1.0, reach: float = 1.1,
+    shape: Shape | None = None,
+) -> Scaling:  # fmt: skip
+    """Time of a particle step on many ranks that divide a bed into bricks.
 
-    A rank has two neighbours. Its ghosts lie within the reach of a pair of its two borders. A pair across a border is
+    A rank has ghosts within the reach of a pair around its brick, and up to 26 neighbours k. A pair across a border is
     computed on both sides:
 
-    .. math:: t = c (n + g / 2) + m (2 l + g b / w) + r \\log_2 p
+    .. math:: t = c (n + g / 2) + m (k l + g b / w) + r \\log_2 p
 
     particles  number of particles of the bed
     ranks      number of ranks p
     machine    c, l, w, r, b and m; see `Machine`
-    aspect     length of the bed across the slabs, over the side of a square section
+    aspect     length of the bed along x over the side of a square section
     reach      of the list of pairs, in diameters: 1 and the skin, and the reach of films
+    shape      ranks along x, y, z; that with the fewest ghosts if None
     returns    see `Scaling`
 
     >>> one, many = weak_scaling(1e6, 1), weak_scaling(64e6, 64)
-    >>> one.efficiency, round(many.efficiency, 2), round(many.ghosts / many.owned, 2)
-    (1.0, 0.79, 0.37)
-    >>> round(weak_scaling(64e6, 64, aspect=8.0).efficiency, 2)
-    0.94
+    >>> one.efficiency, round(many.efficiency, 2), round(many.ghosts / many.owned, 2), many.shape
+    (1.0, 0.95, 0.07, (4, 4, 4))
+    >>> round(weak_scaling(64e6, 64, shape=(64, 1, 1)).efficiency, 2)
+    0.79
     """
     given, owned = machine or Machine(), particles / ranks
     volume = particles * math.pi / (6.0 * RANDOM_PACKING)  # in cubes of the diameter
-    length = (volume * aspect**2) ** (1.0 / 3.0)
-    ghosts = min(2.0 * reach * particles / length, particles - owned) if ranks > 1 else 0.0
+    side = (volume / aspect) ** (1.0 / 3.0)
+    edges = np.array([aspect * side, side, side])
+
+    def ghosts_of(each: Shape) -> float:
+        """Ghosts of the rank that has most."""
+        sides = np.minimum(np.array(each) - 1, 2)
+        around = float(np.prod(1.0 + sides * reach * np.array(each) / edges))
+        return min((around - 1.0) * owned, particles - owned)
+
+    best = shape or min(shapes(ranks, (ranks, ranks, ranks)), key=ghosts_of)
+    ghosts = ghosts_of(best)
     work = given.particle_step * (owned + 0.5 * ghosts)
     exchange = 0.0
     if ranks > 1:
-        halo = given.messages * 2.0 * given.latency + ghosts * given.message / given.bandwidth
+        beside = math.prod(min(n, 3) for n in best) - 1
+        halo = given.messages * beside * given.latency + ghosts * given.message / given.bandwidth
         exchange = halo + given.reduction * math.log2(ranks)
     step = work + exchange
     memory = BYTES_PER_PARTICLE * (owned + ghosts)
-    return Scaling(step, exchange / step, given.particle_step * owned / step, owned, ghosts, memory)
+    return Scaling(step, exchange / step, given.particle_step * owned / step, owned, ghosts, memory, best)

@@ -42,9 +42,9 @@ def _with_ranks(result: Preflight, case: Case, ranks: int, shape: Shape | None) 
     count = case.particle_count
     share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
     (x, y, z), work = expected_division(case, ranks, shape)
-    chosen = "least of all shapes" if shape is None else "shape as given"
+    chosen = "as given" if shape else "the least of all shapes"
     rows = (
         Row("several processes", "ranks", ranks, "", f"can share the case{share}"),
-        Row("several processes", "busiest rank", work, "", f"work over the mean, as {x} x {y} x {z} bricks; {chosen}"),
+        Row("several processes", "most / mean work", work, "", f"{x} x {y} x {z} bricks, {chosen}"),
     )
     return replace(result, rows=(*result.rows, *rows))

@@ -30,7 +30,7 @@ def require_parallel(case: Case, ranks: int, shape: Shape | None = None) -> None
     for table in case.feature_tables:
         if ranks > 1 and table.one_process:
             raise InputError(table.table, None, "left out in a run of several processes", "take one process")
-    if ranks > 1 and case.fluid is not None:
+    if ranks > 1 and case.fluid:
         divide(grid_of(case), ranks, shape=shape)
 
 
@@ -39,7 +39,7 @@ def cells_of(case: Case, position: np.ndarray, communicator: Communicator) -> Di
 
     position  of all particles at the start (N, 3) [m]
     """
-    if communicator.size == 1 or case.fluid is None:
+    if communicator.size == 1 or not case.fluid:
         return None
     return divide(grid_of(case), communicator.size, _expected(case, position), communicator.shape)
 
@@ -63,10 +63,10 @@ def expected_division(case: Case, ranks: int, shape: Shape | None = None) -> tup
     shape  as given by the user; that with the least work if None
     """
     places = _expected(case, np.array(case.bed.positions, float) if case.bed.start == "placed" else _sample(case))
-    if case.fluid is not None:
+    if case.fluid:
         cells = divide(grid_of(case), ranks, places, shape)
         return cells.shape, cells.work(grid_of(case), places)
-    bricks = _dry(case, places, ranks) if shape is None else Bricks.balanced(shape, places)
+    bricks = Bricks.balanced(shape, places) if shape else _dry(case, places, ranks)
     return bricks.shape, bricks.work(places, GHOSTS * case.bed.largest_diameter)
 
 

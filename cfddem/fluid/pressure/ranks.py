@@ -73,7 +73,7 @@ class SharedLevel(Level):
         super().__init__((shape[0], shape[1], shape[2]), factors, outlets)
         merged = factors == 2
         self.shift[:] = merged * self.ghosts * (self.first % 2 == 0)
-        straddled = [merged[axis] and (each[1:-1] % 2).any() for axis, each in enumerate(starts)]
+        straddled = [merged[axis] and 1 in each[1:-1] % 2 for axis, each in enumerate(starts)]
         self.straddled = [each for each in borders if straddled[each.axis]]  # a coarse cell has cells of two ranks
         self.next_starts = [-(-each // factor) for each, factor in zip(starts, factors)]
         self._own = self._inside(self.first, self.stop)
