@@ -17,7 +17,7 @@ from example_case import MIXTURE
 from golden.beds import BEADS, SEEDS
 from in_process_ranks import on_ranks
 
-from cfddem.backend.brick_shapes import place_of
+from cfddem.backend.brick_shapes import Shape, place_of
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
 from cfddem.case.schema import Case
@@ -94,9 +94,11 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
 
 
 def bed_over_time(
-    communicator: Communicator, text: str, changes: dict[str, Any], until: float
+    communicator: Communicator, text: str, changes: dict[str, Any], until: float, shape: Shape | None = None
 ) -> tuple[Array, Array, dict[str, Array]]:
     """Mean pressure drop and bed height over the second half, largest imbalances, and the state at the end."""
+    if shape:
+        communicator.shape = shape
     simulation, measured, imbalances = begun(case_of(text, **changes), communicator), [], []
     while simulation.time < until * (1.0 - 1e-9):
         simulation.step(until)
@@ -215,11 +217,12 @@ def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(ranks: int) 
 
 
 @needs_mpi
-def test_two_ranks_under_mpi_are_one_process() -> None:
+@pytest.mark.parametrize("shape", [(1, 2, 1), pytest.param((2, 2, 2), marks=pytest.mark.slow)])
+def test_ranks_under_mpi_are_one_process(shape: tuple[int, int, int]) -> None:
     """A small liquid bed."""
     given = BEADS, {"column__cell": 0.004, "bed__initial_velocity": [0.3, 0.2, 0.1]}, 0.01
     _, _, alone = bed_over_time(SERIAL, *given)
-    for _, imbalance, found in on_mpi(2, "test_coupling_ranks:bed_over_time", *given):
+    for _, imbalance, found in on_mpi(int(np.prod(shape)), "test_coupling_ranks:bed_over_time", *given, shape):
         assert not differing(found, alone)
         assert imbalance.max() < 1e-10
 

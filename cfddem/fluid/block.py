@@ -94,7 +94,9 @@ def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape |
         x, y, z = grid.cells
         fewer = next(n for n in range(ranks, 0, -1) if shapes(n, most))
         limit = f"at most {most[0]} x {most[1]} x {most[2]} for {x} x {y} x {z} cells"
-        raise InputError("ranks", "x".join(map(str, shape or (ranks,))), limit, f"take {fewer} ranks or more cells")
+        if shape:
+            raise InputError("--division", "x".join(map(str, shape)), limit, "take fewer ranks along that axis")
+        raise InputError("ranks", ranks, limit, f"take {fewer} ranks or more cells")
     divisions = [_cut(grid, each, places) for each in options]
     # of shapes that take equally long the first: loops run along x, which is divided last but for z
     return min(divisions, key=lambda each: round(each.work(grid, places), 2))  # local: known to every rank
