@@ -267,7 +267,7 @@ def test_a_grid_is_divided_into_the_bricks_with_least_work() -> None:
     assert divide(grid, 2, crowded, (2, 1, 1)).planes(grid)[0][0] <= 1.0
     with pytest.raises(InputError, match=r"at most 6 x 2 x 13.*take 156 ranks"):
         divide(grid, 157)
-    with pytest.raises(InputError, match="division = '7x1x1'.*along that axis"):
+    with pytest.raises(InputError, match=r"division = '7x1x1'.*along that axis"):
         divide(grid, 7, shape=(7, 1, 1))
     with pytest.raises(InputError, match="4 ranks in all"):
         divide(grid, 4, shape=(2, 1, 1))
