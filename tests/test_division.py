@@ -68,19 +68,21 @@ def test_the_shape_follows_the_particles() -> None:
 
 
 @pytest.mark.slow
-def test_planes_follow_the_particles_and_bits_stay() -> None:
-    """All particles begin on one rank of three; another has none."""
+@pytest.mark.parametrize(
+    "division", [Bricks.slabs(0, [1e-4, 1.0]), Bricks(([1e-4], [1.0], ()))], ids=["slabs", "bricks"]
+)
+def test_planes_follow_the_particles_and_bits_stay(division: Bricks) -> None:
+    """All particles begin on one rank of three or four; the others have none."""
     spheres, given = settings(True, True)
 
     def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int]:
-        division = Bricks.slabs(0, [1e-4, 1.0])
         run = finished(spheres.copy(), given, 0, communicator=communicator, division=division, balance=True)
         run.advance(STEP, 200)
         return state(run), run.particles.owned
 
     whole = finished(spheres.copy(), given, 0)
     whole.advance(STEP, 200)
-    results = on_ranks(3, program)
+    results = on_ranks(int(np.prod(division.shape)), program)
     counts = np.array([owned for _, owned in results])
     assert counts.sum() == spheres.count and counts.max() < 1.2 * counts.mean()
     assert_same_bits(joined([each for each, _ in results]), joined([state(whole)]))
