@@ -28,9 +28,7 @@ def columns(case: Case) -> dict[str, Quantity]:
         if not wall.moves:
             continue
         name, words = f"wall_{number}", f"of the particles on wall {number}"
-        found |= {
-            f"{name}_force_{axis}": Quantity("N", f"force {words} along {axis}", "measure") for axis in AXES
-        }
+        found |= {f"{name}_force_{axis}": Quantity("N", f"force {words} along {axis}", "measure") for axis in AXES}
         if any(wall.spin):
             found[f"{name}_torque"] = Quantity("N m", f"torque {words} about its spin axis", "measure")
         meaning = f"power that the motion of wall {number} gives to the particles"
