@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -13,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from command_line import call
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from made_up_run import made_up
 
@@ -32,6 +33,9 @@ SHAPES = st.lists(st.integers(0, 5), max_size=4).map(tuple)
 KINDS = st.sampled_from(["f4", "f8", "i8", "u1", "?", "c8", "S5"])
 
 Spoil = Callable[[Path], None]
+
+DRAWN: Counter[str] = Counter()
+"""How often each command has run."""
 
 
 def at_a_place(values: Any, places: list[int], new: Any) -> Any:
@@ -133,6 +137,7 @@ def answers(command: str, spoils: list[Spoil], sound: Path, home: Path) -> None:
     for spoil in spoils:
         with suppress(OSError, KeyError, ValueError, RuntimeError, IndexError, ZeroDivisionError):  # already spoilt
             spoil(home / "run")
+    DRAWN[command] += 1
     done = call(*command.split())
     assert done.code in (0, 2, 3), done
     assert "Traceback" not in done.err, done
@@ -145,7 +150,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@settings(max_examples=500, deadline=None, database=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=500, deadline=None, database=None, phases=[Phase.generate], suppress_health_check=[*HealthCheck])
 @given(command=st.sampled_from(COMMANDS), spoils=SPOILS)
 def test_no_drawn_run_folder_ends_in_a_traceback(
     command: str, spoils: list[Spoil], sound: Path, monkeypatch: pytest.MonkeyPatch

@@ -65,13 +65,13 @@ def defluidisation_of(run: RunData, case: Case) -> Defluidisation | None:
         return None
     inlet, jet, bed, time = case.bed.inlet_velocity, case.bed.jet, estimate_bed(case), history["time"]
     speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
-    if jet is not None:
+    if jet:
         speed = speed + share_of_jet(case, jet) * (jet.velocity - speed)
     joined = history["largest_agglomerate"] > 1.0  # before a spray begins, no liquid holds the particles
     largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
     return defluidisation(
         time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
-        np.where(joined, speed - bed.onset, 0.0), spouts=jet is not None,
+        np.where(joined, speed - bed.onset, 0.0), spouts=bool(jet),
     )  # fmt: skip
 
 

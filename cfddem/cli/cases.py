@@ -61,7 +61,7 @@ class Changes:
         from cfddem.case.schema import Case
         from cfddem.cli.laws_file import import_laws
 
-        if self.laws is not None:
+        if self.laws:
             import_laws(self.laws)
         return Case.from_toml(path, overrides(self.set or []))
 

@@ -172,7 +172,6 @@ def share_of_jet(case: Case, jet: Jet) -> float:
         """Number of places (2, m) that the jet covers."""
         return int(np.count_nonzero(jet.covers(places[0] - 0.5 * width, places[1] - 0.5 * depth)))
 
+    is_open, area = (vessel.floor_places, vessel.floor) if vessel else (floor_places(column), column.floor_area)
     every = covered(floor_places(column, of_the_box=True))
-    is_open = covered(floor_places(column) if vessel is None else vessel.floor_places)
-    opening *= is_open / every if every else 1.0
-    return min(1.0, opening / (column.floor_area if vessel is None else vessel.floor))
+    return min(1.0, opening * (covered(is_open) / every if every else 1.0) / area)

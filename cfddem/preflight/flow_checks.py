@@ -132,8 +132,8 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
     if not (case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or downward == 0.0):
         yield from _check_inlet(case, bed)
-    jet, in_a_box = case.bed.jet, case.column.shape == "box" and vessel_of(case) is None
-    if jet is not None and not (in_a_box or jet.round or jet.depth):
+    jet, in_a_box = case.bed.jet, case.column.shape == "box" and not vessel_of(case)
+    if jet and not (in_a_box or jet.round or jet.depth):
         yield Issue(
             "note", "bed.jet", f"a slot across the whole vessel, {percent(share_of_jet(case, jet))} of its floor",
             "for a nozzle, set bed.jet.round = true; width is then its diameter", False,
