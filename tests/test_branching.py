@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call, parsed
+from made_up_run import BED, made_up
 
+from cfddem.analysis.report import report
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.run.resuming import branch_state
@@ -88,3 +90,13 @@ def test_the_state_is_that_of_the_checkpoint_but_for_the_step(bed: Path) -> None
     case = Case.from_toml(bed / "case.toml", {"run.until": 1.0})
     state = branch_state(case, bed)
     assert state["time"] == pytest.approx(0.01) and state["simulation"]["particle_step"] is None
+
+
+def test_particles_that_the_first_run_has_fed_are_not_lost(tmp_path: Path) -> None:
+    """The counters of feeds and outlets go on, and count from where the branch begins."""
+    feed = "[[feed]]\ncorner = [0.0, 0.0, 0.04]\nsize = [0.02, 0.02, 0.02]\nrate = 10.0\n[run]"
+    fed = {"fed_count": 60.0, "waiting_count": 0.0}
+    run = made_up(tmp_path / "run", BED.replace("[run]", feed), **fed)
+    found = report(run)
+    assert found.ledger["particles_lost"] == 0.0
+    assert "2000 at the start; 0 fed" in str(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -248,3 +249,13 @@ def test_the_json_schema_holds_every_key() -> None:
     for name, section in (("Bed", "bed"), ("Column", "column"), ("CaseLaws", "laws"), ("CaseRun", "run")):
         assert set(tomllib.loads(TEXT)[section]) <= set(schema["$defs"][name]["properties"])
         assert schema["$defs"][name]["additionalProperties"] is False
+
+
+def test_tables_of_the_caller_stay_as_they_are() -> None:
+    """A key inside of a table that the caller gives, too, changes the case and not that table."""
+    bed = {"diameter": 2e-3, "count": 100, "sizes": [], "inlet_velocity": [[0.0, 0.01], [1.0, 0.02]]}
+    given = {"bed": bed, "bed.count": 7, "bed.start": "suspended"}
+    before = copy.deepcopy(given)
+    assert Case.from_text(TEXT, "bed.toml", given).bed.count == 7
+    assert Case.from_text(TEXT).with_(**given).bed.count == 7
+    assert given == before and list(bed) == list(before["bed"])

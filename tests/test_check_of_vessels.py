@@ -18,6 +18,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.gallery import gallery, gallery_files
 from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
+from cfddem.preflight.bed_estimate import mean_inlet_velocity
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.summary import preflight
 from cfddem.run import initial_particles
@@ -228,3 +229,25 @@ def test_a_cell_of_7_5_mm_suggests_8_mm_and_not_one_that_suggests_it() -> None:
     for cell in (0.0075, 0.00740741):
         assert _of_cells(case.with_(**{"column.cell": cell})) == ["0.008 m fits along x, y and z"]
     assert not _of_cells(case.with_(**{"column.cell": 0.008}))
+
+
+def test_a_slot_reaches_as_far_as_the_vessel_is_open_and_a_note_says_that_it_is_one() -> None:
+    """Mean velocity over the floor, a disc of radius R, of a slot of half width a: its share is that of the disc."""
+    radius, half = 0.008, 0.004
+    share = 2.0 * (math.asin(half / radius) + half / radius * math.sqrt(1.0 - (half / radius) ** 2)) / math.pi
+    wall = [{"shape": "cylinder", "point": [0.02, 0.02, 0.0], "radius": radius}]
+    slot = {"bed.inlet_velocity": 0.0, "bed.jet": {"velocity": 1.0, "width": 2.0 * half}, "wall": wall}
+    case = Case.from_toml(gallery_files()["gas-bed"]).with_(
+        **{"column.width": 0.04, "column.depth": 0.04, "column.height": 0.128, "column.cell": 0.004}, **slot
+    )
+    assert mean_inlet_velocity(case) == pytest.approx(share, rel=0.05)
+    said = [str(each) for each in preflight(case).issues if each.key == "bed.jet"]
+    assert len(said) == 1 and "a slot across the whole vessel, 6" in said[0] and "bed.jet.round = true" in said[0]
+    nozzle = case.with_(**{"bed.jet.round": True})
+    assert mean_inlet_velocity(nozzle) == pytest.approx((half / radius) ** 2, rel=0.05)
+    round_column = case.with_(
+        **{"wall": [], "column.width": 2.0 * radius, "column.depth": None, "column.shape": "cylinder"}
+    )
+    assert mean_inlet_velocity(round_column) == pytest.approx(share, rel=0.05)
+    for other in (nozzle, case.with_(wall=[])):
+        assert not [each for each in preflight(other).issues if each.key == "bed.jet"]

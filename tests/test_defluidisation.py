@@ -75,3 +75,25 @@ def test_a_bed_that_no_liquid_joins_is_not_held_by_liquid(tmp_path: Path) -> Non
         still = {"granular_temperature": 1e-12, "particle_count": 100.0, "largest_agglomerate": largest}
         run = open_run(made_up(tmp_path / str(largest), text, **still))
         assert (defluidisation_of(run, Case.from_text(text)) is not None) == held
+
+
+def test_a_spout_is_judged_by_rest_alone() -> None:
+    """It breaks through once, and then carries a part of the weight at a tenth of that motion."""
+    eruption, share = np.where(TIME < 0.5, 20.0 * MOTION, MOTION), np.full(201, 0.5)
+    assert defluidisation(TIME, share, eruption, SHARE, BLOWN) is not None
+    assert defluidisation(TIME, share, eruption, SHARE, BLOWN, spouts=True) is None
+    found = defluidisation(TIME, share, np.where(TIME < 1.2, eruption, 1e-6), SHARE, BLOWN, spouts=True)
+    assert found is not None and found.rests and not found.passed
+    assert found.time == pytest.approx(1.2, abs=0.1)
+
+
+def test_the_jet_counts_where_the_rest_of_the_floor_does_not_fluidise(tmp_path: Path) -> None:
+    liquid = "[liquid]\nviscosity = 5e-3\nsurface_tension = 0.07\nthickness = 1e-6\n[run]"
+    text = BED.replace("[run]", liquid).replace("inlet_velocity = 0.05", "inlet_velocity = 0.01")
+    blown = text.replace("inlet_velocity = 0.01", "inlet_velocity = 0.01\njet = { velocity = 0.3, width = 0.004 }")
+    assert text != blown and Case.from_text(text).bed.inlet_velocity == 0.01
+    still = {"granular_temperature": 1e-12, "particle_count": 100.0, "largest_agglomerate": 50.0}
+    run = open_run(made_up(tmp_path / "run", text, **still))
+    assert defluidisation_of(run, Case.from_text(text)) is None
+    found = defluidisation_of(run, Case.from_text(blown))
+    assert found is not None and found.rests

@@ -276,6 +276,20 @@ def test_resume_imports_a_law_of_the_file_that_the_user_names(
     assert open_run(folder).history["time"][-1] == 0.003
 
 
+def test_check_and_run_import_a_law_of_the_file_that_the_user_names(
+    stopped: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, file = stopped
+    monkeypatch.chdir(folder.parent)
+    done = call("check", "bed/case.toml")
+    assert done.code == 2 and "laws.drag = 'of_a_file': must be one of" in done.err and "--laws FILE.py" in done.err
+    assert file.stem not in sys.modules
+    assert call("check", "bed/case.toml", "--laws", file.name).code == 0
+    done = call("run", "bed/case.toml", "-o", "again", "--laws", file.name, "--set", "until=0.001")
+    assert done.code == 0 and "warning: laws.drag" not in done.err, done.err
+    assert open_run("again").status == "finished" and "of_a_file" in open_run("again").case_text
+
+
 def test_a_file_of_laws_that_is_none_is_refused(tmp_path: Path) -> None:
     for name, text, said in [
         ("no_python.txt", "", "must be an existing Python file"),

@@ -269,6 +269,22 @@ def test_the_power_and_torque_of_a_paddle_are_what_the_sphere_gains() -> None:
     assert [given[f"wall_0_force_{axis}"] for axis in "xyz"] == pytest.approx(-MASS * velocity, abs=1e-6 * MASS)
 
 
+def test_the_film_of_a_paddle_is_in_its_force_and_torque() -> None:
+    """The film alone takes the sphere along, without contact: the loads sum up to its momentum."""
+    run = sphere([0.0, 0.0, RADIUS], [MOVING["paddle"]], film=1.0, gravity=(0.0, 0.0, 0.0))
+    case = SimpleNamespace(wall=(CaseWall(shape="cylinder", axis=(0.0, 1.0, 0.0), radius=1.0, spin=(0.0, 5.0, 0.0)),))
+    simulation = SimpleNamespace(particle_solver=run, case=case, communicator=SERIAL)
+    given = dict.fromkeys(wall_load_columns(case), 0.0)  # type: ignore[arg-type]
+    for _ in range(2500):
+        run.advance(10.0 * STEP)
+        given = {name: total + wall_loads(simulation)[name] * 10.0 * STEP for name, total in given.items()}  # type: ignore[arg-type]
+    place, velocity = run.particles.position[0], run.particles.velocity[0]
+    assert np.linalg.norm(velocity) > 0.1 and not run.wall_force.any()
+    assert [given[f"wall_0_force_{axis}"] for axis in "xyz"] == pytest.approx(-MASS * velocity, abs=2e-3 * MASS)
+    momentum = MASS * np.cross(place - np.array([0.1, 0.0, -0.01]), velocity)[1]
+    assert given["wall_0_torque"] == pytest.approx(-momentum, rel=5e-3)
+
+
 @pytest.mark.parametrize("wall", [Box(low=(-0.02, -0.02, 0.0), high=(0.02, 0.02, 0.02)), sheet(5, size=0.04)], ids=str)
 def test_a_floor_carries_the_weight(wall: Wall) -> None:
     """Forty-nine spheres come to rest: the floor carries their weight to 1e-4."""

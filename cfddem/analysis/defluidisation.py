@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cfddem.analysis.bed_laws import weight_over_floor
 from cfddem.case.schema import Case
 from cfddem.io.reading import RunData
-from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.bed_estimate import estimate_bed, share_of_jet
 
 Series = NDArray[np.float64]
 
@@ -56,22 +56,27 @@ class Defluidisation:
 
 
 def defluidisation_of(run: RunData, case: Case) -> Defluidisation | None:
-    """Defluidisation of a wet bed at a velocity that fluidises it dry; None if it is fluidised at the end, or dry."""
+    """Defluidisation of a wet bed at a velocity that fluidises it dry; None if it is fluidised at the end, or dry.
+
+    A spout carries a part of the weight, and moves most as it breaks through: a bed with a jet is only found at rest.
+    """
     weight, history = weight_over_floor(case), run.history
     if case.liquid is None or weight is None or "largest_agglomerate" not in history or "pressure_drop" not in history:
         return None
-    inlet, time = case.bed.inlet_velocity, history["time"]
+    inlet, jet, bed, time = case.bed.inlet_velocity, case.bed.jet, estimate_bed(case), history["time"]
     speed = np.full(len(time), inlet) if isinstance(inlet, float) else np.interp(time, *np.array(inlet).T)
+    if jet:
+        speed = speed + share_of_jet(case, jet) * (jet.velocity - speed)
     joined = history["largest_agglomerate"] > 1.0  # before a spray begins, no liquid holds the particles
     largest_share = history["largest_agglomerate"] / np.maximum(history["particle_count"], 1.0)
     return defluidisation(
         time, history["pressure_drop"] / weight, history["granular_temperature"], largest_share,
-        np.where(joined, speed - estimate_bed(case).onset, 0.0),
+        np.where(joined, speed - bed.onset, 0.0), spouts=bool(jet),
     )  # fmt: skip
 
 
 def defluidisation(
-    time: Series, carried: Series, temperature: Series, largest_share: Series, excess: Series
+    time: Series, carried: Series, temperature: Series, largest_share: Series, excess: Series, *, spouts: bool = False
 ) -> Defluidisation | None:
     """The time from which on a bed is not fluidised although it is blown; None if it is fluidised at the end.
 
@@ -80,6 +85,7 @@ def defluidisation(
     temperature    granular temperature (n,) [m2/s2]
     largest_share  of the particles in the largest agglomerate (n,)
     excess         inlet velocity above minimum fluidisation of the dry bed; rows without are left out (n,) [m/s]
+    spouts         whether a jet enters: neither the load nor the largest motion of a spout says anything
 
     >>> time = np.linspace(0.0, 1.0, 101)
     >>> moving = np.where(time < 0.5, 1e-3, 1e-6)
@@ -91,8 +97,8 @@ def defluidisation(
     if len(rows) < 4 * width or rows[-1] != len(time) - 1:
         return None
     load, motion, least = (_averaged(series[rows], width) for series in (carried, temperature, NEVER_MOVED * excess**2))
-    still, passed = motion < least, load < CARRIED
-    rests = (motion < STILL * np.maximum.accumulate(motion)) | still
+    still, passed = motion < least, (load < CARRIED) & (not spouts)
+    rests = still | ((motion < STILL * np.maximum.accumulate(motion)) & (not spouts))
     failed = rests | passed
     if not (failed[-LASTING * width :].all() or still[-LASTING_STILL * width :].all()):
         return None

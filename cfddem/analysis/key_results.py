@@ -199,17 +199,22 @@ def _shallow(case: Case, measures: Mapping[str, Measure]) -> str:
 
 
 def _particles(run: RunData) -> Iterator[KeyResult]:
-    """Particles at the end of a run with feeds or outlets, and how many have entered and left."""
+    """Particles at the end of a run with feeds or outlets, and how many have entered and left since it began."""
     history = run.history
+
+    def since(name: str) -> float:
+        """Change of a column over the run, which may go on from another."""
+        return float(history[name][-1] - history[name][0])
+
     if not {"fed_count", "removed_count"} & history.keys():
         return
     count = history["particle_count"]
     said = [f"{count[0]:.0f} at the start"]
     if "fed_count" in history:
         waiting = history.get("waiting_count", np.zeros(1))[-1]
-        said.append(f"{history['fed_count'][-1]:.0f} fed" + f", {waiting:.0f} wait for a place" * bool(waiting))
+        said.append(f"{since('fed_count'):.0f} fed" + f", {waiting:.0f} wait for a place" * bool(waiting))
     if "removed_count" in history:
-        said.append(f"{history['removed_count'][-1]:.0f} removed, {history['removed_mass'][-1]:.3g} kg")
+        said.append(f"{since('removed_count'):.0f} removed, {since('removed_mass'):.3g} kg")
     yield KeyResult("particles", f"{count[-1]:.0f}", math.nan, "1", "; ".join(said), None)
 
 

@@ -175,8 +175,8 @@ def _ledger(run: RunData) -> dict[str, float]:
         for name in _in_group(run, "imbalance")
     }
     count, nothing = run.history["particle_count"], np.zeros(1)
-    moved = run.history.get("fed_count", nothing)[-1] - run.history.get("removed_count", nothing)[-1]
-    return ledger | {"particles_lost": float(count[0] + moved - count[-1])}
+    came = run.history.get("fed_count", nothing) - run.history.get("removed_count", nothing)
+    return ledger | {"particles_lost": float(count[0] + came[-1] - came[0] - count[-1])}  # a run may go on from another
 
 
 def _energy(run: RunData) -> dict[str, float]:

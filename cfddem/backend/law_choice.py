@@ -81,7 +81,7 @@ def _named(kind: str, name: str) -> Law:
     failures = {} if name in laws else registry.load_package_laws()
     if name not in laws:
         known = [*BUILT_IN[kind], *(each.name for each in laws.values() if _can_be_called(kind, each))]
-        remedy = "cfddem explain lists all laws; for one of your own see docs/how-to/user-law.md"
+        remedy = "cfddem explain lists all laws; name the file of one of your own with --laws FILE.py"
         lost = [f"the package {package} could not be loaded: {reason}" for package, reason in failures.items()]
         remedy = "; ".join([remedy, *lost])
         raise InputError(kind, shown(name), nearest(name, dict.fromkeys(known)), remedy)

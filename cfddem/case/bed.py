@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from cfddem.backend.errors import InputError, shown
@@ -31,6 +33,12 @@ class Jet(Checked):
     width: Positive = Field(description="width along x, or diameter of a round jet [m]")
     depth: Positive | None = Field(None, description="depth along y; default: the full depth of the column [m]")
     round: bool = Field(False, description="round instead of rectangular")
+
+    def covers(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether it enters at places, from the middle of the floor (n,) [m]."""
+        if self.round:
+            return np.hypot(x, y) < 0.5 * self.width
+        return (np.abs(x) < 0.5 * self.width) & (np.abs(y) < 0.5 * (self.depth or math.inf))
 
 
 class Species(Checked):

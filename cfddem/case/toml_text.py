@@ -98,4 +98,11 @@ def set_value(values: dict[str, Any], keys: list[str], value: Any, whole: str) -
         values = inner
         if not isinstance(values, dict):
             raise InputError(f"--set {whole}", shown(value), f"inside a table; {key} is a value")
-    values[last] = value
+    values[last] = _copied(value)
+
+
+def _copied(value: Any) -> Any:
+    """A value whose tables and lists are its own, so that a later key inside of it leaves the caller's as they are."""
+    if isinstance(value, dict):
+        return {key: _copied(each) for key, each in value.items()}
+    return [_copied(each) for each in value] if type(value) is list else value

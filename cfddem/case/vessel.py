@@ -152,14 +152,16 @@ def _solid_inside(case: CaseTables, number: int, wanted: bool) -> bool:
 class Vessel:
     """The part of a column that walls leave to the particles, by height.
 
-    edges   heights of the levels (n + 1,) [m]
-    areas   open cross-section of each level (n,) [m2]
-    column  cross-section of the column, above the last level [m2]
+    edges         heights of the levels (n + 1,) [m]
+    areas         open cross-section of each level (n,) [m2]
+    column        cross-section of the column, above the last level [m2]
+    floor_places  x and y of evenly spread places in the lowest open level (2, m) [m]
     """
 
     edges: Array
     areas: Array
     column: float
+    floor_places: Array
 
     @property
     def volumes(self) -> Array:
@@ -225,7 +227,7 @@ def closed_side(case: CaseTables, wall: CaseWall) -> Side | None:
 def _vessel(column: Column, closing: Sequence[tuple[CaseWall, Side]], _: tuple[tuple[int, int], ...]) -> Vessel:
     """The vessel of some walls with their closed sides, sampled on a lattice of places."""
     width, depth, height = column.size
-    x, y = (((np.arange(ACROSS) + 0.5) / ACROSS) * length for length in (width, depth))
+    x, y = _across(column)
     edges = np.linspace(0.0, height, LEVELS + 1)
     z = 0.5 * (edges[1:] + edges[:-1])
     points = np.stack(np.meshgrid(z, y, x, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
@@ -237,5 +239,20 @@ def _vessel(column: Column, closing: Sequence[tuple[CaseWall, Side]], _: tuple[t
             is_open &= ~solid_part(wall.model_copy(update={"solid": side}), points)
         else:
             is_open &= distance(wall, points) >= 0.0
-    areas = is_open.reshape(LEVELS, -1).mean(axis=1) * width * depth
-    return Vessel(edges, areas, column.floor_area)
+    levels = is_open.reshape(LEVELS, -1)
+    lowest = levels[np.argmax(levels.any(axis=1))]
+    return Vessel(edges, levels.mean(axis=1) * width * depth, column.floor_area, points[: len(lowest), :2][lowest].T)
+
+
+def floor_places(column: Column, of_the_box: bool = False) -> Array:
+    """x and y of evenly spread places over the floor of a column, or of the box around it (2, m) [m]."""
+    width, depth, _ = column.size
+    places = np.stack(np.meshgrid(*_across(column))).reshape(2, -1)
+    round_one = np.hypot(places[0] - 0.5 * width, places[1] - 0.5 * depth) < 0.5 * width
+    return places[:, round_one] if column.shape == "cylinder" and not of_the_box else places
+
+
+def _across(column: Column) -> tuple[Array, Array]:
+    """Places along x and along y at which a column is sampled [m]."""
+    x, y = (((np.arange(ACROSS) + 0.5) / ACROSS) * length for length in column.size[:2])
+    return x, y

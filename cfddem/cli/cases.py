@@ -34,7 +34,7 @@ DIVISION = "ranks along x, y and z, such as 2x2x1; default: the shape with the l
 REPORT = "print the report as JSON"
 JSON = "print the result as JSON"
 LOG = "file for progress, one line per history row"
-LAWS = "Python file with the user's laws of the run, which is executed; nothing in a run folder ever is"
+LAWS = "Python file with laws of your own, which is executed; nothing in a case or a run folder ever is"
 
 
 @Parameter(name="*")
@@ -49,6 +49,29 @@ class Processors:
 
 WHOLE_MACHINE = Processors()
 """As many threads as there are, or as the launcher says."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Changes:
+    """What a command adds to a case file; its fields are options."""
+
+    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None
+    laws: Annotated[Path | None, Parameter(help=LAWS)] = None
+
+    def case(self, path: Path) -> Case:
+        """The case of a file with its values replaced, after the user's laws are known."""
+        from cfddem.case.gallery import overrides
+        from cfddem.case.schema import Case
+        from cfddem.cli.laws_file import import_laws
+
+        if self.laws:
+            import_laws(self.laws)
+        return Case.from_toml(path, overrides(self.set or []))
+
+
+AS_IT_IS = Changes()
+"""The case as its file has it."""
 
 
 def new(
@@ -84,7 +107,7 @@ def new(
 def check(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    changes: Changes = AS_IT_IS,
     strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
     ranks: Annotated[int | None, Parameter(help="number of processes that are to share the run")] = None,
     division: Annotated[str | None, Parameter(help=DIVISION)] = None,
@@ -96,13 +119,12 @@ def check(
 
     Example: cfddem check liquid-bed --set bed.inlet_velocity=0.04
     """
-    from cfddem.case.gallery import find_case, overrides
-    from cfddem.case.schema import Case
+    from cfddem.case.gallery import find_case
     from cfddem.run.check import check as checked
 
     shape = parsed(division) if division else None
     ranks = math.prod(shape) if shape and not ranks else ranks
-    result = checked(Case.from_toml(find_case(case), overrides(set or [])), ranks, shape)
+    result = checked(changes.case(find_case(case)), ranks, shape)
     if json:
         print_json("check", result.summary())
     else:
@@ -113,7 +135,7 @@ def check(
 def stability(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    changes: Changes = AS_IT_IS,
     plot: Annotated[Path | None, Parameter(help="PNG file for growth and speed against wavelength")] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
@@ -123,15 +145,14 @@ def stability(
 
     Example: cfddem stability liquid-bed --set agitation=free_spheres
     """
-    from cfddem.case.gallery import find_case, overrides
-    from cfddem.case.schema import Case
+    from cfddem.case.gallery import find_case
     from cfddem.io.files import require_folder
     from cfddem.preflight.bed_estimate import estimate_bed
     from cfddem.preflight.bed_waves import lines, summary, waves_of
     from cfddem.preflight.summary import refused_extremes
 
     require_folder(plot)
-    described = Case.from_toml(find_case(case), overrides(set or []))
+    described = changes.case(find_case(case))
     with refused_extremes(described):
         found = waves_of(described, estimate_bed(described))
     if found is None:
@@ -152,7 +173,7 @@ def run(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="new folder; default: NAME-run")] = None,
-    set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
+    changes: Changes = AS_IT_IS,
     processors: Processors = WHOLE_MACHINE,
     go_on: Annotated[bool, Parameter(name="--continue", help=CONTINUE, negative="")] = False,
     origin: Annotated[Path | None, Parameter(name="--from", help=FROM)] = None,
@@ -166,22 +187,20 @@ def run(
 
     Example: cfddem run liquid-bed -o bed --set run.until=0.02 --set average_from=0.01
     """
-    from cfddem.case.gallery import find_case, overrides
-    from cfddem.case.schema import Case
+    from cfddem.case.gallery import find_case
     from cfddem.case.toml_text import read_text
     from cfddem.io.folder import read_about
 
     if origin is None:
         path = find_case(case)
         folder = output or Path(f"{path.stem}-run")
-        described = Case.from_toml(path, overrides(set or []))
     else:
         if case is not None:
             remedy = "change its values with --set KEY=VALUE"
             raise InputError("case", str(case), f"left out: the case is that of {origin}", remedy)
         read_about(origin)
         path, folder = origin / "case.toml", output or Path(f"{origin.absolute().name}-run")
-        described = Case.from_toml(path, overrides(set or []))
+    described = changes.case(path)
     communicator = on_ranks(processors.ranks, processors.threads, folder, processors.division)
     if go_on and (folder / "run.json").exists():
         if communicator.rank == 0:
@@ -197,7 +216,7 @@ def run(
     if communicator.size == 1:
         use_threads(threads_for(described, processors.threads))
     with live_line(log, communicator.rank == 0) as line:
-        text = None if set or origin is not None else read_text(path)
+        text = None if changes.set or origin is not None else read_text(path)
         with warmup(described) if communicator.rank == 0 else nullcontext():
             prepared = Run.begin(
                 described, folder, text=text, report=line.update, progress=line.progress, communicator=communicator,

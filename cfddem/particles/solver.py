@@ -114,6 +114,7 @@ class ParticleSolver:
         self.box = np.array([np.inf if length is None else length for length in box])
         check_walls(walls, self.box, len(table))
         self.time, self.steps, self.held = 0.0, 0, False
+        self.last_step = 0.0  # [s]
         self.features: list[ParticleFeature] = [Bridges(self, self.laws.bridge)] if self.laws.bridge else []
         self._rows_for: Callable[[int], np.ndarray] = _no_rows
         if record:
@@ -245,6 +246,7 @@ class ParticleSolver:
             for each in self.features:
                 each.before(self, step, first)
             done, farthest, noted = self._integrate(step, min(steps, at_once))
+            self.last_step = step
             self.wall.lap("pairs and motion")
             steps -= done
             for each in self.features:

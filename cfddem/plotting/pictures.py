@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
+from cfddem.case.toml_text import parse
 from cfddem.io.files import PARTIAL
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
@@ -395,7 +395,7 @@ def bounds_of(run: RunData, snapshots: Sequence[int]) -> np.ndarray:
 
 def title_of(run: RunData) -> str:
     """Title of the case, or name of the folder."""
-    name = tomllib.loads(run.case_text).get("title")
+    name = parse(run.case_text, str(run.folder / "case.toml")).get("title")
     return name if isinstance(name, str) else run.folder.resolve().name
 
 

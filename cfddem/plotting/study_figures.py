@@ -120,15 +120,25 @@ def _draw_measured(panel: Any, measured: Sequence[Points]) -> None:
 LAW_STYLES: tuple[Any, ...] = ("--", ":", "-.", (0, (1, 3)), (0, (8, 2)), (0, (8, 2, 1, 2)))
 """Dashes of the curves of published laws."""
 
+LAW_COLOUR = "0.4"
+"""Of the curves of published laws, and of their range."""
+
 
 def _draw_laws(panel: Any, x: Sequence[Any], points: Sequence[Point]) -> None:
-    """Draw the voidages by published laws that all points have."""
-    laws = [name for name in points[0].measures if name.startswith("voidage by ")]
-    for name, style in zip(laws, LAW_STYLES):
-        if all(name in each.measures for each in points):
-            panel.plot(x, [each.measures[name][0] for each in points], ls=style, color="0.4", label=name[11:])
-    if laws:
-        legend(panel)
+    """Draw the voidages by published laws that all points have, and their range as a band."""
+    named = [name for name in points[0].measures if name.startswith("voidage by ")]
+    laws = [name for name in named if all(name in each.measures for each in points)]
+    if not laws:
+        return
+    order = np.argsort(x)
+    place, curves = np.array(x)[order], np.array([[each.measures[name][0] for each in points] for name in laws])
+    curves = curves[:, order]
+    if len(laws) > 1:
+        band = {"color": LAW_COLOUR, "alpha": 0.15, "linewidth": 0.0}
+        panel.fill_between(place, curves.min(axis=0), curves.max(axis=0), label="range of published laws", **band)
+    for name, style, curve in zip(laws, LAW_STYLES, curves):
+        panel.plot(place, curve, ls=style, color=LAW_COLOUR, linewidth=1.0, label=name[11:])
+    legend(panel)
 
 
 def sample_figure(points: Sequence[Point], path: Path) -> bool:

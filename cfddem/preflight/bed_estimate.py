@@ -7,10 +7,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import wraps
 
-from cfddem.case.bed import POURED_SOLID_FRACTION
+import numpy as np
+
+from cfddem.case.bed import POURED_SOLID_FRACTION, Jet
 from cfddem.case.materials import NO_FLUID
 from cfddem.case.schema import Case
-from cfddem.case.vessel import Vessel, vessel_of
+from cfddem.case.vessel import Vessel, floor_places, vessel_of
+from cfddem.case.wall_geometry import Array
 from closures import balance, drag_single, numbers
 from closures.balance import Drag
 from closures.drag import ergun
@@ -153,17 +156,25 @@ def _terminal_by_law(case: Case, gravity: float) -> float:
 
 def mean_inlet_velocity(case: Case) -> float:
     """Mean superficial velocity over the floor including the jet, highest in time [m/s]."""
-    column, jet = case.column, case.bed.jet
-    if column.ends != "flow" or case.around is NO_FLUID:
+    if case.column.ends != "flow" or case.around is NO_FLUID:
         return 0.0
-    inlet = case.bed.highest_inlet_velocity
-    if jet is None:
-        return inlet
+    inlet, jet = case.bed.highest_inlet_velocity, case.bed.jet
+    return inlet if jet is None else inlet + share_of_jet(case, jet) * (jet.velocity - inlet)
+
+
+def share_of_jet(case: Case, jet: Jet) -> float:
+    """Share of the open floor through which the jet enters [-]."""
+    vessel, column = vessel_of(case), case.column
     width, depth, _ = column.size
     opening = 0.25 * math.pi * jet.width**2 if jet.round else min(jet.width, width) * min(jet.depth or depth, depth)
-    vessel = vessel_of(case)
-    share = min(1.0, opening / (column.floor_area if vessel is None else vessel.floor))
-    return (1.0 - share) * inlet + share * jet.velocity
+
+    def covered(places: Array) -> int:
+        """Number of places (2, m) that the jet covers."""
+        return int(np.count_nonzero(jet.covers(places[0] - 0.5 * width, places[1] - 0.5 * depth)))
+
+    is_open, area = (vessel.floor_places, vessel.floor) if vessel else (floor_places(column), column.floor_area)
+    every = covered(floor_places(column, of_the_box=True))
+    return min(1.0, opening * (covered(is_open) / every if every else 1.0) / area)
 
 
 # ---------------------------------------------------------------- drag on mixtures

@@ -119,9 +119,8 @@ def check_overlap(case: Case, bed: BedEstimate, collision: CollisionEstimate) ->
         remedy = "give all values in SI units: m, kg, s, Pa"
         if math.isfinite(needed := needed_modulus(case, collision)):
             beyond = ", and youngs_modulus, too" * (needed > solid.youngs_modulus)
-            remedy = f"use at least {plain(rounded_up(needed))} Pa{beyond}" + " for less than 2 %" * (
-                severity == "note"
-            )
+            enough = " for less than 2 %" * (severity == "note")
+            remedy = f"use at least {plain(rounded_up(needed))} Pa{enough}{beyond}"
             if severity != "note" and cause == "collisions at the reference speed" and case.run.reference_speed is None:
                 remedy += f"; or set run.reference_speed, here {case.reference_speed:.3g} m/s, if collisions are slower"
     reason = f"overlap of {percent(part)} of a diameter under {cause}; {effect}"

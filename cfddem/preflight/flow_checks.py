@@ -8,10 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from cfddem.case.schema import Case
+from cfddem.case.vessel import vessel_of
 from cfddem.fluid.cell_counts import suggested_cells
-from cfddem.preflight.bed_estimate import BedEstimate
+from cfddem.preflight.bed_estimate import BedEstimate, share_of_jet
 from cfddem.preflight.geometry_checks import bed_key, unit_of_velocity
-from cfddem.preflight.issue import Issue, plain
+from cfddem.preflight.issue import Issue, percent, plain
 from cfddem.preflight.step_estimate import StepEstimate
 
 SMALLEST_KERNEL, NARROW_KERNEL = 1.0, 2.0
@@ -130,6 +131,12 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
     if not (case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or downward == 0.0):
         yield from _check_inlet(case, bed)
+    jet, in_a_box = case.bed.jet, case.column.shape == "box" and not vessel_of(case)
+    if jet and not (in_a_box or jet.round or jet.depth):
+        yield Issue(
+            "note", "bed.jet", f"a slot across the whole vessel, {percent(share_of_jet(case, jet))} of its floor",
+            "for a nozzle, set bed.jet.round = true; width is then its diameter", False,
+        )  # fmt: skip
 
 
 def check_wall_drag(case: Case) -> Iterator[Issue]:

@@ -215,7 +215,7 @@ def _expected(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, "bed voidage", bed.voidage)
         if bed.inlet:
             packed, law = case.bed.fixed or bed.inlet < bed.onset, bed_drag(case).__name__
-            area = "the floor area" if vessel_of(case) is None else "the mean cross-section of the bed"
+            area = "the floor area" if vessel_of(case) is None else "its mean cross-section"
             yield Row(group, "pressure drop", bed.pressure_drop, "Pa", law if packed else f"buoyant weight over {area}")
             if packed and vessel_of(case) is None and law != "ergun":
                 fluid = case.required_fluid

@@ -1,7 +1,4 @@
-"""Measures of beds: random motion by direction, waves, pressure of the contacts, and loads on walls.
-
-The impulses of lubrication films on walls are not contacts and do not count.
-"""
+"""Measures of beds: random motion by direction, waves, pressure of the contacts, and loads on walls."""
 
 from __future__ import annotations
 
@@ -129,6 +126,12 @@ def bed_solids(simulation: Simulation) -> float:
 
 AXES = "xyz"
 
+IMPULSES = ("film_push", "impulse", "shear_impulse", "bridge_impulse")
+"""Fields of pairs whose first three values are an impulse of the last step on the particle [N s]."""
+
+COUPLES = ("shear_couples", "shear_impulse")
+"""Fields of pairs whose last three values are an angular impulse of the last step on the wall [N m s]."""
+
 
 def wall_load_columns(case: Case) -> dict[str, Quantity]:
     """Columns of the history: for every wall that moves, and the torque for those that turn."""
@@ -137,18 +140,16 @@ def wall_load_columns(case: Case) -> dict[str, Quantity]:
         if not wall.moves:
             continue
         name, words = f"wall_{number}", f"of the particles on wall {number}"
-        found |= {
-            f"{name}_force_{axis}": Quantity("N", f"contact force {words} along {axis}", "measure") for axis in AXES
-        }
+        found |= {f"{name}_force_{axis}": Quantity("N", f"force {words} along {axis}", "measure") for axis in AXES}
         if any(wall.spin):
-            found[f"{name}_torque"] = Quantity("N m", f"torque of contacts {words} about its spin axis", "measure")
-        meaning = f"power that the motion of wall {number} gives to the particles through contacts"
+            found[f"{name}_torque"] = Quantity("N m", f"torque {words} about its spin axis", "measure")
+        meaning = f"power that the motion of wall {number} gives to the particles"
         found[f"{name}_power"] = Quantity("W", meaning, "measure")
     return found
 
 
 def wall_loads(simulation: Simulation) -> dict[str, float]:
-    """Values of the columns."""
+    """Values of the columns, from contacts, films and bridges; a film or bridge has its last impulse over the step."""
     solver, walls = simulation.particle_solver, simulation.particle_solver.walls
     first = len(walls.sweep) - len(simulation.case.wall)  # the walls of the case are the last ones
     force, torque = (np.array(simulation.communicator.sum(each, axis=())) for each in _loads(simulation))
@@ -174,11 +175,15 @@ def _loads(simulation: Simulation) -> tuple[np.ndarray, np.ndarray]:
     touch = edges.touch.reshape(-1, TOUCH)
     place = particles.position[own] - touch[:, DISTANCE, None] * touch[:, NORMAL : NORMAL + 3]
     arm = place - (walls.centre + walls.shift)[owner]
-    for name in ("force", "bridge_force"):
+    rate = 1.0 / solver.last_step if solver.last_step > 0.0 else 0.0
+    for name, factor in {"force": 1.0, "bridge_force": 1.0, **dict.fromkeys(IMPULSES, rate)}.items():
         if name in edges:
-            pushed = -edges[name][at_walls]
+            pushed = -factor * edges[name][at_walls, :3]
             np.add.at(force, owner, pushed)
             np.add.at(torque, owner, np.cross(arm, pushed))
+    for name in COUPLES:
+        if name in edges:
+            np.add.at(torque, owner, rate * edges[name][at_walls, -3:])
     if "moment" in edges:  # of rolling resistance
         np.subtract.at(torque, owner, edges["moment"][at_walls])
     return force, torque

@@ -232,5 +232,6 @@ def contact_named(name: str) -> ContactLaw:
     if name not in CONTACTS:
         load_package_laws()
     if name not in CONTACTS:
-        raise InputError("contact", shown(name), nearest(name, CONTACTS), "cfddem explain lists all laws")
+        remedy = "cfddem explain lists all laws; name the file of one of your own with --laws FILE.py"
+        raise InputError("contact", shown(name), nearest(name, CONTACTS), remedy)
     return CONTACTS[name]
