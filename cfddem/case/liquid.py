@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import NonNegative, Point, Positive
-from cfddem.case.materials import Checked, Fluid
+from cfddem.case.materials import Checked
 from closures.liquid_film import film_volume
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -142,6 +142,20 @@ class Liquid(Checked):
             raise InputError("volume_per_particle", self.volume_per_particle, "below 1e-3 m3", "volumes are in m3")
         return self
 
+    def refuse(self, case: Any) -> None:
+        """Raise InputError where the liquid does not go with the rest of a case."""
+        if case.spray is None and all(getattr(self, name) is None for name in AMOUNTS):
+            limit = f"given, or {' or '.join(AMOUNTS[1:])}"
+            raise InputError("liquid.thickness", None, limit, "only a case with [spray] may begin dry")
+        around = case.around.viscosity
+        if case.in_liquid and abs(around - self.viscosity) <= SAME_VISCOSITY * max(around, self.viscosity):
+            raise InputError(
+                "liquid.viscosity", self.viscosity, f"other than that of the fluid, {around:g} Pa s",
+                "particles in a liquid have no bridges of the same liquid; leave out [liquid]",
+            )  # fmt: skip
+        if self.bond and not getattr(case, "evaporation", None):
+            raise InputError("liquid.bond", None, "left out without [evaporation]", "bridges leave bonds as they dry")
+
     def volume_on(self, radius: np.ndarray) -> np.ndarray:
         """Volume of liquid on wet particles (N,) [m3].
 
@@ -153,6 +167,10 @@ class Liquid(Checked):
         if self.liquid_fraction is not None:
             return np.asarray(self.liquid_fraction * sphere)
         return np.asarray(film_volume(radius, self.thickness or 0.0))  # type: ignore[arg-type]  # of every sphere
+
+
+_ZONES = {"cone": ("nozzle", "length"), "box": ("corner", "size")}
+"""Keys of each shape of a spray zone."""
 
 
 class Spray(Checked):
@@ -172,11 +190,10 @@ class Spray(Checked):
 
     @model_validator(mode="after")
     def _zone_is_complete(self) -> Spray:
-        own, other = (("nozzle", "length"), ("corner", "size"))[:: 1 if self.zone == "cone" else -1]
-        for name in own:
+        for name in _ZONES[self.zone]:
             if getattr(self, name) is None:
                 raise InputError(name, None, f'given for zone = "{self.zone}"')
-        for name in other:
+        for name in _ZONES["box" if self.zone == "cone" else "cone"]:
             if getattr(self, name) is not None:
                 raise InputError(name, getattr(self, name), f'left out for zone = "{self.zone}"')
         if not math.hypot(*self.direction) > 0.0:
@@ -199,46 +216,18 @@ class Spray(Checked):
         corner = np.array(self.corner)
         return np.array([corner, corner + np.array(self.size)])
 
-
-def check_wet(liquid: Liquid | None, spray: Spray | None, fluid: Fluid, size: Point, round_column: bool) -> None:
-    """Refuse a liquid, or a spray, that does not go with the rest of the case.
-
-    size          of the column [m]
-    round_column  whether it is a cylinder
-    """
-    if liquid is None:
-        if spray is not None:
+    def refuse(self, case: Any) -> None:
+        """Raise InputError where there is no liquid, or the zone is outside the column."""
+        if case.liquid is None:
             raise InputError("spray", None, "left out where there is no liquid", "give the table [liquid]")
-        return
-    if spray is None and all(getattr(liquid, name) is None for name in AMOUNTS):
-        limit = f"given, or {' or '.join(AMOUNTS[1:])}"
-        raise InputError("liquid.thickness", None, limit, "only a case with [spray] may begin dry")
-    if fluid.is_liquid and _alike(fluid.viscosity, liquid.viscosity):
-        raise InputError(
-            "liquid.viscosity", liquid.viscosity, f"other than that of the fluid, {fluid.viscosity:g} Pa s",
-            "particles in a liquid have no bridges of the same liquid; leave out [liquid]",
-        )  # fmt: skip
-    if spray is not None:
-        _check_zone(spray, size, round_column)
-
-
-def _alike(one: float, other: float) -> bool:
-    return abs(one - other) <= SAME_VISCOSITY * max(one, other)
-
-
-def _check_zone(spray: Spray, size: Point, round_column: bool) -> None:
-    """Refuse a spray zone outside the column."""
-    for name, place in zip(_KEYS[spray.zone], spray.extremes):
+        size = case.column.size
         margin = ROUND_OFF * max(size)
-        inside = all(-margin <= each <= length + margin for each, length in zip(place.tolist(), size))
-        if round_column and math.hypot(place[0] - 0.5 * size[0], place[1] - 0.5 * size[0]) > 0.5 * size[0] + margin:
-            inside = False
-        if not inside:
-            where = ", ".join(f"{each:.4g}" for each in place)
-            limit = (
-                f"chosen so that the spray zone lies in the column, 0 to {', '.join(f'{each:g}' for each in size)} m"
-            )
-            raise InputError(f"spray.{name}", None, limit, f"it reaches to ({where}) m")
-
-
-_KEYS = {"cone": ("nozzle", "length"), "box": ("corner", "size")}
+        for name, place in zip(_ZONES[self.zone], self.extremes):
+            inside = all(-margin <= each <= length + margin for each, length in zip(place.tolist(), size))
+            if case.column.shape == "cylinder":
+                inside &= math.hypot(place[0] - 0.5 * size[0], place[1] - 0.5 * size[0]) <= 0.5 * size[0] + margin
+            if not inside:
+                where = ", ".join(f"{each:.4g}" for each in place)
+                column = ", ".join(f"{each:g}" for each in size)
+                limit = f"chosen so that the spray zone lies in the column, 0 to {column} m"
+                raise InputError(f"spray.{name}", None, limit, f"it reaches to ({where}) m")

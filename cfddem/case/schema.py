@@ -20,7 +20,7 @@ from cfddem.case.compare import data_in
 from cfddem.case.feature_table import FeatureTable, with_feature_tables
 from cfddem.case.feeds import refuse_wrong_equipment
 from cfddem.case.input_errors import Key, dotted, input_error, key_lines, line_of
-from cfddem.case.liquid import check_wet
+from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import Material, check_pairs, unknown_materials
 from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
@@ -67,16 +67,11 @@ class Case(CaseTables):
         return self
 
     @model_validator(mode="after")
-    def _liquid_goes_with_the_rest(self) -> Case:
-        check_wet(self.liquid, self.spray, self.around, self.column.size, self.column.shape == "cylinder")
-        if self.liquid and self.liquid.bond and not getattr(self, "evaporation", None):
-            raise InputError("liquid.bond", None, "left out without [evaporation]", "bridges leave bonds as they dry")
-        return self
-
-    @model_validator(mode="after")
     def _tables_of_features_go_with_the_rest(self) -> Case:
-        for table in self.feature_tables:
-            table.refuse(self)
+        tables: list[Liquid | Spray | FeatureTable | None] = [self.liquid, self.spray, *self.feature_tables]
+        for table in tables:
+            if table:
+                table.refuse(self)
         return self
 
     @property
