@@ -35,6 +35,9 @@ class Column(Checked):
     ends: Literal["flow", "closed", "periodic"] = Field(
         "flow", description="floor and lid: inlet and outlet, closed walls, or periodic"
     )
+    walls: Literal["solid_cells", "smooth"] = Field(
+        "solid_cells", description="wall of a cylinder for the fluid: solid cells, or a smooth wall that cuts cells"
+    )
     material: str | None = Field(None, description="material of the walls; default: that of the bed")
 
     @property
@@ -50,6 +53,9 @@ class Column(Checked):
 
     @model_validator(mode="after")
     def _check_cylinder(self) -> Column:
+        if self.walls == "smooth" and (self.shape != "cylinder" or self.sides != "no_slip"):
+            remedy = 'set column.shape = "cylinder" and column.sides = "no_slip"'
+            raise InputError("walls", self.walls, "solid_cells, but in a cylinder whose side is no_slip", remedy)
         if self.shape == "cylinder":
             if self.depth not in (None, self.width):
                 raise InputError(
