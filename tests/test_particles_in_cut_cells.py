@@ -94,7 +94,7 @@ COLUMN = {"width": 0.0192, "height": 0.0576, "cell": 0.0024, "walls": "smooth"}
         ({"shape": "cylinder", "sides": "free_slip"}, {}, "in a cylinder whose side is no_slip"),
         (
             {"shape": "cylinder"},
-            {"wall": [{"shape": "cylinder", "radius": 0.002, "point": [0.0096, 0.0096, 0.02], "direction": [0, 0, 1],
+            {"wall": [{"shape": "cylinder", "radius": 0.002, "point": [0.0096, 0.0096, 0.02], "axis": [0, 0, 1],
                        "length": 0.01, "caps": True}]},
             r"wall\.0\.solid.*smooth walls",
         ),
