@@ -68,7 +68,7 @@ class Case(CaseTables):
 
     @model_validator(mode="after")
     def _smooth_walls_go_with_the_rest(self) -> Case:
-        if self.column.walls == "smooth" and self.fluid is not None:
+        if self.has_smooth_walls:
             closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
             scalars = [name for name in ("heat", "vapour") if getattr(self, name, None) is not None]
             if closing or scalars:

@@ -159,6 +159,11 @@ class CaseTables(Checked):
         """Whether the fluid resists the particles: it has a viscosity and a law of drag."""
         return self.around.viscosity > 0.0 and self.laws.drag_law is not None
 
+    @property
+    def has_smooth_walls(self) -> bool:
+        """Whether a smooth wall cuts cells of the fluid."""
+        return bool(self.fluid) and self.column.walls == "smooth"
+
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""
         return self.fluid is not None and wall.solid != "none"

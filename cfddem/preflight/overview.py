@@ -163,7 +163,7 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
     for number, mask in closed_cells(case).items():
         yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
-    if case.fluid is not None and case.column.walls == "smooth":
+    if case.has_smooth_walls:
         share = open_share(grid_of(case))
         cut = int(((share > 0.0) & (share < 1.0)).sum())
         yield Row(group, "column: cells cut by the wall", cut, "", f"of {share.size}; smooth for the fluid")
