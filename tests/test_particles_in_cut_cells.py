@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 
+from cfddem import run_case
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.coupling.kernel import FilterKernel
-from cfddem.fluid.block import Block, Division
 from cfddem.fluid.conditions import Inlet, Outlet
 from cfddem.fluid.cut_cells import open_share, within
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder
+from cfddem.particles.state import sphere_volume
+from cfddem.run.division import require_parallel
 
 CENTRE, RADIUS = (0.52, 0.47, 0.0), 0.44
 GRID = within(Grid((8, 8, 10), (0.125, 0.125, 0.1)), cylinder(CENTRE, RADIUS))
@@ -75,15 +79,6 @@ def test_a_uniform_suspension_is_uniform_up_to_the_wall():
     assert np.abs(solid[held] / mean - 1.0).max() < 0.08
 
 
-def test_blocks_of_ranks_refuse_particles_within_smooth_walls():
-    class Two:
-        size, rank = 2, 0
-
-    block = Block(GRID, Division(2, (0, 5, 10)), Two())  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="one process"):
-        FilterKernel(block, (False, False, False), communicator=Two())  # type: ignore[arg-type]
-
-
 COLUMN = {"width": 0.0192, "height": 0.0576, "cell": 0.0024, "walls": "smooth"}
 
 
@@ -101,13 +96,43 @@ COLUMN = {"width": 0.0192, "height": 0.0576, "cell": 0.0024, "walls": "smooth"}
     ],
 )  # fmt: skip
 def test_cases_that_smooth_walls_do_not_have_are_refused(column, others, message):
-    material = {"density": 1000.0, "youngs_modulus": 1e8, "poisson": 0.3, "friction": 0.1, "restitution": 0.9}
     with pytest.raises(InputError, match=message):
-        Case(
-            fluid={"density": 1.2, "viscosity": 1.8e-5},
-            material={"seed": material},
-            column=COLUMN | column,
-            bed={"diameter": 1.2e-3, "count": 10, "inlet_velocity": 0.5},
-            run={"until": 0.1},
-            **others,
-        )
+        bed_of(10, column, **others)
+
+
+def bed_of(count: int, column: Mapping[str, Any], **others: Any) -> Case:
+    """A bed of seeds in air, at twice the velocity of minimum fluidisation."""
+    seed = {"density": 1000.0, "youngs_modulus": 1.2e8, "poisson": 0.3, "friction": 0.1, "restitution": 0.9}
+    steps = {"particle_step": 1e-5, "fluid_step": 2e-4, "reference_speed": 0.4}
+    return Case(
+        fluid={"density": 1.2, "viscosity": 1.8e-5},
+        material={"seed": seed | {"contact_modulus": 1e6}},
+        column=COLUMN | column,
+        bed={"diameter": 1.2e-3, "count": count, "seed": 1, "inlet_velocity": [[0.0, 0.2], [0.1, 0.75]]},
+        laws={"drag": "beetstra", "lubrication": "none"},
+        run={"until": 0.3, "every": 0.05, "history_every": 0.001, **steps},
+        **others,
+    )
+
+
+def test_several_processes_are_refused():
+    with pytest.raises(InputError, match=r"column\.walls.*one process"):
+        require_parallel(bed_of(10, {"shape": "cylinder"}), 2)
+
+
+@pytest.mark.slow
+def test_the_pressure_drop_of_a_bubbling_bed_is_its_weight(tmp_path):
+    """What the walls do not carry and what does not accelerate the bed, over 0.15 s."""
+    run = run_case(bed_of(2200, {"shape": "cylinder"}), tmp_path / "bed")
+    history, times, area = run.history, run.times, 0.25 * math.pi * 0.0192**2
+    first, last = 3, len(times) - 1
+    inside = (history["time"] > times[first] - 1e-9) & (history["time"] < times[last] + 1e-9)
+    carried = np.trapezoid((history["pressure_drop"] + history["wall_load"])[inside], history["time"][inside])
+
+    def momentum(place: int) -> float:
+        found = run.particles(place)
+        return float((1000.0 * sphere_volume(found["radius"].astype(float)) * found["velocity"][:, 2]).sum())
+
+    lasted = times[last] - times[first]
+    weight = 2200 * sphere_volume(0.6e-3) * (1000.0 - 1.2) * 9.81 / area
+    assert carried / lasted == pytest.approx(weight + (momentum(last) - momentum(first)) / area / lasted, rel=5e-3)
