@@ -2,7 +2,7 @@
 
 Particles deposit on the large cell of a group, and what they deposit is divided by the open volume of the group: all
 cells of a group have one value, in the part of the cell that is fluid. A gathered field is the mean over a group, by
-open volumes. The two are adjoint, so that forces on fluid and particles stay equal and opposite.
+open volumes. The two are adjoint, so that what particles give to the cells they get from them.
 """
 
 from __future__ import annotations
