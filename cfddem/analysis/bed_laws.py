@@ -13,6 +13,7 @@ from cfddem.analysis.report_values import LawComparison, Measure, comparison
 from cfddem.case.column_grid import grid_of
 from cfddem.case.particle_properties import particle_properties
 from cfddem.case.schema import Case
+from cfddem.fluid.cut_cells import open_share
 from cfddem.io.reading import RunData
 from cfddem.preflight.bed_estimate import bed_drag
 from cfddem.preflight.expansion import Expansions, expansions, is_compared, spread_in_words
@@ -183,7 +184,7 @@ def slip_velocity(run: RunData, case: Case) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and velocities [m/s] of the sphere relative to the mean fluid velocity, up to its first contact."""
     history = run.history
     contacts = history["time"][history["contact_count"] > 0.0]
-    end, open_fraction = contacts.min(initial=math.inf), float(grid_of(case).open.mean())
+    end, held = contacts.min(initial=math.inf), open_share(grid_of(case))
     before = np.flatnonzero(run.times < end)
     chosen = before[np.unique(np.linspace(0, len(before) - 1, min(len(before), MOST_SNAPSHOTS)).astype(int))]
     times, slip = [], []
@@ -191,5 +192,6 @@ def slip_velocity(run: RunData, case: Case) -> tuple[np.ndarray, np.ndarray]:
         velocity = run.particles(place)["velocity"]
         if len(velocity):  # the sphere may have left the column
             times.append(run.times[place])
-            slip.append(velocity[0] - run.fluid("velocity", place).mean(axis=(0, 1, 2)) / open_fraction)
+            of_fluid = run.fluid("velocity", place) * held[..., None]
+            slip.append(velocity[0] - of_fluid.mean(axis=(0, 1, 2)) / float(held.mean()))
     return np.array(times), np.array(slip, float).reshape(-1, 3)

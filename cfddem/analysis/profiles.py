@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cfddem.analysis.measures import Mask, cells_of, granular_temperature, profile, solids_flux
+from cfddem.analysis.measures import cells_of, granular_temperature, profile, solids_flux
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
+from cfddem.fluid.cut_cells import open_share
 from cfddem.fluid.grid import Grid
 from cfddem.io.reading import RunData
 from cfddem.particles.state import sphere_volume
@@ -44,21 +45,23 @@ def profiles_of(run: RunData, case: Case, begin: float) -> Profiles | None:
     height = grid.origin[2] + (np.arange(grid.shape[0]) + 0.5) * grid.spacing[2]
     voidage = spread = None
     if "voidage" in run.fluid_fields:
-        layers = np.array([profile(run.fluid("voidage", place), "z", grid.open) for place in chosen])
+        layers = np.array(
+            [profile(run.fluid("voidage", place), "z", weight=open_share(grid).astype(float)) for place in chosen]
+        )
         voidage, spread = layers.mean(axis=0), layers.std(axis=0)
     if not {"velocity", "radius"} <= {*run.particle_fields}:
         return Profiles(len(chosen), height, voidage, spread, None, None, None)
-    upward, downward, temperature = _of_particles(run, chosen, grid, grid.open)
+    upward, downward, temperature = _of_particles(run, chosen, grid, open_share(grid))
     return Profiles(len(chosen), height, voidage, spread, upward, downward, temperature)
 
 
 def _of_particles(
-    run: RunData, chosen: list[int], grid: Grid, open_cells: Mask
+    run: RunData, chosen: list[int], grid: Grid, held: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Upward and downward flux, and granular temperature, of the layers."""
     layers, spacing = grid.shape[0], grid.spacing
     edges = np.asarray(grid.origin[2] + np.arange(layers + 1) * spacing[2], np.float64)
-    area = float(open_cells[0].sum()) * spacing[0] * spacing[1]
+    area = float(held[0].sum()) * spacing[0] * spacing[1]
     upward, downward, energy, freedoms = np.zeros((4, layers))
     for place in chosen:
         particles = run.particles(place)

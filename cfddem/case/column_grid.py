@@ -11,7 +11,9 @@ from cfddem.case.schema import Case
 from cfddem.case.tables import Column
 from cfddem.case.wall_geometry import solid_part, stamp
 from cfddem.case.walls import CaseWall
+from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
+from cfddem.fluid.surfaces import cylinder
 
 
 def grid_of(case: Case) -> Grid:
@@ -22,6 +24,9 @@ def grid_of(case: Case) -> Grid:
 
 @lru_cache(maxsize=8)
 def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int], ...]) -> Grid:
+    if column.walls == "smooth":
+        axis = (0.5 * column.width, 0.5 * column.width, 0.0)
+        return within(Grid.of_size(column.size, column.cell), cylinder(axis, 0.5 * column.width))
     closing = [_closed_by(wall) for wall in walls]
     if column.shape == "cylinder":
         closing.append(outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width))

@@ -67,6 +67,17 @@ class Case(CaseTables):
         return self
 
     @model_validator(mode="after")
+    def _smooth_walls_go_with_the_rest(self) -> Case:
+        if self.has_smooth_walls:
+            closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
+            scalars = [name for name in ("heat", "vapour") if getattr(self, name, None) is not None]
+            if closing or scalars:
+                remedy = 'set column.walls = "solid_cells"'
+                limit = "left out in a column with smooth walls" if scalars else '"none" in a column with smooth walls'
+                raise InputError([*scalars, *closing][0], None, limit, remedy)
+        return self
+
+    @model_validator(mode="after")
     def _tables_of_features_go_with_the_rest(self) -> Case:
         tables: list[Liquid | Spray | FeatureTable | None] = [self.liquid, self.spray, *self.feature_tables]
         for table in tables:

@@ -35,6 +35,9 @@ class Column(Checked):
     ends: Literal["flow", "closed", "periodic"] = Field(
         "flow", description="floor and lid: inlet and outlet, closed walls, or periodic"
     )
+    walls: Literal["solid_cells", "smooth"] = Field(
+        "solid_cells", description="wall of a cylinder for the fluid: solid cells, or a smooth wall that cuts cells"
+    )
     material: str | None = Field(None, description="material of the walls; default: that of the bed")
 
     @property
@@ -50,6 +53,9 @@ class Column(Checked):
 
     @model_validator(mode="after")
     def _check_cylinder(self) -> Column:
+        if self.walls == "smooth" and (self.shape != "cylinder" or self.sides != "no_slip"):
+            remedy = 'set column.shape = "cylinder" and column.sides = "no_slip"'
+            raise InputError("walls", self.walls, "solid_cells, but in a cylinder whose side is no_slip", remedy)
         if self.shape == "cylinder":
             if self.depth not in (None, self.width):
                 raise InputError(
@@ -152,6 +158,11 @@ class CaseTables(Checked):
     def resists(self) -> bool:
         """Whether the fluid resists the particles: it has a viscosity and a law of drag."""
         return self.around.viscosity > 0.0 and self.laws.drag_law is not None
+
+    @property
+    def has_smooth_walls(self) -> bool:
+        """Whether a smooth wall cuts cells of the fluid."""
+        return bool(self.fluid) and self.column.walls == "smooth"
 
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""

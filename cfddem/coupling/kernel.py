@@ -32,6 +32,7 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
+from cfddem.coupling.merged_cells import merged_cells
 from cfddem.coupling.reach import Reach
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.halo import Halo
@@ -111,7 +112,8 @@ class FilterKernel:
         self.periodic = np.array(periodic, bool)
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
-        self.reach = Reach(grid, periodic, parts)
+        self._merged = merged_cells(grid, self.periodic)
+        self.reach = Reach(self._merged.grid, periodic, parts)
         self._axes = self.reach.axes()
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
         self._buffers: dict[int, Array] = {}
@@ -119,7 +121,7 @@ class FilterKernel:
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
         self._corners = np.array(corners, np.uint32)
         self._homes = self.reach.homes()
-        self._gates = _gates(grid, self.halo)
+        self._gates = self._merged.gates(self.halo)
         self.sizes = tuple(sizes)
         radii = np.array([radius for radius, _ in self.sizes])
         self._edges = np.sqrt(radii[1:] * radii[:-1])
@@ -264,7 +266,7 @@ class FilterKernel:
         fields = np.empty((values.shape[1], *shape), np.int64)
         loops.collect(homes.order, homes.begins, deposits, fields.reshape(len(fields), -1))
         collected: Array = self.reach.collected(fields) / unit[:, None, None, None]
-        return collected
+        return self._merged.shared(collected)
 
     def _unit(self, cell_map: ParticleCellMap, values: Array) -> Array:
         """Whole numbers in 1 of each of the values (m,), so many that no sum in a cell is too large; NaN for NaN."""
@@ -294,7 +296,7 @@ class FilterKernel:
 
     def _layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
-        layered = np.empty((len(self._homes.of_layered), len(fields)))
+        layered, fields = np.empty((len(self._homes.of_layered), len(fields))), self._merged.mean(fields)
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
@@ -304,6 +306,7 @@ class FilterKernel:
         stage  one of `stages`; that of the widest kernel if None
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
+        fields = self._merged.mean(fields)
         if sweeps == 0:
             return np.array(fields, float)
         now, other = self._scratch(len(fields))
@@ -311,8 +314,9 @@ class FilterKernel:
         for _ in range(sweeps):
             self.halo.fill(now, extend=False)  # gates are closed at sides
             loops.sweep(now, other, strength, *self._gates)
+            self._merged.relax(self.halo.inner(now), self.halo.inner(other))
             now, other = other, now
-        return self.halo.inner(now).copy()
+        return self._merged.copied(self.halo.inner(now).copy())
 
     def _scratch(self, count: int) -> tuple[Array, Array]:
         """Two arrays for so many padded fields, the same in every call."""
@@ -349,7 +353,7 @@ class FilterKernel:
             raise InputError(
                 "distance moved by the fastest particle", farthest, "below one cell", "take a smaller fluid step"
             )
-        if grid.whole.solid is not None:
+        if grid.whole.solid is not None or grid.walls:
             raise InputError("solid_flux", None, "computed on a grid without solid cells")
         if self.unequal:
             raise InputError("solid_flux", None, "computed for particles with one width of the kernel")
@@ -411,13 +415,3 @@ def _pieces(count: int) -> Array:
     ring = np.sqrt(1.0 - height**2)
     points = radius[:, None] * np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
     return np.ascontiguousarray(points - points.mean(axis=0))  # local: pieces of one sphere
-
-
-def _gates(grid: Grid, halo: Halo) -> tuple[Array, Array, Array]:
-    """1 on the low face of every cell where the second stage may pass, 0 at walls and solid cells; for x, y, z; padded.
-
-    The low face of the first layer of ghosts is not used.
-    """
-    fluid = halo.padded(grid.open, outside=0.0)
-    gates = [fluid * np.roll(fluid, 1, axis=2 - axis) for axis in range(3)]
-    return gates[0], gates[1], gates[2]

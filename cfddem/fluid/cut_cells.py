@@ -66,6 +66,13 @@ def within(grid: Grid, surface: Surface) -> Grid:
     return made  # type: ignore[no-any-return]
 
 
+def open_share(grid: Grid) -> Array | NDArray[np.bool_]:
+    """Share of every cell that holds fluid (nz, ny, nx)."""
+    if not grid.walls:
+        return grid.open
+    return np.asarray(volumes(grid.walls, grid.spacing, *_full_centres(grid)) * grid.open)
+
+
 def _refuse_hidden_walls(grid: Grid, surface: Surface) -> None:
     """Raise `InputError` where two cells with fluid have a common face that is closed."""
     is_open, parted = grid.open, np.ones((3, *grid.shape), bool)

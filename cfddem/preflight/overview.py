@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cfddem.backend.errors import InputError
+from cfddem.case.column_grid import grid_of
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
+from cfddem.fluid.cut_cells import open_share
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.issue import WIDTH
@@ -161,6 +163,10 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
     for number, mask in closed_cells(case).items():
         yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
+    if case.has_smooth_walls:
+        share = open_share(grid_of(case))
+        cut = int(((share > 0.0) & (share < 1.0)).sum())
+        yield Row(group, "column: cells cut by the wall", cut, "", f"of {share.size}; smooth for the fluid")
     if (vessel := vessel_of(case)) is not None:
         yield Row(group, "cross-section at the floor", vessel.floor, "m2", "that walls leave open")
         yield Row(group, "cross-section at the bed surface", vessel.area_at(bed.height), "m2")

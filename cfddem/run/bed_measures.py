@@ -12,6 +12,7 @@ from cfddem.analysis.waves import FEWEST_LAYERS, LAYER
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.features.feeds import LANDED
+from cfddem.fluid.cut_cells import open_share
 from cfddem.io.quantities import Quantity
 from cfddem.particles.walls.nearest_point import DISTANCE, NORMAL, TOUCH
 from cfddem.run.simulation import Simulation
@@ -90,7 +91,7 @@ def open_volume(case: Case, low: float, high: float) -> float:
 def _open_areas(case: Case) -> np.ndarray:
     """Cross-section of the open cells in each layer of cells (nz,) [m2]."""
     column = case.column
-    open_part = grid_of(case).open.mean(axis=(1, 2))  # local: every rank knows the whole grid
+    open_part = open_share(grid_of(case)).mean(axis=(1, 2))  # local: every rank knows the whole grid
     return np.asarray(open_part * column.size[0] * column.size[1])
 
 

@@ -30,6 +30,9 @@ def require_parallel(case: Case, ranks: int, shape: Shape | None = None) -> None
     for table in case.feature_tables:
         if ranks > 1 and table.one_process:
             raise InputError(table.table, None, "left out in a run of several processes", "take one process")
+    if ranks > 1 and case.has_smooth_walls:
+        limit = '"solid_cells" in a run of several processes'
+        raise InputError("column.walls", case.column.walls, limit, "take one process")
     if ranks > 1 and case.fluid:
         divide(grid_of(case), ranks, shape=shape)
 

@@ -1,0 +1,104 @@
+"""Cut cells that a kernel takes together: a small one belongs to the nearest that is at least half open.
+
+Particles deposit on the large cell of a group, and what they deposit is divided by the open volume of the group: all
+cells of a group have one value, in the part of the cell that is fluid. A gathered field is the mean over a group, by
+open volumes. The two are adjoint, so that what particles give to the cells they get from them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from cfddem.backend.errors import InputError
+from cfddem.fluid.cut_cells import CutCells
+from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.halo import Halo
+
+LEAST = 0.5
+"""Share of a cell that must be open for a group of its own [-]."""
+
+
+class WholeCells:
+    """Of a grid without smooth walls: every cell is its own group. `grid` is the one that particles reach."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+
+    def shared(self, deposits: Array) -> Array:
+        """Deposits (m, nz, ny, nx) over the open share of their groups, in all cells of these."""
+        return deposits
+
+    def mean(self, fields: Array) -> Array:
+        """Mean of fields (m, nz, ny, nx) over the groups, in all cells of these."""
+        return fields
+
+    def copied(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx) with the value of the large cell in all cells of a group."""
+        return fields
+
+    def relax(self, before: Array, after: Array) -> None:
+        """Divide what a sweep has changed by the open share of the groups, in place."""
+
+    def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
+        """What may pass through the low face of every cell in a sweep, for x, y, z; padded: 0 at walls and solid
+        cells. The low face of the first layer of ghosts is not used."""
+        fluid = halo.padded(self.grid.open, outside=0.0)
+        gates = [fluid * np.roll(fluid, 1, axis=2 - axis) for axis in range(3)]
+        return gates[0], gates[1], gates[2]
+
+
+class MergedCells(WholeCells):
+    """The groups of a grid with smooth walls."""
+
+    def __init__(self, grid: Grid, periodic: Any) -> None:
+        if grid.whole is not grid:
+            raise InputError("ranks", None, "1 for particles within smooth walls", "take one process, or solid cells")
+        self._cut = CutCells(grid, Halo(grid.cells, periodic))
+        open_share = self._cut.own_volume() * grid.open
+        small = open_share < LEAST
+        if small.all():
+            remedy = "take smaller cells"
+            raise InputError("walls", None, "such that some cells are at least half open for particles", remedy)
+        super().__init__(replace(grid, solid=small, walls=None))
+        nearest = distance_transform_edt(small, sampling=grid.spacing[::-1], return_indices=True)[1]
+        self._home = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()
+        total = np.bincount(self._home, weights=open_share.ravel(), minlength=self._home.size)
+        self._open, self._total = open_share.ravel(), total[self._home]
+
+    def shared(self, deposits: Array) -> Array:
+        """See `WholeCells.shared`."""
+        flat = deposits.reshape(len(deposits), -1)
+        return np.asarray((flat[:, self._home] / self._total).reshape(deposits.shape))
+
+    def mean(self, fields: Array) -> Array:
+        """See `WholeCells.mean`."""
+        flat = fields.reshape(len(fields), -1) * self._open
+        sums = np.stack([np.bincount(self._home, weights=each, minlength=each.size) for each in flat])
+        return np.asarray((sums[:, self._home] / self._total).reshape(fields.shape))
+
+    def copied(self, fields: Array) -> Array:
+        """See `WholeCells.copied`."""
+        return np.asarray(fields.reshape(len(fields), -1)[:, self._home].reshape(fields.shape))
+
+    def relax(self, before: Array, after: Array) -> None:
+        """See `WholeCells.relax`."""
+        after[:] = before + (after - before) / self._total.reshape(after.shape[1:])
+
+    def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
+        """See `WholeCells.gates`; never more than a group is open, so that sweeps stay stable."""
+        total, whole = halo.padded(self._total.reshape(self.grid.shape)), super().gates(halo)
+        made = []
+        for axis in range(3):
+            apertures = halo.padded(self.grid.inner(self._cut.aperture[axis]))
+            least = np.minimum(total, np.roll(total, 1, axis=2 - axis))
+            made.append(whole[axis] * np.minimum(apertures, least))
+        return made[0], made[1], made[2]
+
+
+def merged_cells(grid: Grid, periodic: Any) -> WholeCells:
+    """The groups of a grid, or its cells as they are where it has no smooth walls."""
+    return MergedCells(grid, periodic) if grid.walls else WholeCells(grid)
