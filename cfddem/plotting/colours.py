@@ -8,7 +8,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.case.toml_text import parse
-from cfddem.io.quantities import shown_unit
+from cfddem.io.quantities import declared, shown_unit
 from cfddem.io.reading import RunData
 
 SPEED = "speed"
@@ -105,7 +105,7 @@ def label(run: RunData, colour: str) -> str:
     if colour == MOISTURE and colour not in run.particle_fields:
         return "moisture, liquid over solid volume  [-]"
     name = "velocity" if colour == SPEED else colour
-    return f"{colour.replace('_', ' ')}  [{shown_unit(run.quantities['particles'][name].unit)}]"
+    return f"{colour.replace('_', ' ')}  [{shown_unit(declared(run.quantities, 'particles', name).unit)}]"
 
 
 def _species_names(run: RunData) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.errors import RunFailed
-from cfddem.io.quantities import shown_unit
+from cfddem.io.quantities import declared, shown_unit
 from cfddem.io.reading import RunData, open_run
 from cfddem.plotting import colours, rendering
 from cfddem.plotting.pictures import SOLID, bounds_of
@@ -150,7 +150,7 @@ class Scene:
         origin[self.depth] = self._position_of_layer(look)
         plane = pyvista.ImageData(dimensions=corners, spacing=grid.spacing, origin=origin)
         plane.cell_data["values"] = values.ravel()
-        unit = self.run.quantities["fluid"]["velocity" if look.layer == "speed" else look.layer].unit
+        unit = declared(self.run.quantities, "fluid", "velocity" if look.layer == "speed" else look.layer).unit
         label = f"{look.layer}{'' if look.layer == 'voidage' else ' of the fluid'}  [{shown_unit(unit)}]"
         self.plotter.add_mesh(
             plane, scalars="values", cmap=_shades_of(look.layer),

@@ -95,7 +95,7 @@ def restored(
 def require_measures(written: RunFolder, case: Case) -> None:
     """Refuse to continue a history with other measures than it began with."""
     before, now = {*written.last_row}, {*history.all_columns(case)}
-    if before and (odd := sorted((before - now) | (now - {*written.quantities["history"]}))):
+    if before and (odd := sorted((before - now) | (now - {*written.quantities.get("history", {})}))):
         remedy = "resume the run from the script that declares them"
         raise InputError("measures", odd, "the same as when the run began", remedy)
 

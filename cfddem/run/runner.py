@@ -335,7 +335,7 @@ class Run:
                 fluid = {name: simulation.fluid.whole(name) for name in RECORDED}
                 for feature in simulation.features:
                     fluid |= feature.cells_for_snapshot()
-                if SOLID in self.folder.quantities["fluid"]:
+                if SOLID in self.folder.quantities.get("fluid", {}):
                     fluid[SOLID] = ~simulation.fluid.grid.whole.open
             collisions = solver.collisions.take() if solver.collisions else None
             self.folder.write_snapshot(simulation.time, solver.steps, fluid, simulation.snapshot(), collisions)
