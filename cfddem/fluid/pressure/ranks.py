@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.backend.brick_shapes import place_of
 from cfddem.backend.communicator import Communicator
-from cfddem.fluid.block import Block, put_together
+from cfddem.fluid.block import Block, region_of
 from cfddem.fluid.grid import Array, Grid, layers
 from cfddem.fluid.halo import Borders
 from cfddem.fluid.pressure.multigrid import Level, PressureEquation, hierarchy
@@ -128,7 +129,15 @@ class SharedLevel(Level):
 
     def gather_to(self, whole: Level, values: Array, target: Array) -> None:
         """Copy the cells of all ranks into an array of the same grid that every rank has."""
-        target[:] = put_together(self.own(values), self.starts, self.communicator)
+        target.reshape(-1)[self.places] = self.communicator.joined(self.own(values).reshape(-1))
+
+    @cached_property
+    def places(self) -> NDArray[np.int64]:
+        """Where the cells of all ranks, one rank after the other, lie in an array of the whole grid."""
+        x, y, z = (len(each) - 1 for each in self.starts)
+        places = (place_of(rank, (x, y, z)) for rank in range(self.communicator.size))
+        number = np.arange(math.prod(self.whole)).reshape(self.whole)
+        return np.concatenate([number[region_of(self.starts, place)].ravel() for place in places])
 
     def take_from(self, whole: Level) -> None:
         """Take over the unknown, with ghosts, from the same grid that every rank has."""
