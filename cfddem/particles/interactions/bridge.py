@@ -42,6 +42,7 @@ PARTICLE_FIELDS = (
     LIQUID,
     Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
     Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),
+    Field("bridge_load", "1/s", role="scratch", halo=("motion",), meaning="sum of damping rates of all its bridges"),
     Field("bridges_change", role="scratch", dtype=bool, meaning="bridges of the particle form or break in this step"),
     Field("bridges_formed", dtype=np.int64, meaning="bridges that have formed, counted by the lower id"),
     Field("bridges_broken", dtype=np.int64, meaning="bridges that have broken, counted by the lower id"),
