@@ -12,6 +12,7 @@ from wet_spheres import CLOSED, FILM, RADIUS, bridged, swarm
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
+from cfddem.particles import listing
 from cfddem.particles.interactions import laws
 from cfddem.particles.interactions.bridge_apart import MOST
 from cfddem.particles.interactions.bridge_law import BridgeLaws
@@ -124,7 +125,8 @@ def test_it_is_the_joint_solution_to_first_order_in_the_step(monkeypatch: pytest
 
 
 @pytest.mark.slow
-def test_the_bits_are_the_same_on_two_threads_and_from_a_checkpoint() -> None:
+def test_the_bits_are_the_same_on_two_threads_and_from_a_checkpoint(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listing, "THREADING_PAYS", 1)
     before, states = use_threads(None), []
     try:
         for threads in (1, 2):

@@ -4,14 +4,14 @@ A step consists of these phases:
 
     kick                 half a step by the forces of the last step
     [halo: velocity, spin]
-    impulses             of all films that are not weak and all bridges together, see `joint_solution`
+    impulses             of all films that are not weak and all stiff bridges together, see `joint_solution`
     [halo: velocity, spin]
     reversals            impulses of the films of bridges that have inertia
     drift                new positions; walls move
     [halo: position, velocity, spin, thickness of the liquid]
     walls                geometry of every particle and wall
     [halo: liquid for new bridges]
-    bridges              those that form and break, and the pull of all
+    bridges              those that form and break, the pull of all, and the resistance of those that are not stiff
     pairs                films, contacts, rolling and bonds of every edge
     sum                  force, torque and impulses of weak films of every particle over its own edges, in a fixed order
     kick                 the other half
