@@ -59,9 +59,7 @@ FIELDS = (
     Field("bridge_distance", "m", role="memory", meaning="distance of the centres at present"),
     Field("closed_along", "kg/s", role="memory", meaning="resistance along the line of centres below h_min"),
     Field("closed_across", "kg/s", role="memory", meaning="resistance of the bridge to sliding below h_min"),
-    Field(
-        "bridge_force", "N", 3, "memory", meaning="on the first body: pull, and resistance as a force"
-    ),
+    Field("bridge_force", "N", 3, "memory", meaning="on the first body: pull, and resistance as a force"),
     Field("bridge_impulse", "N s", 3, "memory", meaning="impulse of the bridge in the last step, on the first body"),
     Field("bridge_couple", "N s", 3, "scratch", meaning="angular impulse per radius, the same on both bodies"),
     Field("bridge_solved", role="memory", dtype=bool, meaning="the bridge has resisted in the last step"),
