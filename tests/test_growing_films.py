@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from wet_spheres import FILM, GRAIN, RADIUS, THIN, bridged
 
@@ -28,7 +30,8 @@ def test_spheres_wetted_after_the_start_form_their_bridge() -> None:
 def test_dry_solids_that_overlap_form_no_bridge() -> None:
     """Two spheres, and a sphere on a wall."""
     places = np.array([[0.0, 0.0, 0.999 * RADIUS], [1.999 * RADIUS, 0.0, 0.999 * RADIUS]])
-    run, bridges = bridged(make_particles(places, RADIUS, GRAIN.density), THIN, 0.0, walls=[Plane()])
+    spheres = make_particles(places, RADIUS, GRAIN.density)
+    run, bridges = bridged(spheres, replace(THIN, cut="zero"), 0.0, walls=[Plane()])
     run.advance(1e-6, 20)
     assert bridges.formed == bridges.broken == bridges.count == 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,13 @@ def bridged(
 
 
 SYRUP = BridgeLaws(
-    viscosity=5.0, surface_tension=TENSION, contact_angle=ANGLE, film="deforming", tangential="davis", minimum_gap=1e-6
+    viscosity=5.0,
+    surface_tension=TENSION,
+    contact_angle=ANGLE,
+    film="deforming",
+    cut="constant",
+    tangential="davis",
+    minimum_gap=1e-6,
 )
 
 
@@ -51,4 +58,8 @@ def swarm(
     return bridged(spheres, laws, **{"box": tuple(box)} | options)
 
 
-THIN = BridgeLaws(viscosity=0.05, surface_tension=TENSION, film="deforming", tangential="davis", minimum_gap=1e-6)
+THIN = BridgeLaws(
+    viscosity=0.05, surface_tension=TENSION, film="deforming", cut="constant", tangential="davis", minimum_gap=1e-6
+)
+CLOSED = replace(THIN, viscosity=1.0, minimum_gap=0.8 * FILM)
+"""Bridges that are closed in a `swarm`, whose solids do not touch."""

@@ -23,7 +23,7 @@ from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_changes import of_same_wall
 from cfddem.particles.interactions.bridge_solution import pull_energy
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius
-from cfddem.particles.interactions.slots import BRIDGE_PULL
+from cfddem.particles.interactions.slots import BRIDGE_APART, BRIDGE_PULL
 from cfddem.particles.pair_graph import geometry
 from cfddem.particles.particle_feature import Engine
 from cfddem.particles.vectors import at, dot, flat, minus, plus, times
@@ -127,13 +127,25 @@ def _half_motion(i, particles, kick, sign):
 
 
 @inline
+def _half_turn(i, particles, kick, sign):
+    """The same of its spin."""
+    gain = times(0.5 * sign * kick * particles.inverse_inertia[i], at(particles.torque, i))
+    return times(kick, plus(at(particles.spin, i), gain))
+
+
+@inline
 def _pulled(k, system, kick, sign):
-    """Work of the pull of edge k in a half kick, and the part of it that a wall does."""
+    """Work of the force of the bridge of edge k in a half kick, and the part of it that a wall does."""
     particles, edges, memory = system.particles, system.edges, system.memory
     i, j = edges.first[k], edges.second[k]
     moved, force = _half_motion(i, particles, kick, sign), at(memory.bridge_force, k)
     if k < edges.between_particles:
-        return dot(force, minus(moved, _half_motion(j, particles, kick, sign))), 0.0
+        work = dot(force, minus(moved, _half_motion(j, particles, kick, sign)))
+        if BRIDGE_APART:
+            turned = times(particles.radius[i], _half_turn(i, particles, kick, sign))
+            turned = plus(turned, times(particles.radius[j], _half_turn(j, particles, kick, sign)))
+            work += dot(at(memory.bridge_turn, k), turned)
+        return work, 0.0
     by_wall = dot(force, times(kick, touched(edges, k, SURFACE)))
     return dot(force, moved) - by_wall, by_wall
 
@@ -169,16 +181,17 @@ def _count_bridge(k, system, count, step, before, after, totals):
     held, pulled = count.held[k], count.pulled[k]
     count.held[k] = 0.0
     count.pulled[k] = 0.0
-    if not BRIDGE_PULL or not bridged:
+    if not (BRIDGE_PULL or BRIDGE_APART) or not bridged:
         return
-    _, _, gap = geometry(k, system)
-    reduced_radius, _ = pair_mass_and_radius(k, system)
-    count.held[k] = pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
+    if BRIDGE_PULL:
+        _, _, gap = geometry(k, system)
+        reduced_radius, _ = pair_mass_and_radius(k, system)
+        count.held[k] = pull_energy(bridge_state(k, gap, reduced_radius, memory, p))
     work, by_wall = _pulled(k, system, before, -1.0)
     totals[BY_WALLS] += by_wall
     if change > 0:
         totals[FORMED] += count.held[k] + work
-    elif step > 0.0 and held != 0.0 and memory.bridge_resistance[k] > 0.0:
+    elif step > 0.0 and (BRIDGE_APART or held != 0.0) and memory.bridge_resistance[k] > 0.0:
         surplus = pulled + work + count.held[k] - held
         totals[RESISTANCE] -= surplus
         note_bridge_loss(k, memory, -surplus)

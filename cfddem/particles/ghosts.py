@@ -222,7 +222,7 @@ class StepsWithGhosts:
         self.begin(system, step if steps > 0 else 0.0)
         largest, done, noted, full = 0.0, 0, 0, False
         if steps == 0:
-            self.finish(self._changes(system), system, 0.0, time, log, noted)
+            self.finish(self._changes(system, 0.0), system, 0.0, time, log, noted)
         while done < steps and not full and largest < reach * reach:
             self.start(system.particles, step)
             if self.films is not None:
@@ -232,17 +232,17 @@ class StepsWithGhosts:
             moved = self.move(system, step, origin)
             self.ghosts.refresh("motion")
             done += 1
-            changes = self._changes(system)
+            changes = self._changes(system, step)
             noted = self.finish(changes, system, step, time + done * step, log, noted)
             largest = self.communicator.largest([largest, moved])
             full = self.recording and self.communicator.any(len(log) - noted < len(system.edges.first))
         return done, largest, noted
 
-    def _changes(self, system: System) -> int:
+    def _changes(self, system: System, step: float) -> int:
         """Number of bridges that form and break, found before ghosts receive liquid; -1 without bridges."""
         if not self.bridges:
             return -1
-        changes: int = self.find_bridge_changes(system)
+        changes: int = self.find_bridge_changes(system, step)
         self.ghosts.refresh("liquid")
         if self.wet_walls and self.communicator.any(changes):
             return self._share_wall_liquid(system)

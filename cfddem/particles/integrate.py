@@ -4,14 +4,14 @@ A step consists of these phases:
 
     kick                 half a step by the forces of the last step
     [halo: velocity, spin]
-    impulses             of all films that are not weak and all bridges together, see `joint_solution`
+    impulses             of all films that are not weak and all stiff bridges together, see `joint_solution`
     [halo: velocity, spin]
     reversals            impulses of the films of bridges that have inertia
     drift                new positions; walls move
     [halo: position, velocity, spin, thickness of the liquid]
     walls                geometry of every particle and wall
     [halo: liquid for new bridges]
-    bridges              those that form and break, and the pull of all
+    bridges              those that form and break, the pull of all, and the resistance of those that are not stiff
     pairs                films, contacts, rolling and bonds of every edge
     sum                  force, torque and impulses of weak films of every particle over its own edges, in a fixed order
     kick                 the other half
@@ -30,6 +30,7 @@ from cfddem.backend.compile import inline, part, prange, serial
 from cfddem.particles.collision_events import record_event
 from cfddem.particles.interactions.bond import bond_forces
 from cfddem.particles.interactions.bridge import renew_wall_bridges
+from cfddem.particles.interactions.bridge_apart import end_release, find_loads, release_stiff, released
 from cfddem.particles.interactions.bridge_changes import exchange_liquid, find_changes, renew_thickness
 from cfddem.particles.interactions.bridge_reversal import reverse_films
 from cfddem.particles.interactions.film import film_force, update_edge_film
@@ -41,6 +42,7 @@ from cfddem.particles.interactions.slots import (
     ADHESIVE,
     BOND,
     BRIDGE,
+    BRIDGE_APART,
     BRIDGE_INERTIA,
     DRIFTING,
     FILM,
@@ -162,11 +164,14 @@ def move(system, step, origin):
 
 
 @serial
-def find_bridge_changes(system):
-    """Walls at the present positions, and where bridges form and break; returns the number of these changes."""
+def find_bridge_changes(system, step):
+    """Walls at the present positions, and where bridges form and break; returns the number of these changes.
+
+    step  since the last positions; 0 if these are the same [s]
+    """
     if WALLS:
         wall_contacts(system, system.parameters.cutoff_ratio)
-    return find_changes(system) if BRIDGE else 0
+    return find_changes(system, step) if BRIDGE else 0
 
 
 @serial
@@ -197,11 +202,24 @@ def record(system, time, log, noted):
 # ---------------------------------------------------------------- all phases of many steps
 
 
+@part
+def renew_released(system):
+    """Sum the forces on the particles anew some of whose bridges are stiff at the step that begins."""
+    for i in prange(system.particles.owned):
+        if released(i, system):
+            gather_forces(i, system, may_touch(system.edges))
+
+
 @serial
 def start_steps(system, step):
     """What steps need before the first: liquid from outside, and which films and bridges are solved together."""
     if BRIDGE:
         renew_thickness(system.particles)
+    if BRIDGE_APART:
+        find_loads(system, False)
+        if step > 0.0 and release_stiff(system, step) > 0:
+            renew_released(system)
+            end_release(system.memory)
     if JOINT and step > 0.0:
         find_due(system, step)
 
@@ -227,7 +245,7 @@ def integrate(system, step, steps, origin, reach, time, log):
             moved = move(system, step, origin)
             largest = larger(largest, moved)
             done += 1
-        changes = find_bridge_changes(system)
+        changes = find_bridge_changes(system, half)
         if BRIDGE:
             act_bridges(changes, system)
         act(system, half)
@@ -252,7 +270,7 @@ def start_step(particles, step):
 def finish_step(changes, system, step, time, log, noted):
     """Find and act on bridges, unless found (`changes`); act, and record; returns the number of rows written."""
     if changes < 0:
-        changes = find_bridge_changes(system)
+        changes = find_bridge_changes(system, step)
     if BRIDGE:
         act_bridges(changes, system)
     act(system, step)

@@ -6,7 +6,17 @@ import numpy as np
 
 from cfddem.backend.compile import CHUNKS, inline, part, prange
 from cfddem.particles.interactions.joint_films import list_due
-from cfddem.particles.interactions.slots import BOND, BRIDGE, DRIFTING, FILM, JOINT, ROLLING, SHEAR
+from cfddem.particles.interactions.slots import (
+    BOND,
+    BRIDGE,
+    BRIDGE_APART,
+    BRIDGE_SLIDING,
+    DRIFTING,
+    FILM,
+    JOINT,
+    ROLLING,
+    SHEAR,
+)
 from cfddem.particles.pair_graph import edge_role, places_of
 from cfddem.particles.vectors import NOTHING, at, dot, minus, plus, put, times
 
@@ -32,6 +42,8 @@ def gather_forces(i, system, near):
             turn = plus(turn, at(memory.shear_couples, _2 * k + (_0 if sign > 0.0 else _1)))
         if BRIDGE:  # zero without a bridge, which costs less than to look
             force = plus(force, times(sign, at(memory.bridge_force, k)))
+        if BRIDGE_APART and BRIDGE_SLIDING:
+            couple = plus(couple, at(memory.bridge_turn, k))
         if BOND and k < edges.between_particles:
             force = plus(force, times(sign, at(memory.bond_force, k)))
             couple = plus(couple, at(memory.bond_couple, k))

@@ -6,7 +6,8 @@ their films touch until it is stretched too far (:mod:`~cfddem.particles.interac
 The resistance of a bridge acts by impulses between the kick and the drift, which are solved together with those of all
 other bridges and films (:mod:`~cfddem.particles.interactions.joint_solution`). Along the line of centres the resistance
 is integrated over the gap, so that impulses add up to the potential between the first gap and the last. The pull is an
-ordinary force.
+ordinary force, and so is the resistance of closed bridges that are not stiff
+(:mod:`~cfddem.particles.interactions.bridge_apart`).
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ PARTICLE_FIELDS = (
     LIQUID,
     Field("film_thickness", "m", role="scratch", halo=("motion",), meaning="thickness of the liquid on the particle"),
     Field("liquid_supply", "m3", role="scratch", halo=("liquid",), meaning="liquid of which new bridges take a share"),
+    Field("bridge_load", "1/s", role="scratch", halo=("motion",), meaning="sum of damping rates of all its bridges"),
     Field("bridges_change", role="scratch", dtype=bool, meaning="bridges of the particle form or break in this step"),
     Field("bridges_formed", dtype=np.int64, meaning="bridges that have formed, counted by the lower id"),
     Field("bridges_broken", dtype=np.int64, meaning="bridges that have broken, counted by the lower id"),
@@ -57,7 +59,7 @@ FIELDS = (
     Field("bridge_distance", "m", role="memory", meaning="distance of the centres at present"),
     Field("closed_along", "kg/s", role="memory", meaning="resistance along the line of centres below h_min"),
     Field("closed_across", "kg/s", role="memory", meaning="resistance of the bridge to sliding below h_min"),
-    Field("bridge_force", "N", 3, "memory", meaning="pull of the bridge on the first body"),
+    Field("bridge_force", "N", 3, "memory", meaning="on the first body: pull, and resistance as a force"),
     Field("bridge_impulse", "N s", 3, "memory", meaning="impulse of the bridge in the last step, on the first body"),
     Field("bridge_couple", "N s", 3, "scratch", meaning="angular impulse per radius, the same on both bodies"),
     Field("bridge_solved", role="memory", dtype=bool, meaning="the bridge has resisted in the last step"),

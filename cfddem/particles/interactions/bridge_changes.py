@@ -22,9 +22,11 @@ from cfddem.particles.interactions.bridge import (
     renew_bridge,
     renew_resistance,
 )
+from cfddem.particles.interactions.bridge_apart import find_loads
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, relative_velocity
 from cfddem.particles.interactions.slots import (
     BOND,
+    BRIDGE_APART,
     BRIDGE_INERTIA,
     DRYING,
     RECORD,
@@ -74,13 +76,15 @@ def longest_gap(k, system):
 
 
 @serial
-def find_changes(system):
+def find_changes(system, step):
     """Mark where bridges form or break, and what each body has for new ones; returns the number of changes.
 
     Bridges between particles that neither form nor break are renewed on the way.
+
+    step  since the last positions; 0 if these are the same [s]
     """
     edges = system.edges
-    pair_bridges(0, edges.between_particles, system)
+    pair_bridges(0, edges.between_particles, system, step)
     changes = _open_changes(system)
     if WALLS:
         changes += wall_changes(system)
@@ -133,6 +137,8 @@ def _give_liquid(system):
     if BOND:
         form_bonds(system)
     clear_bridges(system.edges, system.memory)
+    if BRIDGE_APART:
+        find_loads(system, True)
 
 
 @inline
@@ -371,3 +377,6 @@ def clear_bridge(k, memory):
     if BRIDGE_INERTIA:
         memory.bridge_impact_speed[k] = 0.0
     put(memory.bridge_force, k, NOTHING)
+    if BRIDGE_APART:
+        memory.bridge_apart[k] = 0.0
+        put(memory.bridge_turn, k, NOTHING)

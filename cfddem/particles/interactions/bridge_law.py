@@ -310,6 +310,11 @@ class BridgeLaws:
         return self.slides or self._law("film") is not None
 
     @property
+    def resists_evenly(self) -> bool:
+        """Whether closed bridges resist alike at any gap, without inertia."""
+        return self.resists and self.cut == "constant" and self.film_density == 0.0
+
+    @property
     def numbers(self) -> BridgeNumbers:
         """The numbers of all laws."""
         on_walls = self.contact_angle if self.wall_contact_angle is None else self.wall_contact_angle
@@ -376,7 +381,7 @@ class NoBridges:
     pulling           fields of pairs on which the pull depends
     collision_memory  what pairs remember of a recorded collision, beyond the memory without liquid
     collision_fields  columns of the record of collisions
-    resists, slides   there are no bridges that do
+    resists, slides   there are no bridges that do; nor such as resist evenly
     """
 
     particle_fields: tuple[Field, ...] = ()
@@ -386,7 +391,7 @@ class NoBridges:
     collision_memory: tuple[Field, ...] = ()
     collision_fields = COLLISION_FIELDS
     wall_share = 0.0
-    resists = slides = False
+    resists = slides = resists_evenly = False
     parameters: Mapping[str, float] = {}
     numbers = numbers({})
     bond_numbers = numbers

@@ -13,12 +13,13 @@ import numpy as np
 from cfddem.backend.compile import inline
 from cfddem.particles.interactions.bond import SMALLEST_GAP, dried, thinnest_film
 from cfddem.particles.interactions.bridge import bridge_state
+from cfddem.particles.interactions.bridge_apart import resist_apart
 from cfddem.particles.interactions.bridge_solution import held_gap
-from cfddem.particles.interactions.slots import BRIDGE_PULL, DRYING, bridge_pull
+from cfddem.particles.interactions.slots import BRIDGE_APART, BRIDGE_PULL, DRYING, bridge_pull
 from cfddem.particles.pair_graph import of_two_spheres
-from cfddem.particles.vectors import at, put, times
+from cfddem.particles.vectors import NOTHING, at, plus, put, times
 
-WetParticles = namedtuple("WetParticles", "position radius film_thickness")
+WetParticles = namedtuple("WetParticles", "position radius film_thickness velocity spin inverse_mass bridge_load")
 """Arrays of the particles that loops over bridges read."""
 
 
@@ -31,8 +32,11 @@ def kept_separation(k, system):
 
 
 @inline
-def pair_bridge(n, system):
-    """Pull of the bridge of a pair, its resistance if it is closed, and whether one forms."""
+def pair_bridge(n, system, step):
+    """Force of the bridge of a pair, its resistance if it is closed, and whether one forms.
+
+    step  since the last positions; 0 if these are the same [s]
+    """
     particles, edges, memory, shift, p = system.particles, system.edges, system.memory, system.shift, system.parameters
     k = np.uint64(n)
     i, j = edges.first[k], edges.second[k]
@@ -43,7 +47,8 @@ def pair_bridge(n, system):
     state = bridge_state(k, gap, reduced_radius, memory, p)
     film = particles.film_thickness[i] + particles.film_thickness[j]
     bridged = memory.bridge_film[k] > 0.0
-    closed = gap < held_gap(state)
+    floor = held_gap(state)
+    closed = gap < floor
     thinnest = SMALLEST_GAP
     if DRYING:
         thinnest = max(thinnest, thinnest_film(reduced_radius, p.bridge.minimum_gap))
@@ -53,6 +58,15 @@ def pair_bridge(n, system):
     if DRYING:
         memory.bridge_open[k] = bridged & ((not closed) | dried(k, reduced_radius, memory))
     memory.bridge_resistance[k] = memory.closed_along[k] + memory.closed_across[k] if bridged & closed else 0.0
+    force = NOTHING
     if BRIDGE_PULL:
         pull = bridge_pull(state)
-        put(memory.bridge_force, k, times(-pull / distance if bridged else 0.0, separation))
+        force = times(-pull / distance if bridged else 0.0, separation)
+    if BRIDGE_APART:
+        lasts = bridged & closed
+        if DRYING:
+            lasts = bridged & (not memory.bridge_open[k])
+        between = (times(1.0 / distance, separation), distance, gap)
+        force = plus(force, resist_apart(k, between, lasts, floor, system, step))
+    if BRIDGE_PULL or BRIDGE_APART:
+        put(memory.bridge_force, k, force)

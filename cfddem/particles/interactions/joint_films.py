@@ -1,7 +1,8 @@
 """Films and bridges whose impulses act over a step: their fields, and the list of those that are solved together.
 
-Weak films act by themselves (`cfddem.particles.interactions.film`). All other films, and all bridges that resist, are
-solved together (`cfddem.particles.interactions.joint_solution`), a film and a bridge of one pair as one.
+Weak films act by themselves (`cfddem.particles.interactions.film`), and so do closed bridges that are not stiff
+(`cfddem.particles.interactions.bridge_apart`). All other films and bridges that resist are solved together
+(`cfddem.particles.interactions.joint_solution`), a film and a bridge of one pair as one.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from cfddem.particles.interactions.kinematics import (
     relative_velocity,
 )
 from cfddem.particles.interactions.shear_film import put_impulses
-from cfddem.particles.interactions.slots import BRIDGE_RESISTS, DRIFTING, SHEAR, FilmState
+from cfddem.particles.interactions.slots import BRIDGE_APART, BRIDGE_RESISTS, DRIFTING, SHEAR, FilmState
 from cfddem.particles.pair_graph import geometry, places_of
 from cfddem.particles.vectors import NOTHING, across, dot, put, times
 
@@ -145,8 +146,10 @@ def note_approach(k, system):
 def is_due(k, memory):
     """Whether the film or the bridge of edge k is solved with the others in the next step.
 
-    A closed bridge that does not resist may open in the step: all bridges are.
+    A closed bridge that does not resist may open in the step: all bridges are that do not act by themselves.
     """
+    if BRIDGE_APART:
+        return memory.bridge_film[k] > 0.0 and memory.bridge_apart[k] == 0.0
     if DRIFTING and BRIDGE_RESISTS:
         return memory.film_due[k] or memory.bridge_film[k] > 0.0
     return memory.film_due[k] if DRIFTING else memory.bridge_film[k] > 0.0

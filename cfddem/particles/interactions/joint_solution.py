@@ -14,7 +14,8 @@ Preconditioned conjugate gradients start from the impulses of the last step. Eac
 pairs, so momentum stays to round-off, and energy falls with every iterate, however early the iteration ends. Where
 spheres pass each other, the rate at which they part in the step adds a term of second order in the step, which can
 raise the energy of a row of spheres by that order. Films with a damping number X = c dt (1/m1 + 1/m2) below `WEAK`
-stay outside: they act by themselves, at the end of the step.
+stay outside: they act by themselves, at the end of the step. So do closed bridges that are not stiff, as forces
+(`cfddem.particles.interactions.bridge_apart`).
 
 A loop over particles sums what the films of each do to it, in a fixed order, and a loop over films finds the rates.
 Sums over all films are sums of integers (`scale_of`): they have the same bits in any order, on any number of threads.

@@ -10,7 +10,7 @@ from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.law_choice import OF_THE_PAIR_LOOP, chosen
 from cfddem.backend.law_set import check_compiles
 from cfddem.data.fields import Field
-from cfddem.particles.interactions import contact, film, joint_films, rolling, shear_film
+from cfddem.particles.interactions import bridge_apart, contact, film, joint_films, rolling, shear_film
 from cfddem.particles.interactions.bridge_law import NO_BRIDGES, BridgeLaws, NoBridges
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named
 from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
@@ -127,6 +127,11 @@ class Laws(NamedTuple):
         return self.drifting or self.bridges.resists
 
     @property
+    def apart(self) -> bool:
+        """Whether closed bridges may resist by themselves; films of the same pairs, or with inertia, act with them."""
+        return self.bridges.resists_evenly and not self.film
+
+    @property
     def slides(self) -> bool:
         """Whether films or bridges resist sliding."""
         return self.shears or self.bridges.slides
@@ -178,6 +183,8 @@ class Laws(NamedTuple):
         if self.rolling != "none":
             fields += rolling.FIELDS
         fields += self.bridges.fields
+        if self.apart:
+            fields += bridge_apart.FIELDS
         if self.minimum_gap is not None or self.lubrication is not None:
             fields.append(film.OUTSIDE)
         return fields
@@ -211,6 +218,7 @@ def _choices(contact_law: ContactLaw, laws: Laws) -> dict[str, Any]:
         "JOINT": laws.joins,
         "SLIDES": laws.slides,
         "BRIDGE_RESISTS": laws.bridges.resists,
+        "BRIDGE_APART": laws.apart,
         "RESCALED": laws.spring == "rescaled",
         "FROM_OVERLAP": laws.friction_onset == "overlap",
         "ROLLING": laws.rolling != "none",

@@ -109,7 +109,7 @@ class PairLoop(NamedTuple):
 LOOPS: dict[str, PairLoop] = {
     "pair_forces": PairLoop(pair_force),
     "update_films": PairLoop(pair_film, needed_by="FILM"),
-    "pair_bridges": PairLoop(pair_bridge, rest="", particles=WetParticles, needed_by="BRIDGE"),
+    "pair_bridges": PairLoop(pair_bridge, particles=WetParticles, needed_by="BRIDGE"),
 }
 """Slot -> loop over pairs."""
 

@@ -114,6 +114,7 @@ film_outside = Slot("film_outside")
 
 BRIDGE = Slot("BRIDGE")  # bodies carry liquid, which forms bridges
 BRIDGE_RESISTS = Slot("BRIDGE_RESISTS")  # bridges resist along the line of centres or across it
+BRIDGE_APART = Slot("BRIDGE_APART")  # closed bridges may resist by themselves
 DRYING = Slot("DRYING")  # bridges lose water, and break where none is left
 BOND = Slot("BOND")  # and leave solid bonds
 BRIDGE_FILM = Slot("BRIDGE_FILM")  # bridges resist along the line of centres
