@@ -46,6 +46,11 @@ LOCAL_FILES = {
     "coupling/self_disturbance_tables.py": "every rank computes the tables of the whole lattice",
     "run/initial_particles.py": "every rank makes all particles before the run starts",
     "fluid/viscosity.py": "every rank knows the solid cells of the whole box",
+    "fluid/cut_cells.py": "every rank knows the smooth walls of the whole box",
+    "fluid/near_walls.py": "along axes and neighbours of one cell",
+    "fluid/surfaces.py": "every rank knows the smooth walls of the whole box",
+    "fluid/wall_force.py": "along the axes of one cell",
+    "coupling/merged_cells.py": "for one process alone",
 }
 """Files and folders that reduce only arrays that every rank knows whole: the input of a run, and what is made before it
 starts."""

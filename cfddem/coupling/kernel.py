@@ -296,7 +296,8 @@ class FilterKernel:
 
     def _layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""
-        layered, fields = np.empty((len(self._homes.of_layered), len(fields))), self._merged.mean(fields)
+        layered = np.empty((len(self._homes.of_layered), len(fields)))
+        fields = self._merged.mean(fields)  # local: of merged cells, for one process alone
         loops.spread(self._homes.of_layered, self.reach.spread(fields).reshape(len(fields), -1), layered)
         return layered
 
@@ -306,7 +307,7 @@ class FilterKernel:
         stage  one of `stages`; that of the widest kernel if None
         """
         sweeps, strength = (self.sweeps, self.strength) if stage is None else stage
-        fields = self._merged.mean(fields)
+        fields = self._merged.mean(fields)  # local: of merged cells, for one process alone
         if sweeps == 0:
             return np.array(fields, float)
         now, other = self._scratch(len(fields))
