@@ -319,10 +319,13 @@ def test_ranks_have_the_bits_of_one_process(size: int) -> None:
         {
             "gap": "lens", "gas_conductivity": GAS, "emissivity": {"light": 0.8, "heavy": 0.8},
             "surroundings_temperature": 400.0, "surroundings": "local",
-            "wall": {"floor": {"temperature": 350.0}, "x_low": {"power": 0.1}, "y_low": {"temperature": 280.0, "coefficient": 50.0}},
+            "wall": {
+                "floor": {"temperature": 350.0}, "x_low": {"power": 0.1},
+                "y_low": {"temperature": 280.0, "coefficient": 50.0},
+            },
         },
         bed={
-            "species": {name: {"material": each, "diameter": 2.0 * radius, "count": 52} for name, each in kinds.items()},
+            "species": {name: {"material": each, "diameter": 3.3e-3, "count": 52} for name, each in kinds.items()},
             "positions": [(float(a), float(b), float(c)) for a in x for b in y for c in z],
         },
     )  # fmt: skip

@@ -14,7 +14,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cfddem.backend.compile import serial
 

@@ -23,17 +23,15 @@ class Menisci:
 
     def __init__(self, simulation: Any, density: float) -> None:
         solver, self.density = simulation.particle_solver, density
-        particles, edges = solver.particles, solver.edges
-        self.solver, self.count = solver, particles.owned
-        self.rows = np.flatnonzero(edges.bridge_film > 0.0)
+        self.solver, self.count = solver, solver.particles.owned
+        self.rows = np.flatnonzero(solver.edges.bridge_film > 0.0)
         # two parts of every bridge, the first of all bridges, then the second; that at a wall has one
         parts = 2 * len(self.rows)
         self.body, self.parts, self.masses = np.empty(parts, np.int64), np.empty(parts), np.empty(parts)
         self.area, self.mass = np.zeros(self.count), np.zeros(self.count)
         if parts:
             menisci(
-                self.rows, solver.gap, edges.first, edges.second, edges.between_particles, self.count, particles.radius,
-                edges.bridge_volume, density, self.body, self.parts, self.masses, self.area, self.mass,
+                self.rows, density, solver.system, self.body, self.parts, self.masses, self.area, self.mass
             )  # fmt: skip
 
     def lose(self, lost: np.ndarray) -> float:

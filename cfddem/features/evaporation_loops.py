@@ -10,6 +10,7 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.law_set import Slot
+from cfddem.particles.pair_graph import geometry
 from closures.bond import neck_area
 from closures.evaporation import (
     dilute_drive,
@@ -70,24 +71,23 @@ def drive(temperature, gas, fraction, air):
 
 
 @serial
-def menisci(rows, gap, first, second, pairs, count, radius, volume, density, body, parts, masses, area, mass):
-    """Parts of bridges: the first of all, then the second, with the body, its meniscus [m2] and its liquid [kg], written
-    to `body`, `parts` and `masses` (2 n,); and their sums of every owned particle, `area` and `mass` (count,).
+def menisci(rows, density, system, body, parts, masses, area, mass):
+    """Parts of bridges, the first of all, then the second: particle, meniscus [m2] and liquid [kg], written to `body`,
+    `parts` and `masses` (2 n,); and their sums of every owned particle, to `area` and `mass` (count,).
 
-    rows          of the edges that have a bridge (n,)
-    gap           of every edge [m]
-    first,second  bodies of every edge; those from `pairs` on are at walls, whose bridges are of one part
+    rows  of the edges that have a bridge (n,); those at walls have one part
     """
-    n = len(rows)
+    n, edges, radius, count = len(rows), system.edges, system.particles.radius, len(area)
     for k in range(n):
         row = rows[k]
-        i, one, pair = first[row], radius[first[row]], row < pairs
-        other = second[row] if pair else i
+        i, pair = np.int64(edges.first[row]), row < edges.between_particles
+        other, one, volume = np.int64(edges.second[row]) if pair else i, radius[i], system.memory.bridge_volume[row]
         reduced = one * radius[other] / (one + radius[other]) if pair else one
-        share, free = 0.5 if pair else 1.0, neck_area(volume[row], gap[row], reduced)
+        _, _, gap = geometry(row, system)
+        share, free = 0.5 if pair else 1.0, neck_area(volume, gap, reduced)
         body[k], body[n + k] = i, other if pair else count  # beyond the owned particles: not ours
         parts[k], parts[n + k] = share * free, (1.0 - share) * free
-        masses[k], masses[n + k] = share * (volume[row] * density), (1.0 - share) * (volume[row] * density)
+        masses[k], masses[n + k] = share * (volume * density), (1.0 - share) * (volume * density)
     for k in range(2 * n):
         if body[k] < count:
             area[body[k]] += parts[k]
