@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from golden.beds import SEEDS as golden_seeds
 from in_process_ranks import on_ranks
-from two_phase_balance import TwoPhaseBalance
+from two_phase_balance import Balances, TwoPhaseBalance
 
 from cfddem import open_run
 from cfddem.backend.compile import use_threads
@@ -446,15 +446,14 @@ def test_a_hot_bed_in_cold_gas_cools_by_the_balance_of_both_phases() -> None:
     heat, flow = simulation.feature(HeatExchange), 1.13 * speed * 0.0144**2 * 1000.0
     assert heat.cells is not None
     air = (1.13, 1000.0, 0.026, 1.68144e-5)
-    in_cells, in_layers = (TwoPhaseBalance(simulation, air, capacity, 300.0, each) for each in (False, True))
+    in_cells, in_layers = (TwoPhaseBalance(simulation, air, capacity, 300.0, each) for each in ("cells", "layers"))
+    simulation.add(Balances([in_cells, in_layers]))
     of_bed = float(heat.capacity(simulation.particles).sum())
     begin, first, gas = simulation.time, float(simulation.particles.temperature.mean()), heat.cells.content
     by_air = first
     worst = dict.fromkeys(("air that leaves", "cells", "layers", "mixed"), 0.0)
     while simulation.time < 1.0:
         simulation.step()
-        in_cells.step()
-        in_layers.step()
         by_air -= flow * simulation.last_step * (heat.cells.leaving - 300.0) / of_bed
         mean = float(simulation.particles.temperature.mean())
         expected = {

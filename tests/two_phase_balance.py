@@ -11,16 +11,34 @@ bubbles.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import spsolve
 
+from cfddem.features.heat import HeatExchange
+from cfddem.model.feature import Equipment
 from closures.evaporation import latent_heat, saturation_pressure, vapour_fraction
 from closures.heat_transfer import gunn
 
 PRESSURE = 101325.0
+
+Place = Literal["cells", "kernel", "layers"]
+
+
+class Balances(Equipment):
+    """Follows the steps of a simulation with some balances."""
+
+    name = "balances"
+
+    def __init__(self, balances: list[TwoPhaseBalance]) -> None:
+        self.balances = balances
+
+    def before(self, simulation: Any, step: float) -> None:
+        """Follow the step [s]."""
+        for each in self.balances:
+            each.step(step)
 
 
 class TwoPhaseBalance:
@@ -30,7 +48,7 @@ class TwoPhaseBalance:
     density, capacity, conductivity, viscosity  of the gas
     specific      heat capacity of the particles [J/kg/K]
     inlet         temperature of the air that enters [K]
-    stirred       every layer of cells has one state
+    place         with which cells a particle exchanges
 
     hot      temperature of the particles by id [K]
     gas      temperature of the cells (nz, ny, nx) [K]
@@ -42,35 +60,38 @@ class TwoPhaseBalance:
         gas: tuple[float, float, float, float],
         specific: float,
         inlet: float,
-        stirred: bool = False,
+        place: Place = "cells",
     ) -> None:
         self.density, self.capacity, self.conductivity, self.viscosity = gas
-        self.simulation, self.inlet, self.stirred = simulation, inlet, stirred
+        self.simulation, self.inlet, self.place = simulation, inlet, place
         particles, fluid = simulation.particles, simulation.required_fluid
         self.heat = specific * float(particles.mass[0])
         self.diameter = 2.0 * float(particles.radius[0])
         self.hot = particles.temperature[np.argsort(particles.id)].copy()
-        from cfddem.features.heat import HeatExchange
-
         cells = simulation.feature(HeatExchange).cells
         assert cells is not None
         self.gas, self.grid, self.leaving = cells.value.copy(), fluid.grid, inlet
         self.vapour: np.ndarray | None = None
         self.water = np.zeros(len(self.hot))
+        self.dry: list[tuple[float, float]] = []  # time, and share of the water that is left
+
+    def dry_at(self, share: float) -> float:
+        """Time at which no more than a share of the water was left; infinite if it never was [s]."""
+        return next((time for time, left in self.dry if left <= share), math.inf)
 
     def wet(self, water: float, vapour: np.ndarray, inlet: float, diffusivity: float) -> None:
         """Let the particles carry the same mass of water each [kg], in gas with a vapour (nz, ny, nx)."""
-        self.water[:] = water
+        self.water[:] = self.each = water
         self.vapour, self.inlet_vapour, self.diffusivity = vapour.copy(), inlet, diffusivity
 
-    def step(self) -> None:
-        """Follow the step that the simulation has made."""
-        simulation, fluid = self.simulation, self.simulation.required_fluid
-        particles, flow, h = simulation.particles, simulation.terms.flow, simulation.last_step
+    def step(self, h: float) -> None:
+        """Follow the step of the fluid that has been made [s], before the particles move."""
+        simulation = self.simulation
+        particles, flow = simulation.particles, simulation.terms.flow
         order = np.argsort(particles.id)
         place = np.floor(simulation.terms.cell_map.position / np.array(self.grid.spacing)).astype(int)
         place = np.clip(place, 0, np.array(self.grid.cells) - 1)
-        nx, ny, nz = self.grid.cells
+        nx, ny, _ = self.grid.cells
         cell = ((place[:, 2] * ny + place[:, 1]) * nx + place[:, 0])[order]
         reynolds, voidage = flow.reynolds[order], flow.voidage[order]
         length = math.pi * self.diameter
@@ -80,7 +101,7 @@ class TwoPhaseBalance:
         b = self.heat * -np.expm1(-h * b / self.heat) / h
         amount = self.density * self.capacity
         self.gas, self.leaving = self._carried(self.gas, self.inlet, amount, h, cell, b, b * self.hot)
-        passed = h * b * (self.gas.reshape(-1)[cell] - self.hot)
+        passed = h * b * (self._around(self.gas, cell) - self.hot)
         self.hot += passed / self.heat
         if self.vapour is None:
             return
@@ -89,7 +110,7 @@ class TwoPhaseBalance:
         wet = self.water > 0.0
         pressure = np.array([saturation_pressure(t) for t in self.hot.tolist()])
         surface = np.array([vapour_fraction(min(p, 0.99 * PRESSURE), PRESSURE) for p in pressure.tolist()])
-        around = self.vapour.reshape(-1)[cell]
+        around = self._around(self.vapour, cell)
         difference = np.where(np.abs(surface - around) > 1e-9, surface - around, 1e-9)
         stefan = np.log((1.0 - around) / (1.0 - np.minimum(around + difference, 0.99))) / difference
         g = np.where(wet, length * self.density * self.diffusivity * sherwood * stefan, 0.0)
@@ -97,9 +118,27 @@ class TwoPhaseBalance:
         self.vapour, self.leaving_vapour = self._carried(
             self.vapour, self.inlet_vapour, self.density, h, cell, g, g * surface
         )
-        lost = np.minimum(h * g * (surface - self.vapour.reshape(-1)[cell]), self.water)
+        lost = np.minimum(h * g * (surface - self._around(self.vapour, cell)), self.water)
         self.water -= lost
+        self.dry += [(simulation.time + h, float(self.water.mean() / self.each))]
         self.hot -= lost * np.array([latent_heat(t) for t in self.hot.tolist()]) / self.heat
+
+    def _deposited(self, cell: np.ndarray, *values: np.ndarray) -> list[np.ndarray]:
+        """Sums in the cells of values of the particles, by id."""
+        if self.place != "kernel":
+            return [np.bincount(cell, each, self.gas.size) for each in values]
+        rows = np.empty((len(cell), len(values)))
+        rows[np.argsort(self.simulation.particles.id)] = np.stack(values, axis=1)
+        fields = self.simulation.required_coupling.kernel.spread(self.simulation.terms.cell_map, rows)
+        return [each.reshape(-1) for each in fields]
+
+    def _around(self, field: np.ndarray, cell: np.ndarray) -> np.ndarray:
+        """Values of the cells with which every particle exchanges, by id."""
+        if self.place != "kernel":
+            return np.asarray(field.reshape(-1)[cell])
+        kernel, places = self.simulation.required_coupling.kernel, self.simulation.terms.cell_map
+        sampled = kernel.sample(places.stencil, places.radius, field[None])[:, 0]
+        return np.asarray(sampled[np.argsort(self.simulation.particles.id)])
 
     def _carried(
         self,
@@ -116,7 +155,7 @@ class TwoPhaseBalance:
         volume = self.grid.cell_volume
         number = np.arange(nx * ny * nz).reshape(nz, ny, nx)
         eps = fluid.mean_voidage
-        sums = [np.bincount(cell, each, number.size) for each in (b, product)]
+        sums = self._deposited(cell, b, product)
         stored = amount * volume * fluid.voidage.reshape(-1) / h
         rows, columns, values = [], [], []
         left = 0.0
@@ -140,9 +179,8 @@ class TwoPhaseBalance:
                 top, leaves = numbers[-1].ravel(), (voidage[-1] * inner[-1]).ravel()
         row, column, value = (np.concatenate(each) for each in (rows, columns, values))
         np.add.at(diagonal, row, value)
-        if self.stirred:  # cells of a layer are one
-            of_layer = lambda index: index // (nx * ny)  # noqa: E731
-            row, column, size = of_layer(row), of_layer(column), nz
+        if self.place == "layers":  # cells of a layer are one
+            row, column, size = row // (nx * ny), column // (nx * ny), nz
             apart = row != column
             lateral = np.zeros(number.size)
             np.add.at(lateral, np.concatenate(rows)[~apart], value[~apart])
@@ -153,7 +191,7 @@ class TwoPhaseBalance:
             size = number.size
         matrix = diags_array(diagonal) - coo_array((value, (row, column)), shape=(size, size))
         new = np.asarray(spsolve(matrix.tocsc(), right))
-        if self.stirred:
+        if self.place == "layers":
             new = np.repeat(new, nx * ny)
         leaves = np.maximum(leaves, 0.0)
         left = float((leaves * new[top]).sum() / max(leaves.sum(), 1e-300))
