@@ -1,11 +1,11 @@
 """The balance of gas and particles of a bed, cell by cell, by another route than the solver's.
 
 It takes the motion from a simulation: fluxes, voidage, and where the particles are with which Reynolds number. It has
-temperatures, vapour and water of its own. Gas is carried by first-order upwind differences, implicitly in all cells at
-once. Every particle exchanges with the cell of its centre alone, with the exact exponential of a step.
+temperatures of its own. Gas is carried by first-order upwind differences, implicitly in all cells at once. Particles
+exchange by the exact exponential of a step, by `place`,
 
-`stirred` layers have one state of the gas in each layer of cells, through which the mean flux rises: a bed without
-bubbles.
+    cells   with the cell of their centre alone
+    layers  with the cells of their layer, which have one state: the mean flux rises through a bed without bubbles
 """
 
 from __future__ import annotations
@@ -19,12 +19,9 @@ from scipy.sparse.linalg import spsolve
 
 from cfddem.features.heat import HeatExchange
 from cfddem.model.feature import Equipment
-from closures.evaporation import latent_heat, saturation_pressure, vapour_fraction
 from closures.heat_transfer import gunn
 
-PRESSURE = 101325.0
-
-Place = Literal["cells", "kernel", "layers"]
+Place = Literal["cells", "layers"]
 
 
 class Balances(Equipment):
@@ -71,18 +68,6 @@ class TwoPhaseBalance:
         cells = simulation.feature(HeatExchange).cells
         assert cells is not None
         self.gas, self.grid, self.leaving = cells.value.copy(), fluid.grid, inlet
-        self.vapour: np.ndarray | None = None
-        self.water = np.zeros(len(self.hot))
-        self.dry: list[tuple[float, float]] = []  # time, and share of the water that is left
-
-    def dry_at(self, share: float) -> float:
-        """Time at which no more than a share of the water was left; infinite if it never was [s]."""
-        return next((time for time, left in self.dry if left <= share), math.inf)
-
-    def wet(self, water: float, vapour: np.ndarray, inlet: float, diffusivity: float) -> None:
-        """Let the particles carry the same mass of water each [kg], in gas with a vapour (nz, ny, nx)."""
-        self.water[:] = self.each = water
-        self.vapour, self.inlet_vapour, self.diffusivity = vapour.copy(), inlet, diffusivity
 
     def step(self, h: float) -> None:
         """Follow the step of the fluid that has been made [s], before the particles move."""
@@ -101,44 +86,8 @@ class TwoPhaseBalance:
         b = self.heat * -np.expm1(-h * b / self.heat) / h
         amount = self.density * self.capacity
         self.gas, self.leaving = self._carried(self.gas, self.inlet, amount, h, cell, b, b * self.hot)
-        passed = h * b * (self._around(self.gas, cell) - self.hot)
+        passed = h * b * (self.gas.reshape(-1)[cell] - self.hot)
         self.hot += passed / self.heat
-        if self.vapour is None:
-            return
-        schmidt = self.viscosity / (self.density * self.diffusivity)
-        sherwood = np.array([gunn(r, schmidt, e) for r, e in zip(reynolds.tolist(), voidage.tolist())])
-        wet = self.water > 0.0
-        pressure = np.array([saturation_pressure(t) for t in self.hot.tolist()])
-        surface = np.array([vapour_fraction(min(p, 0.99 * PRESSURE), PRESSURE) for p in pressure.tolist()])
-        around = self._around(self.vapour, cell)
-        difference = np.where(np.abs(surface - around) > 1e-9, surface - around, 1e-9)
-        stefan = np.log((1.0 - around) / (1.0 - np.minimum(around + difference, 0.99))) / difference
-        g = np.where(wet, length * self.density * self.diffusivity * sherwood * stefan, 0.0)
-        g = np.minimum(g, self.water / (h * np.maximum(surface, 1e-9)))
-        self.vapour, self.leaving_vapour = self._carried(
-            self.vapour, self.inlet_vapour, self.density, h, cell, g, g * surface
-        )
-        lost = np.minimum(h * g * (surface - self._around(self.vapour, cell)), self.water)
-        self.water -= lost
-        self.dry += [(simulation.time + h, float(self.water.mean() / self.each))]
-        self.hot -= lost * np.array([latent_heat(t) for t in self.hot.tolist()]) / self.heat
-
-    def _deposited(self, cell: np.ndarray, *values: np.ndarray) -> list[np.ndarray]:
-        """Sums in the cells of values of the particles, by id."""
-        if self.place != "kernel":
-            return [np.bincount(cell, each, self.gas.size) for each in values]
-        rows = np.empty((len(cell), len(values)))
-        rows[np.argsort(self.simulation.particles.id)] = np.stack(values, axis=1)
-        fields = self.simulation.required_coupling.kernel.spread(self.simulation.terms.cell_map, rows)
-        return [each.reshape(-1) for each in fields]
-
-    def _around(self, field: np.ndarray, cell: np.ndarray) -> np.ndarray:
-        """Values of the cells with which every particle exchanges, by id."""
-        if self.place != "kernel":
-            return np.asarray(field.reshape(-1)[cell])
-        kernel, places = self.simulation.required_coupling.kernel, self.simulation.terms.cell_map
-        sampled = kernel.sample(places.stencil, places.radius, field[None])[:, 0]
-        return np.asarray(sampled[np.argsort(self.simulation.particles.id)])
 
     def _carried(
         self,
@@ -155,7 +104,7 @@ class TwoPhaseBalance:
         volume = self.grid.cell_volume
         number = np.arange(nx * ny * nz).reshape(nz, ny, nx)
         eps = fluid.mean_voidage
-        sums = self._deposited(cell, b, product)
+        sums = [np.bincount(cell, each, number.size) for each in (b, product)]
         stored = amount * volume * fluid.voidage.reshape(-1) / h
         rows, columns, values = [], [], []
         left = 0.0

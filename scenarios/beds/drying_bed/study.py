@@ -14,7 +14,6 @@ The heat that warms the seeds at the start comes from the same air:
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -101,13 +100,8 @@ def balance(described: Case, water: float, capacity: float) -> Balance:
     return Balance(middle, surface, flow * (surface - inflow), end)
 
 
-def drying(
-    described: Case, begin: Callable[[Simulation, float], None] = lambda simulation, water: None
-) -> tuple[Drying, Balance]:
-    """Dry the bed of a case; its history, and the balance.
-
-    begin  called with the simulation at the start, and the mass of water in it [kg]
-    """
+def drying(described: Case) -> tuple[Drying, Balance]:
+    """Dry the bed of a case; its history, and the balance."""
     simulation, rows = Simulation(described), []
     keys, vapour = Evaporation.of(described), VapourTable.of(described)
     heat = Heat.of(described)
@@ -115,7 +109,6 @@ def drying(
     first = row(simulation)
     water = keys.liquid_density * (first["liquid_on_particles"] + first["liquid_in_bridges"])
     capacity = float((simulation.particles.mass * heat.capacities(described)[simulation.particles.material]).sum())
-    begin(simulation, water)
     while simulation.time < described.run.until - 1e-9:
         simulation.until(simulation.time + (described.run.history_every or 0.01))
         rows.append(row(simulation))
