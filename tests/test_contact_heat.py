@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from in_process_ranks import on_ranks
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
@@ -20,7 +25,6 @@ from cfddem.case.schema import Case
 from cfddem.features.contact_heat import HeatExchangeOfContacts, contact_heat_imbalance
 from cfddem.features.contact_heat_keys import wall_names
 from cfddem.preflight.summary import preflight
-from cfddem.run.division import require_parallel
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from scenarios.validation import heated_bed
@@ -295,9 +299,40 @@ def test_check_warns_of_a_circle_of_softened_contacts() -> None:
     assert "contact_heat.radius" in [each.key for each in preflight(case).issues]
 
 
-def test_several_processes_are_refused_in_one_line() -> None:
-    with pytest.raises(InputError, match="contact_heat: must be left out in a run of several processes"):
-        require_parallel(case_of(0.0, 0.1, 1.0), 2)
+def by_id(case: Case, ranks: Any = None, steps: int = 3) -> dict[str, np.ndarray]:
+    """Temperatures by id after some steps, and the columns of the history, of all ranks."""
+    simulation = Simulation(case) if ranks is None else Simulation(case, communicator=ranks)
+    for _ in range(steps):
+        simulation.step()
+    values = {name: value for name, value in row(simulation).items() if "heat" in name or "temperature" in name}
+    return {"particles": simulation.whole("temperature"), "row": np.array(list(values.values()))}
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_ranks_have_the_bits_of_one_process(size: int) -> None:
+    """Contacts, gaps, a wall of a temperature, one with a power, one with a coefficient, and radiation inside a bed."""
+    spacing, radius = 3.2999e-3, 1.65e-3
+    x, y, z = (radius - 1e-7 + spacing * np.arange(n) for n in (13, 4, 2))
+    kinds = {"cold": "light", "hot": "heavy"}
+    case = case_of(
+        0.0, 0.5, 10.0,
+        {
+            "gap": "lens", "gas_conductivity": GAS, "emissivity": {"light": 0.8, "heavy": 0.8},
+            "surroundings_temperature": 400.0, "surroundings": "local",
+            "wall": {
+                "floor": {"temperature": 350.0}, "x_low": {"power": 0.1},
+                "y_low": {"temperature": 280.0, "coefficient": 50.0},
+            },
+        },
+        bed={
+            "species": {name: {"material": each, "diameter": 3.3e-3, "count": 52} for name, each in kinds.items()},
+            "positions": [(float(a), float(b), float(c)) for a in x for b in y for c in z],
+        },
+    )  # fmt: skip
+    alone = by_id(case)
+    assert np.ptp(alone["particles"]) > 1.0
+    for found in on_ranks(size, lambda ranks: by_id(case, ranks)):
+        assert all(np.array_equal(values, found[name]) for name, values in alone.items())
 
 
 def test_walls_are_named_in_the_order_of_the_solver() -> None:

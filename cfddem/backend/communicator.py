@@ -14,6 +14,7 @@ A line that reduces an array of this rank alone, on purpose, says so with a comm
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from cfddem.backend.brick_shapes import Shape
 from cfddem.backend.errors import CfddemError, failure_elsewhere
-from cfddem.backend.exact_sums import put_together, split, unit_of
+from cfddem.backend.exact_sums import largest_of_rows, put_together, split, unit_of
 
 Value = TypeVar("Value")
 Axis = int | tuple[int, ...] | None
@@ -54,14 +55,15 @@ class Communicator:
         array = np.asarray(values)
         if array.dtype.kind in "biu":
             return _plain(self._add(np.asarray(array.sum(axis=axis, dtype=np.int64))))
-        array = array.astype(float, copy=False)
-        axes = tuple(range(array.ndim)) if axis is None else axis
-        largest = self._largest(np.abs(array).max(axis=axes, initial=0.0, keepdims=True))
-        finite = np.isfinite(largest)
-        unit = np.array([unit_of(size) for size in largest.flat]).reshape(largest.shape)
-        parts = self._add(split(array if finite.all() else np.where(finite, array, 0.0), unit, axes))
-        kept = parts.shape[1:]
-        return _plain(np.where(finite.reshape(kept), put_together(parts, unit.reshape(kept)), np.nan))
+        rows, kept = _rows(array.astype(float, copy=False), axis)
+        most, parts = np.zeros(len(rows)), np.zeros((2, len(rows)), np.int64)
+        largest_of_rows(rows.view(np.int64), most.view(np.int64))
+        most = self._largest(most)
+        units = [unit_of(size) if math.isfinite(size) else 0.0 for size in most.tolist()]
+        split(rows, np.array(units), parts)
+        whole, fine = self._add(parts).tolist()
+        sums = [put_together(each, unit) if unit > 0.0 else math.nan for *each, unit in zip(whole, fine, units)]
+        return np.array(sums).reshape(kept) if kept else sums[0]
 
     def largest(self, values: ArrayLike, axis: Axis = None, *, default: float = -np.inf) -> Any:
         """Largest element of the arrays of all ranks; NaN if any element is NaN.
@@ -172,6 +174,17 @@ class Communicator:
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         """Combine the values of all ranks, in the order of the ranks; the value of this rank if it is the only one."""
         return local
+
+
+def _rows(array: np.ndarray, axis: Axis) -> tuple[np.ndarray, tuple[int, ...]]:
+    """An array as rows of what is summed over some axes (k, n), and the shape of the axes that stay."""
+    if axis is None:
+        return np.ascontiguousarray(array).reshape(1, -1), ()
+    summed = {each % array.ndim for each in ((axis,) if isinstance(axis, int) else axis)}
+    stay = [d for d in range(array.ndim) if d not in summed]
+    kept = tuple(array.shape[d] for d in stay)
+    count = math.prod(array.shape[d] for d in summed)
+    return np.ascontiguousarray(array.transpose([*stay, *sorted(summed)])).reshape(math.prod(kept), count), kept
 
 
 def _not_none(first: Any, second: Any) -> Any:

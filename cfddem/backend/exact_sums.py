@@ -14,7 +14,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from cfddem.backend.compile import serial
 
 DIGITS = 30
 """Binary digits of each of the two whole numbers."""
@@ -29,15 +30,34 @@ def unit_of(largest: float, digits: int = DIGITS) -> float:
     return math.ldexp(1.0, min(digits - math.frexp(largest)[1], 1000))
 
 
-def split(values: NDArray[np.float64], unit: Any, axis: Any) -> NDArray[np.int64]:
-    """Sums of the two whole numbers of finite values over some axes (2, ...); `unit` as `values` with these axes."""
-    scaled = values * unit
-    whole = np.rint(scaled)
-    fine = np.rint((scaled - whole) * FINE)
-    return np.stack([part.astype(np.int64).sum(axis=axis) for part in (whole, fine)])
+@serial
+def largest_of_rows(bits, largest):
+    """Largest size in every row (k, n), as 64-bit integers, written to `largest` (k,) as such: NaN if there is one.
+
+    Sizes are ordered as the integers of the same bits, and NaN is above all. Integers are compared many at once.
+    """
+    for k in range(len(bits)):
+        most = 0
+        for n in range(bits.shape[1]):
+            most = max(most, bits[k, n] & 0x7FFFFFFFFFFFFFFF)
+        largest[k] = most
 
 
-def put_together(parts: NDArray[np.int64], unit: Any) -> Any:
-    """The sums of which the two whole numbers are given (2, ...)."""
+@serial
+def split(rows, unit, parts):
+    """Sums of the two whole numbers of the values of every row (k, n), written to `parts` (2, k); none of unit 0."""
+    for k in range(len(rows)):
+        whole_sum, fine_sum, of_one = 0, 0, unit[k]
+        if of_one > 0.0:
+            for n in range(rows.shape[1]):
+                scaled = rows[k, n] * of_one
+                whole = np.rint(scaled)
+                whole_sum += np.int64(whole)
+                fine_sum += np.int64(np.rint((scaled - whole) * FINE))
+        parts[0, k], parts[1, k] = whole_sum, fine_sum
+
+
+def put_together(parts: Any, unit: Any) -> Any:
+    """The sums of which the two whole numbers are given (2, ...), as numbers or arrays."""
     whole, fine = parts[0] + (parts[1] >> DIGITS), parts[1] & ((1 << DIGITS) - 1)
     return (whole + fine / FINE) / unit

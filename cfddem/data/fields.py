@@ -25,11 +25,11 @@ Role = Literal["state", "memory", "scratch"]
 """`state` describes the row itself, `memory` is what a law stores from step to step, `scratch` is valid within a step.
 Checkpoints hold state and memory, not scratch."""
 
-Phase = Literal["start", "film", "film_change", "film_direction", "bridge", "motion", "liquid", "work"]
+Phase = Literal["start", "film", "film_change", "film_direction", "bridge", "motion", "liquid", "work", "heat"]
 """When ghost rows receive values.
 
 In order: at the start of an advance, before the solution of films and bridges and twice within, before films are
-reversed, after the drift, before new bridges fill, and before work is counted.
+reversed, after the drift, before new bridges fill, before work is counted, and within the exchange of heat by contacts.
 """
 
 Initial = float | Callable[[Any, np.ndarray], np.ndarray]

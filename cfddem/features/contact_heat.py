@@ -2,8 +2,9 @@ r"""Heat between particles, with walls, and by radiation with the surroundings.
 
 .. math:: m_i c_i\,\dot T_i = \sum_j G_{ij}(T_j - T_i) + \sum_w G_{iw}(T_w - T_i) + h_i A_i (T_e - T_i)
 
-One implicit step over the list of pairs: no step is too long, and no temperature leaves the range of those that
-exchange. What a pair exchanges is computed once, from the new temperatures, and is equal and opposite.
+One implicit step over the list of pairs (:mod:`cfddem.features.heat_network`): no step is too long, and no temperature
+leaves the range of those that exchange. What a pair exchanges follows from the new temperatures, and is equal and
+opposite to the last bit.
 """
 
 from __future__ import annotations
@@ -11,24 +12,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
+from cfddem.backend.communicator import Communicator
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
 from cfddem.features.contact_heat_loops import LENS, NONE, RAREFIED, ROUGH, SMOOTH, Choices, Pairs, conductances
 from cfddem.features.heat_keys import Heat
+from cfddem.features.heat_network import UNKNOWN, Links, Network
 from cfddem.particles.pair_graph import shifts
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.nearest_point import NORMAL
 from closures.heat_radiation import local_surroundings, radiation_coefficient
-
-TOLERANCE = 1e-13
-"""Residual of the implicit step over the right-hand side [-]."""
-
-MOST_ITERATIONS = 2000
 
 
 class HeatExchangeOfContacts(CaseFeature):
@@ -60,15 +57,15 @@ class HeatExchangeOfContacts(CaseFeature):
             jump=keys.jump,
         )
         solver = simulation.particle_solver
-        solver.features.append(HeatReach(self._reach(solver.particles)))
+        solver.features.append(HeatReach(self._reach(solver.particles, simulation.communicator)))
         if keys.held:
             solver.hold()
 
-    def _reach(self, particles: Particles) -> float:
+    def _reach(self, particles: Particles, communicator: Communicator) -> float:
         """Reach of the list of pairs over R* [-]."""
         if self.choices.gap == NONE and not any(each.coefficient for each in self.walls):
             return 0.0
-        largest, smallest = particles.radius.max(), particles.radius.min()  # local: one process
+        largest, smallest = communicator.largest(particles.radius), communicator.smallest(particles.radius)
         return float(self.keys.lens * (1.0 + largest / smallest))
 
     @classmethod
@@ -82,13 +79,13 @@ class HeatExchangeOfContacts(CaseFeature):
         keys = ContactHeat.of(case)
         assert keys
         if Heat.of(case):
-            return ()
+            return (UNKNOWN,)
         by_species = keys.start_temperatures(case)
 
         def start(particles: Any, rows: np.ndarray) -> np.ndarray:
             return by_species[particles.species[rows]] if len(by_species) > 1 else np.full(len(rows), by_species[0])
 
-        return (Field("temperature", "K", initial=start, snapshot=True, meaning="temperature"),)
+        return Field("temperature", "K", initial=start, snapshot=True, meaning="temperature"), UNKNOWN
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:
@@ -111,46 +108,46 @@ class HeatExchangeOfContacts(CaseFeature):
 
     def after(self, simulation: Any) -> None:
         """Exchange heat over the step."""
-        particles, step = simulation.owned, self._step
+        solver, particles, step = simulation.particle_solver, simulation.owned, self._step
+        total, count = simulation.communicator.sum, simulation.owned.count
         capacity, start = self.capacity(particles), particles.temperature.copy()
-        first, second, between, body, wall, at_wall = self._links(simulation.particle_solver)
+        pairs, (body, wall, at_wall) = self._links(solver)
         area = 4.0 * np.pi * particles.radius**2
-        seen = self._surroundings(particles)
+        seen = self._surroundings(simulation)
         emissivity: Any = self.emissivities[particles.material]
         radiation = area * radiation_coefficient(emissivity, start, seen)  # type: ignore[arg-type]  # of every particle
-        count = len(capacity)
         temperatures = np.array([each.fixed for each in self.walls])
         powered = np.array([each.is_powered for each in self.walls], bool)
-        node = np.full(len(self.walls), -1)
-        node[powered] = count + np.arange(powered.sum())  # local: walls
 
         # walls of a temperature stand on the right; a wall with a power is an unknown without capacity
         fixed, free = ~powered[wall], powered[wall]
         diagonal, right = capacity / step + radiation, capacity / step * start + radiation * seen
         np.add.at(diagonal, body[fixed], at_wall[fixed])
         np.add.at(right, body[fixed], at_wall[fixed] * temperatures[wall[fixed]])
-        ends = np.concatenate([first, body[free]]), np.concatenate([second, node[wall[free]]])
-        links = np.concatenate([between, at_wall[free]])
         power = np.array([each.power for each in self.walls if each.is_powered], float)  # type: ignore[type-var]
-        diagonal, right = np.append(diagonal, np.zeros(len(power))), np.append(right, power)
-        new = _solved(diagonal, *ends, links, right, np.append(start, np.zeros(len(power))))
+        node = (np.cumsum(powered) - 1)[wall[free]]  # local: walls
+        network = Network(solver, diagonal, pairs, (body[free], node, at_wall[free]), len(power))
+        new, of_walls = network.solved(np.append(right, power), start)
 
-        heat = step * links * (new[ends[1]] - new[ends[0]])
-        passed = np.zeros(len(new))
-        np.add.at(passed, ends[0], heat)
-        np.subtract.at(passed, ends[1], heat)
+        heat = step * pairs.link * (network.around(new)[pairs.other] - new[pairs.row])
+        of_power = step * at_wall[free] * (of_walls[node] - new[body[free]])
         given = step * at_wall[fixed] * (temperatures[wall[fixed]] - new[body[fixed]])
+        absorbed = step * radiation * (seen - new)
+        passed = pairs.sums(heat, count)
+        np.add.at(passed, body[free], of_power)
         np.add.at(passed, body[fixed], given)
-        absorbed = step * radiation * (seen - new[:count])
-        particles.temperature += (passed[:count] + absorbed) / capacity
+        particles.temperature += (passed + absorbed) / capacity
 
-        self.from_walls += float(given.sum() - passed[count:].sum())  # local: one process
-        self.radiated += float(absorbed.sum())  # local: one process
-        self.gained += float((capacity * (particles.temperature - start)).sum())  # local: one process
-        self.scale += float(np.abs(heat).sum() + np.abs(given).sum() + np.abs(absorbed).sum())  # local: one process
+        at_walls = total(np.append(of_power, given)), total(np.abs(np.append(of_power, given)))
+        gained = capacity * (particles.temperature - start)
+        radiated, gains, size = total([absorbed, gained, np.abs(absorbed)], axis=1).tolist()
+        self.from_walls += at_walls[0]
+        self.radiated += radiated
+        self.gained += gains
+        self.scale += 0.5 * total(np.abs(heat)) + at_walls[1] + size
 
-    def _links(self, solver: Any) -> tuple[np.ndarray, ...]:
-        """Rows and conductance of pairs of particles, and rows, walls and conductance of particles at walls."""
+    def _links(self, solver: Any) -> tuple[Links, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Links of owned particles with others, and rows, walls and conductance of owned particles at walls."""
         edges, particles, walls, keys = solver.edges, solver.particles, solver.walls, self.keys
         pairs, gap = edges.between_particles, solver.gap
         first, second = edges.first.astype(np.int64), edges.second.astype(np.int64)
@@ -167,7 +164,7 @@ class HeatExchangeOfContacts(CaseFeature):
         fresh[1:] = (np.diff(body[order]) != 0) | (np.diff(wall[order]) != 0)
         heated = np.array([each.passes_heat for each in self.walls], bool)
         rows = order[fresh]
-        rows = rows[heated[wall[rows]]]
+        rows = rows[heated[wall[rows]] & (body[rows] < particles.owned)]
         body, wall, gap, force = body[rows], wall[rows], gap[pairs:][rows], force[pairs:][rows]
         radius = particles.radius[body]
         at_wall = self._conductances(
@@ -177,8 +174,9 @@ class HeatExchangeOfContacts(CaseFeature):
         coefficient = np.array([each.coefficient or 0.0 for each in self.walls])[wall]
         touches = np.where(gap < keys.lens * radius, coefficient * np.pi * radius**2, 0.0)
         at_wall = np.where(coefficient > 0.0, touches, at_wall)
-        some, there = between > 0.0, at_wall > 0.0
-        return first[:pairs][some], second[:pairs][some], between[some], body[there], wall[there], at_wall[there]
+        there = at_wall > 0.0
+        links = Links.of(first[:pairs], second[:pairs], between, particles)
+        return links, (body[there], wall[there], at_wall[there])
 
     def _normal_force(self, solver: Any) -> np.ndarray:
         """Normal force of every contact, repulsive above 0 (n,) [N]."""
@@ -218,9 +216,10 @@ class HeatExchangeOfContacts(CaseFeature):
         conductances(pairs, self.choices, result)
         return result
 
-    def _surroundings(self, particles: Particles) -> np.ndarray:
+    def _surroundings(self, simulation: Any) -> np.ndarray:
         """Temperature of what every particle sees (N,) [K]."""
-        seen = np.full(len(particles.radius), self.keys.surroundings_temperature or 0.0)
+        particles, joined = simulation.owned, simulation.communicator.joined
+        seen = np.full(particles.count, self.keys.surroundings_temperature or 0.0)
         if self.keys.surroundings == "uniform" or not self.keys.emissivity:
             return seen
         size = np.array(self.case.column.size)
@@ -229,9 +228,11 @@ class HeatExchangeOfContacts(CaseFeature):
         place = np.clip((particles.position / size * number).astype(np.int64), 0, number - 1)
         row = (place[:, 0] * number[1] + place[:, 1]) * number[2] + place[:, 2]
         cells = int(np.prod(number))
-        volume = 4.0 / 3.0 * np.pi * particles.radius**3
-        voidage = 1.0 - np.minimum(np.bincount(row, volume, cells) / np.prod(size / number), 1.0)
-        mean = np.bincount(row, particles.temperature, cells) / np.maximum(np.bincount(row, minlength=cells), 1)
+        # of all ranks, by id, so that sums have the same bits on any number of them
+        order = np.argsort(joined(particles.id))
+        every, volume, values = (joined(each)[order] for each in (row, particles.volume, particles.temperature))
+        voidage = 1.0 - np.minimum(np.bincount(every, volume, cells) / np.prod(size / number), 1.0)
+        mean = np.bincount(every, values, cells) / np.maximum(np.bincount(every, minlength=cells), 1)
         return np.asarray(local_surroundings(voidage[row], seen, mean[row]))  # type: ignore[arg-type]
 
     def checkpoint(self) -> dict[str, Any]:
@@ -270,38 +271,6 @@ class HeatReach(ParticleFeature):
         return self.reach > reach
 
 
-def _solved(
-    diagonal: np.ndarray, one: np.ndarray, other: np.ndarray, links: np.ndarray, right: np.ndarray, start: np.ndarray
-) -> np.ndarray:
-    """Temperatures of the implicit step, by conjugate gradients with fixed sums (n,) [K].
-
-    diagonal    without the links (n,)
-    one, other  rows that links join
-    start       first guess
-    """
-    count = len(diagonal)
-    whole = diagonal + np.bincount(one, links, count) + np.bincount(other, links, count)
-    whole[whole == 0.0] = 1.0  # a wall with a power that nothing touches
-    apart = csr_array(
-        (np.concatenate([links, links]), (np.concatenate([one, other]), np.concatenate([other, one]))),
-        shape=(count, count),
-    )
-    values = np.where(start > 0.0, start, right / whole)
-    residual = right - (whole * values - apart @ values)
-    scale = float((right * right).sum())  # local: one process
-    direction, size = np.zeros(count), 1.0
-    for _ in range(MOST_ITERATIONS):
-        if float((residual * residual).sum()) <= TOLERANCE**2 * scale:  # local: one process
-            break
-        guess = residual / whole
-        before, size = size, float((residual * guess).sum())  # local: one process
-        direction = guess + (size / before) * direction
-        image = whole * direction - apart @ direction
-        length = size / float((direction * image).sum())  # local: one process
-        values, residual = values + length * direction, residual - length * image
-    return values
-
-
 # ---------------------------------------------------------------- measures
 
 
@@ -309,7 +278,8 @@ def mean_temperature(simulation: Any) -> float:
     """Mean temperature of the particles, by heat capacity."""
     particles = simulation.owned
     capacity = simulation.feature(HeatExchangeOfContacts).capacity(particles)
-    return float((capacity * particles.temperature).sum() / max(capacity.sum(), 1e-300))  # local: one process
+    total = simulation.communicator.sum
+    return float(total(capacity * particles.temperature) / max(total(capacity), 1e-300))
 
 
 def contact_heat_from_walls(simulation: Any) -> float:

@@ -65,7 +65,6 @@ class ContactHeat(FeatureTable):
 
     table: ClassVar[str] = "contact_heat"
     meaning: ClassVar[str] = "heat between particles, with walls, and by radiation with the surroundings"
-    one_process: ClassVar[bool] = True
 
     conductivity: dict[str, Positive] = Field({}, description="thermal conductivity of the solids, by material [W/m/K]")
     heat_capacity: dict[str, Positive] = Field(

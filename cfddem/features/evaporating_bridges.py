@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cfddem.features.evaporation_loops import meniscus_areas
+from cfddem.features.evaporation_loops import menisci, taken_from
 from cfddem.particles.interactions.bridge_view import Bridges
 
 
@@ -23,26 +23,16 @@ class Menisci:
 
     def __init__(self, simulation: Any, density: float) -> None:
         solver, self.density = simulation.particle_solver, density
-        particles, edges = solver.particles, solver.edges
-        self.solver, self.count = solver, particles.owned
-        self.rows = np.flatnonzero(edges.bridge_film > 0.0)
-        pair = self.rows < edges.between_particles
-        first = edges.first[self.rows].astype(np.int64)
-        second = np.where(pair, edges.second[self.rows], first).astype(np.int64)
-        radius = particles.radius
-        reduced = np.where(pair, radius[first] * radius[second] / (radius[first] + radius[second]), radius[first])
-        areas = np.zeros(len(self.rows))
-        meniscus_areas(edges.bridge_volume[self.rows], solver.gap[self.rows], reduced, areas)
+        self.solver, self.count = solver, solver.particles.owned
+        self.rows = np.flatnonzero(solver.edges.bridge_film > 0.0)
         # two parts of every bridge, the first of all bridges, then the second; that at a wall has one
-        share = np.where(pair, 0.5, 1.0)
-        self.body = np.append(first, np.where(pair, second, self.count))  # beyond the owned particles: not ours
-        self.parts = np.append(share, 1.0 - share) * np.tile(areas, 2)
-        self.masses = np.append(share, 1.0 - share) * np.tile(edges.bridge_volume[self.rows] * density, 2)
-        self.mine = self.body < self.count
-        self.area, self.mass = self._sums(self.parts), self._sums(self.masses)
-
-    def _sums(self, values: np.ndarray) -> np.ndarray:
-        return np.bincount(self.body[self.mine], values[self.mine], self.count)
+        parts = 2 * len(self.rows)
+        self.body, self.parts, self.masses = np.empty(parts, np.int64), np.empty(parts), np.empty(parts)
+        self.area, self.mass = np.zeros(self.count), np.zeros(self.count)
+        if parts:
+            menisci(
+                self.rows, density, solver.system, self.body, self.parts, self.masses, self.area, self.mass
+            )  # fmt: skip
 
     def lose(self, lost: np.ndarray) -> float:
         """Take from the bridges what every particle loses from its parts of them (N,) [kg]; returns the energy of the
@@ -52,13 +42,8 @@ class Menisci:
         """
         if not len(self.rows) and self.solver.communicator.size == 1:
             return 0.0
-        body, taken = self.body[self.mine], np.zeros(len(self.body))
-        of_area = lost[body] * self.parts[self.mine] / np.maximum(self.area[body], 1e-300)
-        some, there = np.minimum(of_area, self.masses[self.mine]), self.masses[self.mine]
-        missing = lost - np.bincount(body, some, self.count)
-        left = np.bincount(body, there - some, self.count)
-        more = np.where(missing > 0.0, missing / np.maximum(left, 1e-300), 0.0)
-        taken[self.mine] = np.minimum(some + np.minimum(more[body], 1.0) * (there - some), there)
+        taken = np.zeros(len(self.body))
+        taken_from(self.body, self.parts, self.masses, self.area, lost, taken)
         halves = self._of_all_owners(taken.reshape(2, -1).T)
         bridges: Bridges = self.solver.feature(Bridges)
         return bridges.dry(self.rows, (halves[:, 0] + halves[:, 1]) / self.density)
@@ -69,7 +54,7 @@ class Menisci:
         if communicator.size == 1:
             return halves
         names = edges.ends(self.solver.particles.id, self.rows).reshape(-1, 2)
-        shared = ~self.mine.reshape(2, -1).all(axis=0) & (names[:, 1] >= 0)
+        shared = (self.body.reshape(2, -1) >= self.count).any(axis=0) & (names[:, 1] >= 0)
         sent = communicator.joined(np.column_stack([names[shared].astype(float), halves[shared]]).reshape(-1, 4))
         _, place = np.unique(sent[:, :2], axis=0, return_inverse=True)
         sums = np.zeros((len(sent), 2))

@@ -25,7 +25,7 @@ from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.evaporating_bridges import Menisci
 from cfddem.features.evaporating_walls import WallFilms
 from cfddem.features.evaporation_keys import Evaporation
-from cfddem.features.evaporation_loops import Air, Surfaces, evaporate
+from cfddem.features.evaporation_loops import Air, Surfaces, conductance_of_vapour, evaporate, share_out
 from cfddem.features.heat import HeatExchange
 from cfddem.features.heat_keys import Heat
 from cfddem.features.liquid import LiquidOnParticles
@@ -36,6 +36,8 @@ from closures.kinds import DRYING_ARGUMENTS
 
 SMALLEST = 1e-6
 """Radius of a drop that has evaporated [m]."""
+
+_NONE = np.zeros(0, np.int64)
 
 
 class EvaporationOfLiquid(CaseFeature):
@@ -82,26 +84,25 @@ class EvaporationOfLiquid(CaseFeature):
     def before(self, simulation: Any, step: float) -> None:
         """Evaporate over the step [s], after the exchange of heat with the gas."""
         particles, heat, keys = simulation.owned, simulation.feature(HeatExchange), self.keys
-        is_drop, diameter, flow = self.drops[particles.material], 2.0 * particles.radius, simulation.terms.flow
-        on_films = particles.liquid if "liquid" in particles else np.zeros(len(diameter))
-        smallest = particles.density * (4.0 / 3.0 * math.pi * SMALLEST**3)
-        drops, begin = np.maximum(particles.mass - smallest, 0.0), particles.temperature.copy()
+        count, flow, begin = particles.count, simulation.terms.flow, particles.temperature.copy()
+        on_films = particles.liquid if "liquid" in particles else np.zeros(count)
+        film, mass = on_films.copy(), on_films * keys.liquid_density
+        is_drop = self._drops(particles, film, mass)
         vapour = simulation.feature(Vapour) if self.gains else None
         menisci = Menisci(simulation, keys.liquid_density) if "liquid" in particles else None
-        nothing = np.zeros(len(diameter))
         surfaces = Surfaces(
-            temperature=particles.temperature.copy(),
-            diameter=diameter,
+            temperature=begin.copy(),
+            diameter=2.0 * particles.radius,
             sherwood=heat.law.numbers(flow, particles.viscosity / (self.fluid.density * self.diffusivity)),
             gas=heat.around,
-            fraction=vapour.around(simulation) if vapour else np.full(len(diameter), self.fraction),
-            film=np.where(is_drop, np.inf, on_films),
-            menisci=menisci.area if menisci else nothing,
+            fraction=vapour.around(simulation) if vapour else np.full(count, self.fraction),
+            film=film,
+            menisci=menisci.area if menisci else np.zeros(count),
             response=heat.response,
-            mass=np.where(is_drop, drops, on_films * keys.liquid_density),
-            bridged=menisci.mass.copy() if menisci else nothing.copy(),
-            heat=np.zeros(len(diameter)),
-            saturated=np.zeros(len(diameter)),
+            mass=mass,
+            bridged=menisci.mass.copy() if menisci else np.zeros(count),
+            heat=np.zeros(count),
+            saturated=np.zeros(count),
         )
         there = surfaces.mass.copy(), surfaces.bridged.copy()
         air = Air(keys.pressure, self.fluid.density, self.diffusivity, keys.rate == "stefan", keys.full_thickness)
@@ -110,31 +111,44 @@ class EvaporationOfLiquid(CaseFeature):
             _give(simulation, vapour, surfaces, begin, there, step)
         lost, of_bridges = surfaces.mass, surfaces.bridged
         particles.temperature[...] = surfaces.temperature
-        self._remove(particles, lost, is_drop)
-        self.mass += float(self.communicator.sum(lost + of_bridges))
-        self.heat += float(self.communicator.sum(surfaces.heat))
+        from_films = lost / keys.liquid_density
+        from_films[is_drop] = 0.0
+        self._remove(particles, lost, from_films, is_drop)
+        volume = from_films + of_bridges / keys.liquid_density
+        sums = self.communicator.sum([lost + of_bridges, surfaces.heat, volume], axis=1)
+        self.mass += float(sums[0])
+        self.heat += float(sums[1])
         if menisci:
             energy, energies = menisci.lose(of_bridges), simulation.particle_solver.energies
             if energies:
                 energies.add(DRIED, energy)
-            volume = np.where(is_drop, 0.0, lost / keys.liquid_density) + of_bridges / keys.liquid_density
-            simulation.feature(LiquidOnParticles).evaporated += float(self.communicator.sum(volume))
+            simulation.feature(LiquidOnParticles).evaporated += float(sums[2])
 
         if self.walls:
             gone = self.walls.lose(self.fraction, keys.pressure, self.fluid.density, step)
             self.mass += gone * keys.liquid_density
             simulation.feature(LiquidOnParticles).evaporated += gone
 
-    def _remove(self, particles: Any, lost: np.ndarray, is_drop: np.ndarray) -> None:
-        """Take the mass [kg] from films, and from drops, which shrink."""
+    def _drops(self, particles: Any, film: np.ndarray, mass: np.ndarray) -> np.ndarray:
+        """Rows of the particles that are drops, whose film is infinite and whose mass [kg] can all evaporate but that
+        of the smallest drop."""
+        is_drop = np.flatnonzero(self.drops[particles.material]) if self.drops.any() else _NONE  # local: materials
+        if len(is_drop):
+            film[is_drop] = np.inf
+            smallest = particles.density[is_drop] * (4.0 / 3.0 * math.pi * SMALLEST**3)
+            mass[is_drop] = np.maximum(particles.mass[is_drop] - smallest, 0.0)
+        return is_drop
+
+    def _remove(self, particles: Any, lost: np.ndarray, from_films: np.ndarray, is_drop: np.ndarray) -> None:
+        """Take a volume [m3] from films, and the mass `lost` [kg] from drops, which shrink."""
         if "liquid" in particles:
-            left = particles.liquid - np.where(is_drop, 0.0, lost / self.keys.liquid_density)
+            left = particles.liquid - from_films
             particles.liquid[...] = np.where(left > 1e-12 * particles.liquid, left, 0.0)
-        if is_drop.any():  # local: every rank has its own drops
-            ratio = np.where(is_drop, 1.0 - lost / particles.mass, 1.0)
-            particles.radius[...] *= np.cbrt(ratio)
-            particles.inverse_mass[...] /= ratio
-            particles.inverse_inertia[...] /= ratio ** (5.0 / 3.0)
+        if len(is_drop):
+            ratio = 1.0 - lost[is_drop] / particles.mass[is_drop]
+            particles.radius[is_drop] *= np.cbrt(ratio)
+            particles.inverse_mass[is_drop] /= ratio
+            particles.inverse_inertia[is_drop] /= ratio ** (5.0 / 3.0)
 
     def checkpoint(self) -> dict[str, Any]:
         """What evaporated, and its heat."""
@@ -161,21 +175,10 @@ def _give(
     begin  temperature of the surfaces before [K]
     there  liquid that can evaporate, of films and of bridges [kg]
     """
-    mass = surfaces.mass + surfaces.bridged
-    difference = surfaces.saturated - surfaces.fraction
-    differs = np.abs(difference) > 1e-12
-    conductance = np.where(differs, mass / step / np.where(differs, difference, 1.0), 0.0)
-    most = (there[0] + there[1]) / (step * np.maximum(surfaces.saturated, 1e-300))  # not more, also into dry air
-    conductance = np.maximum(np.minimum(conductance, most), 0.0)
-    latent = surfaces.heat / np.where(mass == 0.0, 1.0, mass)
+    conductance, latent = np.empty((2, len(begin)))
+    conductance_of_vapour(surfaces, *there, step, conductance, latent)
     taken = -vapour.exchange(simulation, conductance, surfaces.saturated, step)
-    # by their rates, as far as there is liquid
-    of_bridges = taken * np.where(mass == 0.0, 0.0, surfaces.bridged / np.where(mass == 0.0, 1.0, mass))
-    of_bridges = np.clip(of_bridges, taken - there[0], np.where(there[1] > 0.0, there[1], 0.0))
-    surfaces.bridged[...] = of_bridges
-    surfaces.mass[...] = taken - of_bridges
-    surfaces.heat[...] = latent * taken
-    surfaces.temperature[...] = begin - surfaces.response * surfaces.heat / step
+    share_out(surfaces, begin, *there, taken, latent, step)
 
 
 def evaporated_mass(simulation: Any) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, serial
 from cfddem.backend.law_set import Slot
+from cfddem.particles.pair_graph import geometry
 from closures.bond import neck_area
 from closures.evaporation import (
     dilute_drive,
@@ -70,10 +71,75 @@ def drive(temperature, gas, fraction, air):
 
 
 @serial
-def meniscus_areas(volume, gap, reduced_radius, areas):
-    """Area of the free surface of every bridge, written (n,) [m2]."""
-    for k in range(len(areas)):
-        areas[k] = neck_area(volume[k], gap[k], reduced_radius[k])
+def menisci(rows, density, system, body, parts, masses, area, mass):
+    """Parts of bridges, the first of all, then the second: particle, meniscus [m2] and liquid [kg], written to `body`,
+    `parts` and `masses` (2 n,); and their sums of every owned particle, to `area` and `mass` (count,).
+
+    rows  of the edges that have a bridge (n,); those at walls have one part
+    """
+    n, edges, radius, count = len(rows), system.edges, system.particles.radius, len(area)
+    for k in range(n):
+        row = rows[k]
+        i, pair = np.int64(edges.first[row]), row < edges.between_particles
+        other, one, volume = np.int64(edges.second[row]) if pair else i, radius[i], system.memory.bridge_volume[row]
+        reduced = one * radius[other] / (one + radius[other]) if pair else one
+        _, _, gap = geometry(row, system)
+        share, free = 0.5 if pair else 1.0, neck_area(volume, gap, reduced)
+        body[k], body[n + k] = i, other if pair else count  # beyond the owned particles: not ours
+        parts[k], parts[n + k] = share * free, (1.0 - share) * free
+        masses[k], masses[n + k] = share * (volume * density), (1.0 - share) * (volume * density)
+    for k in range(2 * n):
+        if body[k] < count:
+            area[body[k]] += parts[k]
+            mass[body[k]] += masses[k]
+
+
+@serial
+def taken_from(body, parts, masses, area, lost, taken):
+    """What bridges lose, by their areas; what one has not, the others of its particle give: written to `taken` (2 n,).
+
+    lost  of every particle (count,) [kg]
+    """
+    given, left = np.zeros(len(lost)), np.zeros(len(lost))
+    for k in range(len(body)):
+        i = body[k]
+        if i < len(lost):
+            taken[k] = min(lost[i] * parts[k] / max(area[i], 1e-300), masses[k])
+            given[i] += taken[k]
+            left[i] += masses[k] - taken[k]
+    for k in range(len(body)):
+        i = body[k]
+        if i < len(lost):
+            missing = lost[i] - given[i]
+            more = min(missing / max(left[i], 1e-300) if missing > 0.0 else 0.0, 1.0)
+            taken[k] = min(taken[k] + more * (masses[k] - taken[k]), masses[k])
+
+
+@serial
+def conductance_of_vapour(surfaces, there, there_in_bridges, step, conductance, latent):
+    """Conductance that gives the cells what evaporates, at most what is there (N,) [kg/s]; latent heat (N,) [J/kg]."""
+    for i in range(len(conductance)):
+        mass, difference = surfaces.mass[i] + surfaces.bridged[i], surfaces.saturated[i] - surfaces.fraction[i]
+        most = (there[i] + there_in_bridges[i]) / (step * max(surfaces.saturated[i], 1e-300))
+        wanted = mass / step / difference if abs(difference) > 1e-12 else 0.0
+        conductance[i] = max(min(wanted, most), 0.0)
+        latent[i] = surfaces.heat[i] / mass if mass != 0.0 else surfaces.heat[i]
+
+
+@serial
+def share_out(surfaces, begin, there, there_in_bridges, taken, latent, step):
+    """Let surfaces lose what cells took (N,) [kg]: films and bridges by their rates, as far as there is liquid.
+
+    begin  temperature of the surfaces before [K]
+    """
+    for i in range(len(taken)):
+        mass = surfaces.mass[i] + surfaces.bridged[i]
+        of_bridges = taken[i] * (surfaces.bridged[i] / mass if mass != 0.0 else 0.0)
+        most = there_in_bridges[i] if there_in_bridges[i] > 0.0 else 0.0
+        of_bridges = min(max(of_bridges, taken[i] - there[i]), most)
+        surfaces.bridged[i], surfaces.mass[i] = of_bridges, taken[i] - of_bridges
+        surfaces.heat[i] = latent[i] * taken[i]
+        surfaces.temperature[i] = begin[i] - surfaces.response[i] * surfaces.heat[i] / step
 
 
 @serial
@@ -86,7 +152,9 @@ def evaporate(surfaces, air, step):
     for i in range(len(surfaces.mass)):
         there, begin, diameter = surfaces.mass[i], surfaces.temperature[i], surfaces.diameter[i]
         in_bridges, sherwood, film = surfaces.bridged[i], surfaces.sherwood[i], surfaces.film[i]
-        surfaces.mass[i] = surfaces.bridged[i] = surfaces.heat[i] = 0.0
+        surfaces.mass[i] = surfaces.bridged[i] = surfaces.heat[i] = surfaces.saturated[i] = 0.0
+        if not (there > 0.0 or in_bridges > 0.0):
+            continue
         area, share = math.pi * diameter**2, 1.0
         if film < math.inf:
             share = drying_share(film, area, air.full_thickness, diameter, sherwood) if film > 0.0 else 0.0
@@ -98,16 +166,17 @@ def evaporate(surfaces, air, step):
             continue
         slowness, gas, fraction = surfaces.response[i], surfaces.gas[i], surfaces.fraction[i]
         scale = slowness * transport
-        low = begin
-        at_low = scale * latent_heat(begin) * drive(begin, gas, fraction, air)  # of T - T' + s L m
+        low = middle = begin
+        latent, driven = latent_heat(begin), drive(begin, gas, fraction, air)  # at `middle`
+        at_low = scale * latent * driven  # of T - T' + s L m
         high = max(begin - at_low, 200.0)
         at_high = high - begin + scale * latent_heat(high) * drive(high, gas, fraction, air)
-        middle = begin
         for _ in range(100):
             if abs(high - low) <= CLOSEST or at_low == at_high:
                 break
             middle = high - at_high * (high - low) / (at_high - at_low)  # regula falsi, as in Illinois
-            value = middle - begin + scale * latent_heat(middle) * drive(middle, gas, fraction, air)
+            latent, driven = latent_heat(middle), drive(middle, gas, fraction, air)
+            value = middle - begin + scale * latent * driven
             if abs(value) <= CLOSEST:
                 break
             if value * at_high <= 0.0:
@@ -115,12 +184,13 @@ def evaporate(surfaces, air, step):
             else:
                 at_low *= 0.5
             high, at_high = middle, value
-        passing = step * drive(middle, gas, fraction, air)
+        passing = step * driven
         surfaces.mass[i] = min(passing * of_film, there)
         surfaces.bridged[i] = min(passing * of_bridges, in_bridges)
         mass = surfaces.mass[i] + surfaces.bridged[i]
         if mass < passing * transport:
             middle = begin - slowness * latent_heat(begin) * mass / step
+            latent = latent_heat(middle)
         surfaces.temperature[i] = middle
-        surfaces.heat[i] = mass * latent_heat(middle)
+        surfaces.heat[i] = mass * latent
         surfaces.saturated[i] = vapour_fraction(saturated(middle, air), air.pressure)

@@ -39,7 +39,7 @@ class HeatExchange(CaseFeature):
     """Temperature of the particles and of the fluid, and the heat between them.
 
     cells              temperature of the fluid in every cell; None if it is uniform
-    fluid_temperature  of all the fluid now, or its mean over the cells [K]
+    fluid_temperature  of all the fluid, where it is uniform [K]
     given              heat given to the particles by the fluid [J]
     scale              heat exchanged, without sign [J]
     sprayed            heat that drops of the spray have brought [J]
@@ -122,11 +122,11 @@ class HeatExchange(CaseFeature):
 
     def stored(self, particles: Any) -> float:
         """Heat in all particles, above the temperature of new ones [J]."""
-        return self._held(particles, self.capacity(particles))
+        return float(self.communicator.sum(self._above(particles, self.capacity(particles))))
 
-    def _held(self, particles: Any, capacity: np.ndarray) -> float:
-        above = particles.temperature - self.keys.particle_temperature
-        return float(self.communicator.sum(capacity * above))
+    def _above(self, particles: Any, capacity: np.ndarray) -> np.ndarray:
+        """Heat in every particle, above the temperature of new ones (N,) [J]."""
+        return np.asarray(capacity * (particles.temperature - self.keys.particle_temperature))
 
     def buoyancy(self, fluid: FluidSolver) -> np.ndarray:
         """Weight that warm fluid lacks, per volume of the cell (nz, ny, nx, 3) [N/m3]."""
@@ -155,17 +155,20 @@ class HeatExchange(CaseFeature):
         """Exchange heat over the step [s], at the slip of the coupling."""
         particles, total = simulation.owned, self.communicator.sum
         self._capacity = capacity = self.capacity(particles)  # of the whole step
-        self.other += self._held(particles, capacity) - self.last
+        before = self._above(particles, capacity)
         terms = simulation.terms
         if self.cells is None:
             received = self._from_uniform(particles, capacity, self.conductance(terms), step)
         else:
             received = self._from_cells(self.cells, particles, terms, step)
             self.response = step / capacity
-        self.given += float(total(received))
-        self.scale += float(total(np.abs(received)))
         particles.temperature += received / capacity
-        self.last = self._held(particles, capacity)
+        after = self._above(particles, capacity)
+        given, scale, held, holds = total([received, np.abs(received), before, after], axis=1).tolist()
+        self.given += given
+        self.scale += scale
+        self.other += held - self.last
+        self.last = holds
 
     def _from_uniform(self, particles: Any, capacity: np.ndarray, conductance: np.ndarray, step: float) -> np.ndarray:
         """Heat that every particle receives from a fluid of one temperature (N,) [J]."""
@@ -187,7 +190,6 @@ class HeatExchange(CaseFeature):
         self.transfer.last_step = 0.0
         sent = self.transfer.prepare(particles, terms.cell_map, self.conductance(terms), step)
         seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])[..., None]
-        self.fluid_temperature = cells.mean
         rate = self.transfer.apply(particles, terms.cell_map, sent, np.ones_like(seen), seen)[:, 0]
         self.around = particles.temperature + rate / sent.implicit
         return np.asarray(step * rate)
@@ -229,7 +231,7 @@ def mean_temperature(simulation: Any) -> float:
 def fluid_temperature(simulation: Any) -> float:
     """Mean temperature of the fluid."""
     heat = simulation.feature(HeatExchange)
-    return float(heat.fluid_temperature)
+    return float(heat.cells.mean if heat.cells else heat.fluid_temperature)
 
 
 def outlet_temperature(simulation: Any) -> float:

@@ -95,8 +95,9 @@ class Vapour(CaseFeature):
         seen = self.cells.step(coefficient, product)
         around = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(seen), seen]))
         received = np.asarray(step * conductance * (around[:, 1] - around[:, 0] * surface))
-        self.received += float(self.communicator.sum(received))
-        self.scale += float(self.communicator.sum(np.abs(received)))
+        sums = self.communicator.sum([received, np.abs(received)], axis=1)
+        self.received += float(sums[0])
+        self.scale += float(sums[1])
         self._made = True
         return received
 

@@ -101,6 +101,9 @@ class Scalar:
         )
         self._through = np.zeros((2, 3, *self.grid.padded_shape))
         self._faces = SideFaces.of(fluid.boundaries, sides, kind.capacity)
+        self._side = self._faces.places[:, 0], self._faces.places[:, 1]  # where the faces of sides are
+        names = ("stored", "lost", "growth", "rate", "coefficient", "target", "missed")
+        self._cells = {name: self.fields.owned(name) for name in names}  # views of what is never exchanged
         is_open = fluid.boundaries.halo.padded(self.grid.open, outside=0.0)
         for d in range(3):
             self.fields.gate[d] = is_open * np.roll(is_open, 1, axis=2 - d)
@@ -149,20 +152,21 @@ class Scalar:
         product      beta times the value of the particles (nz, ny, nx)
         returns      value that the exchange has seen (nz, ny, nx): it has given beta (v - seen) per volume and time
         """
-        fields, step = self.fields, self.fluid.last_step
+        step = self.fluid.last_step
         parts = self._find_fluxes(step)
         exchanging = coefficient is not None and product is not None
         if exchanging:
             self._take_exchange(coefficient, product)
-        flows = np.zeros(len(self._faces.area))
+        of_sides = np.asarray(self.fields.flux.reshape(3, -1)[self._side])
+        flows = np.zeros(len(of_sides))
         for _ in range(parts):
             if exchanging:
                 self._relax(0.5 * step / parts)
-            self._move(step / parts, flows)
+            self._move(step / parts, of_sides, flows)
             if exchanging:
                 self._relax(0.5 * step / parts)
-        self._count(flows)
-        seen: Array = fields.owned("target") - fields.owned("missed") * (0.5 / parts)
+        self._count(of_sides, flows)
+        seen: Array = self._cells["target"] - self._cells["missed"] * (0.5 / parts)
         if coefficient is not None and product is not None:
             given = float(self.fluid.communicator.sum(product - coefficient * seen))
             self.sums["exchange"] += step * self.grid.cell_volume * given
@@ -172,13 +176,14 @@ class Scalar:
         """Flux of the fluid, diffusivity, and rates of cells; returns into how many parts the step is divided."""
         fluid, fields, inverse = self.fluid, self.fields, self.fluid.inverse_spacing
         earlier = fluid.voidage - step * fluid.fields.owned("voidage_rate")
-        self._set(fields.lost, (fields.owned("stored") - earlier) * fluid.open_cells)
+        self._cells["lost"][:] = (self._cells["stored"] - earlier) * fluid.open_cells
+        fluid.boundaries.halo.fill(fields.lost)
         strength = FOLLOW / (step * inverse)
         volume_fluxes(fluid.fields.velocity, fluid.fields.mean_voidage, fields.lost, fields.gate, strength, fields.flux)
         molecular = self.kind.conductivity / self.kind.capacity
         diffusivities(fluid.fields.mean_voidage, molecular, self.kind.spread == "none", fields.diffusivity)
         cell_rates(fields.flux, fields.diffusivity, inverse, fields.growth, fields.rate)
-        growth, stored = fields.owned("growth"), fields.owned("stored")
+        growth, stored = self._cells["growth"], self._cells["stored"]
         growth *= fluid.open_cells
         least = np.minimum(stored, stored - step * growth)
         if fluid.communicator.smallest(least) <= 0.0:
@@ -186,26 +191,27 @@ class Scalar:
                 f"{self.kind.name} of the fluid: a cell loses all of its fluid in the step of {step:.3g} s to "
                 f"t = {fluid.time:g} s; take shorter fluid steps"
             )
-        rate = (fields.owned("rate") + self._wall_rate) * fluid.open_cells
+        rate = (self._cells["rate"] + self._wall_rate) * fluid.open_cells
         self.parts = max(1, math.ceil(step * fluid.communicator.largest(rate / least) * (1.0 - 1e-9)))
         return self.parts
 
     def _take_exchange(self, coefficient: Any, product: Any) -> None:
         """Coefficient over capacity, and value of the particles in every cell."""
-        fields = self.fields
-        fields.owned("coefficient")[:] = coefficient / self.kind.capacity
-        fields.owned("target")[:] = np.where(
-            coefficient > 0.0, product / np.where(coefficient > 0.0, coefficient, 1.0), self.value
-        )
-        fields.missed.fill(0.0)
+        self._cells["coefficient"][:] = coefficient / self.kind.capacity
+        there = coefficient > 0.0
+        self._cells["target"][:] = np.where(there, product / np.where(there, coefficient, 1.0), self.value)
+        self.fields.missed.fill(0.0)
 
     def _relax(self, step: float) -> None:
         """Exchange with the particles."""
         fields = self.fields
         relax(fields.value, fields.stored, fields.coefficient, fields.target, step, fields.missed)
 
-    def _move(self, step: float, flows: Array) -> None:
-        """Advection, diffusion and the flux of walls over a step [s]; adds what came through every face of a side."""
+    def _move(self, step: float, of_sides: Array, flows: Array) -> None:
+        """Advection, diffusion and the flux of walls over a step [s]; adds what came through every face of a side.
+
+        of_sides  eps u through these, along their axes (m,) [m/s]
+        """
         fields, inverse, through = self.fields, self.fluid.inverse_spacing, self._through
         for stage, second in ((0, 0.0), (1, 0.5)):
             value = fields.next if stage else fields.value
@@ -221,25 +227,20 @@ class Scalar:
             if self.grid.solid is not None:
                 self.grid.inner(fields.next)[self.grid.solid] = self.kind.start
         fields.swap("value", "next")
-        stored = fields.owned("stored")
-        stored -= step * fields.owned("growth")
-        axis, face, _, inward = self._faces.places.T
-        both = through.reshape(2, 3, -1)[:, axis, face]
-        flows += step * inward * (0.5 * (both[0] + both[1]) - self.kind.start * self._flux_of_sides())
+        self._cells["stored"][:] -= step * self._cells["growth"]
+        one, other = (each.reshape(3, -1)[self._side] for each in through)
+        flows += step * self._faces.places[:, 3] * (0.5 * (one + other) - self.kind.start * of_sides)
 
-    def _flux_of_sides(self) -> Array:
-        """eps u through the faces of sides, along their axes (m,) [m/s]."""
-        axis, face = self._faces.places[:, 0], self._faces.places[:, 1]
-        return np.asarray(self.fields.flux.reshape(3, -1)[axis, face])
-
-    def _count(self, flows: Array) -> None:
+    def _count(self, of_sides: Array, flows: Array) -> None:
         """Add what came through the sides in a step to the sums."""
-        faces, total, into = self._faces, self.fluid.communicator.sum, self._flux_of_sides() * self._faces.places[:, 3]
+        faces, into = self._faces, of_sides * self._faces.places[:, 3]
         brought = flows * faces.area * self.kind.capacity
-        flowing, leaves = ~faces.wall, ~faces.wall & (into < 0.0)
-        through = (flowing & ~leaves, leaves, faces.wall)
-        inflow, outflow, walls = (float(total(brought[some])) for some in through)
-        left = -float(total((into * faces.area)[leaves])) * self.fluid.last_step
+        leaves = ~faces.wall & (into < 0.0)
+        terms = np.where([~faces.wall & ~leaves, leaves, faces.wall], brought, 0.0)
+        inflow, outflow, walls, left = self.fluid.communicator.sum(
+            np.append(terms, [np.where(leaves, into * faces.area, 0.0)], axis=0), axis=1
+        ).tolist()
+        left *= -self.fluid.last_step
         self.sums["inflow"] += inflow
         self.sums["outflow"] -= outflow
         self.sums["walls"] += walls
@@ -252,11 +253,6 @@ class Scalar:
         coefficient = np.where(faces.rules[:, 5] > 0.0, 0.0, faces.rules[:, 1]) * faces.rules[:, 4]
         np.add.at(rate.reshape(-1), faces.places[:, 2], coefficient * self.fluid.inverse_spacing[faces.places[:, 0]])
         return np.array(self.grid.inner(rate))
-
-    def _set(self, padded: Array, cells: Array) -> None:
-        """Write the cells of a padded field, and fill its ghosts."""
-        self.grid.inner(padded)[:] = cells
-        self.fluid.boundaries.halo.fill(padded)
 
     # ------------------------------------------------------------ checkpoint
 

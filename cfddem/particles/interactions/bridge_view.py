@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -133,7 +134,12 @@ class Bridges(ParticleFeature):
         lost     volume (n,), below 0 where vapour condenses [m3]
         returns  energy of the pulls that is gone, of bridges whose first body this process owns [J]
         """
-        return float(specialise(_dry, self._solver.choices)(rows, lost, self._solver.system))
+        return float(self._dry(rows, lost, self._solver.system))
+
+    @cached_property
+    def _dry(self) -> Any:
+        """The loop of `dry`, which is called in every step."""
+        return specialise(_dry, self._solver.choices)
 
     def checkpoint(self) -> dict[str, Any]:
         """What the fields of particles do not tell."""
