@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rooms  # noqa: F401  programs are functions of tests
 
 from cfddem.backend.errors import InputError
 from cfddem.backend.launch import launch_command
@@ -37,7 +38,7 @@ needs_mpi = pytest.mark.skipif(bool(why_not()), reason=why_not())
 def on_mpi(ranks: int, program: str, *arguments: Any, timeout: float = 900.0) -> list[Any]:
     """Run `program(communicator, *arguments)` on ranks; returns what it returns, in the order of ranks.
 
-    program  as "module:function", of a module beside this one
+    program  as "module:function", of a test or helper
     """
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "arguments").write_bytes(pickle.dumps(arguments))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
+import rooms  # noqa: F401  tests import each other
 
 LONGEST = (
     "test_gallery", "test_docs", "test_golden", "test_user_laws", "test_ghosts", "test_resolved_suspension",

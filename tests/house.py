@@ -1,6 +1,6 @@
 """The command `python -m tests.house`: how large the code is, and how much of it must be known at once.
 
-Each number is to fall, or to stay; `tests/test_structure.py` holds the limits.
+Each number is to fall, or to stay; `tests/package/test_structure.py` holds the limits.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ Sums are sums of whole numbers (:mod:`cfddem.backend.exact_sums`): they have the
 ranks, however an array is divided among them. All ranks must make the same calls in the same order.
 
 A line that reduces an array of this rank alone, on purpose, says so with a comment `# local: reason`.
-`tests/test_communicator.py` forbids other reductions without a communicator in the code of the solver.
+`tests/backend/test_communicator.py` forbids other reductions without a communicator in the code of the solver.
 """
 
 from __future__ import annotations

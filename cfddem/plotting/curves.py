@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cfddem.analysis.fluctuations import RegimeMap
 
 BLUE, SKY, ORANGE, GREEN, RED, GREY = "#0b4f8a", "#66b9e8", "#e08a00", "#12995a", "#8c1020", "#757575"
-"""Colours that differ in print and for colour-blind readers, as `tests/test_figures.py` measures."""
+"""Colours that differ in print and for colour-blind readers, as `tests/plotting/test_figures.py` measures."""
 
 _STYLE: Any = {
     "font.size": 11.0,

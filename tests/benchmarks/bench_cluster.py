@@ -20,6 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+import rooms  # noqa: F401
 from test_ghosts import DRY, GLASS, WET
 
 from cfddem.backend.launch import communicator as started

@@ -57,6 +57,8 @@ def main(beads: int, steps: int) -> None:
 def seen(folder: Path) -> str:
     """What the reader of ParaView finds, against the snapshots."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
+
+    import rooms  # noqa: F401
     from toy_run import series
 
     written = open_run(folder)

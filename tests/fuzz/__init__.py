@@ -7,4 +7,6 @@ number only; `--only NUMBER` repeats one and shows what it tried.
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # helpers of the tests are top-level modules
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import rooms  # noqa: F401  helpers of the tests are top-level modules

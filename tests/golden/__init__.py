@@ -10,4 +10,6 @@ Only `building` and `states` know how a run is made and how its state is read.
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))  # for `python -m tests.golden`
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import rooms  # noqa: F401  helpers of the tests are top-level modules

@@ -1,0 +1,282 @@
+"""Coupled runs on several ranks have the bits of one process, and nothing is lost at borders."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from cluster import needs_mpi, on_mpi
+from example_case import MIXTURE
+from golden.beds import BEADS, SEEDS
+from in_process_ranks import on_ranks
+
+from cfddem.backend.brick_shapes import Shape, place_of
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import RunFailed
+from cfddem.case.schema import Case
+from cfddem.coupling.kernel import FilterKernel
+from cfddem.coupling.reach import Reach
+from cfddem.features.heat import HeatExchange
+from cfddem.fluid.block import Block, Division, divide, region_of
+from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.pressure import ranks as shared
+from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.particles.bricks import Bricks
+from cfddem.run import history
+from cfddem.run.simulation import Simulation
+
+TIGHT = 1e-11
+"""Tolerance of the pressure."""
+
+
+@pytest.fixture(autouse=True)
+def _small_grids_are_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several levels of these small grids are divided, too."""
+    monkeypatch.setattr(shared, "SMALL", 100)
+
+
+def case_of(text: str, **changes: Any) -> Case:
+    """A case with changes, with __ for the point."""
+    return Case.from_text(text, "case", {name.replace("__", "."): value for name, value in changes.items()})
+
+
+ALL_FORCES = {f"laws__{name}": True for name in ("lift", "torque", "viscous_stress")}
+
+BEDS = {
+    "all forces": case_of(
+        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__agitation="pseudo_turbulence", run__energy_budget=True,
+        **ALL_FORCES
+    ),
+    "crossing a periodic border": case_of(
+        BEADS, column__cell=0.004, column__sides="periodic", column__ends="periodic", bed__inlet_velocity=0.0,
+        bed__initial_velocity=[1.0, 0.9, 1.0],
+    ),
+    "mixture, pieces of spheres": case_of(MIXTURE, column__cell=0.002, laws__mapping="divided"),
+}  # fmt: skip
+
+
+def begun(case: Case, communicator: Communicator = SERIAL, state: dict[str, Any] | None = None) -> Simulation:
+    """A run with a tight tolerance of the pressure."""
+    simulation = Simulation(case, communicator=communicator, state=state)
+    assert simulation.fluid is not None
+    simulation.fluid.tolerance = TIGHT
+    return simulation
+
+
+def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
+    """Particles by id, fluid, and what the history says after some steps."""
+    assert simulation.fluid is not None
+    for _ in range(steps):
+        simulation.step()
+    names = ("position", "velocity", "spin", "applied", "drag_impulse")
+    order = np.argsort(simulation.whole("id"))
+    particles = {name: simulation.whole(name)[order] for name in names}
+    particles["temperature"] = np.zeros(0)
+    if heat := [each for each in simulation.features if isinstance(each, HeatExchange)]:
+        cells = list(heat[0].cells_for_snapshot().values())
+        particles["temperature"] = np.append(simulation.whole("temperature")[order], cells)
+    row = history.row(simulation)
+    measured = ("bed_height", "pressure_drop", "bed_voidage_from_pressure", "out_of_range_count")
+    solids = simulation.communicator.sum(1.0 - simulation.fluid.voidage) * simulation.fluid.grid.cell_volume
+    volume = simulation.communicator.sum(simulation.owned.volume)
+    return particles | simulation.fluid.checkpoint() | {
+        "history": np.array([row[name] for name in measured]),
+        "energy": np.array([row[name] for name in row if name.startswith("energy_")] or [0.0]),
+        "imbalance": np.array([row["momentum_imbalance"], row["volume_imbalance"], solids / volume - 1.0]),
+    }  # fmt: skip
+
+
+def bed_over_time(
+    communicator: Communicator, text: str, changes: dict[str, Any], until: float, shape: Shape | None = None
+) -> tuple[Array, Array, dict[str, Array]]:
+    """Mean pressure drop and bed height over the second half, largest imbalances, and the state at the end."""
+    if shape:
+        communicator.shape = shape
+    simulation, measured, imbalances = begun(case_of(text, **changes), communicator), [], []
+    while simulation.time < until * (1.0 - 1e-9):
+        simulation.step(until)
+        row = history.row(simulation) if simulation.steps % 5 == 0 else None
+        if row is not None:
+            imbalances.append([row["momentum_imbalance"], row["volume_imbalance"]])
+        if row is not None and simulation.time > 0.5 * until:
+            measured.append([row["pressure_drop"], row["bed_height"]])
+    return np.mean(measured, axis=0), np.max(np.abs(imbalances), axis=0), advanced(simulation, 0)
+
+
+def differing(found: dict[str, Array], expected: dict[str, Array]) -> list[str]:
+    """Names of the arrays whose bits differ."""
+    return [name for name in expected if not np.array_equal(found[name], expected[name], equal_nan=True)]
+
+
+@pytest.mark.parametrize("shape", [(1, 2, 1), (2, 2, 1), (1, 2, 2)])
+@pytest.mark.parametrize("name", BEDS)
+def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int, int, int]) -> None:
+    """Particles, fluid and history of slabs and bricks; volume and momentum are conserved across the borders."""
+    steps, ranks = 5, int(np.prod(shape))
+
+    def program(communicator: Communicator) -> tuple[dict[str, Array], set[int]]:
+        communicator.shape = shape
+        simulation = begun(BEDS[name], communicator)
+        before = set(simulation.owned.id.tolist())
+        return advanced(simulation, steps), before ^ set(simulation.owned.id.tolist())
+
+    alone = advanced(begun(BEDS[name]), steps)
+    for found, moved in on_ranks(ranks, program):
+        assert not differing(found, alone)
+        assert np.abs(found["imbalance"]).max() < 1e-10
+        assert len(moved) > 20 or "periodic" not in name
+
+
+def test_sums_in_the_order_of_the_ranks_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The control: with scalar products of floats, rank by rank, bits of the pressure are lost."""
+
+    def by_floats(self: PressureEquation, a: Array, b: Array) -> float:
+        return sum(self.communicator._combine([float(np.sum(a * b))], lambda one, other: one + other))
+
+    monkeypatch.setattr(PressureEquation, "_product", by_floats)
+    case = BEDS["all forces"]
+    alone = advanced(begun(case), 2)
+    assert "pressure" in differing(on_ranks(3, lambda ranks: advanced(begun(case, ranks), 2))[0], alone)
+
+
+TALL = {"column__cell": 0.004, "column__height": 0.12, "run__fluid_step": 5e-4}
+MANY = {
+    "films, agitation, history force": case_of(
+        BEADS, **TALL, laws__agitation="pseudo_turbulence", laws__history="basset", run__energy_budget=True
+    ),
+    "sharp surfaces": case_of(BEADS, **TALL, laws__surface="sharp"),
+    "hot gas, beside walls": case_of(
+        SEEDS, column__height=0.072, column__cell=0.0024, bed__count=1500, laws__wall_drag="nearest",
+        laws__self_disturbance_correction=True,
+        heat={
+            "particle_temperature": 400.0, "fluid_temperature": 300.0, "conductivity": 0.026,
+            "fluid_heat_capacity": 1000.0, "heat_capacity": {"seed": 100.0},
+        },
+    ),
+}  # fmt: skip
+
+MANY_SHAPES = ((1, 2, 1), (1, 1, 3), (2, 2, 1), (2, 1, 3), (2, 2, 2), (1, 2, 4), (1, 1, 8))
+"""2, 3, 4, 6 and 8 ranks, eight of them in three ways."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MANY)
+def test_any_number_of_ranks_has_the_bits_of_one(name: str) -> None:
+    """500 fluid steps at the default tolerance of the pressure, in one process and on 2, 3, 4, 6 and 8 ranks."""
+
+    def program(communicator: Communicator, shape: tuple[int, int, int] | None = None) -> dict[str, Array]:
+        if shape is not None:
+            communicator.shape = shape
+        return advanced(Simulation(MANY[name], communicator=communicator), 500)
+
+    alone = program(SERIAL)
+    assert np.abs(alone["drag_impulse"]).max() > 0.0
+    assert "hot" not in name or np.ptp(alone["temperature"]) > 10.0
+    counted = alone.pop("energy")  # by each rank in turn
+    for shape in MANY_SHAPES:
+        for found in on_ranks(int(np.prod(shape)), partial(program, shape=shape)):
+            assert not differing(found, alone), shape
+            assert found["energy"] == pytest.approx(counted, rel=1e-12)
+
+
+def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The volume that one rank deposits on cells of another belongs to the bed."""
+    monkeypatch.setattr(Reach, "collected", lambda self, fields: np.ascontiguousarray(self._inner(fields)))
+    case = BEDS["all forces"]
+    imbalance = on_ranks(2, lambda communicator: advanced(begun(case, communicator), 0)["imbalance"])[0]
+    assert abs(imbalance[2]) > 1e-3
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(ranks: int) -> None:
+    """Two steps on four ranks and two on fewer, against four steps in one process."""
+    case = case_of(BEADS, column__cell=0.002, bed__initial_velocity=[0.3, 0.1, 0.2])
+    alone = advanced(begun(case), 4)
+
+    def half(communicator: Communicator) -> dict[str, Any]:
+        simulation = begun(case, communicator)
+        advanced(simulation, 2)
+        return simulation.checkpoint()
+
+    state = on_ranks(4, half)[0]
+
+    def rest(communicator: Communicator) -> dict[str, Array]:
+        return advanced(begun(case, communicator, state), 2)
+
+    assert not differing(on_ranks(ranks, rest)[0], alone)
+
+
+# ---------------------------------------------------------------- under MPI
+
+
+@needs_mpi
+@pytest.mark.parametrize("shape", [(1, 2, 1), pytest.param((2, 2, 2), marks=pytest.mark.slow)])
+def test_ranks_under_mpi_are_one_process(shape: tuple[int, int, int]) -> None:
+    """A small liquid bed."""
+    given = BEADS, {"column__cell": 0.004, "bed__initial_velocity": [0.3, 0.2, 0.1]}, 0.01
+    _, _, alone = bed_over_time(SERIAL, *given)
+    for _, imbalance, found in on_mpi(int(np.prod(shape)), "test_coupling_ranks:bed_over_time", *given, shape):
+        assert not differing(found, alone)
+        assert imbalance.max() < 1e-10
+
+
+LARGE = {
+    "liquid": (BEADS, {"column__width": 0.06, "column__height": 0.18}),
+    "gas": (SEEDS, {"column__width": 0.036, "column__height": 0.072, "laws__self_disturbance_correction": True}),
+}
+"""Beds of 10 000 particles."""
+
+
+@needs_mpi
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
+def test_a_large_bed_under_mpi_has_the_bits_of_one_process(name: str) -> None:
+    """0.05 s on two and four ranks; volume and momentum to 1e-10."""
+    text, changes = LARGE[name]
+    given = text, changes | {"bed__count": 10_000}, 0.05
+    _, _, alone = bed_over_time(SERIAL, *given)
+    for ranks in (2, 4):
+        for _, imbalance, found in on_mpi(ranks, "test_coupling_ranks:bed_over_time", *given, timeout=3000.0):
+            assert not differing(found, alone)
+            assert imbalance.max() < 1e-10
+
+
+@pytest.mark.parametrize(("shape", "periodic"), [((2, 2, 1), (False, False, False)), ((2, 1, 2), (True, True, True))])
+def test_the_flux_of_solids_has_the_bits_of_one_process(
+    shape: tuple[int, int, int], periodic: tuple[bool, bool, bool]
+) -> None:
+    """Every face of all ranks, of particles that cross the borders."""
+    grid, draw = Grid((10, 9, 12), (0.01, 0.01, 0.01)), np.random.default_rng(4)
+    places, ways = draw.uniform(0.006, 0.084, (150, 3)), draw.uniform(-0.006, 0.006, (150, 3))
+    radius = draw.uniform(1e-3, 2e-3, 150)
+
+    def program(communicator: Communicator) -> list[Array]:
+        cells, mine = grid, np.ones(150, bool)
+        if communicator.size > 1:
+            cells = Block(grid, divide(grid, communicator.size, shape=shape), communicator)
+            mine = Bricks(cells.division.planes(grid)).owner(places) == communicator.rank
+        kernel = FilterKernel(cells, periodic, smoothing=0.012, communicator=communicator)
+        before, after = (kernel.map_particles(each[mine], radius[mine]) for each in (places, places + ways))
+        return kernel.solid_flux(before, after, 1e-3)
+
+    alone = program(SERIAL)
+    division = divide(grid, 4, shape=shape)
+    for rank, found in enumerate(on_ranks(4, program)):
+        for axis, flux in enumerate(found):
+            more = [int(axis == each) for each in range(3)]
+            assert np.array_equal(flux, alone[axis][region_of(division.starts, place_of(rank, shape), more)])
+
+
+def test_a_particle_beyond_the_ghosts_is_reported() -> None:
+    """Three layers of ghosts reach two and a half cells beyond the cells of a rank."""
+    grid = Grid((12, 2, 2), (0.1, 0.1, 0.1))
+
+    def program(communicator: Communicator) -> None:
+        reach = Reach(Block(grid, Division(((0, 6, 12), (0, 2), (0, 2))), communicator), (False, False, False))
+        reach.refuse_beyond(np.array([[0.6 + 0.24 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
+        with pytest.raises(RunFailed, match=r"2\.6 cells beyond"):
+            reach.refuse_beyond(np.array([[0.6 + 0.26 * (1 - 2 * communicator.rank), 0.1, 0.1]]))
+
+    on_ranks(2, program)

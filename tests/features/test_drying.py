@@ -1,0 +1,218 @@
+"""Water that evaporates into the cells of the fluid, which take the vapour and give the heat."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from in_process_ranks import on_ranks
+from test_heat_in_fluid import SEEDS, case_of, lattice
+
+from cfddem.backend.compile import use_threads
+from cfddem.backend.errors import InputError
+from cfddem.case.schema import Case
+from cfddem.features.evaporation_keys import Evaporation
+from cfddem.features.heat import HeatExchange
+from cfddem.features.vapour import Vapour, outlet_vapour, vapour_imbalance
+from cfddem.run.history import row
+from cfddem.run.simulation import Simulation
+from closures.evaporation import latent_heat, saturation_pressure, vapour_fraction
+
+SPEED = 1.0
+
+
+def wet_bed(layers: int, **changes: Any) -> Case:
+    """Drops of 2 mm on a lattice in air of 320 K, which enters with a little vapour."""
+    return case_of(
+        material__glass__density=998.0, bed__positions=lattice(4e-3, (2, 2, layers)), bed__inlet_velocity=SPEED,
+        heat={
+            "particle_temperature": 298.0, "fluid_temperature": 320.0, "conductivity": 0.027,
+            "fluid_heat_capacity": 1007.0, "heat_capacity": {"glass": 420.0},
+        },
+        vapour={"fluid_fraction": 0.005, "diffusivity": 2.8e-5}, evaporation={"drops": ["glass"]},
+        laws__kernel_width=0.0, **changes,
+    )  # fmt: skip
+
+
+def test_a_wet_bed_dries_at_the_rate_of_the_air_that_leaves_and_at_the_wet_bulb() -> None:
+    """The first layer is at the wet bulb of the air that enters, and no drop leaves its balance."""
+    simulation = Simulation(wet_bed(10))
+    simulation.until(3.0)
+    then = row(simulation)
+    simulation.until(3.5)
+    now = row(simulation)
+    rate = (now["evaporated_mass"] - then["evaporated_mass"]) / 0.5
+    leaves = 1.2 * SPEED * 0.008**2 * (outlet_vapour(simulation) - 0.005)
+    cooled = 1.2 * SPEED * 0.008**2 * 1007.0 * (320.0 - now["outlet_temperature"])
+    particles, keys = simulation.particles, Evaporation.of(simulation.case)
+    assert keys is not None
+    first = particles.temperature[particles.position[:, 2] < 3e-3].mean()
+    latent = latent_heat(float(particles.temperature.mean()))
+    slip = simulation.terms.flow.reynolds.mean()  # type: ignore[union-attr]
+    print(
+        f"rate {rate:.5g}, by the air {leaves:.5g} kg/s; heat {cooled:.5g}, latent {latent * rate:.5g} W; Re {slip:.0f}"
+    )
+    print(f"first layer {first:.3f} K, wet bulb at the reference speed {keys.wet_bulb(simulation.case):.3f} K")
+    assert leaves == pytest.approx(rate, rel=0.01) and cooled == pytest.approx(latent * rate, rel=0.01)
+    assert first == pytest.approx(keys.wet_bulb(simulation.case), abs=0.3)
+    assert now["heat_imbalance"] < 1e-10 and vapour_imbalance(simulation) < 1e-10
+    assert now["vapour_from_particles"] == pytest.approx(now["evaporated_mass"], rel=1e-10)
+
+
+@pytest.mark.slow
+def test_a_layer_of_wet_beads_is_dry_when_the_balance_says() -> None:
+    """Beads with films: a plateau at the wet bulb, a constant rate, and the end within 2 % of the water over the rate
+    by the air that leaves."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.07, "thickness": 3e-6}
+    case = wet_bed(1, liquid=film).with_(**{"evaporation": {}, "heat.particle_temperature": 294.0})
+    simulation = Simulation(case)
+    simulation.until(0.6)
+    begin, then = simulation.time, row(simulation)
+    simulation.until(0.8)
+    now, particles, keys = row(simulation), simulation.particles, Evaporation.of(simulation.case)
+    assert keys is not None
+    rate = (now["evaporated_mass"] - then["evaporated_mass"]) / (simulation.time - begin)
+    by_air = 1.2 * SPEED * 0.008**2 * (outlet_vapour(simulation) - 0.005)
+    plateau = float(particles.temperature.mean())
+    end = simulation.time + 998.0 * float(particles.liquid.sum()) / by_air
+    whole = then["liquid_on_particles"]
+    while particles.liquid.sum() > 1e-4 * whole and simulation.time < 10.0:
+        simulation.step()
+    print(f"rate {rate:.5g}, by the air {by_air:.5g} kg/s; plateau {plateau:.3f} K")
+    print(f"dry at {simulation.time:.3f} s, by the balance {end:.3f} s")
+    assert rate == pytest.approx(by_air, rel=0.01)
+    assert plateau == pytest.approx(keys.wet_bulb(simulation.case), abs=0.3)
+    assert simulation.time == pytest.approx(end, rel=0.02)
+    assert row(simulation)["liquid_imbalance"] < 1e-12 and vapour_imbalance(simulation) < 1e-10
+
+
+def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
+    """The drops shrink, so that air flows in through the open end; it is counted."""
+    case = wet_bed(
+        4, column={"width": 0.008, "height": 0.016, "cell": 0.004, "sides": "periodic"}, run__fluid_step=2e-3
+    )
+    simulation = Simulation(case.with_(**{"bed.inlet_velocity": 0.0}))
+    vapour, water = simulation.feature(Vapour), float(simulation.particles.mass.sum())
+    for _ in range(1000):
+        simulation.step()
+    sums, mass = vapour.cells.sums, float(simulation.particles.mass.sum())
+    assert mass + vapour.cells.content + sums["outflow"] - sums["inflow"] == pytest.approx(water, rel=1e-13)
+    surface = vapour_fraction(saturation_pressure(float(simulation.particles.temperature.mean())), 101325.0)
+    print(f"vapour {vapour.cells.value.mean():.6f}, saturated {surface:.6f}")
+    assert vapour.cells.value == pytest.approx(surface, rel=5e-3)
+    assert vapour_imbalance(simulation) < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
+
+
+MOVING = SEEDS.with_(**{
+    "heat.particle_temperature": 310.0, "heat.fluid_temperature": 340.0, "evaporation": {"drops": ["seed"]},
+    "vapour": {"fluid_fraction": 0.005, "diffusivity": 2.8e-5},
+})  # fmt: skip
+"""A bed of seeds that move, which dry as drops do."""
+
+
+def dried(simulation: Simulation, steps: int) -> dict[str, np.ndarray]:
+    """Particles by id, cells and history after some steps."""
+    for _ in range(steps):
+        simulation.step()
+    order, parts = np.argsort(simulation.whole("id")), (simulation.feature(HeatExchange), simulation.feature(Vapour))
+    cells = {name: values for each in parts for name, values in each.cells_for_snapshot().items()}
+    particles = {
+        f"{name} of particles": simulation.whole(name)[order] for name in ("temperature", "radius", "position")
+    }
+    return {**particles, **cells, "history": np.array(list(row(simulation).values()))}
+
+
+def test_a_drying_bed_has_the_same_bits_on_two_threads_and_when_it_goes_on() -> None:
+    before = use_threads(1)
+    expected, stopped = dried(Simulation(MOVING), 20), Simulation(MOVING)
+    dried(stopped, 10)
+    resumed = dried(Simulation.restored(MOVING, stopped.checkpoint()), 10)
+    use_threads(2)
+    threaded = dried(Simulation(MOVING), 20)
+    use_threads(before)
+    assert np.ptp(expected["vapour"]) > 1e-3 and expected["radius of particles"].max() < 0.6e-3
+    for found in (resumed, threaded):
+        for name, values in expected.items():
+            assert np.array_equal(values, found[name], equal_nan=True), name
+
+
+def test_two_processes_dry_a_bed_as_one_to_round_off() -> None:
+    """As their flow, whose sums over the cells at the border have another order."""
+    alone = dried(Simulation(MOVING), 20)
+    for shared in on_ranks(2, lambda ranks: dried(Simulation(MOVING, communicator=ranks), 20)):
+        assert shared["temperature of particles"] == pytest.approx(alone["temperature of particles"], abs=1e-9)
+        assert shared["radius of particles"] == pytest.approx(alone["radius of particles"], rel=1e-12)
+        assert shared["temperature"] == pytest.approx(alone["temperature"], abs=1e-9)
+        assert shared["vapour"] == pytest.approx(alone["vapour"], abs=1e-13)
+
+
+@pytest.mark.slow  # its law set is compiled for no other plain test
+def test_films_give_their_water_to_the_air_from_the_inlet_on_and_then_warm_up() -> None:
+    """All water of the films is in the vapour of the cells and of the air that left; the first layer is dry first."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 1e-6}
+    simulation = Simulation(
+        wet_bed(10).with_(
+            **{"material.glass.density": 2500.0, "heat.heat_capacity": {"glass": 40.0}},
+            **{"evaporation.drops": [], "liquid": film},
+        )
+    )
+    particles, first = simulation.particles, simulation.particles.position[:, 2] < 3e-3
+    water, begin = 998.0 * float(particles.liquid.sum()), float(particles.temperature[0])
+    simulation.until(0.4)
+    middle, early = row(simulation), particles.liquid[first].mean() / particles.liquid[~first].mean()
+    keys, cold = Evaporation.of(simulation.case), float(particles.temperature[first].mean())
+    assert keys is not None
+    print(f"{middle['evaporated_mass'] / water:.2%} of the water, first film over others {early:.2f}, at {cold:.2f} K")
+    assert 0.2 < middle["evaporated_mass"] / water < 0.8 and early < 0.9
+    assert cold == pytest.approx(keys.wet_bulb(simulation.case), abs=0.5) and cold < begin
+    simulation.until(2.5)
+    now, vapour = row(simulation), simulation.feature(Vapour)
+    assert particles.liquid.max() == 0.0 and now["evaporated_mass"] == pytest.approx(water, rel=1e-12)
+    sums = vapour.cells.sums
+    assert vapour.cells.content + sums["outflow"] - sums["inflow"] == pytest.approx(water, rel=1e-9)
+    assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
+    assert particles.temperature[first] == pytest.approx(320.0, abs=0.3)
+
+
+@pytest.mark.slow  # as the test above
+def test_drops_of_a_spray_bring_their_heat_and_all_budgets_close() -> None:
+    """Cold drops on warm beads in warm air: heat of the air in, latent heat out, heat of the drops in, the rest is
+    stored. A bead that receives more than one drop is between its temperature and that of the drops."""
+    film = {"viscosity": 1e-3, "surface_tension": 0.072, "thickness": 1e-6}
+    spray = {"rate": 2e-9, "drop_volume": 5e-13, "zone": "box", "corner": (0, 0, 0.02), "size": (8e-3, 8e-3, 0.02)}
+    case = wet_bed(10).with_(
+        **{"material.glass.density": 2500.0, "evaporation.drops": [], "liquid": film, "spray": spray},
+        **{"heat.spray_temperature": 280.0},
+    )
+    simulation = Simulation(case)
+    simulation.until(0.3)
+    middle = Simulation.restored(case, simulation.checkpoint())
+    simulation.until(0.6)
+    middle.until(0.6)
+    now, heat = row(simulation), simulation.feature(HeatExchange)
+    assert list(row(middle)) == list(now)
+    assert np.array_equal(list(row(middle).values()), list(now.values()), equal_nan=True)
+    landed = now["liquid_sprayed"]
+    colder = 298.0 - 280.0
+    print(f"{landed / 5e-13:.0f} drops brought {now['heat_from_spray']:.4g} J, latent {now['latent_heat_taken']:.4g} J")
+    assert landed == pytest.approx(2e-9 * 0.6, rel=1e-3) and now["liquid_missed"] == 0.0
+    assert now["heat_from_spray"] == pytest.approx(-landed * 4.17e6 * colder, rel=0.35)
+    gained = now["heat_in"] - now["heat_out"] + now["heat_from_walls"] - now["latent_heat_taken"]
+    scale = heat.scale + now["latent_heat_taken"]
+    assert now["heat_stored"] == pytest.approx(gained + now["heat_from_spray"], abs=1e-11 * scale)
+    assert now["liquid_imbalance"] < 1e-12 and now["vapour_imbalance"] < 1e-10 and now["heat_imbalance"] < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"vapour__inlet_fraction": 0.5}, "vapour.inlet_fraction = 0.5: must be at most saturated.*0.0"),
+        ({"evaporation__relative_humidity": 0.5}, "evaporation.relative_humidity.*left out with .vapour."),
+        ({"vapour": None}, "evaporation.vapour_fraction.*found none"),
+    ],
+)
+def test_air_that_cannot_be_is_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message) as failure:
+        wet_bed(2).with_(**{name.replace("__", "."): value for name, value in changes.items()})
+    assert len(str(failure.value).splitlines()) == 1
