@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from cfddem.backend.brick_shapes import Shape
 from cfddem.backend.errors import CfddemError, failure_elsewhere
-from cfddem.backend.exact_sums import largest_of_rows, put_together, split, unit_of
+from cfddem.backend.exact_sums import put_together, unit_of
 
 Value = TypeVar("Value")
 Axis = int | tuple[int, ...] | None
@@ -55,6 +55,8 @@ class Communicator:
         array = np.asarray(values)
         if array.dtype.kind in "biu":
             return _plain(self._add(np.asarray(array.sum(axis=axis, dtype=np.int64))))
+        from cfddem.backend.exact_sums_loops import largest_of_rows, split  # loads the compiler, which checks lack
+
         rows, kept = _rows(array.astype(float, copy=False), axis)
         most, parts = np.zeros(len(rows)), np.zeros((2, len(rows)), np.int64)
         largest_of_rows(rows.view(np.int64), most.view(np.int64))

@@ -7,13 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cfddem.backend.errors import InputError
-from cfddem.case.column_grid import grid_of
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
-from cfddem.fluid.cut_cells import open_share
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.issue import WIDTH
@@ -164,6 +162,9 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
     for number, mask in closed_cells(case).items():
         yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
     if case.has_smooth_walls:
+        from cfddem.case.column_grid import grid_of  # loads the compiler, which other checks lack
+        from cfddem.fluid.cut_cells import open_share
+
         share = open_share(grid_of(case))
         cut = int(((share > 0.0) & (share < 1.0)).sum())
         yield Row(group, "column: cells cut by the wall", cut, "", f"of {share.size}; smooth for the fluid")

@@ -18,7 +18,7 @@ from cfddem.backend.json_text import as_json
 def test_check_gives_what_the_command_prints() -> None:
     case = cfddem.gallery()["liquid-bed"]
     found = cfddem.check(case, ranks=2)
-    assert isinstance(found, cfddem.Preflight) and found.status == "ok" and found.rows[-1].name == "ranks"
+    assert isinstance(found, cfddem.Preflight) and found.status == "ok" and "ranks" in [row.name for row in found.rows]
     assert f"{found}\n" == call("check", "liquid-bed", "--ranks", "2").out
     broken = cfddem.check(case.with_(**{"bed.diameter": 0.5}))
     assert broken.status == "error" and {each.severity for each in broken.issues} >= {"error"}

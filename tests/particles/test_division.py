@@ -82,6 +82,7 @@ def test_planes_follow_the_particles_and_bits_stay(division: Bricks) -> None:
     assert_same_bits(joined([each for each, _ in results]), joined([state(whole)]))
 
 
+@pytest.mark.slow
 def test_a_rank_without_particles_changes_nothing() -> None:
     """The planes stay where they are."""
     spheres, given = settings(True, False)

@@ -27,7 +27,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import tangential_lubrication as film
-from scenarios.validation.particles import two_spheres
+from scenarios.validation.particles import few_spheres as two_spheres
 
 GLASS = Material(density=2500, youngs_modulus=60e9, poisson=0.23, restitution=0.97, friction=0.3, roughness=1e-9)
 FULL = Laws(film=True, film_motions="full")

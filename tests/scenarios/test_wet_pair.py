@@ -50,6 +50,7 @@ def test_head_on_with_zero_cut_is_the_closed_form(bridge: str) -> None:
             assert run.restitution == pytest.approx(davis_sitison(stokes, 0.9, run.minimum_gap / 270e-6), abs=2e-4)
 
 
+@pytest.mark.slow
 def test_a_dry_contact_returns_its_restitution_and_rolls() -> None:
     """Next to no film: e_dry head-on, and full sliding turns each sphere by 2.5 mu (1 + e) v_n / (2 R)."""
     thin = {"viscosity": 1e-8, "film": 1e-6, "tangential": "none", "stokes": 4e5, "radius": 1e-3}

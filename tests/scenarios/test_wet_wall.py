@@ -194,6 +194,7 @@ def test_a_toroid_that_is_singular_is_refused_by_name(sphere: str, film: float) 
     assert exact(sphere, "water", film, 3.0, capillary_phases="bridge").outcome == "rebound"
 
 
+@pytest.mark.slow
 def test_a_toroid_that_is_nearly_singular_is_said_to_be() -> None:
     """Alumina under 100 um of water, 28 degrees: an arc of 1 um at contact; the others have 22 um and more."""
     case = ("alumina_1.74", "water", 100e-6)
