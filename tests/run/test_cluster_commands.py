@@ -146,7 +146,7 @@ def test_more_ranks_than_can_share_the_cells_are_refused(case: Path, tmp_path: P
     """Before anything runs, once, with exit code 2; and a number of ranks that the launcher has not started."""
     (tmp_path / "bed.toml").write_text(BED)
     done = cfddem("run", "bed.toml", "-o", "run", "--ranks", "3", folder=tmp_path)
-    assert done.returncode == 2 and done.stderr.count("ranks = 3: must be at most 2 for 6 x 3 x 8 cells") == 1
+    assert done.returncode == 2 and done.stderr.count("ranks = 3: must be at most 2 x 1 x 2 for 6 x 3 x 8 cells") == 1
     assert not (tmp_path / "run").exists()
     done = subprocess.run(
         launch_command(2, [sys.executable, "-m", "cfddem", "run", str(case), "--ranks", "3"]),
