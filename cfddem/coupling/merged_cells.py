@@ -22,7 +22,7 @@ LEAST = 0.5
 """Share of a cell that must be open for a group of its own [-]."""
 
 
-class WholeCells:
+class SingleCells:
     """Of a grid without smooth walls: every cell is its own group. `grid` is the one that particles reach."""
 
     def __init__(self, grid: Grid) -> None:
@@ -51,7 +51,7 @@ class WholeCells:
         return gates[0], gates[1], gates[2]
 
 
-class MergedCells(WholeCells):
+class MergedCells(SingleCells):
     """The groups of a grid with smooth walls."""
 
     def __init__(self, grid: Grid, periodic: Any) -> None:
@@ -70,26 +70,26 @@ class MergedCells(WholeCells):
         self._open, self._total = open_share.ravel(), total[self._home]
 
     def shared(self, deposits: Array) -> Array:
-        """See `WholeCells.shared`."""
+        """See `SingleCells.shared`."""
         flat = deposits.reshape(len(deposits), -1)
         return np.asarray((flat[:, self._home] / self._total).reshape(deposits.shape))
 
     def mean(self, fields: Array) -> Array:
-        """See `WholeCells.mean`."""
+        """See `SingleCells.mean`."""
         flat = fields.reshape(len(fields), -1) * self._open
         sums = np.stack([np.bincount(self._home, weights=each, minlength=each.size) for each in flat])
         return np.asarray((sums[:, self._home] / self._total).reshape(fields.shape))
 
     def copied(self, fields: Array) -> Array:
-        """See `WholeCells.copied`."""
+        """See `SingleCells.copied`."""
         return np.asarray(fields.reshape(len(fields), -1)[:, self._home].reshape(fields.shape))
 
     def relax(self, before: Array, after: Array) -> None:
-        """See `WholeCells.relax`."""
+        """See `SingleCells.relax`."""
         after[:] = before + (after - before) / self._total.reshape(after.shape[1:])
 
     def gates(self, halo: Halo) -> tuple[Array, Array, Array]:
-        """See `WholeCells.gates`; never more than a group is open, so that sweeps stay stable."""
+        """See `SingleCells.gates`; never more than a group is open, so that sweeps stay stable."""
         total, whole = halo.padded(self._total.reshape(self.grid.shape)), super().gates(halo)
         made = []
         for axis in range(3):
@@ -99,6 +99,6 @@ class MergedCells(WholeCells):
         return made[0], made[1], made[2]
 
 
-def merged_cells(grid: Grid, periodic: Any) -> WholeCells:
+def merged_cells(grid: Grid, periodic: Any) -> SingleCells:
     """The groups of a grid, or its cells as they are where it has no smooth walls."""
-    return MergedCells(grid, periodic) if grid.walls else WholeCells(grid)
+    return MergedCells(grid, periodic) if grid.walls else SingleCells(grid)

@@ -57,7 +57,7 @@ def within(grid: Grid, surface: Surface) -> Grid:
     if grid.solid is not None:
         remedy = "draw the solid cells as walls, or all walls as solid cells"
         raise InputError("walls", None, "in a grid without solid cells", remedy)
-    volume = volumes(surface, grid.spacing, *np.broadcast_arrays(*grid.centres()))
+    volume = volumes(surface, grid.spacing, *_full_centres(grid))
     solid = volume < SMALLEST_VOLUME
     if solid.all():
         raise InputError("walls", None, "around some of the fluid", "no cell holds fluid; check centre and radius")
@@ -75,7 +75,7 @@ def open_share(grid: Grid) -> Array | NDArray[np.bool_]:
 
 def _refuse_hidden_walls(grid: Grid, surface: Surface) -> None:
     """Raise `InputError` where two cells with fluid have a common face that is closed."""
-    is_open, parted = grid.open, np.ones((3, *grid.shape), bool)
+    is_open, parted, centres = grid.open, np.ones((3, *grid.shape), bool), _full_centres(grid)
     for d in range(3):
         if grid.cells[d] == 1:
             continue
@@ -83,7 +83,7 @@ def _refuse_hidden_walls(grid: Grid, surface: Surface) -> None:
         high = [slice(None)] * 3
         low[2 - d], high[2 - d] = slice(None, -1), slice(1, None)
         both = is_open[tuple(low)] & is_open[tuple(high)]
-        points = [c[tuple(high)] - 0.5 * grid.spacing[d] * (n == d) for n, c in enumerate(_full_centres(grid))]
+        points = [c[tuple(high)] - 0.5 * grid.spacing[d] * (n == d) for n, c in enumerate(centres)]
         share = section(surface, points, d, grid.spacing).share
         parted[d][tuple(high)] = ~(both & (share > SMALLEST_APERTURE))
     # regions that faces join, and those that touch

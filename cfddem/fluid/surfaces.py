@@ -2,7 +2,7 @@
 
     pipe = cylinder((0.05, 0.05, 0.0), radius=0.05)
     funnel = turned([(0.0, 0.01), (0.05, 0.05), (0.3, 0.05)], centre=(0.05, 0.05, 0.0))
-    grid = Grid.of_size((0.1, 0.1, 0.3), 0.005).with_walls(funnel)
+    grid = within(Grid.of_size((0.1, 0.1, 0.3), 0.005), funnel)  # of cfddem.fluid.cut_cells
 
 A distance is positive in the fluid, negative in the solid, and changes by no more than one metre in a metre. A wall
 may slide along itself: it then has a velocity, which the fluid takes over where it sticks.

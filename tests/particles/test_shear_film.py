@@ -27,7 +27,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures import tangential_lubrication as film
-from scenarios.validation.particles import few_spheres as two_spheres
+from scenarios.validation.particles import few_spheres
 
 GLASS = Material(density=2500, youngs_modulus=60e9, poisson=0.23, restitution=0.97, friction=0.3, roughness=1e-9)
 FULL = Laws(film=True, film_motions="full")
@@ -55,7 +55,7 @@ def film_matrix(ratio: float) -> np.ndarray:
 @pytest.mark.parametrize("ratio", [0.1, 0.7, 1.0, 3.0, 20.0])
 def test_resistances_are_the_leading_terms_of_jeffrey_and_onishi(ratio: float) -> None:
     """Y^A, Y^B and Y^C of the first sphere, from the two motions of the gap, within 1e-12."""
-    matrix, exact = film_matrix(ratio), two_spheres.leading(ratio)
+    matrix, exact = film_matrix(ratio), few_spheres.leading(ratio)
     assert matrix[0, 0] == pytest.approx(6.0 * math.pi * exact.force_by_own, rel=1e-12)
     assert matrix[0, 1] == pytest.approx(-6.0 * math.pi * exact.force_by_other, rel=1e-12)
     assert matrix[2, 0] == pytest.approx(4.0 * math.pi * exact.couple_by_own, rel=1e-12)
@@ -74,16 +74,16 @@ def test_resistances_at_a_wall_are_those_of_goldman_cox_and_brenner() -> None:
     assert (shear + 2.0 * both + roll) / (8.0 * math.pi) == pytest.approx(2.0 / 5.0)
 
 
-PUBLISHED = two_spheres.Resistance(0.9983, 0.2737, -0.2390, -0.0017, 0.7028, -0.0274)
+PUBLISHED = few_spheres.Resistance(0.9983, 0.2737, -0.2390, -0.0017, 0.7028, -0.0274)
 """Constants beside the logarithms for equal spheres, Jeffrey & Onishi (1984), tables 3 to 7."""
 
 
 def test_recurrences_give_the_published_constants() -> None:
     """Exact functions less their singular terms at xi = 1e-6, within the printed digit; single spheres far apart."""
-    found, singular = two_spheres.resistance(1e-6), two_spheres.leading(1.0)
+    found, singular = few_spheres.resistance(1e-6), few_spheres.leading(1.0)
     for value, coefficient, constant in zip(found, singular, PUBLISHED):
         assert value - coefficient * math.log(1e6) == pytest.approx(constant, abs=1.01e-4)
-    apart = two_spheres.resistance(200.0, 0.5)
+    apart = few_spheres.resistance(200.0, 0.5)
     assert np.array(apart) == pytest.approx([1.0, 0.0, 0.0, 0.0, 1.0, 0.0], abs=1e-2)
 
 
@@ -94,16 +94,16 @@ def test_the_page_tabulates_what_the_film_leaves_out() -> None:
     rows = [[float(each) for each in row.split("|")[1:-1]] for row in table]
     assert [row[0] for row in rows] == [1e-4, 1e-3, 0.01, 0.02, 0.05]
     for gap, *printed in rows:
-        film_alone = np.array(two_spheres.leading(1.0)) * math.log(1.0 / gap)
-        assert two_spheres.resistance(gap) - film_alone - [1, 0, 0, 0, 1, 0] == pytest.approx(printed, abs=6e-4)
+        film_alone = np.array(few_spheres.leading(1.0)) * math.log(1.0 / gap)
+        assert few_spheres.resistance(gap) - film_alone - [1, 0, 0, 0, 1, 0] == pytest.approx(printed, abs=6e-4)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 0.25, 4.0])
 def test_exact_resistance_follows_the_logarithm(ratio: float) -> None:
     """Slope against ln(1/xi) between 1e-4 and 1e-3 within 1 % of the leading coefficient; 3 % for the large sphere."""
-    near, far = (two_spheres.resistance(gap, ratio) for gap in (1e-4, 1e-3))
+    near, far = (few_spheres.resistance(gap, ratio) for gap in (1e-4, 1e-3))
     slopes = (np.array(near) - far) / math.log(10.0)
-    assert slopes == pytest.approx(np.array(two_spheres.leading(ratio)), rel=0.03 if ratio < 1.0 else 0.01)
+    assert slopes == pytest.approx(np.array(few_spheres.leading(ratio)), rel=0.03 if ratio < 1.0 else 0.01)
 
 
 def test_logarithm_of_the_loops() -> None:
@@ -126,7 +126,7 @@ def pair(radii: tuple[float, float], gap: float, velocity: Any, spin: Any, visco
 def test_forces_of_the_solver_are_those_of_the_theory(radii: tuple[float, float]) -> None:
     """Force and couple by sliding and turning in a short step, within 1 % of the slope of Jeffrey & Onishi."""
     step, ratio = 1e-12, radii[1] / radii[0]
-    lead = two_spheres.leading(ratio)
+    lead = few_spheres.leading(ratio)
     measured = []
     for gap in (1e-4 * radii[0], 1e-3 * radii[0]):
         moved = pair(radii, gap, [ACROSS, 0.0 * ACROSS], 0.0)
