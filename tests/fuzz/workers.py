@@ -22,10 +22,6 @@ from typing import Any
 
 from fuzz.trials import Surroundings, TooSlow, as_command, judge_command, perform
 
-PATIENCE = 6.0
-"""A worker that is silent for so many times the limit is killed: it sleeps, or the machine is busy."""
-
-
 @dataclass(frozen=True)
 class Limits:
     """Of one trial."""
@@ -33,6 +29,7 @@ class Limits:
     seconds: float = 20.0  # of processor time
     memory: float = 4.0  # address space [GB]
     niceness: int = 19
+    patience: float = 6.0  # a worker that is silent for so many times `seconds` is killed: it sleeps, or is starved
 
 
 @dataclass
@@ -161,7 +158,7 @@ def many(
                 busy[worker.pipe] = worker
         for pipe, worker in list(busy.items()):
             silent = time.monotonic() - worker.since
-            if silent > PATIENCE * limits.seconds:
+            if silent > limits.patience * limits.seconds:
                 del busy[pipe]
                 assert worker.number is not None
                 yield worker.number, f"worker {worker.replace()}", silent
@@ -190,14 +187,14 @@ def real_command(around: Surroundings, seed: int, number: int, limits: Limits) -
         try:
             done = subprocess.run(
                 [sys.executable, "-m", "cfddem", *words], cwd=folder, env=environment, capture_output=True, text=True,
-                errors="replace", timeout=PATIENCE * limits.seconds, stdin=subprocess.DEVNULL,
+                errors="replace", timeout=limits.patience * limits.seconds, stdin=subprocess.DEVNULL,
                 preexec_fn=lambda: (limit_memory(limits), limit_time(limits), os.nice(limits.niceness)),
             )  # fmt: skip
             assert done.returncode != -signal.SIGXCPU, f"hangs: longer than {limits.seconds:g} s"
             judge_command(done.returncode, done.stdout, done.stderr, max(map(len, words), default=0))
             answer = "accepted" if done.returncode == 0 else "refused"
         except subprocess.TimeoutExpired:
-            answer = f"does not end in {PATIENCE * limits.seconds:g} s of wall time; repeat it on a quiet machine"
+            answer = f"does not end in {limits.patience * limits.seconds:g} s of wall time; repeat it on a quiet machine"
         except AssertionError as failure:
             answer = f"{failure}"[:600]
         return answer, time.monotonic() - begun, words
