@@ -20,7 +20,7 @@ from cfddem.cli.json_output import word
 
 HOME = Path(__file__).parents[1]
 WIDTH = 100
-ANNOUNCED = "cfddem: compiling loops, about a minute the first time\n"
+ANNOUNCED = "cfddem: compiling loops, up to two minutes the first time\n"
 """Left out of the errors: whether loops are compiled depends on what the machine has kept."""
 
 

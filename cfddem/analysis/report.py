@@ -35,6 +35,9 @@ def report(folder: str | Path, data: Sequence[str | Path] = ()) -> Report:
     folder   of the run
     data     files of measured points beside those of the case
     errors   InputError if the run has no history, or for data that cannot be read
+
+    >>> found = report("bed")                                              # doctest: +SKIP
+    >>> found.measures["bed_height"].mean, found.key_results[0].verdict    # doctest: +SKIP
     """
     folder = Path(folder)
     run = open_run(folder)

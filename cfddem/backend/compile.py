@@ -225,7 +225,7 @@ def announced(what: str) -> None:
     if sys.stderr.isatty():
         print(f"\r{what:<60}\r", end="", file=sys.stderr, flush=True)
     elif what and _compilation.compiled == 1:
-        print("cfddem: compiling loops, about a minute the first time", file=sys.stderr, flush=True)
+        print("cfddem: compiling loops, up to two minutes the first time", file=sys.stderr, flush=True)
 
 
 class _Compilation(event.Listener):

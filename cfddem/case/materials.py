@@ -59,6 +59,10 @@ class Material(Checked):
 
     Films always use the real `youngs_modulus`. A smaller `contact_modulus` softens the contact only, so that
     larger time steps are stable.
+
+    >>> glass = Material(density=2500.0, youngs_modulus=60e9, poisson=0.23, contact_modulus=1e7, roughness=134e-9)
+    >>> glass.restitution
+    1.0
     """
 
     density: float = Field(gt=0, description="density rho_p [kg/m3]")
@@ -183,6 +187,9 @@ class Fluid(Checked):
     """A Newtonian fluid with constant viscosity or a viscosity that varies with height.
 
     Viscosity 0 means no drag and no films.
+
+    >>> Fluid(density=998.0, viscosity=1e-3).viscosity_profile
+    ()
     """
 
     density: float = Field(gt=0, description="density rho_f [kg/m3]")

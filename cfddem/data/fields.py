@@ -50,6 +50,9 @@ class Field:
     halo        phases in which ghosts are updated, see `Phase`; empty: only copied when the ghost is made
     snapshot    whether snapshots contain the field
     meaning     long name in snapshots and tables
+
+    >>> Field("charge", "C", meaning="electric charge").components
+    0
     """
 
     name: str

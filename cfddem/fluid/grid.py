@@ -52,6 +52,9 @@ class Grid:
     origin   corner of the box with the lowest x, y, z [m]
     solid    (nz, ny, nx) true where a cell is solid, or None
     walls    smooth walls, which cut cells (:func:`cfddem.fluid.cut_cells.within`), or None
+
+    >>> Grid(cells=(4, 4, 24), spacing=(5e-3, 5e-3, 5e-3)).origin
+    (0.0, 0.0, 0.0)
     """
 
     cells: tuple[int, int, int]

@@ -43,6 +43,10 @@ def open_run(folder: str | Path) -> RunData:
     folder   of the run
     returns  RunData; fields are read on demand
     errors   InputError if the folder holds no run or a run of another format
+
+    >>> run = open_run("bed")                    # doctest: +SKIP
+    >>> run.history["bed_height"], run.times     # doctest: +SKIP
+    >>> run.fluid("voidage", -1)                 # doctest: +SKIP
     """
     return RunData(Path(folder))
 

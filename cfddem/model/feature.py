@@ -104,6 +104,9 @@ class OwnForce(FluidForce):
 
     function  particles -> force on each of them (N, 3), or (3,) for all [N]
     on        "particles", "fluid" (where the particles are), or "both": on the particles, its opposite on the fluid
+
+    >>> OwnForce(lambda particles: 1e-7 * particles.radius[:, None] * [1.0, 0.0, 0.0]).on
+    'particles'
     """
 
     lines = ("external",)

@@ -78,6 +78,13 @@ def pair_table(
     materials  solids of a run, including those of the walls
     overrides  {(i, j): {"friction": 0.3, ...}} with indices into `materials`
     returns    structured array (n, n) of dtype :data:`PAIR`, symmetric
+
+    >>> from cfddem import Material
+    >>> glass = Material(density=2500.0, youngs_modulus=60e9, poisson=0.23, restitution=0.97, friction=0.2)
+    >>> nylon = Material(density=1140.0, youngs_modulus=2.5e9, poisson=0.4, restitution=0.9, friction=0.25)
+    >>> pairs = pair_table([glass, nylon])
+    >>> float(pairs[0, 1]["restitution"]), float(pairs[0, 1]["friction"])
+    (0.9, 0.2)
     """
     table = np.zeros((len(materials), len(materials)), PAIR)
     for i, first in enumerate(materials):

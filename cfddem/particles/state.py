@@ -165,6 +165,10 @@ def make_particles(
     material  (N,) or one for all, row of the pair table
     viscosity of the fluid around the particles [Pa s]
     fixed     (N,) or one for all: particles that nothing moves
+
+    >>> beads = make_particles([[0.0, 0.0, 0.01], [0.0, 0.0, 0.02]], radius=1e-3, density=2500.0)
+    >>> beads.count, round(float(beads.mass[0]) * 1e6, 2)
+    (2, 10.47)
     """
     places = np.ascontiguousarray(np.atleast_2d(np.asarray(position, float)))
     count = len(places)

@@ -21,6 +21,7 @@ from cfddem.preflight.geometry_checks import (
     check_particle_size,
     check_positions,
     check_scales,
+    check_start_box,
     check_units,
 )
 from cfddem.preflight.issue import ORDER, Issue, Severity, percent, plain, rounded_up
@@ -70,6 +71,7 @@ def find_issues(
         *scales,
         *check_units(case),
         *check_bed_size(case, bed),
+        *check_start_box(case),
         *check_positions(case),
         *check_overlap(case, bed, collision),
         *check_surface_laws(case),

@@ -22,6 +22,9 @@ RANDOM_CLOSE_PACKING = 0.64
 SUSPENDED_SOLID_FRACTION = math.pi / 6.0 / 1.02**3
 """Solid fraction of a cubic lattice with gaps of 2 % of the diameter, the densest suspended start [-]."""
 
+LATTICE_SPACING = {"suspended": 1.02, "poured": 1.05}
+"""Least distance of neighbouring places of a start over the largest diameter [-]."""
+
 LARGEST_INITIAL_OVERLAP = 0.02
 """Largest overlap of particles at given positions, over the diameter [-]."""
 
@@ -74,6 +77,25 @@ def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             severity, "column.height",
             f"the bed expands to about {bed.height:.3g} m; the lid is at {column.height:.3g} m",
             f"use a height of {1.3 * bed.height:.2g} m, or a lower inlet velocity",
+        )  # fmt: skip
+
+
+def check_start_box(case: Case) -> Iterator[Issue]:
+    """Check that a given box has places for the particles that start in it; walls in it may leave fewer."""
+    bed = case.bed
+    if bed.start_corner is None or bed.start_size is None or bed.species or bed.start not in LATTICE_SPACING:
+        return
+    pitch, edges = LATTICE_SPACING[bed.start] * bed.largest_diameter, list(bed.start_size)
+    if bed.start == "poured":  # what the box does not hold starts above it
+        if bed.smallest_diameter <= 0.5 * bed.largest_diameter:  # several small ones share a place
+            return
+        edges[2] = case.column.height - bed.start_corner[2]
+    places = math.prod(math.floor(edge / pitch + 1e-9) for edge in edges)
+    if places < case.particle_count:
+        above = " up to the lid" if bed.start == "poured" else ""
+        yield Issue(
+            "error", "bed.start_size", f"{case.particle_count} particles start in it; it has room for {places}{above}",
+            f"each takes a cube of {pitch:.3g} m; use fewer particles, or a larger box",
         )  # fmt: skip
 
 

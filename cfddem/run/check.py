@@ -22,6 +22,11 @@ def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> P
     shape    of them along x, y, z; that with the least work if None
     returns  `status` ("ok", "warning" or "error"), `issues` (severity, key, reason, remedy) and `rows` (name, value,
              unit, note); `print` shows all as `cfddem check` does
+
+    >>> from cfddem import gallery
+    >>> case = gallery()["liquid-bed"]
+    >>> check(case).status, check(case.with_(**{"bed.inlet_velocity": 0.7})).status
+    ('ok', 'error')
     """
     result = preflight(case)
     if case.compare:

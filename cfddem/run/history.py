@@ -73,6 +73,10 @@ def measure(
              `simulation.communicator`, or reads `simulation.whole(...)`. Others are refused there
     returns  decorator
     errors   InputError if a built-in measure has the name of the function
+
+    >>> @measure("m")                                                 # doctest: +SKIP
+    ... def highest_particle(simulation):
+    ...     return float(simulation.particles.position[:, 2].max())
     """
 
     def declare(function: Function) -> Function:

@@ -77,6 +77,9 @@ class Run:
     simulation  the simulation
     folder      that is written
     report      called after every row of history, and every half second of wall time; of several ranks on rank 0
+
+    >>> from cfddem import gallery
+    >>> Run.begin(gallery()["liquid-bed"], Path("bed")).go()    # doctest: +SKIP
     """
 
     def __init__(self, simulation: Simulation, folder: RunFolder, report: Report = lambda _: None) -> None:

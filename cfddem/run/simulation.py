@@ -45,6 +45,11 @@ class Simulation:
     features      a user's forces and equipment, see `add`
     state         `checkpoint()` to continue from
     communicator  path to sums, extremes and decisions over all ranks
+
+    >>> from cfddem import gallery
+    >>> simulation = Simulation(gallery()["liquid-bed"])    # doctest: +SKIP
+    >>> simulation.until(0.01)                              # doctest: +SKIP
+    >>> simulation.particles.position.mean(axis=0)          # doctest: +SKIP
     """
 
     def __init__(

@@ -44,6 +44,9 @@ def run_case(
     returns            the run, to read its fields and history
     errors             PreflightError if the check finds errors; InputError if the folder holds a run,
                        or, with overwrite, a run.json that is not that of a run
+
+    >>> from cfddem import gallery
+    >>> run = run_case(gallery()["liquid-bed"], "bed")    # doctest: +SKIP
     """
     folder = Path(folder)
     for issue in refuse_errors(case).to_act_on:

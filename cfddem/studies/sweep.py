@@ -384,6 +384,8 @@ def open_sweep(folder: str | Path) -> pandas.DataFrame:
     folder   of the sweep, which holds `sweep.csv`
     returns  keys that were changed, status, measures, message
     errors   InputError if there is no table, or pandas is not installed
+
+    >>> open_sweep("velocities")[["bed.inlet_velocity", "bed_height", "bed_height_error"]]    # doctest: +SKIP
     """
     pandas = library("pandas", "open_sweep", "data")
     path = Path(folder) / "sweep.csv"

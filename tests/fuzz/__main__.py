@@ -29,14 +29,15 @@ def main(words: list[str]) -> int:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=20.0, help="limit of one trial")
     parser.add_argument("--memory", type=float, default=4.0, help="address space of a worker [GB]")
-    parser.add_argument("--patience", type=float, default=6.0, help="limit of one trial in time of the clock, in limits")
+    parser.add_argument("--patience", type=float, default=6.0, help="limit of one trial by the clock, in limits")
     parser.add_argument("--nice", type=int, default=19, help="niceness of the workers")
+    parser.add_argument("--loaded", action="store_true", help="commands end where they would compile a loop")
     parser.add_argument("--minutes", type=float, default=60.0, help="limit of all trials")
     parser.add_argument("--only", type=int, default=None, help="repeat one trial and show it")
     parser.add_argument("--output", type=Path, default=None, help="JSON file for the outcome")
     given = parser.parse_args(words)
     os.environ["NUMBA_NUM_THREADS"] = "1"
-    limits = Limits(given.seconds, given.memory, given.nice, given.patience)
+    limits = Limits(given.seconds, given.memory, given.nice, not given.loaded, given.patience)
     with tempfile.TemporaryDirectory() as home:
         around = Surroundings(Path(home))
         if given.only is not None:
@@ -69,7 +70,8 @@ def _report(given: argparse.Namespace, limits: Limits, around: Surroundings) -> 
         if commands.add(10**9 + number, answer if good else f"{' '.join(words)[:200]}: {answer}", seconds):
             print(f"command {number}: {words} {answer}", flush=True)
     summary = {
-        "seed": given.seed, "first": given.first, "kind": given.kind, "trials": made, "answers": outcome.counts, "slowest": outcome.slowest,
+        "seed": given.seed, "first": given.first, "kind": given.kind,
+        "trials": made, "answers": outcome.counts, "slowest": outcome.slowest,
         "commands": commands.counts, "slowest_command": commands.slowest, "seconds": round(time.monotonic() - begun, 1),
         "limits": [limits.seconds, limits.memory], "python": platform.python_version(),
         "faults": {key: [len(each), each[:5]] for key, each in {**outcome.faults, **commands.faults}.items()},

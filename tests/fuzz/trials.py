@@ -82,10 +82,11 @@ class TooSlow(BaseException):
 class Surroundings:
     """What trials share: valid inputs, names of keys and options, a run folder to be damaged.
 
-    home  folder for the trials
+    home      folder for the trials
+    compiles  whether commands compile loops; otherwise they end there
     """
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, compiles: bool = True) -> None:
         from disturbed_runs import WET
         from example_case import MIXTURE, TEXT
         from made_up_run import BED, made_up
@@ -96,7 +97,7 @@ class Surroundings:
         from cfddem.io import checkpoint
         from cfddem.io.reading import open_run
 
-        self.home = home
+        self.home, self.compiles = home, compiles
         self.texts = [TEXT, MIXTURE, HOPPER, WET, BED, *(path.read_text() for path in gallery_files().values())]
         tables = {name: part["properties"] for name, part in Case.model_json_schema()["$defs"].items()}
         self.keys = sorted({name for properties in tables.values() for name in properties})
@@ -230,7 +231,7 @@ def words_trial(around: Surroundings, chance: random.Random) -> str:
     Path("bed.toml").write_text(around.texts[0])
     Path("points.csv").write_text(TABLES[0])
     shutil.copytree(around.run_folder, "bed")
-    code, out, err = called(words)
+    code, out, err = called(words, around.compiles)
     judge_command(code, out, err, max(map(len, words), default=0))
     return "accepted" if code == 0 else "refused"
 
@@ -243,7 +244,7 @@ def plausible_trial(around: Surroundings, chance: random.Random) -> str:
     Path("rebounds.csv").write_text(REBOUNDS)
     shutil.copytree(around.run_folder, "bed")
     try:
-        code, out, err = called(words)
+        code, out, err = called(words, around.compiles)
     except TooSlow:
         if words[0] in COMPUTING:  # it compiles loops, or computes what it was asked for
             return "accepted"
@@ -278,7 +279,7 @@ def refused_or_accepted(step: Callable[[], Any]) -> str:
     return "accepted"
 
 
-def called(words: list[str]) -> tuple[int, str, str]:
+def called(words: list[str], compiles: bool = True) -> tuple[int, str, str]:
     """Exit code and output of a command in this process."""
     from cfddem.cli.app import main
 
@@ -294,6 +295,9 @@ def called(words: list[str]) -> tuple[int, str, str]:
         "scenarios.benchmarks.dense_bed.bench": stop, "scenarios.beds.gas_bed.study.bench": stop,
         "sys.argv": ["cfddem", *words],
     }  # fmt: skip
+    if not compiles:
+        compilation = "cfddem.backend.compile._Compilation"
+        patches |= {f"{compilation}.on_start": stop, f"{compilation}.on_end": mock.Mock()}
     with contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(err))

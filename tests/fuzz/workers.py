@@ -22,6 +22,7 @@ from typing import Any
 
 from fuzz.trials import Surroundings, TooSlow, as_command, judge_command, perform
 
+
 @dataclass(frozen=True)
 class Limits:
     """Of one trial."""
@@ -29,6 +30,7 @@ class Limits:
     seconds: float = 20.0  # of processor time
     memory: float = 4.0  # address space [GB]
     niceness: int = 19
+    compiles: bool = True  # otherwise a command ends where it would compile a loop
     patience: float = 6.0  # a worker that is silent for so many times `seconds` is killed: it sleeps, or is starved
 
 
@@ -92,7 +94,7 @@ def work(pipe: Any, home: str, seed: int, limits: Limits) -> None:
     """Make the trials whose numbers arrive, until None arrives."""
     os.nice(limits.niceness)
     logging.disable()
-    around = Surroundings(Path(home))
+    around = Surroundings(Path(home), limits.compiles)
     limit_memory(limits)
     while (number := pipe.recv()) is not None:
         begun = time.process_time()
@@ -194,7 +196,9 @@ def real_command(around: Surroundings, seed: int, number: int, limits: Limits) -
             judge_command(done.returncode, done.stdout, done.stderr, max(map(len, words), default=0))
             answer = "accepted" if done.returncode == 0 else "refused"
         except subprocess.TimeoutExpired:
-            answer = f"does not end in {limits.patience * limits.seconds:g} s of wall time; repeat it on a quiet machine"
+            answer = (
+                f"does not end in {limits.patience * limits.seconds:g} s of the clock; repeat it when it is quiet"
+            )
         except AssertionError as failure:
             answer = f"{failure}"[:600]
         return answer, time.monotonic() - begun, words

@@ -52,6 +52,13 @@ def test_gallery_has_the_cases_that_the_command_lists() -> None:
     assert [[name, case.title] for name, case in cfddem.gallery().items()] == listed
 
 
+def test_help_lists_the_public_names_and_those_that_users_begin_with_have_an_example() -> None:
+    assert {name for name in dir(cfddem) if not name.startswith("_")} == {*cfddem._MODULES}
+    first = "Case check gallery run_case Run report open_run open_sweep Simulation make_particles pair_table coat Grid"
+    for name in [*first.split(), "Material", "Fluid", "Field", "Box", "Cone", "OwnForce", "measure"]:
+        assert ">>> " in getattr(cfddem, name).__doc__, name
+
+
 def test_names_for_type_checkers_are_those_that_are_imported() -> None:
     tree = ast.parse(Path(cfddem.__file__).read_text(encoding="utf-8"))
     (block,) = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")

@@ -201,6 +201,18 @@ def test_a_softer_contact_modulus_changes_the_contact_and_not_the_film() -> None
             "bed.count",
             "above the limit 0.49 of a suspended start",
         ),
+        (
+            {"bed.start_corner": [0.0] * 3, "bed.start_size": [0.02, 0.02, 0.02], "bed.start": "suspended"},
+            "error",
+            "bed.start_size",
+            "2000 particles start in it; it has room for 216",
+        ),
+        (
+            {"bed.start_corner": [0.0, 0.0, 0.01], "bed.start_size": [0.004, 0.004, 0.01], "bed.count": 100},
+            "error",
+            "bed.start_size",
+            "100 particles start in it; it has room for 46 up to the lid",
+        ),
         ({"bed.diameter": 0.05}, "error", "bed.diameter", "larger than the smallest edge of the column, 0.04 m"),
         ({"bed.inlet_velocity": 0.6}, "error", "bed.inlet_velocity", "above the terminal velocity 0.505 m/s"),
         ({"bed.inlet_velocity": [[0, 0.1], [1, 0.6]]}, "warning", "bed.inlet_velocity", "above the terminal velocity"),

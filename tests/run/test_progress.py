@@ -93,7 +93,7 @@ def test_where_there_is_no_terminal_one_line_says_that_loops_are_compiled(
             njit(lambda x, factor=factor: factor * x)(1.0)
     finally:
         announce_compilation(before)
-    assert capfd.readouterr().err == "cfddem: compiling loops, about a minute the first time\n"
+    assert capfd.readouterr().err == "cfddem: compiling loops, up to two minutes the first time\n"
 
 
 def test_compilation_is_counted_apart(monkeypatch: pytest.MonkeyPatch) -> None:

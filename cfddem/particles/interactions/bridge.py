@@ -106,6 +106,12 @@ def coat(particles: Particles, thickness: np.ndarray | float) -> None:
     """Give particles a film of liquid.
 
     thickness  of the film on each (N,), or one for all [m]
+
+    >>> from cfddem import make_particles
+    >>> beads = make_particles([[0.0, 0.0, 0.01]], radius=1e-3, density=2500.0)
+    >>> coat(beads, 1e-5)
+    >>> round(float(beads.liquid[0]) * 1e9, 3)
+    0.127
     """
     films = np.broadcast_to(np.asarray(thickness, float), (particles.count,))
     refused = np.flatnonzero(~((films >= 0.0) & np.isfinite(films)))

@@ -115,6 +115,9 @@ class Box(Wall):
     """The six sides of a box with particles inside.
 
     low, high  opposite corners [m]
+
+    >>> Box(low=(0.0, 0.0, 0.0), high=(0.02, 0.02, 0.1)).high
+    (0.02, 0.02, 0.1)
     """
 
     low: Vector
@@ -203,6 +206,9 @@ class Cone(Wall):
     radius      of the lower end, the outlet; may be 0 [m]
     top_radius  of the upper end [m]
     length      [m]
+
+    >>> Cone(radius=0.01, top_radius=0.03, length=0.05).point
+    (0.0, 0.0, 0.0)
     """
 
     point: Vector = (0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -172,7 +172,8 @@ def collide(
     simulation = stage(setting, table, bodies.materials, laws, full, spin)
     fluid = fluid_around(simulation, chosen_forces(surroundings), fluid_density, viscosity, gravity, against == "wall")
     history = integrate(simulation, setting, full, fluid, until)
-    return _result(simulation, setting, table, history, laws, full, caveats)
+    found = _result(simulation, setting, table, history, laws, full, caveats)
+    return found if stokes is None or not laws.film else replace(found, stokes=float(stokes))  # without round-off
 
 
 def _both(value: Any) -> tuple[Any, Any]:
