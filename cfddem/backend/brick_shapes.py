@@ -21,14 +21,11 @@ def shapes(ranks: int, most: Sequence[int]) -> list[Shape]:
 
     most  largest number along x, y, z
     """
-    found = [
-        (x, y, ranks // (x * y))
-        for z_left in range(1, ranks + 1) if ranks % z_left == 0
-        for x in range(1, z_left + 1) if z_left % x == 0
-        for y in (z_left // x,)
+    return [
+        (x, ranks // z // x, z)
+        for z in range(1, min(ranks, most[2]) + 1) if ranks % z == 0
+        for x in range(1, min(ranks // z, most[0]) + 1) if ranks // z % x == 0 and ranks // z // x <= most[1]
     ]  # fmt: skip
-    fitting = [shape for shape in found if all(n <= limit for n, limit in zip(shape, most))]
-    return sorted(fitting, key=lambda shape: (shape[2], shape[0]))
 
 
 def place_of(rank: int, shape: Shape) -> tuple[int, int, int]:

@@ -92,7 +92,7 @@ def divide(grid: Grid, ranks: int, position: Array | None = None, shape: Shape |
     options = [each for each in [shape] if each] or shapes(ranks, most)
     if not options or any(n > limit for n, limit in zip(options[0], most)):
         x, y, z = grid.cells
-        fewer = next(n for n in range(ranks, 0, -1) if shapes(n, most))
+        fewer = next(n for n in range(min(ranks, math.prod(most)), 0, -1) if shapes(n, most))
         limit = f"at most {most[0]} x {most[1]} x {most[2]} for {x} x {y} x {z} cells"
         if shape:
             raise InputError("--division", "x".join(map(str, shape)), limit, "take fewer ranks along that axis")

@@ -14,6 +14,9 @@ from cfddem.preflight.summary import Preflight, preflight
 from cfddem.run.division import expected_division, require_parallel
 from cfddem.run.history import units_of
 
+MOST_RANKS = 100_000
+"""Largest number of processes that is checked."""
+
 
 def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> Preflight:
     """Check a case before it runs. Nothing is run or written.
@@ -36,8 +39,8 @@ def check(case: Case, ranks: int | None = None, shape: Shape | None = None) -> P
 
 def _with_ranks(result: Preflight, case: Case, ranks: int, shape: Shape | None) -> Preflight:
     """The result of a check, and whether several processes can share the case."""
-    if ranks < 1:
-        raise InputError("ranks", ranks, "at least 1")
+    if not 1 <= ranks <= MOST_RANKS:
+        raise InputError("ranks", ranks, f"1 to {MOST_RANKS}")
     try:
         require_parallel(case, ranks, shape)
     except InputError as failure:

@@ -196,9 +196,7 @@ def real_command(around: Surroundings, seed: int, number: int, limits: Limits) -
             judge_command(done.returncode, done.stdout, done.stderr, max(map(len, words), default=0))
             answer = "accepted" if done.returncode == 0 else "refused"
         except subprocess.TimeoutExpired:
-            answer = (
-                f"does not end in {limits.patience * limits.seconds:g} s of the clock; repeat it when it is quiet"
-            )
+            answer = f"does not end in {limits.patience * limits.seconds:g} s of the clock; repeat it when it is quiet"
         except AssertionError as failure:
             answer = f"{failure}"[:600]
         return answer, time.monotonic() - begun, words

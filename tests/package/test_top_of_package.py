@@ -20,6 +20,8 @@ def test_check_gives_what_the_command_prints() -> None:
     found = cfddem.check(case, ranks=2)
     assert isinstance(found, cfddem.Preflight) and found.status == "ok" and "ranks" in [row.name for row in found.rows]
     assert f"{found}\n" == call("check", "liquid-bed", "--ranks", "2").out
+    with pytest.raises(cfddem.CfddemError, match=r"ranks = 10+: must be 1 to 100000"):  # at once
+        cfddem.check(case, ranks=10**30)
     broken = cfddem.check(case.with_(**{"bed.diameter": 0.5}))
     assert broken.status == "error" and {each.severity for each in broken.issues} >= {"error"}
 

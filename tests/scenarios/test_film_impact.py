@@ -101,6 +101,7 @@ def test_a_slow_bead_sticks() -> None:
         ({"diameter": math.inf}, "diameter"),
         ({"domain": 0.1, "velocity": 0.3}, r"domain = 0.1: must be at least 0\.\d+ for this bead"),
         ({"domain": 0.7, "cells": 10}, "domain"),
+        ({"domain": 1e300}, r"domain = 1e\+300: must be at most \S+ for this bead, .* at most 10,000,000 cells"),
     ],
     ids=lambda value: str(value),
 )

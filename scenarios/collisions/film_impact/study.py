@@ -33,6 +33,9 @@ from scenarios.references.isph.impact import SmoothedImpact
 METHODS = {"grid": 20, "isph": 5}
 """Method -> cells or layers of particles in the film, if not given."""
 
+MOST_CELLS = 10_000_000
+"""Of a grid; more need days and all of the memory."""
+
 LONGEST = 30.0
 """A bead that has not left after this many times film/velocity has stuck."""
 
@@ -140,6 +143,9 @@ def grid_for(diameter: float, film: float, cells: int, domain: float = 1.0) -> G
     if domain < least:  # the bead would fill the domain and leave the liquid no surface
         limit = f"at least {math.ceil(1e3 * least) / 1e3:g} for this bead, film and number of cells"
         raise InputError("domain", domain, limit, "the wetted radius must fit into it")
+    if domain * width / dx * 5 * cells > MOST_CELLS:
+        limit = f"at most {MOST_CELLS / (5 * cells) * dx / width:.3g} for this bead, film and number of cells"
+        raise InputError("domain", domain, limit, f"a grid has at most {MOST_CELLS:,} cells")
     return Grid(math.ceil(domain * width / dx), 5 * cells, dx)
 
 
