@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+
+import cfddem
 
 HOME = Path(__file__).parents[2]
 PROJECT = tomllib.loads((HOME / "pyproject.toml").read_text(encoding="utf-8"))
@@ -32,6 +35,14 @@ def test_every_package_of_the_wheel_is_marked_as_typed() -> None:
     for name in PACKAGES["packages"]:
         assert (HOME / name / "py.typed").read_bytes() == b""
     assert not {"py.typed", "*.typed"} & set((HOME / ".gitignore").read_text(encoding="utf-8").split())
+
+
+def test_the_source_package_holds_what_its_first_page_links_to() -> None:
+    """And the citation file names the version of the package."""
+    kept = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    links = re.findall(r"\]\(([\w./-]+)", (HOME / "README.md").read_text(encoding="utf-8"))
+    assert len(links) > 10 and {link.split("/")[0] for link in links} <= {*kept}
+    assert f"version: {cfddem.__version__}\n" in (HOME / "CITATION.cff").read_text(encoding="utf-8")
 
 
 def test_mypy_accepts_a_script_of_a_user_and_finds_a_wrong_argument_in_it(tmp_path: Path) -> None:
