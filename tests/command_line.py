@@ -15,7 +15,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from cfddem.cli.app import app, main
-from cfddem.cli.json_forms import SCHEMAS
+from cfddem.cli.json_forms import form
 from cfddem.cli.json_output import word
 
 HOME = Path(__file__).parents[1]
@@ -63,8 +63,8 @@ def parsed(text: str) -> dict[str, Any]:
     printed: dict[str, Any] = json.loads(text)
     name = printed["schema"].split("/")[1]
     assert printed["schema"] == word(name)
-    form = TypeAdapter(SCHEMAS[name][1])
-    assert form.dump_python(form.validate_json(text, strict=True), mode="json") == printed
+    adapter = TypeAdapter(form(name))
+    assert adapter.dump_python(adapter.validate_json(text, strict=True), mode="json") == printed
     return printed
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, fields, is_dataclass
 from os import PathLike
 from typing import Any
 
@@ -29,6 +29,8 @@ def plain(value: Any) -> Any:
     """
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
     if isinstance(value, Mapping):
         return {str(name): plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
@@ -38,3 +40,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, PathLike) else value
+
+
+def summary_of(result: Any) -> dict[str, Any]:
+    """The values of a dataclass that `repr` shows, in the types of JSON."""
+    return {each.name: plain(getattr(result, each.name)) for each in fields(result) if each.repr}

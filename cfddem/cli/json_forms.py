@@ -1,8 +1,16 @@
-"""Forms of what commands print with `--json`: names and types of each object, from which JSON schemas are made."""
+"""Forms of what commands print with `--json`: names and types of each object, from which JSON schemas are made.
+
+A result that is a dataclass and prints all its values has the form of the dataclass, see :func:`form_of`.
+"""
 
 from __future__ import annotations
 
-from typing import Any, Literal, NotRequired
+from dataclasses import fields, is_dataclass
+from functools import reduce
+from importlib import import_module
+from operator import or_
+from types import UnionType
+from typing import Any, Literal, NotRequired, get_args, get_origin, get_type_hints
 
 from typing_extensions import TypedDict
 
@@ -39,61 +47,6 @@ class Mistake(TypedDict):
     value: NotRequired[str]
     limit: NotRequired[str]
     remedy: NotRequired[str]
-
-
-class KeyResult(TypedDict):
-    """A quantity that a reader asks for first. `holds`: as expected, not so, or null without an expectation."""
-
-    name: str
-    value: Number | str
-    error: Number
-    unit: str
-    verdict: str
-    holds: bool | None
-    error_is_lower_bound: bool
-
-
-class Measure(TypedDict):
-    """Mean of a measure over the averaging window, with its standard error and its drift."""
-
-    mean: Number
-    error: Number
-    error_is_lower_bound: bool
-    unit: str
-    meaning: str
-    drift: Number
-    drift_error: Number
-    drift_times: tuple[Number, Number]
-    stationary: bool | None
-    inlet_changes: str
-
-
-class Law(TypedDict):
-    """A value of a run beside that of a published law."""
-
-    law: str
-    computed: Number
-    expected: Number
-    ratio: Number
-    unit: str
-    outside_range: str
-
-
-class EnergyLine(TypedDict):
-    """A line of the energy budget."""
-
-    group: str
-    name: str
-    energy: Number
-    fraction: Number
-
-
-class Citation(TypedDict):
-    """A law that a run has used."""
-
-    kind: str
-    name: str
-    reference: str
 
 
 class GalleryCase(TypedDict):
@@ -242,36 +195,6 @@ class Stability(TypedDict):
     fastest: FastestWave
 
 
-class ReportOutput(TypedDict):
-    """`run`, `resume`, `report`: the report of a run."""
-
-    schema: str
-    case: str
-    folder: str
-    status: str
-    message: str
-    window: tuple[float, float]
-    films: str
-    key_results: list[KeyResult]
-    measures: dict[str, Measure]
-    measured: list[dict[str, Any]]
-    laws: list[Law]
-    laws_note: str
-    ledger: dict[str, Number]
-    energy: dict[str, Number]
-    energy_lines: list[EnergyLine]
-    collisions: dict[str, Number]
-    impacts: dict[str, Number]
-    film_solution: dict[str, Number]
-    warnings: list[str]
-    actions: dict[str, list[str]]
-    wall_time: dict[str, float]
-    steps: dict[str, Number]
-    preflight: dict[str, Any]
-    provenance: dict[str, Any]
-    references: list[Citation]
-
-
 class Comparison(TypedDict):
     """`compare`: several runs, the first of which is the reference."""
 
@@ -339,26 +262,6 @@ class Doctor(TypedDict):
     checks: list[Check]
 
 
-class Collision(TypedDict):
-    """`collide` at one Stokes number; `stokes` is null for a dry collision."""
-
-    schema: str
-    stokes: Number
-    velocity: float
-    viscosity: float
-    outcome: Literal["no_touch", "touch_no_rebound", "rebound"]
-    restitution: Number
-    restitution_tangential: Number
-    rebound_angle_striker: Number
-    rebound_angle_relative: Number
-    minimum_gap: float
-    mechanism: str
-    friction_used: Number
-    stop_gap: Number
-    spin: tuple[float, float]
-    warnings: list[str]
-
-
 class Collisions(TypedDict):
     """`collide` over a range of Stokes numbers; each collision as in `collide`, without `schema`."""
 
@@ -386,39 +289,6 @@ class MeasuredCollisions(TypedDict):
     figure: str
 
 
-class WetWall(TypedDict):
-    """`wet-wall`."""
-
-    schema: str
-    outcome: Literal["rebound", "stick"]
-    restitution: Number
-    restitution_tangential: Number
-    restitution_rotational: Number
-    spin: Number
-    energy_lost: dict[str, Number]
-    half_filling_angle: Number
-    friction: Number
-    contact_speed: Number
-    bridge_volume: Number
-    rupture_length: Number
-    duration: Number
-    warnings: list[str]
-
-
-class WetPair(TypedDict):
-    """`wet-pair`."""
-
-    schema: str
-    outcome: Literal["bounce", "stick_rotate_separate", "stick"]
-    restitution: Number
-    spin: Number
-    separation_time: Number
-    minimum_gap: Number
-    velocity: Number
-    turned: Number
-    warnings: list[str]
-
-
 class ThreeSpheres(TypedDict):
     """`three-spheres`: times over (film / impact speed), `time_star` over (diameter / impact speed)."""
 
@@ -428,38 +298,6 @@ class ThreeSpheres(TypedDict):
     restitution23: Number
     contacts: dict[str, int]
     events: list[dict[str, Any]]
-
-
-class FilmImpact(TypedDict):
-    """`film-impact`."""
-
-    schema: str
-    outcome: Literal["rebound", "stick"]
-    restitution: Number
-    stokes: Number
-    film_ratio: float
-    added_mass: float
-    minimum_gap: Number
-    p1: dict[str, Number]
-    p2: dict[str, Number]
-    p3: dict[str, Number]
-    p4: dict[str, Number]
-    turned_speed: Number
-    turning_energy: tuple[Number, Number]
-    fastest: Number
-    energies: dict[str, Number]
-    ledger_error: Number
-    volume_error: Number
-    momentum_error: Number
-    lowest_pressure: Number
-    highest_pressure: Number
-    wetted_radius: Number
-    mass_carried: Number
-    contacts: int
-    steps: int
-    cells: int
-    seconds: float
-    warnings: list[str]
 
 
 class Failure(TypedDict):
@@ -476,20 +314,54 @@ SCHEMAS: dict[str, tuple[int, Any]] = {
     "written": (1, Written),
     "check": (1, CheckOutput),
     "stability": (1, Stability),
-    "report": (1, ReportOutput),
+    "report": (1, "cfddem.analysis.report_text:Report"),
     "compare": (1, Comparison),
     "sweep": (1, Sweep),
     "calibrate": (1, CalibrationOutput),
-    "collide": (1, Collision),
+    "collide": (1, "scenarios.collisions.immersed_pair.study:Collision"),
     "collide-range": (1, Collisions),
     "collide-data": (1, MeasuredCollisions),
-    "wet-wall": (1, WetWall),
-    "wet-pair": (1, WetPair),
+    "wet-wall": (1, "scenarios.collisions.wet_wall.study:Impact"),
+    "wet-pair": (1, "scenarios.collisions.wet_pair.study:WetPair"),
     "three-spheres": (1, ThreeSpheres),
-    "film-impact": (1, FilmImpact),
+    "film-impact": (1, "scenarios.collisions.film_impact.result:FilmImpact"),
     "validate": (1, Validation),
     "bench": (1, Benchmark),
     "explain": (1, Explanation),
     "doctor": (1, Doctor),
 }
-"""Version and form of each schema."""
+"""Version and form of each schema, or the module and name of the dataclass that has it."""
+
+
+def form(name: str) -> Any:
+    """The form of a schema."""
+    found = SCHEMAS[name][1]
+    if not isinstance(found, str):
+        return found
+    module, _, kind = found.partition(":")
+    return form_of(getattr(import_module(module), kind), {"schema": str})
+
+
+def form_of(kind: Any, more: dict[str, Any] | None = None) -> Any:
+    """The form of a dataclass or named tuple as JSON: its values that `repr` shows, where no number is null.
+
+    more  further names and types
+    """
+    shown = {each.name for each in fields(kind) if each.repr} if is_dataclass(kind) else set(kind._fields)
+    hints = {name: _in_json(hint) for name, hint in get_type_hints(kind).items() if name in shown}
+    made = TypedDict(kind.__name__, {**(more or {}), **hints})  # type: ignore[misc]
+    made.__doc__ = kind.__doc__
+    return made
+
+
+def _in_json(hint: Any) -> Any:
+    """A type as JSON has it."""
+    if hint is float:
+        return Number
+    if is_dataclass(hint) or hasattr(hint, "_fields"):
+        return form_of(hint)
+    inner = tuple(_in_json(each) if each is not Ellipsis else each for each in get_args(hint))
+    origin = get_origin(hint)
+    if origin is UnionType:
+        return reduce(or_, inner)
+    return origin[inner] if origin in (list, dict, tuple) else hint

@@ -11,7 +11,7 @@ from typing import Any
 
 from cfddem.backend.errors import CfddemError, InputError, nearest
 from cfddem.backend.json_text import as_json
-from cfddem.cli.json_forms import SCHEMAS, Mistake
+from cfddem.cli.json_forms import SCHEMAS, Mistake, form
 
 
 def word(name: str) -> str:
@@ -32,7 +32,7 @@ def json_schema(name: str) -> dict[str, Any]:
         raise InputError("name", name, nearest(name, ["case", *SCHEMAS]))
     from pydantic import TypeAdapter
 
-    made = TypeAdapter(SCHEMAS[name][1]).json_schema()
+    made = TypeAdapter(form(name)).json_schema()
     made["properties"]["schema"] |= {"const": word(name)}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": word(name)} | made
 

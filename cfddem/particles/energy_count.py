@@ -18,20 +18,22 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.compile import CHUNKS, prange, threaded
 from cfddem.backend.errors import InputError
-from cfddem.backend.law_set import specialise
+from cfddem.backend.law_set import Slot, specialise
 from cfddem.data.fields import Field
-from cfddem.particles.energy_of_bonds import BondEnergies
-from cfddem.particles.energy_of_bridges import DRIED, BridgeEnergies
+from cfddem.particles.energy_of_bridges import BONDS, BRIDGES, DRYING_BRIDGES
 from cfddem.particles.energy_of_contacts import (
     CHANNELS,
+    SHEARED_FILMS,
     WALLS,
+    Count,
     EnergyAccount,
+    Tally,
     allocate_tally,
     count_motion,
     count_work,
 )
-from cfddem.particles.energy_of_shear import ShearEnergies
 from cfddem.particles.impulse_motion import keep_motion
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import added_mass_energy, kinetic_energy
@@ -43,8 +45,55 @@ WORK_DISPLACEMENT = Field(
 )
 
 
-EVERY_CHANNEL = (*CHANNELS, *BridgeEnergies.channels, DRIED, *BondEnergies.channels, *ShearEnergies.channels)
+EVERY_CHANNEL = (*CHANNELS, *DRYING_BRIDGES.channels, *BONDS.channels, *SHEARED_FILMS.channels)
 """Channels of a run that has everything."""
+
+count_edge = Slot("count_edge")
+
+
+@threaded
+def _count_edges(system, tally, number, step, before, after):
+    """Count the first `number` edges of an account, see :class:`EnergyAccount`."""
+    particles, edges = system.particles, system.edges
+    for chunk in prange(CHUNKS):
+        for k in range(chunk * number // CHUNKS, (chunk + 1) * number // CHUNKS):
+            totals = tally.totals[0 if edges.first[k] < particles.owned else 1, chunk]
+            count_edge(k, system, tally, step, before, after, totals)
+
+
+class _Counter:
+    """Counts one account of a particle engine."""
+
+    def __init__(self, account: EnergyAccount, engine: Engine) -> None:
+        self.account = account
+        self._loop = specialise(_count_edges, {**engine.choices, "count_edge": account.count_edge})
+
+    def make_room(self, engine: Engine, contacts: Count) -> None:
+        """Begin with another neighbour list; `contacts` keeps what impulses act on."""
+        held, pulled = np.zeros((2, len(engine.edges.first)))
+        totals = np.zeros((2, CHUNKS, len(self.account.channels) + 1))
+        self._tally = Tally(contacts.ahead, contacts.spin_ahead, held, pulled, totals)
+
+    def count(self, engine: Engine, step: float, before: float, after: float) -> np.ndarray:
+        """Energy of each channel, and what moving walls have put in [J]; step and half kicks as in `EnergyAccount`."""
+        tally = _flat_but_totals(self._tally)
+        tally.totals[:] = 0.0
+        if self.account.at_walls and step > 0.0 and len(engine.walls.kind) > 0:
+            self.account.at_walls(engine.system, tally)
+        edges = engine.edges
+        number = edges.between_particles if self.account.pairs_only else len(edges.first)
+        self._loop(engine.system, tally, number, step, before, after)
+        return engine.communicator.sum(tally.totals[0], axis=0)  # type: ignore[no-any-return]
+
+    def stored(self, engine: Engine) -> dict[str, float]:
+        """Energy that all edges store, by its form [J]."""
+        held = self._tally.held[engine.edges.first < engine.particles.owned]
+        return {self.account.form: float(engine.communicator.sum(held))} if self.account.form else {}
+
+
+def _flat_but_totals(count: Any) -> Any:
+    """A count as compiled loops take it."""
+    return flat(count._replace(totals=None))._replace(totals=count.totals)
 
 
 class Energies(ParticleFeature):
@@ -68,9 +117,10 @@ class Energies(ParticleFeature):
             raise InputError("energies", None, 'films with integrator "drift"', "work of explicit films is not counted")
         self._work, self._motion = specialise(count_work, engine.choices), specialise(count_motion, engine.choices)
         choices = engine.choices
-        present = {BridgeEnergies: choices["BRIDGE"], BondEnergies: choices["BOND"], ShearEnergies: laws.shears}
-        self._accounts: list[EnergyAccount] = [each(engine) for each, counted in present.items() if counted]
-        self.channels = (*CHANNELS, *(name for each in self._accounts for name in each.channels))
+        bridges = DRYING_BRIDGES if choices["DRYING"] else BRIDGES
+        present = {bridges: choices["BRIDGE"], BONDS: choices["BOND"], SHEARED_FILMS: laws.shears}
+        self._counters = [_Counter(each, engine) for each, counted in present.items() if counted]
+        self.channels = (*CHANNELS, *(name for each in self._counters for name in each.account.channels))
         self.totals = np.zeros(len(self.channels))
         self.fed, self._had = 0.0, 0.0  # energy of inserted particles less that of removed ones; before an exchange [J]
         for field in (DISPLACEMENT, WORK_DISPLACEMENT):
@@ -86,13 +136,11 @@ class Energies(ParticleFeature):
             if self._edges is not engine.edges:
                 self._make_room(engine)
             self._pass(engine, 0.0, 0.0, 0.5 * step if first else 0.0)
-            for account in () if first else self._accounts:
-                account.renewed(engine, 0.5 * step)
+            for counter in () if first else self._counters:
+                counter.count(engine, 0.0, 0.0, 0.5 * step)  # the half kick that follows is in the totals already
         particles = engine.particles
         ahead = particles.velocity + (0.5 * step * particles.inverse_mass)[:, None] * particles.force
         keep_motion(self._count, particles, step, ahead)
-        for account in self._accounts:
-            account.before(engine, step, ahead)
 
     def after(self, engine: Engine, step: float, last: bool, ended: int) -> None:
         """Count after a step [s]; `last` of an advance."""
@@ -118,8 +166,8 @@ class Energies(ParticleFeature):
             "normal_springs": total(count.held[mine]),
             "tangential_springs": 0.5 * total((count.stiffness * count.spring)[mine]),
         }
-        for account in self._accounts:
-            forms |= account.stored(engine)
+        for counter in self._counters:
+            forms |= counter.stored(engine)
         return forms
 
     def springs(self, engine: Engine) -> tuple[float, float]:
@@ -153,12 +201,12 @@ class Energies(ParticleFeature):
     def _make_room(self, engine: Engine) -> None:
         """Begin with another neighbour list."""
         self._edges, self._count = engine.edges, allocate_tally(engine)
-        for account in self._accounts:
-            account.make_room(engine)
+        for counter in self._counters:
+            counter.make_room(engine, self._count)
 
     def _pass(self, engine: Engine, step: float, before: float, after: float) -> None:
         engine.lists.ghosts.refresh("work")
-        count = flat(self._count._replace(totals=None))._replace(totals=self._count.totals)
+        count = _flat_but_totals(self._count)
         count.totals[:] = 0.0
         gravity, free = np.array(engine.gravity, float), np.array(engine.free, float)
         self._motion(engine.system.particles, count, gravity, free, step, before, after)
@@ -166,8 +214,10 @@ class Energies(ParticleFeature):
         counted = engine.communicator.sum(count.totals[0], axis=0)
         self.totals[: len(CHANNELS)] += counted[: len(CHANNELS)]
         place = len(CHANNELS)
-        for account in self._accounts:
-            done, by_walls = account.count(engine, step, before, after, counted)
+        for counter in self._counters:
+            *done, by_walls = counter.count(engine, step, before, after)
+            if counter.account.begun is not None:
+                done[0] += counted[counter.account.begun]
             self.totals[place : place + len(done)] += done
             self.totals[WALLS] += by_walls
             place += len(done)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from cfddem.particles.integrate import may_touch
 from cfddem.particles.interactions.contact import friction_coefficient
 from cfddem.particles.interactions.joint_films import normal_of
 from cfddem.particles.interactions.kinematics import pair_mass_and_radius, pair_row
-from cfddem.particles.interactions.shear_film import two
+from cfddem.particles.interactions.shear_film import impulses_of, two
 from cfddem.particles.interactions.slots import (
     BRIDGE_RESISTS,
     DRIFTING,
@@ -45,8 +46,8 @@ CHANNELS = ("film", "contact_damping", "friction", "rolling", "walls", "stiffeni
 stiffness changes with the overlap, and from gravity; energy lost by the contact law itself, to plastic deformation."""
 
 BY_IMPULSES, BY_SHEAR = len(CHANNELS), len(CHANNELS) + 1
-"""Places after the channels: work of springs and gravity that the impulses of bridges have taken again, and energy lost
-to weak films that resist sliding."""
+"""Places after the channels: work of springs and gravity that the impulses of bridges have taken again, negative, and
+energy lost to weak films that resist sliding."""
 
 ALMOST = 1.0 - 1e-9
 """A contact slides if its tangential force is this share of Coulomb's limit or more."""
@@ -82,38 +83,35 @@ def allocate_tally(engine: Engine) -> Count:
     )
 
 
-class EnergyAccount:
-    """Energy of one kind of interaction, counted beside that of contacts and films.
+class EnergyAccount(NamedTuple):
+    """Energy of one kind of interaction, counted edge by edge beside that of contacts and films.
 
-    channels  names of its channels
+    channels    names of its channels
+    count_edge  (k, system, tally, step, before, after, totals) counts edge k at this instant. step: 0 where no time has
+                passed since the last count; before, after: half kicks around this instant [s]. `totals` has a place
+                for each channel, and one for what moving walls have put in [J]
+    pairs_only  whether walls have none
+    form        of the energy that it stores; none if empty
+    begun       what contacts have counted that belongs to the first channel, a place of `Count.totals`, if any
+    at_walls    (system, tally) passes what is held on to other pieces of a wall, where there are walls
     """
 
-    channels: tuple[str, ...] = ()
+    channels: tuple[str, ...]
+    count_edge: Callable[..., None]
+    pairs_only: bool = False
+    form: str = ""
+    begun: int | None = None
+    at_walls: Callable[..., None] | None = None
 
-    def make_room(self, engine: Engine) -> None:
-        """Begin with another neighbour list."""
 
-    def before(self, engine: Engine, step: float, ahead: np.ndarray) -> None:
-        """Before a step [s]; `ahead`, the velocity after the first half kick (N, 3) [m/s]."""
+class Tally(NamedTuple):
+    """State of an account between two steps, as compiled loops take it."""
 
-    def renewed(self, engine: Engine, kick: float) -> None:
-        """A new list was made amid an advance; it has forgotten the half kick [s] that follows."""
-
-    def count(
-        self, engine: Engine, step: float, before: float, after: float, contacts: np.ndarray
-    ) -> tuple[np.ndarray, float]:
-        """Count at this instant.
-
-        step           0 where no time has passed since the last count [s]
-        before, after  half kicks before and after this instant [s]
-        contacts       `Count.totals` of contacts, summed [J]
-        returns        energy of each channel and what moving walls have put in [J]
-        """
-        return np.zeros(len(self.channels)), 0.0
-
-    def stored(self, engine: Engine) -> dict[str, float]:
-        """Energy that it stores, by its form [J]."""
-        return {}
+    ahead: np.ndarray  # (N, 3) velocity after the first half kick of the step [m/s]
+    spin_ahead: np.ndarray  # (N, 3) likewise [rad/s]
+    held: np.ndarray  # (n,) energy that each edge stores [J]
+    pulled: np.ndarray  # (n,) work of what stores it, in the half kick after the last count [J]
+    totals: np.ndarray  # (2, CHUNKS, channels + 1); the second half is of pairs that another rank adds [J]
 
 
 @threaded
@@ -146,7 +144,7 @@ def count_motion(particles, count, gravity, free, step, before, after):
                             taken = plus(taken, at(particles.film_gain, i))
                         taken = (free[0] * taken[0], free[1] * taken[1], free[2] * taken[2])
                         work = 0.5 * step * dot(weight, taken)  # of gravity in the half kicks; impulses take it again
-                        totals[FILMS if DRIFTING else BY_IMPULSES] += -work if DRIFTING else work
+                        totals[FILMS if DRIFTING else BY_IMPULSES] -= work
             elif step > 0.0:
                 put(count.ahead, i, at(particles.velocity, i))
 
@@ -246,7 +244,7 @@ def _take_again(k, work, memory, totals):
         totals[FILMS] -= work
         note_loss(k, memory, FILMS, -work)
         return
-    totals[BY_IMPULSES] += work
+    totals[BY_IMPULSES] -= work
     if BRIDGE_RESISTS and memory.bridge_film[k] > 0.0:
         note_bridge_loss(k, memory, -work)
 
@@ -378,3 +376,34 @@ def count_work(system, count, step, before, after):
                 totals[WALLS] += by_wall
             if not near <= k < pairs:
                 _contact_works(k, system, count, step, before + after, totals)
+
+
+# ---------------------------------------------------------------- films that resist sliding
+
+
+@inline
+def _count_shear(k, system, tally, step, before, after, totals):
+    """Energy that the film of edge k has taken in the step, and that a moving wall has put in through it.
+
+    The work of an impulse is its product with the mean of the motion before and after all impulses of the step. So the
+    work of all impulses adds up to the change of the kinetic energy to round-off.
+    """
+    if not step > 0.0:
+        return
+    particles, edges, memory, walls = system.particles, system.edges, system.memory, system.walls
+    i, j = edges.first[k], edges.second[k]
+    impulse, first, second = impulses_of(k, memory.shear_impulse)
+    velocity, spin = mean_motion(i, particles, tally, step)
+    gained, by_wall = dot(impulse, velocity) + dot(first, spin), 0.0
+    if k < edges.between_particles:
+        velocity, spin = mean_motion(j, particles, tally, step)
+        gained += dot(second, spin) - dot(impulse, velocity)
+    else:
+        by_wall = dot(impulse, touched(edges, k, SURFACE)) - dot(second, at(walls.spin, walls.wall[j]))
+    totals[0] += by_wall - gained
+    totals[1] += by_wall
+    note_loss(k, memory, FILMS, by_wall - gained)
+
+
+SHEARED_FILMS = EnergyAccount(("film_shear",), _count_shear, begun=BY_SHEAR)
+"""Energy lost to films that resist sliding, rolling and twisting."""

@@ -27,6 +27,15 @@ def keep_motion(count: Any, particles: Particles, step: float, ahead: np.ndarray
 
 
 @inline
+def half_motion(i, particles, kick, sign):
+    """Distance and angle of particle i in a half kick (sign 1: after this instant, -1: before it)."""
+    half = 0.5 * sign * kick
+    velocity = plus(at(particles.velocity, i), times(half * particles.inverse_mass[i], at(particles.force, i)))
+    spin = plus(at(particles.spin, i), times(half * particles.inverse_inertia[i], at(particles.torque, i)))
+    return times(kick, velocity), times(kick, spin)
+
+
+@inline
 def drifted(i, particles, step):
     """Velocity and spin with which particle i has drifted in the step."""
     velocity = minus(at(particles.velocity, i), times(0.5 * step * particles.inverse_mass[i], at(particles.force, i)))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.json_text import plain
+from cfddem.backend.json_text import summary_of
 from closures.restitution import singh_crossover
 from scenarios.collisions.film_impact.solver import GridImpact
 from scenarios.references.isph.impact import SmoothedImpact
@@ -36,7 +36,7 @@ class Frame(NamedTuple):
 class FilmImpact:
     """Result of an impact. Speeds are those of the bead where its lowest point passes the undisturbed surface."""
 
-    outcome: str  # "rebound" or "stick"
+    outcome: Literal["rebound", "stick"]
     restitution: float  # speed out over speed in; 0 where the bead sticks [-]
     stokes: float  # rho_p D v/(9 eta); infinite without viscosity [-]
     film_ratio: float  # gamma, depth of the film over the diameter [-]
@@ -72,9 +72,7 @@ class FilmImpact:
 
     def summary(self) -> dict[str, Any]:
         """The result without histories and frames, ready for JSON."""
-        names = [name for name in self.__dataclass_fields__ if name not in ("history", "frames")]
-        moments = {name: getattr(self, name)._asdict() for name in ("p1", "p2", "p3", "p4")}
-        return {name: plain(moments.get(name, getattr(self, name))) for name in names}
+        return summary_of(self)
 
 
 ENERGIES = ("liquid_kinetic", "liquid_potential", "contact", "viscous", "impulsive", "exchange", "voids", "surface")

@@ -14,13 +14,13 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from cfddem.backend.errors import InputError, UnstableStep, nearest
 from cfddem.backend.html import table
-from cfddem.backend.json_text import plain
+from cfddem.backend.json_text import summary_of
 from cfddem.backend.law_choice import called_by_name, chosen
 from cfddem.case.materials import Material
 from cfddem.particles.collision_record import CollisionRecord
@@ -67,7 +67,7 @@ class Collision:
     stokes: float  # of the normal approach at h_co [-]; infinite when dry
     velocity: float  # of the normal approach at h_co [m/s]
     viscosity: float  # of the fluid [Pa s]
-    outcome: str  # "no_touch", "touch_no_rebound" or "rebound"
+    outcome: Literal["no_touch", "touch_no_rebound", "rebound"]
     restitution: float  # normal speed out over in [-]
     restitution_tangential: float  # tangential speed out over in [-]; NaN head-on
     rebound_angle_striker: float  # of the striker's own velocity against the line of centres at contact [deg]
@@ -84,8 +84,7 @@ class Collision:
 
     def summary(self) -> dict[str, Any]:
         """The result without its histories, ready for JSON."""
-        names = [name for name in self.__dataclass_fields__ if name not in ("time", "gap", "history")]
-        return {name: plain(getattr(self, name)) for name in names}
+        return summary_of(self)
 
     def _repr_html_(self) -> str:
         """The result in a notebook."""

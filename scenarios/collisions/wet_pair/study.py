@@ -14,11 +14,12 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed, nearest
+from cfddem.backend.json_text import summary_of
 from cfddem.case.materials import Material
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import CUTS, TANGENTIALS, BridgeLaws
@@ -56,7 +57,7 @@ LEAST_VISCOSITY, LARGE_RADIUS = 1.0, 0.1
 class WetPair:
     """Result of a wet collision; speeds are taken where the films separate, at h = film."""
 
-    outcome: str  # "bounce", "stick_rotate_separate" or "stick"
+    outcome: Literal["bounce", "stick_rotate_separate", "stick"]
     restitution: float  # normal speed of separation over that of impact; 0 where the pair does not separate [-]
     spin: float  # of each sphere, positive in the direction in which the pair turns [rad/s]
     separation_time: float | None  # after the films met [s]
@@ -68,8 +69,7 @@ class WetPair:
 
     def summary(self) -> dict[str, Any]:
         """The result without its history, ready for JSON."""
-        kept = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "history"}
-        return kept | {"warnings": list(self.warnings)}
+        return summary_of(self)
 
 
 def collide_wet(

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from cfddem.backend.errors import InputError, nearest
-from cfddem.backend.json_text import plain
+from cfddem.backend.json_text import summary_of
 from cfddem.case.materials import Material
 from cfddem.particles.material_pairs import pair_table
 from closures import capillary, contact, timescales
@@ -47,7 +47,7 @@ FASTEST = 1e3
 class Impact:
     """Result of a wet impact. Speeds are taken where the sphere meets the layer and where the bridge ruptures."""
 
-    outcome: str  # "rebound" or "stick"
+    outcome: Literal["rebound", "stick"]
     restitution: float  # normal speed out over in; 0 where the sphere sticks [-]
     restitution_tangential: float  # the same along the wall [-]; NaN head-on or stuck
     restitution_rotational: float  # spin after over before [-]; NaN without spin or stuck
@@ -59,14 +59,13 @@ class Impact:
     bridge_volume: float | None  # liquid in the bridge when it breaks [m3]
     rupture_length: float | None  # [m]
     duration: float  # until the bridge breaks, or the sphere has come to rest [s]
-    time: np.ndarray  # [s]
+    time: np.ndarray = field(repr=False)  # [s]
     history: dict[str, np.ndarray] = field(repr=False)  # columns of motion.COLUMNS, and the phase, 1 to 4
     warnings: tuple[str, ...] = ()
 
     def summary(self) -> dict[str, Any]:
         """The result without its histories, ready for JSON."""
-        names = [name for name in self.__dataclass_fields__ if name not in ("time", "history")]
-        return {name: plain(getattr(self, name)) for name in names}
+        return summary_of(self)
 
 
 def impact(
