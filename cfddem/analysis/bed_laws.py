@@ -35,7 +35,7 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
         case.column.ends != "flow"
         or not isinstance(case.bed.inlet_velocity, float)
         or case.bed.inlet_velocity <= 0.0
-        or case.bed.jet is not None
+        or case.bed.jets
         or _equipped(case)
         or not {"bed_voidage", "pressure_drop"} <= {*measures}
     ):
@@ -121,7 +121,7 @@ def _equipped(case: Case) -> bool:
 
 def weight_over_floor(case: Case) -> float | None:
     """Buoyant weight per floor area [Pa]; None if the flow does not have to carry it."""
-    if case.fluid is None or case.bed.fixed or abs(case.laws.gravity[2]) == 0.0 or _equipped(case):
+    if not case.has_fluid or case.bed.fixed or abs(case.laws.gravity[2]) == 0.0 or _equipped(case):
         return None
     return buoyant_weight(case) / case.column.floor_area
 

@@ -230,7 +230,7 @@ def _classified(run: RunData, case: Case, measures: Mapping[str, Measure]) -> tu
     if case.bed.fixed:
         return "fixed bed", "the particles do not move", None
     weight = weight_over_floor(case)
-    flows = case.fluid is not None and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
+    flows = case.has_fluid and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
     if case.is_one_sphere:
         return ("sphere at rest", moving, None) if at_rest and not flows else ("sphere in motion", moving, None)
     drop = measures.get("pressure_drop")
@@ -265,6 +265,6 @@ def _of_a_bed(case: Case, bed: BedEstimate, carried: float) -> str:
     """The regime of a bed whose flow carries a share of its weight."""
     if carried < CARRIED:
         return "packed" if bed.inlet <= bed.onset else "not fully fluidised"
-    if case.bed.jet is not None:
+    if case.bed.jets:
         return "fluidised with a jet"
     return "fluidised, expanded" if case.in_liquid else "fluidised, bubbling"

@@ -268,7 +268,7 @@ def references_of(case: Case) -> list[Citation]:
 
 def _used(case: Case) -> Iterator[Law]:
     laws = case.laws
-    if case.fluid is not None:
+    if case.has_fluid:
         given = (laws.drag_law, laws.added_mass_law, case.agitation)
         yield from (law for law in given if isinstance(law, Law))
         yield from (REGISTRY["history"][name] for name in (laws.history,) if name in REGISTRY["history"])

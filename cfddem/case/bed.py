@@ -260,9 +260,14 @@ class Bed(Species):
         return inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
 
     @property
+    def jets(self) -> tuple[Jet, ...]:
+        """The jet, if there is one."""
+        return (self.jet,) if self.jet else ()
+
+    @property
     def fastest_inflow(self) -> float:
         """Highest superficial velocity over time through the floor or the jet, whichever is higher [m/s]."""
-        return max(self.highest_inlet_velocity, 0.0 if self.jet is None else self.jet.velocity)
+        return max(self.highest_inlet_velocity, *(jet.velocity for jet in self.jets), 0.0)
 
 
 class CaseFeed(Checked):

@@ -42,7 +42,7 @@ def _wrong_walls(case: CaseTables) -> Iterator[InputError]:
             yield InputError(
                 f"{key}.material", shown(wall.material), limit, "every material is a table [material.NAME]"
             )
-        if case.fluid is None:
+        if not case.has_fluid:
             if wall.solid is not None:
                 yield InputError(f"{key}.solid", wall.solid, "left out in a case without a fluid")
             continue
@@ -70,7 +70,7 @@ def _wrong_feeds(case: CaseTables) -> Iterator[InputError]:
                 remedy = f"the box ends at {', '.join(f'{a + b:.4g}' for a, b in zip(corner, size))} m"
                 yield InputError(f"{key}{divider}corner", corner, limit, remedy)
                 break
-    if case.feed and case.fluid is not None:
+    if case.feed and case.has_fluid:
         for key, law, none in (("added_mass", case.laws.added_mass, 0.0), ("history", case.laws.history, "none")):
             if law != none:
                 remedy = "the law needs the past of a particle, and particles of a feed have none"

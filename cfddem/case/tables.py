@@ -145,6 +145,11 @@ class CaseTables(Checked):
         return self.fluid
 
     @property
+    def has_fluid(self) -> bool:
+        """Whether there is a fluid around the particles."""
+        return bool(self.fluid)
+
+    @property
     def around(self) -> Fluid:
         """What is around the particles: the fluid, or :data:`~cfddem.case.materials.NO_FLUID` around dry ones."""
         return self.fluid or NO_FLUID
@@ -162,8 +167,8 @@ class CaseTables(Checked):
     @property
     def has_smooth_walls(self) -> bool:
         """Whether a smooth wall cuts cells of the fluid."""
-        return bool(self.fluid) and self.column.walls == "smooth"
+        return self.has_fluid and self.column.walls == "smooth"
 
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""
-        return self.fluid is not None and wall.solid != "none"
+        return self.has_fluid and wall.solid != "none"

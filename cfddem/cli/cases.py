@@ -6,6 +6,7 @@ import math
 import sys
 from contextlib import nullcontext
 from dataclasses import dataclass
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -63,7 +64,7 @@ class Changes:
         """The case of a file with its values replaced, after the user's laws are known."""
         from cfddem.case.gallery import overrides
         from cfddem.case.schema import Case
-        from cfddem.cli.laws_file import import_laws
+        from cfddem.cli.cases import import_laws
 
         if self.laws:
             import_laws(self.laws)
@@ -290,7 +291,7 @@ def resume(
     Example: cfddem resume bed --until 0.03
     """
     from cfddem.backend.compile import use_threads
-    from cfddem.cli.laws_file import import_laws
+    from cfddem.cli.cases import import_laws
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
     from cfddem.run.resuming import case_to_continue
@@ -316,3 +317,31 @@ def resume(
         Run.resume(folder, until=until, report=line.update, progress=line.progress, communicator=communicator).go()
     if communicator.rank == 0:
         _print_report(folder, json)
+
+
+# ---------------------------------------------------------------- a file of laws
+#
+# A file of the user that declares laws: executed where a command names it, and nowhere else.
+
+
+def import_laws(file: Path) -> None:
+    """Execute a Python file, so that its laws are known.
+
+    errors  InputError if it is no Python file, or fails
+    """
+    if file.suffix != ".py" or not file.stem.isidentifier() or not file.is_file():
+        raise InputError("--laws", str(file), "an existing Python file, such as my_laws.py")
+    known = sys.modules.get(file.stem)
+    if known is not None and getattr(known, "__file__", None) == str(file.resolve()):
+        return
+    if known is not None or file.stem in sys.stdlib_module_names:
+        raise InputError("--laws", str(file), "a file with a name of its own", "another module has its name; rename it")
+    spec = spec_from_file_location(file.stem, file.resolve())
+    assert spec is not None and spec.loader is not None
+    module = sys.modules[file.stem] = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as failure:
+        del sys.modules[file.stem]
+        limit = "a file that can be executed"
+        raise InputError("--laws", str(file), limit, f"{type(failure).__name__}: {failure}") from failure

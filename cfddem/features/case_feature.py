@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
@@ -23,9 +23,12 @@ class Measured(NamedTuple):
 class CaseFeature(Equipment):
     """Equipment that a case can have.
 
+    table       of the case that turns it on
     case        that has it
     simulation  of the case; particles and solvers are ready, and in their state at the start
     """
+
+    table: ClassVar[str] = ""
 
     def __init__(self, case: Case, simulation: Any) -> None:
         """Prepare what acts in every step."""
@@ -33,7 +36,7 @@ class CaseFeature(Equipment):
     @classmethod
     def is_in(cls, case: Case) -> bool:
         """Whether a case has it."""
-        return False
+        return bool(getattr(case, cls.table or "_", None))  # a case may be older than the table
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:

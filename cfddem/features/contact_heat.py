@@ -37,7 +37,7 @@ class HeatExchangeOfContacts(CaseFeature):
     scale       heat that particles gained and lost so far, without sign [J]
     """
 
-    name = "contact heat"
+    name, table = "contact heat", "contact_heat"
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = ContactHeat.of(case)
@@ -67,11 +67,6 @@ class HeatExchangeOfContacts(CaseFeature):
             return 0.0
         largest, smallest = communicator.largest(particles.radius), communicator.smallest(particles.radius)
         return float(self.keys.lens * (1.0 + largest / smallest))
-
-    @classmethod
-    def is_in(cls, case: Case) -> bool:
-        """Whether the case has the table."""
-        return bool(ContactHeat.of(case))
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:

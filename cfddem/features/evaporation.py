@@ -47,7 +47,7 @@ class EvaporationOfLiquid(CaseFeature):
     heat  latent heat taken so far [J]
     """
 
-    name = "evaporation"
+    name, table = "evaporation", "evaporation"
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Evaporation.of(case)
@@ -68,11 +68,6 @@ class EvaporationOfLiquid(CaseFeature):
             assert heat
             temperature = keys.wall_temperature or heat.gas_temperature
             self.walls = WallFilms(simulation, keys.wall_coefficient, temperature, keys.liquid_density)
-
-    @classmethod
-    def is_in(cls, case: Case) -> bool:
-        """Whether the case has the table."""
-        return bool(Evaporation.of(case))
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:

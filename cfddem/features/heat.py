@@ -50,7 +50,7 @@ class HeatExchange(CaseFeature):
                        less than the step over its capacity where the fluid gives heat within the step
     """
 
-    name = "heat"
+    name, table = "heat", "heat"
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Heat.of(case)
@@ -75,11 +75,6 @@ class HeatExchange(CaseFeature):
         self.start = self.stored(simulation.owned)
         self.scale, self.other, self.last, self.sprayed = 0.0, 0.0, self.start, 0.0
         self.around, self.response = np.full(simulation.owned.count, self.fluid_temperature), np.zeros(0)
-
-    @classmethod
-    def is_in(cls, case: Case) -> bool:
-        """Whether the case has the table."""
-        return Heat.of(case) is not None
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:

@@ -34,18 +34,13 @@ class LiquidOnParticles(CaseFeature):
     evaporated  liquid that has left as vapour since the start [m3]
     """
 
-    name = "liquid"
+    name, table = "liquid", "liquid"
     fields = SNAPSHOT_FIELDS
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.particle_solver, self.brought, self.evaporated = simulation.particle_solver, 0.0, 0.0
         self.bridges: Bridges = self.particle_solver.feature(Bridges)
         self.start = self.total
-
-    @classmethod
-    def is_in(cls, case: Case) -> bool:
-        """Whether the case has a liquid."""
-        return case.liquid is not None
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:

@@ -42,7 +42,7 @@ FIELDS = (INSIDE, ENTERED, VISITS, VISIT_TIME, ROUNDS, ROUND_TIME)
 class SprayZone(CaseFeature):
     """The spray of a case and its zone."""
 
-    name = "spray"
+    name, table = "spray", "spray"
     fields = FIELDS
 
     def __init__(self, case: Case, simulation: Any) -> None:
@@ -59,11 +59,6 @@ class SprayZone(CaseFeature):
         self.spray = Spray(
             given.rate, given.drop_volume, zone, case.bed.seed, given.begin, end, communicator=simulation.communicator
         )
-
-    @classmethod
-    def is_in(cls, case: Case) -> bool:
-        """Whether the case has a spray."""
-        return case.spray is not None
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:

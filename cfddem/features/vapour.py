@@ -31,7 +31,7 @@ class Vapour(CaseFeature):
     received  mass of vapour that particles have received so far; below zero where they evaporate [kg]
     """
 
-    name = "vapour"
+    name, table = "vapour", "vapour"
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys, law, fluid = VapourTable.of(case), case.laws.heat_law, simulation.required_fluid
@@ -44,11 +44,6 @@ class Vapour(CaseFeature):
         )  # fmt: skip
         self.cells = Scalar(fluid, kind, ScalarSides(keys.inflow, keys.outlet_fraction))
         self.received, self.scale, self._made = 0.0, 0.0, False
-
-    @classmethod
-    def is_in(cls, case: Case) -> bool:
-        """Whether the case has the table."""
-        return VapourTable.of(case) is not None
 
     @classmethod
     def cell_fields_of(cls, case: Case) -> tuple[CellField, ...]:

@@ -33,8 +33,8 @@ from cfddem.particles.energy_of_contacts import (
     allocate_tally,
     count_motion,
     count_work,
+    keep_motion,
 )
-from cfddem.particles.impulse_motion import keep_motion
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import added_mass_energy, kinetic_energy
 from cfddem.particles.vectors import flat

@@ -15,8 +15,7 @@ last belongs to this line.
 from __future__ import annotations
 
 from cfddem.backend.compile import inline, serial
-from cfddem.particles.energy_of_contacts import BY_IMPULSES, EnergyAccount, note_bridge_loss
-from cfddem.particles.impulse_motion import half_motion, mean_motion
+from cfddem.particles.energy_of_contacts import BY_IMPULSES, EnergyAccount, half_motion, mean_motion, note_bridge_loss
 from cfddem.particles.interactions.bond import bond_loads
 from cfddem.particles.interactions.bridge import bridge_state
 from cfddem.particles.interactions.bridge_changes import of_same_wall

@@ -152,8 +152,8 @@ def _inflow(axes: Axes, case: Case) -> None:
     if case.column.ends != "flow" or bed.fastest_inflow <= 0.0:
         return
     half, fastest, words = 0.0, bed.highest_inlet_velocity, f"{bed.highest_inlet_velocity:.3g} m/s"
-    if bed.jet is not None:
-        half, fastest = 0.5 * bed.jet.width, bed.jet.velocity
+    for jet in bed.jets:
+        half, fastest = 0.5 * jet.width, jet.velocity
         words += f", jet {fastest:.3g} m/s"
     for x in (np.arange(7) + 0.5) * width / 7.0:
         speed = fastest if abs(x - 0.5 * width) <= half else bed.highest_inlet_velocity

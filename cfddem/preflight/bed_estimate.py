@@ -158,8 +158,8 @@ def mean_inlet_velocity(case: Case) -> float:
     """Mean superficial velocity over the floor including the jet, highest in time [m/s]."""
     if case.column.ends != "flow" or case.around is NO_FLUID:
         return 0.0
-    inlet, jet = case.bed.highest_inlet_velocity, case.bed.jet
-    return inlet if jet is None else inlet + share_of_jet(case, jet) * (jet.velocity - inlet)
+    inlet = case.bed.highest_inlet_velocity
+    return inlet + sum(share_of_jet(case, jet) * (jet.velocity - inlet) for jet in case.bed.jets)
 
 
 def share_of_jet(case: Case, jet: Jet) -> float:

@@ -85,7 +85,7 @@ def find_issues(
         *(Issue(*each) for table in case.feature_tables for each in table.issues(case)),
         *(Issue(*each) for table in case.feature_tables for each in table.issues_of_bed(case, bed)),
     ]
-    if case.fluid is not None:
+    if case.has_fluid:
         found += [*check_kernel(case, steps), *check_cells(case, bed, steps), *check_flow(case, bed)]
         found += [*check_drag(case), *check_ranges(case, bed), *check_waves(case, bed)]
         found += check_expansion(case, bed)
@@ -170,7 +170,7 @@ def needed_modulus(case: Case, collision: CollisionEstimate) -> float:
 def check_surface_laws(case: Case) -> Iterator[Issue]:
     """Check that contact law and rolling resistance have material properties, and that no property is unused."""
     laws, contact = case.laws, case.laws.contact_law
-    wetting = {"bridges": case.liquid is not None, "films": case.has_films}
+    wetting = {"bridges": bool(case.liquid), "films": case.has_films}
     liquid = next((name for name, form in wetting.items() if form), "")
     if contact.adhesive and liquid:
         remedy = {"bridges": "leave out [liquid]", "films": 'set laws.lubrication = "none"'}[liquid]

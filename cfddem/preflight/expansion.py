@@ -64,8 +64,7 @@ def is_compared(case: Case) -> bool:
         and case.column.ends == "flow"
         and isinstance(inlet, float)
         and inlet > 0.0
-        and case.bed.jet is None
-        and not (case.bed.fixed or case.bed.species or case.wall or case.feed or case.outlet)
+        and not (case.bed.jets or case.bed.fixed or case.bed.species or case.wall or case.feed or case.outlet)
         and abs(case.laws.gravity[2]) > 0.0
     )
 

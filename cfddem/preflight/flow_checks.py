@@ -143,7 +143,7 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
     """Check that drag beside walls has a fluid, walls at rest of a known shape, and no sum over several of them."""
     if case.laws.wall_drag == "none":
         return
-    if case.fluid is None:
+    if not case.has_fluid:
         yield Issue("warning", "laws.wall_drag", "unused, because the case has no fluid", "leave it out")
     for number, wall in enumerate(case.wall):
         if wall.shape == "surface" or wall.moves:
@@ -152,7 +152,7 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
     column = case.column
     pairs = column.ends, column.sides, column.sides if column.front is None else column.front
     faces = 2 * sum(each != "periodic" for each in pairs) + len(case.wall)
-    if case.laws.wall_drag == "all" and case.fluid is not None and faces > 1:
+    if case.laws.wall_drag == "all" and case.has_fluid and faces > 1:
         yield Issue(
             "warning", "laws.wall_drag",
             'the sum over several walls is more than their drag: with "all" the spheres of ten Cate et al. (2002) fall '

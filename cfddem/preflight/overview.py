@@ -63,12 +63,12 @@ def overview(
 def _particles_and_flow(case: Case, bed: BedEstimate) -> Iterator[Row]:
     group = "particles and flow"
     yield Row(group, "particles", bed.count)
-    if case.fluid is None:
+    if not case.has_fluid:
         return
     cell = case.column.cell if isinstance(case.column.cell, float) else min(case.column.cell)
     several = bool(case.bed.species)
     yield Row(group, "cell / diameter", cell / case.bed.largest_diameter, "", "of the largest species" * several)
-    yield Row(group, "density ratio", case.solid_density / case.fluid.density, "", "solid over fluid")
+    yield Row(group, "density ratio", case.solid_density / case.around.density, "", "solid over fluid")
     if math.isnan(bed.archimedes):
         return
     yield Row(group, "Re_p", bed.reynolds, "", f"Reynolds number at {'inlet' if bed.inlet else 'terminal'} velocity")

@@ -49,7 +49,7 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
     shortest = min(every, key=lambda each: each.recommended)
     at_rest = case.bed.fixed or any(each.holds_particles for each in case.feature_tables)
     particle = math.inf if at_rest else run.particle_step or shortest.recommended
-    if case.fluid is None:
+    if not case.has_fluid:
         return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, {}), None)
     cells = cell_counts(case.column.size, case.column.cell)
     spacing = [length / count for length, count in zip(case.column.size, cells)]
@@ -57,8 +57,8 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
     if fastest > 0.0:
         flow["Courant"] = courant_step(fastest, spacing)
     rates = [width**-2 for width, count in zip(spacing, cells) if count > 1]
-    if rates and case.fluid.viscosity > 0.0:
-        flow["viscous"] = VISCOUS * case.fluid.density / (2.0 * case.fluid.viscosity * sum(rates))
+    if rates and case.around.viscosity > 0.0:
+        flow["viscous"] = VISCOUS * case.around.density / (2.0 * case.around.viscosity * sum(rates))
     if not case.bed.fixed:
         flow["particle Courant"] = courant_step(speed, spacing)
     return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, flow), cells)

@@ -75,7 +75,7 @@ def parts_of(
         spheres = communicator.by_first(lambda: particles_of(case, table, walls, laws))
     if case.bed.species:
         spheres.declare(SPECIES)
-    dry, cells = case.fluid is None, cells_of(case, spheres.position, communicator)
+    dry, cells = not case.has_fluid, cells_of(case, spheres.position, communicator)
     solver = ParticleSolver(
         spheres,
         table,
@@ -272,9 +272,7 @@ def _inlet(case: Case) -> list[Condition]:
     else:
         times, speeds = np.array(velocity).T
         inlets = [Inlet(1.0, in_time=lambda t: float(np.interp(t, times, speeds)), where=within())]
-    if case.bed.jet is not None:
-        inlets.append(Inlet(case.bed.jet.velocity, where=within(_hole(case.bed.jet, case.column))))
-    return inlets
+    return [*inlets, *(Inlet(jet.velocity, where=within(_hole(jet, case.column))) for jet in case.bed.jets)]
 
 
 def _hole(jet: Jet, column: Column) -> Region:

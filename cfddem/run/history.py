@@ -137,7 +137,7 @@ def _declare(name: str, made: Measure) -> None:
 
 
 def _has_fluid(case: Case) -> bool:
-    return case.fluid is not None
+    return case.has_fluid
 
 
 def _is_bed(case: Case) -> bool:

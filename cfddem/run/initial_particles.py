@@ -48,7 +48,7 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
                 table, diameters, properties.density, walls, *start_box(case),
                 box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
                 gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
-                at_rest=AT_REST if case.fluid is None else NEARLY_AT_REST,
+                at_rest=NEARLY_AT_REST if case.has_fluid else AT_REST,
             ).particles  # fmt: skip
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start in ("packed", "expanded"):

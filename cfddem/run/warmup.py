@@ -44,7 +44,7 @@ def _cores() -> int:
 @contextmanager
 def warmup(case: Case) -> Iterator[None]:
     """Warm up while the block runs, for a case with a fluid, an empty cache and more than one core."""
-    if case.fluid is None or _cores() == 1 or not is_new():
+    if not case.has_fluid or _cores() == 1 or not is_new():
         yield
         return
     process = subprocess.Popen(
@@ -97,6 +97,6 @@ def threads_for(case: Case, given: int | None) -> int | None:
     """
     if given is not None:
         return given
-    cells = 0 if case.fluid is None else math.prod(grid_of(case).cells)
+    cells = math.prod(grid_of(case).cells) if case.has_fluid else 0
     is_small = case.particle_count + fed_count(case) <= FEW_PARTICLES and cells <= FEW_CELLS
     return 1 if is_small else None

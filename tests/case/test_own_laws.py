@@ -21,7 +21,7 @@ from cfddem.analysis.comparison import compare, lines
 from cfddem.analysis.report import report
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.cli.laws_file import import_laws
+from cfddem.cli.cases import import_laws
 from cfddem.coupling.forces.drag import Drag
 from cfddem.io.reading import open_run
 from cfddem.plotting.report_page import page

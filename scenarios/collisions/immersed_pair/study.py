@@ -321,7 +321,6 @@ def _result(
     parting = target - velocity[0]
     separated = history["gap"][end] > cutoff
     touched = bool(history.pop("touched"))
-    outcome = "rebound" if separated and touched else "touch_no_rebound" if touched else "no_touch"
     restitution = float(parting[0]) / setting.speed if separated or full else 0.0
     sideways = -float(parting[1])
     minimum_gap = _frozen_gap(simulation, setting)
@@ -335,7 +334,7 @@ def _result(
         stokes=setting.speed / setting.film_speed if laws.film else math.inf,
         velocity=setting.speed,
         viscosity=setting.viscosity,
-        outcome=outcome,
+        outcome="rebound" if separated and touched else "touch_no_rebound" if touched else "no_touch",
         restitution=restitution,
         restitution_tangential=sideways / setting.tangential_speed if setting.tangential_speed > 0.0 else math.nan,
         rebound_angle_striker=_degrees(float(velocity[0, 1]), float(velocity[0, 0])),
