@@ -18,9 +18,20 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
-from cfddem.features.contact_heat_loops import LENS, NONE, RAREFIED, ROUGH, SMOOTH, Choices, Pairs, conductances
 from cfddem.features.heat_keys import Heat
-from cfddem.features.heat_network import UNKNOWN, Links, Network
+from cfddem.features.heat_network import (
+    LENS,
+    NONE,
+    RAREFIED,
+    ROUGH,
+    SMOOTH,
+    UNKNOWN,
+    Choices,
+    Links,
+    Network,
+    Pairs,
+    conductances,
+)
 from cfddem.particles.pair_graph import shifts
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles

@@ -20,8 +20,7 @@ from cfddem.data.fields import Field
 from cfddem.features.energy import EnergyLedger
 from cfddem.particles.energy_of_contacts import CHANNELS
 from cfddem.particles.interactions.contact_law import ContactLaw, contact_named, register
-from cfddem.particles.interactions.contact_slots import check_contact_law, contact_choices
-from cfddem.particles.interactions.laws import Laws
+from cfddem.particles.interactions.laws import Laws, check_contact_law, contact_choices
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import kinetic_energy, make_particles

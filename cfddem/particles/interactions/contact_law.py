@@ -7,7 +7,7 @@ A contact law is a set of functions of numbers. Each takes what it needs by name
         restitution, friction, work_of_adhesion [J/m2], ...
     a parameter, a memory field or a derived value of the law, by its own name
 
-The functions are compiled into the loops of a run (:mod:`cfddem.particles.interactions.contact_slots`). They should be
+The functions are compiled into the loops of a run (:mod:`cfddem.particles.interactions.laws`). They should be
 free of branches: `a if condition else b`, `min` and `max` keep the loop working on several pairs at once.
 
 A law that is registered here can be chosen by its name in cases and in `Laws`; `cfddem explain` lists it. Each module
