@@ -30,7 +30,9 @@ def validate(
     ] = None,
     hours: Annotated[
         float | None,
-        Parameter(help="of wet-beds and bed-steps: begin no further piece after this time; the next call goes on with the rest"),
+        Parameter(
+            help="of wet-beds and bed-steps: begin no further piece after this time; the next call goes on with the rest"
+        ),
     ] = None,
     json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,
 ) -> None:

@@ -170,18 +170,19 @@ class EnergyLedger(CaseFeature):
         if self._work is None:
             sums["external"] += self.particle_solver.communicator.sum(owned.applied * owned.work_displacement)
             return
-        done = self._work.end(owned)
-        sums["external"] += done.external + done.external_on_fluid
-        agitation = done.fluctuating - done.fluctuating_on_fluid
-        sums["agitation"] += agitation + done.agitation
-        sums["drag"] += done.drag_on_fluid + done.explicit_drag_on_fluid - done.drag + agitation
-        sums["drag_from_fluid"] += done.explicit_history_on_fluid + done.explicit_drag_on_fluid
-        sums["drag_to_particles"] += done.drag + done.history
-        sums["drag_in_cells"] -= done.drag_on_fluid + done.history_on_fluid
-        sums["history"] += done.history_on_fluid + done.explicit_history_on_fluid - done.history
-        sums["lift_and_added_mass"] -= done.explicit + done.added
-        sums["lift_and_added_mass"] -= done.explicit_history_on_fluid + done.explicit_drag_on_fluid
-        sums["lift_and_added_mass"] += done.external_on_fluid  # not between the phases
+        done, on_fluid = self._work.end(owned), self._work.on_fluid
+        work = done.of_line
+        sums["external"] += work["external"] + on_fluid.external
+        agitation = done.fluctuating - on_fluid.of_fluctuation
+        sums["agitation"] += agitation + work["agitation"]
+        sums["drag"] += on_fluid.drag + on_fluid.explicit_drag - work["drag"] + agitation
+        sums["drag_from_fluid"] += on_fluid.explicit_history + on_fluid.explicit_drag
+        sums["drag_to_particles"] += work["drag"] + work["history"]
+        sums["drag_in_cells"] -= on_fluid.drag + on_fluid.history
+        sums["history"] += on_fluid.history + on_fluid.explicit_history - work["history"]
+        sums["lift_and_added_mass"] -= work["explicit"] + done.added
+        sums["lift_and_added_mass"] -= on_fluid.explicit_history + on_fluid.explicit_drag
+        sums["lift_and_added_mass"] += on_fluid.external  # not between the phases
         sums["fallen"] += done.weight
         sums["driving"] += done.driving
         sums["pressure_to_particles"] += done.pressure
@@ -286,18 +287,8 @@ class ImplicitWork(NamedTuple):
 class ParticleWork(NamedTuple):
     """Work on the particles in a fluid step [J]."""
 
-    drag: float
-    drag_on_fluid: float  # of the same force at the velocity with which the fluid acts
+    of_line: dict[str, float]  # of each line of `LINES`, without those that follow
     fluctuating: float  # part of the drag by the fluctuation of the fluid velocity
-    fluctuating_on_fluid: float  # of the same part at the velocity with which the fluid acts
-    history: float
-    history_on_fluid: float  # of the implicit part of the same force at the velocity with which the fluid acts
-    explicit_history_on_fluid: float  # of its other part
-    explicit_drag_on_fluid: float  # of the part of drag and its pressure that the fluid receives a step later
-    explicit: float  # lift, viscous stress, added mass and wall drag across the slip
-    agitation: float  # other forces of agitation
-    external: float  # forces from outside, and of a user
-    external_on_fluid: float  # of those on the fluid
     added: float  # kinetic energy that a change of the added mass has given to the particles
     weight: float  # less buoyancy
     driving: float  # mean pressure gradient of periodic sides
@@ -310,13 +301,14 @@ class CouplingWork:
 
     particles  get the fields that the count stores within a step
     coupling   the coupling
+    on_fluid   work on the fluid in the last fluid step
     """
 
     def __init__(self, particles: Particles, coupling: Coupling) -> None:
         self.coupling = coupling
         for field in (*FORCES.values(), FLUCTUATING, PRESSURE):
             particles.declare(field)
-        self._on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0, 0.0, 0.0)
+        self.on_fluid = ImplicitWork(0.0, np.zeros(0), 0.0, 0.0, 0.0, 0.0, 0.0)
         self._added = 0.0
         self._pressure = np.zeros(0)  # of the cells (1, nz, ny, nx) [Pa]
 
@@ -325,8 +317,8 @@ class CouplingWork:
         particles = terms.particles
         total = self.coupling.fluid.communicator.sum
         self._pressure = self.coupling.fluid.pressure[None].copy()
-        self._on_fluid = self._implicit_work(particles, terms)
-        particles[FLUCTUATING.name][:] = self._on_fluid.fluctuating
+        self.on_fluid = self._implicit_work(particles, terms)
+        particles[FLUCTUATING.name][:] = self.on_fluid.fluctuating
         self._added = total(0.5 * terms.added[:, None] * particles.velocity**2)
         for line, field in FORCES.items():
             particles[field.name][:] = terms.force(line)
@@ -343,18 +335,8 @@ class CouplingWork:
         driving = model_a * particles.volume[:, None] * fluid.boundaries.driving
         rise = self._pressure_at(particles) - particles.pressure_before
         return ParticleWork(
-            drag=work("drag"),
-            drag_on_fluid=self._on_fluid.drag,
+            of_line={line: work(line) for line in LINES if line not in ("pressure", "weight")},
             fluctuating=total(particles[FLUCTUATING.name] * particles.work_displacement),
-            fluctuating_on_fluid=self._on_fluid.of_fluctuation,
-            history=work("history"),
-            history_on_fluid=self._on_fluid.history,
-            explicit_history_on_fluid=self._on_fluid.explicit_history,
-            explicit_drag_on_fluid=self._on_fluid.explicit_drag,
-            explicit=work("explicit"),
-            agitation=work("agitation"),
-            external=work("external"),
-            external_on_fluid=self._on_fluid.external,
             added=self._added,
             weight=total(particles[FORCES["weight"].name] * particles.displacement),
             driving=total(driving * particles.work_displacement),
