@@ -6,12 +6,13 @@ fields       declared fields of cells and faces
 conditions   walls, inlets, outlets, periodic sides, and the times and regions in which they hold
 boundaries   the conditions as known faces and values of ghosts; arrays of one side
 halo         fills the ghosts of padded fields
-momentum     the terms of the momentum balance (models A and B); predictor; effective viscosity; rates that limit a step
+momentum     the terms of the momentum balance (models A and B); predictor; rates that limit a step
+viscosity    effective viscosity, with the sub-grid viscosity
 pressure/    the pressure equation: conjugate gradients with a multigrid preconditioner; projection; closed regions
 step_limit   the largest stable step at these rates; nothing compiled
 checks       checks of input and of divergence
 solver       the fluid: its fields, their values in cells and at points, and the step
 budgets      momentum, drag and energy of the step just made
-scalar       temperature or a vapour in every cell: its step, its conditions at the sides (scalar_conditions), its loops
-             (scalar_loops)
+scalar       temperature or a vapour in every cell: its step, its conditions at the sides (scalar_conditions,
+             scalar_sides), its loops (scalar_loops)
 """

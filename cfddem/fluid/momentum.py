@@ -34,15 +34,12 @@ relaxes by 1/(1 + z + z^2/2), never past its target.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import inline, prange, serial, threaded, vector_inline
 from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.grid import HIGH, LOW, UNIT, Array, Grid
-from cfddem.fluid.halo import Halo
+from cfddem.fluid.grid import LOW, Array
 from cfddem.fluid.step_limit import Rates
 
 # ---------------------------------------------------------------- terms, one function each
@@ -368,95 +365,3 @@ def _row_rates(k, j, velocity, voidage, viscosity, open_cells, density, inverse,
         advection[x] = max(advection[x], u * inverse[0] + v * inverse[1] + w * inverse[2])
         viscous[x] = max(viscous[x], stiffness)
         fluxes[x] = max(fluxes[x], max(u, max(v, w)) * fluid[x])
-
-
-# ---------------------------------------------------------------- effective viscosity
-#
-# Effective viscosity of cells: voidage times viscosity, the sub-grid viscosity included.
-
-
-@threaded
-def eddy_viscosity(velocity, factor, inverse, viscosity):
-    """Write the sub-grid viscosity rho (C Delta)^2 sqrt(2 S:S) of every cell; factor is rho (C Delta)^2 [kg/m]."""
-    pz, py, px = viscosity.shape
-    for k in prange(LOW, pz - HIGH):
-        for j in range(LOW, py - HIGH):
-            for i in range(LOW, px - HIGH):
-                squares = 0.0
-                for d in range(velocity.shape[0]):
-                    dk, dj, di = UNIT[d]
-                    u = velocity[d]
-                    for e in range(velocity.shape[0]):
-                        ek, ej, ei = UNIT[e]
-                        if e == d:
-                            stretch = (u[k + dk, j + dj, i + di] - u[k, j, i]) * inverse[d]
-                            squares += 2.0 * stretch * stretch
-                        elif e > d:
-                            v = velocity[e]
-                            shear = 0.25 * inverse[e] * (
-                                u[k + ek, j + ej, i + ei] + u[k + ek + dk, j + ej + dj, i + ei + di]
-                                - u[k - ek, j - ej, i - ei] - u[k - ek + dk, j - ej + dj, i - ei + di]
-                            ) + 0.25 * inverse[d] * (
-                                v[k + dk, j + dj, i + di] + v[k + ek + dk, j + ej + dj, i + ei + di]
-                                - v[k - dk, j - dj, i - di] - v[k - dk + ek, j - dj + ej, i - di + ei]
-                            )  # fmt: skip
-                            squares += shear * shear
-                viscosity[k, j, i] = factor * math.sqrt(squares)
-
-
-class EffectiveViscosity:
-    """The effective viscosity of a fluid.
-
-    A solid cell that touches open cells takes the mean of their values, so that the stress on a wall is that of the
-    fluid next to it.
-
-    grid         cells, some of them solid
-    halo         fills ghosts
-    density      rho [kg/m3]
-    smagorinsky  constant C of the sub-grid viscosity; 0 for none
-    """
-
-    def __init__(self, grid: Grid, halo: Halo, density: float, smagorinsky: float) -> None:
-        self.halo, self._inverse = halo, 1.0 / np.array(grid.spacing)
-        resolved = [h for h, n in zip(grid.spacing, grid.whole.cells) if n > 1] or [0.0]
-        width = math.prod(resolved) ** (1.0 / len(resolved))
-        self._factor = density * (smagorinsky * width) ** 2
-        self._has_eddies = smagorinsky > 0.0
-        self._rim = _rim(grid, halo)
-
-    def update(self, velocity: Array, voidage: Array, viscosity: Array, effective: Array) -> None:
-        """Write the effective viscosity of every cell and ghost.
-
-        velocity   padded, its ghosts filled (3, nz, ny, nx) [m/s]
-        voidage    padded
-        viscosity  dynamic viscosity of the fluid, padded [Pa s]
-        effective  written, padded [Pa s]
-        """
-        if self._has_eddies:
-            eddy_viscosity(velocity, self._factor, self._inverse, effective)
-            effective += viscosity
-            self.halo.fill(effective)
-            effective *= voidage
-        else:
-            np.multiply(voidage, viscosity, out=effective)
-        if self._rim is not None:
-            cells, neighbours, shares = self._rim
-            flat = effective.ravel()
-            flat[cells] = (flat[neighbours] * shares).sum(axis=1)
-            self.halo.fill(effective)
-
-
-def _rim(grid: Grid, halo: Halo) -> tuple[np.ndarray, np.ndarray, Array] | None:
-    """Solid cells that touch open ones: indices in a flat padded field, those of their 26 neighbours, weights."""
-    if grid.whole.solid is None:
-        return None
-    is_open = halo.padded(grid.open, outside=0.0)
-    _, ny, nx = grid.padded_shape
-    steps = np.array([(c * ny + b) * nx + a for c in (-1, 0, 1) for b in (-1, 0, 1) for a in (-1, 0, 1) if a or b or c])
-    k, j, i = np.nonzero(~grid.open)
-    cells = ((k + LOW) * ny + j + LOW) * nx + i + LOW
-    neighbours = cells[:, None] + steps
-    shares = is_open.ravel()[neighbours]
-    total = shares.sum(axis=1)
-    touching = total > 0.0
-    return cells[touching], neighbours[touching], shares[touching] / total[touching, None]

@@ -32,10 +32,11 @@ from cfddem.fluid.checks import checked_field, checked_viscosity, checked_voidag
 from cfddem.fluid.conditions import Condition
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
 from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, on_faces, sample
-from cfddem.fluid.momentum import EffectiveViscosity, FlowRates, drag_seen, in_cells, predict, transport
+from cfddem.fluid.momentum import FlowRates, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
 from cfddem.fluid.step_limit import Rates, StepLimit, step_limit
+from cfddem.fluid.viscosity import EffectiveViscosity
 
 LOOSE = 1e-6
 """Pressure tolerance of the first stage: it only shapes the convecting flux of the second."""

@@ -1,0 +1,103 @@
+"""State of the particles and their pairs by ids, without rows: for a checkpoint that any number of ranks goes on from.
+
+A neighbour list is not stored. It follows from where particles and walls were when it was made, so that any number of
+ranks makes the same list again, with the same bits in the next steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.errors import InputError
+from cfddem.particles.listing import NeighbourLists
+from cfddem.particles.pair_graph import Edges
+from cfddem.particles.state import Particles, rows_of
+from cfddem.particles.walls.arrays import restored_walls
+from cfddem.particles.walls.nearest_point import Walls
+
+
+def named_state(
+    particles: Particles, edges: Edges, origin: np.ndarray, communicator: Communicator = SERIAL
+) -> dict[str, Any]:
+    """The state of all ranks, on rank 0; other ranks get arrays without rows.
+
+    origin   (N, 3) position of each particle when the list was made [m]
+    returns  "particles" and "origin" by id, "pairs" and their "bodies" (see `Edges.ends`), and "touch" of the pairs
+             with walls, whose names are "touch_bodies"
+    """
+    rows, mine = slice(particles.owned), np.flatnonzero(edges.first < particles.owned)
+    at_walls = mine[mine >= edges.between_particles]
+    order = np.argsort(communicator.gathered(particles.id[rows]))
+
+    def by_id(values: np.ndarray) -> np.ndarray:
+        return communicator.gathered(values[rows])[order]
+
+    lasting = [name for name, field in edges.fields.items() if field.role != "scratch"]
+    return {
+        "particles": {name: by_id(array) for name, array in particles.lasting().items()},
+        "origin": by_id(origin),
+        "pairs": {name: communicator.gathered(edges[name][mine]) for name in lasting},
+        "bodies": communicator.gathered(edges.ends(particles.id, mine)),
+        "touch": communicator.gathered(edges.touch[at_walls - edges.between_particles]),
+        "touch_bodies": communicator.gathered(edges.ends(particles.id, at_walls)),
+    }
+
+
+def restored_list(
+    state: Mapping[str, Any],
+    particles: Particles,
+    edges: Edges,
+    lists: NeighbourLists,
+    walls: Mapping[str, np.ndarray],
+    reach_ratio: float,
+) -> tuple[Particles, Edges, np.ndarray]:
+    """The particles of this rank, their pairs, and the positions at which the list was made.
+
+    state             of a solver, of one rank or of several; the same on all ranks
+    particles, edges  with the fields of the run
+    walls             as they were when the list was made
+    reach_ratio       as of `NeighbourLists.renewed`
+    errors            InputError if the list does not contain a pair of the state: the state is of another case
+    """
+    particles.drop_ghosts()
+    if "edges" in state:
+        particles.restore(state["particles"])
+        edges = edges.restored(state["edges"])
+        if lists.communicator.size == 1:
+            return particles, edges, state["origin"]
+        state = named_state(particles, edges, state["origin"])
+    return _listed_again(state, particles, lists, restored_walls(walls), reach_ratio)
+
+
+def _listed_again(
+    state: Mapping[str, Any], particles: Particles, lists: NeighbourLists, walls: Walls, reach_ratio: float
+) -> tuple[Particles, Edges, np.ndarray]:
+    """See `restored_list`, for a `named_state()`."""
+    particles.restore(dict(state["particles"]) | {"position": state["origin"]})
+    particles = lists.own(particles)
+    lists.count(particles)
+    edges = lists.renewed(particles, walls, reach_ratio, np.full(particles.count, -1, np.int32), None)
+    origin, ids = particles.position.copy(), np.asarray(state["particles"]["id"])
+    particles.position[:] = np.asarray(state["particles"]["position"])[np.searchsorted(ids, particles.id)]
+    for names, values in ((state["bodies"], state["pairs"]), (state["touch_bodies"], {"touch": state["touch"]})):
+        _give(edges, particles, np.asarray(names).reshape(-1, 2), values)
+    return particles, edges, origin
+
+
+def _give(edges: Edges, particles: Particles, bodies: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
+    """Give the pairs of this rank their values, by the names of their bodies."""
+    rows = rows_of(bodies.reshape(-1), particles.id, np.argsort(particles.id)).reshape(-1, 2)
+    found = edges.between(rows, bodies)
+    owned = ((rows >= 0) & (rows < particles.owned)).any(axis=1)  # local: two bodies
+    if (owned & (found < 0)).any():  # local: each rank checks its own pairs
+        raise InputError("checkpoint", None, "one of this case", "its pairs are not those of these particles and walls")
+    known = np.flatnonzero(found >= 0)
+    for name, each in values.items():
+        if name == "touch":
+            edges.touch[found[known] - edges.between_particles] = each[known]
+        else:
+            edges[name][found[known]] = each[known]
