@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import sys
@@ -79,6 +80,8 @@ def main() -> None:
         for stream in (sys.stdout, sys.stderr):
             getattr(stream, "reconfigure", lambda **_: None)(errors="replace")
     begin()
+    if logging.lastResort is not None:  # of messages that no handler takes
+        logging.lastResort.setFormatter(logging.Formatter("cfddem: warning: %(message)s"))
     try:
         ignore_settings_files()
         with warnings.catch_warnings():

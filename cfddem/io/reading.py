@@ -336,7 +336,7 @@ class RunData:
         if not self.snapshots:
             return {"fluid": [], "particles": []}
         with self._opened(-1) as data:
-            return {block: sorted(map(field_name, data.file.get(block, {}))) for block in ("fluid", "particles")}
+            return {block: sorted(map(field_name, data.file.get(block, {}).keys())) for block in ("fluid", "particles")}
 
     @contextmanager
     def _opened(self, snapshot: int) -> Iterator[ArrayFile]:

@@ -127,6 +127,7 @@ def _logged(path: Path | None) -> Iterator[None]:
     before = package.level
     terminal = logging.StreamHandler()
     terminal.setLevel(logging.WARNING)
+    terminal.setFormatter(logging.Formatter("cfddem: warning: %(message)s"))
     for each in (handler, terminal):
         package.addHandler(each)
     package.setLevel(logging.INFO)

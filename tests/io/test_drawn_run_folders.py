@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import h5py
 import numpy as np
@@ -18,9 +20,12 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from made_up_run import made_up
 
+import cfddem
+from cfddem.backend.errors import CfddemError, InputError
+
 COMMANDS = (
     "report run", "report run --json", "compare run sound", "export run --to csv -o out.csv", "resume run --until 3",
-    "view run", "view run --history", "view run --waves",
+    "view run", "view run --history", "view run --waves", "run --from run --set until=3 -o other", "dataset",
 )  # fmt: skip
 
 NUMBERS = st.one_of(st.integers(-(2**70), 2**70), st.floats(), st.sampled_from([0, 1, -1, 1e300, 10**400]))
@@ -138,7 +143,14 @@ def answers(command: str, spoils: list[Spoil], sound: Path, home: Path) -> None:
         with suppress(OSError, KeyError, ValueError, RuntimeError, IndexError, ZeroDivisionError):  # already spoilt
             spoil(home / "run")
     DRAWN[command] += 1
-    done = call(*command.split())
+    if command == "dataset":
+        pytest.importorskip("xarray")
+        with suppress(CfddemError):
+            cfddem.open_run(home / "run").dataset().load()
+        return
+    shutil.rmtree(home / "other", ignore_errors=True)
+    with mock.patch("cfddem.run.runner.Simulation", side_effect=InputError("run", None, "not begun here")):
+        done = call(*command.split())
     assert done.code in (0, 2, 3), done
     assert "Traceback" not in done.err, done
     assert done.code == 0 or done.err.startswith("cfddem: ") or '"error"' in done.out, done
@@ -147,6 +159,15 @@ def answers(command: str, spoils: list[Spoil], sound: Path, home: Path) -> None:
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_up(tmp_path_factory.mktemp("drawn") / "sound", rows=101)
+
+
+def test_a_missing_snapshot_is_warned_of_in_a_line_of_the_program(sound: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(sound.parent)
+    monkeypatch.setattr(logging.root, "handlers", [])  # as outside of tests
+    shutil.copytree(sound, "gap")
+    Path("gap/data/00000001.h5").unlink()
+    done = call("compare", "gap", "sound")
+    assert done.err.startswith("cfddem: warning: gap/data: 1 snapshots are missing: 00000001.h5\n"), done
 
 
 @pytest.mark.slow

@@ -171,3 +171,13 @@ def test_a_nested_value_of_run_json_is_no_reason_for_a_traceback(tmp_path: Path)
     (folder / "run.json").write_text(text[:-1] + ', "more": ' + '{"a":' * 50_000 + "1" + "}" * 50_001)
     with pytest.raises(CfddemError, match=r"run.json: the file is damaged"):
         open_run(folder)
+
+
+def test_an_array_in_the_place_of_the_particle_fields_is_damage(tmp_path: Path) -> None:
+    """As a drawn folder had it: its rows were taken for names."""
+    folder = made_up(tmp_path / "run", rows=101)
+    with h5py.File(sorted((folder / "data").glob("*.h5"))[-1], "r+") as file:
+        del file["particles"]
+        file["particles"] = np.ones((3, 4))
+    with pytest.raises(RunFailed, match=r"\.h5: the file is damaged"):
+        _ = open_run(folder).particle_fields
