@@ -55,7 +55,7 @@ def start_box(case: CaseTables) -> tuple[Point, Point]:
     width, depth, height = case.column.size
     if not case.line:
         return (0.0, 0.0, 0.0), (width, depth, height)
-    side = math.sqrt(2.0) * max(radius for _, radius in case.line)
+    side = 2.0 * max(radius for _, radius in case.line) / math.sqrt(2.0)
     return (0.5 * (width - side), 0.5 * (depth - side), 0.0), (side, side, height)
 
 

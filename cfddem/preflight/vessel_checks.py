@@ -67,14 +67,15 @@ def open_share_of(case: Case, patch: CasePatch) -> float:
     """Share of a patch that lies on its side of the vessel [-]; of a whole side that of the side."""
     width, depth, height = case.column.size
     middle = patch.centre or (0.5 * width, 0.5 * depth)
-    reach = patch.diameter or max(*(patch.size or (2.0 * width, 2.0 * depth)))
+    edges = patch.size or (2.0 * width, 2.0 * depth)
+    reach = patch.diameter or float(max(edges))
     along = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
     x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + along, middle[1] + along))
     mine = patch.weight(x, y, middle) > 0.0
     z = np.full(x.size, 0.0 if patch.side == "floor" else height)
     inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
     inside &= case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0
-    return float(np.count_nonzero(mine & inside) / max(np.count_nonzero(mine), 1))
+    return float(np.count_nonzero(mine & inside)) / max(int(np.count_nonzero(mine)), 1)
 
 
 def _radius(case: Case, patch: CasePatch) -> float:
