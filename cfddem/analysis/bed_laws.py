@@ -43,7 +43,7 @@ def compared_with_bed_laws(case: Case, measures: Mapping[str, Measure]) -> list[
     drop = measures["pressure_drop"].mean
     if case.bed.fixed:
         return list(_of_a_fixed_bed(case, measures, drop))
-    weight = buoyant_weight(case) / case.column.floor_area
+    weight = buoyant_weight(case) / case.floor_area
     rows = [comparison("pressure drop by the buoyant weight", drop, weight, "Pa")]
     if "wall_load" in measures:
         carried = drop + measures["wall_load"].mean
@@ -116,14 +116,14 @@ def buoyant_weight(case: Case) -> float:
 
 def _equipped(case: Case) -> bool:
     """Whether walls, feeds or outlets change the floor area or the number of particles."""
-    return bool(case.wall or case.feed or case.outlet)
+    return bool(case.wall or case.feed or case.outlet or (case.vessel and not case.vessel.is_upright))
 
 
 def weight_over_floor(case: Case) -> float | None:
     """Buoyant weight per floor area [Pa]; None if the flow does not have to carry it."""
     if not case.has_fluid or case.bed.fixed or abs(case.laws.gravity[2]) == 0.0 or _equipped(case):
         return None
-    return buoyant_weight(case) / case.column.floor_area
+    return buoyant_weight(case) / case.floor_area
 
 
 def _outside_range(law: str, **arguments: float) -> str:

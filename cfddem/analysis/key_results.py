@@ -137,7 +137,7 @@ def _height(case: Case, measures: Mapping[str, Measure], laws: Sequence[LawCompa
     verdict = ""
     published = _published(laws)
     if published:
-        solids = OF_THE_BED * estimate_bed(case).solid_volume / case.column.floor_area  # as the bed height is defined
+        solids = OF_THE_BED * estimate_bed(case).solid_volume / case.floor_area  # as the bed height is defined
         low, high = (solids / (1.0 - each) for each in (min(published), max(published)))
         verdict = f"published laws give {low:.3g} to {high:.3g} m"
     yield _mean("bed height", height, verdict, None)
@@ -230,7 +230,7 @@ def _classified(run: RunData, case: Case, measures: Mapping[str, Measure]) -> tu
     if case.bed.fixed:
         return "fixed bed", "the particles do not move", None
     weight = weight_over_floor(case)
-    flows = case.has_fluid and case.column.ends == "flow" and case.bed.fastest_inflow > 0.0
+    flows = case.has_fluid and case.column.ends == "flow" and case.fastest_inflow > 0.0
     if case.is_one_sphere:
         return ("sphere at rest", moving, None) if at_rest and not flows else ("sphere in motion", moving, None)
     drop = measures.get("pressure_drop")

@@ -59,7 +59,7 @@ def layer_map(run: RunData, case: Case, layer: float | None = None) -> LayerMap:
     rows = []
     for place in range(len(run.times)):
         particles = run.particles(place)
-        rows.append(layer_solid_fraction(particles["position"], particles["radius"], edges, case.column.floor_area))
+        rows.append(layer_solid_fraction(particles["position"], particles["radius"], edges, case.floor_area))
     return LayerMap(run.times, 0.5 * (edges[1:] + edges[:-1]), np.array(rows))
 
 

@@ -20,6 +20,8 @@ ABSENT: dict[str, str] = {
     "compressib|mach$|speed_of_sound": "the fluid is incompressible",
     "bubble|level_set|volume_of_fluid": "there is one fluid; bubbles of a bed are regions of "
         "high voidage",
+    "fill_level|fill_height|free_surface|half_filled|liquid_level": "one fluid fills the whole vessel, without a free "
+        "surface; for a drum of particles in air leave out [fluid], or give that of the air",
     "rotation_rate|rpm$|angular_velocity": "a wall turns by spin, a vector [rad/s]",
     "stl$|stl_|mesh_file": "a surface is [[wall]] with shape = \"surface\" and file",
     "cooling": "temperatures are [heat] of the fluid and [contact_heat] of contacts and walls",
@@ -35,6 +37,8 @@ TABLES: dict[str, str] = {
     "vapour": "Not there: more than one vapour, its effect on the density of the gas, and reactions.",
     "evaporation": "Not there: condensation, and pores; what bonds are made of has no mass.",
     "fluid": "Not there: turbulence models, compressibility, free surfaces, and a viscosity that flows with the fluid.",
+    "vessel": "Not there: vessels that are not round about an upright axis, openings in their sides, a free surface of "
+    "the fluid, and walls that move through it. With a fluid: [heat], [vapour] and several processes.",
     "wall": "Not there: the effect of a moving wall on the fluid; and wear.",
     "liquid": "Not there: several liquids, flow through bridges, and the mass of the liquid.",
     "spray": "Not there: flight of drops, which land at once, and their momentum.",

@@ -1,4 +1,4 @@
-"""The grid of a column: cells outside a cylinder, and those that walls of the case close, are solid."""
+"""The grid of a column: a vessel cuts its cells; cells outside a cylinder, and those that walls close, are solid."""
 
 from __future__ import annotations
 
@@ -9,24 +9,31 @@ import numpy as np
 
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
+from cfddem.case.vessel_shape import CaseVessel
 from cfddem.case.wall_geometry import solid_part, stamp
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
-from cfddem.fluid.surfaces import cylinder
+from cfddem.fluid.surfaces import turned
 
 
 def grid_of(case: Case) -> Grid:
-    """Cells of the column; those outside a cylinder, and those whose centres walls close to the fluid, are solid."""
+    """Cells of the column, cut by its vessel; cells outside a cylinder, and behind walls, are solid."""
+    if case.vessel:
+        return _in_vessel(case.column, case.vessel)
     walls = tuple(filter(case.closes_cells, case.wall))
     return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
 
 
 @lru_cache(maxsize=8)
+def _in_vessel(column: Column, vessel: CaseVessel) -> Grid:
+    centre = (0.5 * column.size[0], 0.5 * column.size[1], 0.0)
+    wall = turned(vessel.line_in(column), centre, spin=vessel.spin)
+    return within(Grid.of_size(column.size, column.cell), wall)
+
+
+@lru_cache(maxsize=8)
 def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int], ...]) -> Grid:
-    if column.walls == "smooth":
-        axis = (0.5 * column.width, 0.5 * column.width, 0.0)
-        return within(Grid.of_size(column.size, column.cell), cylinder(axis, 0.5 * column.width))
     closing = [_closed_by(wall) for wall in walls]
     if column.shape == "cylinder":
         closing.append(outside_cylinder((0.5 * column.width, 0.5 * column.width, 0.0), 0.5 * column.width))

@@ -60,21 +60,44 @@ class Case(CaseTables):
 
     @model_validator(mode="after")
     def _a_random_packing_fills_a_box(self) -> Case:
-        if self.bed.start in AT_RANDOM and self.column.shape == "cylinder":
+        if self.bed.start in AT_RANDOM and self.line:
+            where = "a vessel" if self.vessel else "a cylinder"
             raise InputError(
-                "bed.start", self.bed.start, '"poured" or "suspended" in a cylinder', "a packing fills a box"
+                "bed.start", self.bed.start, f'"poured" or "suspended" in {where}', "a packing fills a box"
             )
         return self
 
     @model_validator(mode="after")
-    def _smooth_walls_go_with_the_rest(self) -> Case:
+    def _the_vessel_goes_with_the_rest(self) -> Case:
+        if self.vessel:
+            self.vessel.refuse(self.column)
         if self.has_smooth_walls:
             closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
             scalars = [name for name in ("heat", "vapour") if getattr(self, name, None) is not None]
             if closing or scalars:
-                remedy = 'set column.walls = "solid_cells"'
-                limit = "left out in a column with smooth walls" if scalars else '"none" in a column with smooth walls'
+                remedy = 'take column.shape = "cylinder", whose wall has steps of cells, instead of the vessel'
+                limit = "left out in a vessel with a fluid" if scalars else '"none" in a vessel with a fluid'
                 raise InputError([*scalars, *closing][0], None, limit, remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _what_enters_leaves(self) -> Case:
+        if not self.patch:
+            return self
+        first, ends = next(iter(self.patch)), self.column.ends
+        if not self.fluid or ends == "periodic":
+            where = "without a fluid" if not self.fluid else 'where column.ends is "periodic"'
+            raise InputError(f"patch.{first}", None, f"left out {where}", "patches are for the fluid at floor and lid")
+        if self.bed.jet:
+            raise InputError("bed.jet", None, "left out where there are patches", 'make it a patch, kind = "inlet"')
+        kinds = [(each.kind, each.side, each.shape) for each in self.patch.values()]
+        of_lid = [kind for kind, side, shape in kinds if side == "lid" and shape == "whole"]
+        leaves = ends == "flow" and not {"wall", "inlet"} & {*of_lid}
+        inlets = [name for name, each in self.patch.items() if each.kind == "inlet"]
+        enters = [f"patch.{name}" for name in inlets] + ["bed.inlet_velocity"] * (ends == "flow")
+        if enters and not leaves and "outlet" not in {kind for kind, _, _ in kinds}:
+            remedy = 'give a patch of kind = "outlet", or column.ends = "flow", whose lid is one'
+            raise InputError(enters[0], None, "together with an outlet: what enters has to leave", remedy)
         return self
 
     @model_validator(mode="after")
@@ -108,7 +131,7 @@ class Case(CaseTables):
         if bed.height is None:
             return {name: each.count or len(bed.positions) for name, each in self.species.items()}
         vessel = vessel_of(self)
-        volume = self.column.floor_area * bed.height if vessel is None else vessel.below(bed.height)
+        volume = self.floor_area * bed.height if vessel is None else vessel.below(bed.height)
         solids = POURED_SOLID_FRACTION * volume
         shares = bed.species_volumes(solids) or dict.fromkeys(self.species, solids)
         return {name: int(shares[name] / each.mean_volume) for name, each in self.species.items()}
@@ -165,7 +188,7 @@ class Case(CaseTables):
         numbers = [
             {
                 "density_ratio": self.material_of(each).density / fluid.density,
-                "reynolds": fluid.density * self.bed.fastest_inflow * each.diameter / fluid.viscosity,
+                "reynolds": fluid.density * self.fastest_inflow * each.diameter / fluid.viscosity,
             }
             for each in self.species.values()
         ]
@@ -197,7 +220,8 @@ class Case(CaseTables):
         fall = math.sqrt(math.hypot(*self.laws.gravity) * self.bed.largest_diameter)
         speeds = [math.hypot(*self.bed.initial_velocity), *(math.hypot(*each.velocity) for each in self.feed)]
         speeds += [each.fastest for each in self.wall if math.isfinite(each.fastest)]
-        return max(2.0 * self.bed.fastest_inflow, fall, *speeds)
+        speeds += [abs(self.vessel.spin) * max(radius for _, radius in self.line)] if self.vessel else []
+        return max(2.0 * self.fastest_inflow, fall, *speeds)
 
     @classmethod
     def from_toml(cls, path: str | Path, overrides: Mapping[str, Any] | None = None) -> Case:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from cfddem.backend.errors import InputError
@@ -13,13 +15,18 @@ from cfddem.case.case_laws import CaseLaws
 from cfddem.case.compare import CaseData
 from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import NO_FLUID, Checked, Fluid, Material, Materials, Pairs
+from cfddem.case.patches import CasePatch
+from cfddem.case.vessel_shape import CaseVessel, Line
 from cfddem.case.walls import CaseWall
 
 
 class Column(Checked):
-    """The vessel and its grid: a box, or an upright cylinder inside a box of cells."""
+    """The column and its grid: a box, or an upright cylinder of cells; around a vessel, the box of its cells."""
 
-    shape: Literal["box", "cylinder"] = Field("box", description="shape of the vessel; a cylinder is upright")
+    shape: Literal["box", "cylinder"] = Field(
+        "box",
+        description="shape of the column; a cylinder is upright, with a wall of solid cells: a smooth one is [vessel]",
+    )
     width: Positive = Field(description="width along x, or diameter of a cylinder [m]")
     depth: Positive | None = Field(None, description="depth along y; default: width [m]")
     height: Positive = Field(description="height along z [m]")
@@ -34,9 +41,6 @@ class Column(Checked):
     )
     ends: Literal["flow", "closed", "periodic"] = Field(
         "flow", description="floor and lid: inlet and outlet, closed walls, or periodic"
-    )
-    walls: Literal["solid_cells", "smooth"] = Field(
-        "solid_cells", description="wall of a cylinder for the fluid: solid cells, or a smooth wall that cuts cells"
     )
     material: str | None = Field(None, description="material of the walls; default: that of the bed")
 
@@ -53,9 +57,6 @@ class Column(Checked):
 
     @model_validator(mode="after")
     def _check_cylinder(self) -> Column:
-        if self.walls == "smooth" and (self.shape != "cylinder" or self.sides != "no_slip"):
-            remedy = 'set column.shape = "cylinder" and column.sides = "no_slip"'
-            raise InputError("walls", self.walls, "solid_cells, but in a cylinder whose side is no_slip", remedy)
         if self.shape == "cylinder":
             if self.depth not in (None, self.width):
                 raise InputError(
@@ -106,6 +107,8 @@ class CaseTables(Checked):
     material: Materials = Field(min_length=1, description="solids by name")
     pair: Pairs = Field({}, description="contact of two unlike materials, by their names")
     column: Column
+    vessel: CaseVessel | None = Field(None, description="a round vessel with a smooth wall, in the column")
+    patch: dict[Name, CasePatch] = Field({}, description="inlets, outlets and walls on floor and lid, by name")
     bed: Bed
     wall: tuple[CaseWall, ...] = Field((), description="walls beside those of the column")
     feed: tuple[CaseFeed, ...] = Field((), description="boxes in which particles enter during the run")
@@ -167,7 +170,39 @@ class CaseTables(Checked):
     @property
     def has_smooth_walls(self) -> bool:
         """Whether a smooth wall cuts cells of the fluid."""
-        return self.has_fluid and self.column.walls == "smooth"
+        return self.has_fluid and bool(self.vessel)
+
+    @property
+    def fastest_inflow(self) -> float:
+        """Highest superficial velocity over time through the floor, the jet or an inlet [m/s]."""
+        return max([self.bed.fastest_inflow, *(each.fastest for each in self.patch.values())])
+
+    @property
+    def line(self) -> Line:
+        """Heights and radii of the round wall of the vessel or column, from the floor up [m]; empty in a box."""
+        if self.vessel:
+            return self.vessel.line_in(self.column)
+        half = 0.5 * self.column.width
+        return ((0.0, half), (self.column.height, half)) if self.column.shape == "cylinder" else ()
+
+    @property
+    def floor_area(self) -> float:
+        """Area of the floor, inside the vessel if there is one [m2]."""
+        return self.column.floor_area if not self.vessel else self.vessel.floor_area(self.column)
+
+    def beyond_the_side(self, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.float64]:
+        """How far places (N, 3) are outside of the round wall, across (N,); negative inside, or in a box [m].
+
+        margin  from the wall, across it [m]
+        """
+        if not self.line:
+            return np.full(len(places), -np.inf)
+        heights, radii = np.array(self.line).T
+        slope = np.diff(radii) / np.diff(heights)
+        piece = np.clip(np.searchsorted(heights, places[:, 2]) - 1, 0, len(slope) - 1)
+        across = margin * np.sqrt(1.0 + slope[piece] ** 2)
+        away = np.hypot(*(places[:, :2] - 0.5 * np.array(self.column.size[:2])).T)
+        return np.asarray(away - np.interp(places[:, 2], heights, radii) + across)
 
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""

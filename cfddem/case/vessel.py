@@ -13,6 +13,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Point
 from cfddem.case.tables import CaseTables, Column
+from cfddem.case.vessel_shape import Line
 from cfddem.case.wall_geometry import (
     Array,
     distance,
@@ -45,15 +46,17 @@ SET_START = "set bed.start_corner and bed.start_size"
 
 
 def start_box(case: CaseTables) -> tuple[Point, Point]:
-    """Corner and size of the box in which particles start [m]: as given, or the column, or a box in a round one."""
+    """Corner and size of the box in which particles start [m]: as given, or the column, or a box in a round one.
+
+    In a vessel it fits into the widest part; walls keep particles out of what it has beyond narrower ones.
+    """
     if case.bed.start_corner is not None and case.bed.start_size is not None:
         return case.bed.start_corner, case.bed.start_size
     width, depth, height = case.column.size
-    if case.column.shape == "box":
+    if not case.line:
         return (0.0, 0.0, 0.0), (width, depth, height)
-    side = width / math.sqrt(2.0)
-    corner = 0.5 * (width - side)
-    return (corner, corner, 0.0), (side, side, height)
+    side = 2.0 * max(radius for _, radius in case.line) / math.sqrt(2.0)
+    return (0.5 * (width - side), 0.5 * (depth - side), 0.0), (side, side, height)
 
 
 def start_places(case: CaseTables) -> Array:
@@ -196,15 +199,16 @@ class Vessel:
 
 
 def vessel_of(case: CaseTables) -> Vessel | None:
-    """The vessel that walls at rest form in the column of a case; None if none does, or a surface cannot be read.
+    """The vessel that walls at rest, or the vessel of a case, form in its column; None if the column is as wide
+    everywhere, or a surface cannot be read.
 
     An open cone or tube without a fluid has no side: particles may be on both.
     """
     try:
         closing = tuple((wall, side) for wall in case.wall if (side := closed_side(case, wall)) is not None)
-        if not closing:
+        if not closing and (not case.vessel or case.vessel.is_upright):
             return None
-        vessel = _vessel(case.column, closing, tuple(stamp(wall) for wall, _ in closing))
+        vessel = _vessel(case.column, case.line, closing, tuple(stamp(wall) for wall, _ in closing))
     except (InputError, OSError, ValueError):  # reported by the checks of walls
         return None
     return vessel if vessel.areas.any() else None
@@ -224,16 +228,21 @@ def closed_side(case: CaseTables, wall: CaseWall) -> Side | None:
 
 
 @lru_cache(maxsize=8)
-def _vessel(column: Column, closing: Sequence[tuple[CaseWall, Side]], _: tuple[tuple[int, int], ...]) -> Vessel:
-    """The vessel of some walls with their closed sides, sampled on a lattice of places."""
+def _vessel(
+    column: Column, line: Line, closing: Sequence[tuple[CaseWall, Side]], _: tuple[tuple[int, int], ...]
+) -> Vessel:
+    """The vessel within a round wall, if there is one, and some walls with their closed sides; with these it is sampled
+    on a lattice of places."""
     width, depth, height = column.size
     x, y = _across(column)
     edges = np.linspace(0.0, height, LEVELS + 1)
     z = 0.5 * (edges[1:] + edges[:-1])
     points = np.stack(np.meshgrid(z, y, x, indexing="ij")[::-1], axis=-1).reshape(-1, 3)
     is_open = np.ones(len(points), bool)
-    if column.shape == "cylinder":
-        is_open &= np.hypot(*(points[:, :2] - 0.5 * width).T) < 0.5 * width
+    radii = np.interp(z, *np.array(line).T) if line else np.zeros(0)
+    if line:
+        away = np.hypot(*(points[:, :2] - 0.5 * np.array((width, depth))).T)
+        is_open &= away < np.interp(points[:, 2], *np.array(line).T)
     for wall, side in closing:
         if wall.shape == "surface" or wall.is_open:
             is_open &= ~solid_part(wall.model_copy(update={"solid": side}), points)
@@ -241,15 +250,16 @@ def _vessel(column: Column, closing: Sequence[tuple[CaseWall, Side]], _: tuple[t
             is_open &= distance(wall, points) >= 0.0
     levels = is_open.reshape(LEVELS, -1)
     lowest = levels[np.argmax(levels.any(axis=1))]
-    return Vessel(edges, levels.mean(axis=1) * width * depth, column.floor_area, points[: len(lowest), :2][lowest].T)
+    above = math.pi * line[-1][1] ** 2 if line else column.floor_area
+    areas = math.pi * radii**2 if line and not closing else levels.mean(axis=1) * width * depth
+    return Vessel(edges, areas, above, points[: len(lowest), :2][lowest].T)
 
 
-def floor_places(column: Column, of_the_box: bool = False) -> Array:
-    """x and y of evenly spread places over the floor of a column, or of the box around it (2, m) [m]."""
+def floor_places(column: Column, line: Line = ()) -> Array:
+    """x and y of evenly spread places over the floor of the box of a column, or within a round wall (2, m) [m]."""
     width, depth, _ = column.size
     places = np.stack(np.meshgrid(*_across(column))).reshape(2, -1)
-    round_one = np.hypot(places[0] - 0.5 * width, places[1] - 0.5 * depth) < 0.5 * width
-    return places[:, round_one] if column.shape == "cylinder" and not of_the_box else places
+    return places[:, np.hypot(places[0] - 0.5 * width, places[1] - 0.5 * depth) < line[0][1]] if line else places
 
 
 def _across(column: Column) -> tuple[Array, Array]:

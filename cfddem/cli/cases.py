@@ -112,20 +112,30 @@ def check(
     strict: Annotated[bool, Parameter(help="exit with code 1 if there are warnings", negative="")] = False,
     ranks: Annotated[int | None, Parameter(help="number of processes that are to share the run")] = None,
     division: Annotated[str | None, Parameter(help=DIVISION)] = None,
+    picture: Annotated[Path | None, Parameter(help="PNG file for a drawing of the case, seen along y")] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
-    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run or written.
+    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run, or written but
+    the picture.
 
     Exit code: 0 without errors, 2 with errors.
 
     Example: cfddem check liquid-bed --set bed.inlet_velocity=0.04
     """
     from cfddem.case.gallery import find_case
+    from cfddem.io.files import require_folder
     from cfddem.run.check import check as checked
 
     shape = parsed(division) if division else None
     ranks = math.prod(shape) if shape and not ranks else ranks
-    result = checked(changes.case(find_case(case)), ranks, shape)
+    described = changes.case(find_case(case))
+    result = checked(described, ranks, shape)
+    if picture is not None:
+        require_folder(picture)
+        from cfddem.plotting.case_drawing import case_drawing
+        from cfddem.plotting.curves import save
+
+        save(case_drawing(described), picture)
     if json:
         print_json("check", result.summary())
     else:

@@ -26,7 +26,7 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.cut_cells import CutCells, section
 from cfddem.fluid.fields import CellFields
 from cfddem.fluid.grid import Array
-from cfddem.fluid.near_walls_loops import cut_transport, hold_near_walls
+from cfddem.fluid.near_walls_loops import FULL, cut_transport, hold_near_walls
 
 LEAST_RISE = 0.4
 """How much farther from the wall the next face must be, for a curvature to be taken, in cells."""
@@ -79,7 +79,8 @@ class NearWalls(NoWalls):
         assert isinstance(cut, CutCells)
         self.profiles = [_profiles(cut, d) for d in range(3)]
         self._resistance = [np.zeros(0)] * 3
-        self.components = [_faces_of(cut, d, solved[d] > 0.0, self.profiles[d]) for d in range(3)]
+        outlets = [(side.axis, side.face(cut.grid)) for side in boundaries.sides if side.outlet.any()]
+        self.components = [_faces_of(cut, d, solved[d] > 0.0, self.profiles[d], outlets) for d in range(3)]
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
         """See `NoWalls.replace`; `fields.flux` is that of the velocity."""
@@ -113,8 +114,11 @@ def near_walls(boundaries: Boundaries, fields: CellFields, solved: Array) -> NoW
 # ---------------------------------------------------------------- gradients as weights of velocities
 
 
-def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles) -> Faces:
-    """The faces of a component near walls, and the weights of their gradients."""
+def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: Sequence[tuple[int, int]]) -> Faces:
+    """The faces of a component near walls, and the weights of their gradients.
+
+    outlets  axes, and layers of faces normal to them, in which there are outlets
+    """
     spacing, shape = cut.grid.spacing, cut.volume.shape
     steps = (1, shape[2], shape[1] * shape[2])
     inverse = 1.0 / np.array(spacing)
@@ -149,8 +153,11 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles) -> Faces:
     wall_index = np.stack([at, profiles.next[at]], axis=-1)
     wall_constant = -(pull * profiles.sliding[wall_index]).sum(axis=1)
     stiff = np.maximum(stiff + pull[:, 0] - whole, 0.0)
+    # beyond an outlet the fluid is not continuous: convection and growth there act on equally much fluid, or u grows
+    at_outlet = np.isin(at // steps[d] % shape[2 - d], [layer for axis, layer in outlets if axis == d])
+    acting = np.where(at_outlet, np.maximum(open_share, FULL), open_share)
     return Faces(
-        d, at, open_share, area, index, weight, constant, wall_index, pull, wall_constant, stiff, cut.aperture,
+        d, at, acting, area, index, weight, constant, wall_index, pull, wall_constant, stiff, cut.aperture,
         inverse,
     )  # fmt: skip
 

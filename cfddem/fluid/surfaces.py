@@ -91,6 +91,9 @@ class Turned:
             raise InputError("turned.line", self.line, "at least two points (place along the axis, radius), in m")
         if (points[:, 1] < 0.0).any() or not (np.diff(points, axis=0) != 0.0).any(axis=1).all():
             raise InputError("turned.line", self.line, "radii of at least zero, and no point twice in a row")
+        if (np.diff(points[:, 0]) < 0.0).any():
+            remedy = "a line that turns back has its inside out; draw a rod with inside = False"
+            raise InputError("turned.line", self.line, "places along the axis that do not fall", remedy)
         if self.axis not in (0, 1, 2):
             raise InputError("turned.axis", self.axis, "0, 1 or 2, for x, y, z")
 

@@ -43,7 +43,7 @@ def case_drawing(case: Case, bed_height: float | None = None) -> Figure:
     )
     _cells(axes, case)
     _particles(axes, case)
-    for wall in case.wall:
+    for wall in (*case.wall, *(case.vessel.walls_in(case.column) if case.vessel else ())):
         _wall(axes, wall, width, height)
     for boxes, name, colour in ((case.feed, "feed", GREEN), (case.outlet, "outlet", RED)):
         for box in boxes:
@@ -52,11 +52,12 @@ def case_drawing(case: Case, bed_height: float | None = None) -> Figure:
         _spray(axes, case.spray)
     _column(axes, case)
     _inflow(axes, case)
+    _patches(axes, case)
     if bed_height is not None and math.isfinite(bed_height):
         axes.axhline(bed_height, color=ORANGE, linewidth=1.6, linestyle="--")
         axes.text(1.05 * width, bed_height, "bed height", color=ORANGE, fontsize=9.5, va="center", clip_on=False)
     margin = 0.04 * max(width, height)
-    low = -0.16 * height if case.bed.fastest_inflow > 0.0 and case.column.ends == "flow" else -margin
+    low = -0.16 * height if case.fastest_inflow > 0.0 and case.column.ends == "flow" else -margin
     axes.set(xlim=(-margin, width + margin), ylim=(low, height + margin), xlabel="x  [m]", ylabel="z  [m]")
     axes.set_aspect("equal")
     axes.grid(False)
@@ -109,6 +110,9 @@ def _particles(axes: Axes, case: Case) -> None:
         centres = _lattice(corner, size, diameter)
         kept = np.random.default_rng(1).random(len(centres)) < share
         centres = centres[kept]
+        middle = np.full(len(centres), 0.5 * case.column.size[1])
+        inside = case.beyond_the_side(np.stack([centres[:, 0], middle, centres[:, 1]], axis=-1), 0.5 * diameter) <= 0.0
+        centres = centres[inside]
     wide = np.full(len(centres), diameter)
     axes.add_collection(
         EllipseCollection(
@@ -161,6 +165,19 @@ def _inflow(axes: Axes, case: Case) -> None:
         if length > 0.0:
             axes.annotate("", (x, 0.0), (x, -length), arrowprops={"arrowstyle": "-|>", "color": SKY, "linewidth": 1.4})
     axes.text(0.5 * width, -0.105 * height, words, ha="center", va="top", fontsize=9.5, color=BLUE)
+
+
+def _patches(axes: Axes, case: Case) -> None:
+    """Patches of floor and lid as thick lines with their names: blue where fluid enters, red where it leaves."""
+    width, _, height = case.column.size
+    for number, (name, patch) in enumerate(case.patch.items()):
+        middle = patch.centre[0] if patch.centre else 0.5 * width
+        half = 0.5 * (patch.size[0] if patch.size else patch.diameter or width)
+        z, colour = (0.0, height)[patch.side == "lid"], {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]
+        axes.plot([middle - half, middle + half], [z, z], color=colour, linewidth=4.0, solid_capstyle="butt")
+        words = f"{name} {patch.highest:.3g} m/s" if patch.kind == "inlet" else name
+        lower = (-0.04 if patch.side == "floor" else 0.02) * height * (1.0 + number % 2)
+        axes.text(middle, z + lower, words, color=colour, fontsize=9.5, ha="center", va="center", **LEGIBLE)
 
 
 def _box(axes: Axes, corner: Any, size: Any, name: str, colour: str) -> None:
@@ -237,6 +254,8 @@ def _facts(case: Case) -> list[str]:
     """What the drawing cannot show, one line each."""
     width, depth, height = case.column.size
     box = f"width {width:.4g} m\ndepth {depth:.4g} m\nheight {height:.4g} m"
+    if case.vessel:
+        box += f"\n{case.vessel.shape}, {2.0 * case.line[0][1]:.4g} m at the floor"
     lines = [f"cylinder\ndiameter {width:.4g} m\nheight {height:.4g} m" if case.column.shape == "cylinder" else box]
     lines.append(f"sides {case.column.sides.replace('_', ' ')}\nends {case.column.ends}")
     lines.append("")

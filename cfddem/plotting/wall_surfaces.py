@@ -26,9 +26,11 @@ SHARP = 25.0
 
 
 def walls_of(run: RunData) -> tuple[CaseWall, ...]:
-    """The walls of a run beside those of its column; none if its case or its surface files cannot be read."""
+    """The walls of a run beside those of its column, and the pieces of its vessel; none if its case or its surface
+    files cannot be read."""
     try:
-        return case_of(run).wall
+        case = case_of(run)
+        return (*case.wall, *(case.vessel.walls_in(case.column) if case.vessel else ()))
     except CfddemError:
         return ()
 

@@ -52,7 +52,7 @@ def estimate_bed(case: Case) -> BedEstimate:
     """
     vessel, solids = vessel_of(case), sum(case.volumes.values())
     if vessel is None:
-        return _estimate(case, case.column.floor_area, None)
+        return _estimate(case, case.floor_area, None)
     height = vessel.height_of(solids / POURED_SOLID_FRACTION)
     for _ in range(EXPANSIONS):
         bed = _estimate(case, vessel.below(height) / height, vessel)
@@ -155,10 +155,15 @@ def _terminal_by_law(case: Case, gravity: float) -> float:
 
 
 def mean_inlet_velocity(case: Case) -> float:
-    """Mean superficial velocity over the floor including the jet, highest in time [m/s]."""
-    if case.column.ends != "flow" or case.around is NO_FLUID:
+    """Mean superficial velocity over the floor including jet and inlets, highest in time [m/s]."""
+    if (case.column.ends != "flow" and not case.patch) or case.around is NO_FLUID:
         return 0.0
     inlet = case.bed.highest_inlet_velocity
+    of_floor = [each for each in case.patch.values() if each.kind == "inlet" and each.side == "floor"]
+    if of_floor:
+        shares = [min(1.0, each.area / case.floor_area) for each in of_floor]
+        entering = sum(each.highest * share for each, share in zip(of_floor, shares))
+        return entering + max(0.0, 1.0 - sum(shares)) * inlet
     return inlet + sum(share_of_jet(case, jet) * (jet.velocity - inlet) for jet in case.bed.jets)
 
 
@@ -172,8 +177,10 @@ def share_of_jet(case: Case, jet: Jet) -> float:
         """Number of places (2, m) that the jet covers."""
         return int(np.count_nonzero(jet.covers(places[0] - 0.5 * width, places[1] - 0.5 * depth)))
 
-    is_open, area = (vessel.floor_places, vessel.floor) if vessel else (floor_places(column), column.floor_area)
-    every = covered(floor_places(column, of_the_box=True))
+    is_open, area = (
+        (vessel.floor_places, vessel.floor) if vessel else (floor_places(column, case.line), case.floor_area)
+    )
+    every = covered(floor_places(column))
     return min(1.0, opening * (covered(is_open) / every if every else 1.0) / area)
 
 

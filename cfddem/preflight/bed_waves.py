@@ -162,7 +162,7 @@ def waves_of(case: Case, bed: BedEstimate) -> BedWaves | None:
         return None
     height, voidage = bed.height, bed.voidage
     if column.ends == "periodic":
-        height, voidage = math.inf, 1.0 - bed.solid_volume / (column.floor_area * column.height)
+        height, voidage = math.inf, 1.0 - bed.solid_volume / (case.floor_area * column.height)
     elif not bed.inlet > bed.onset:
         return None
     if not (0.0 < voidage < 1.0 and case.solid_density > case.around.density and case.laws.gravity[2] < 0.0):

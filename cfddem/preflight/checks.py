@@ -27,6 +27,7 @@ from cfddem.preflight.geometry_checks import (
 from cfddem.preflight.issue import ORDER, Issue, Severity, percent, plain, rounded_up
 from cfddem.preflight.law_ranges import check_ranges
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate, available_memory, estimate_cost, estimate_steps
+from cfddem.preflight.vessel_checks import check_patches, check_vessel
 from cfddem.preflight.wall_checks import check_walls_and_feeds
 from cfddem.preflight.wet_estimate import WetEstimate, check_wet
 
@@ -78,6 +79,8 @@ def find_issues(
         *check_wall_drag(case),
         *check_wet(case, wet),
         *check_walls_and_feeds(case),
+        *check_vessel(case),
+        *check_patches(case),
         *check_steps(case, steps),
         *check_cost(case, cost),
         *check_stiffness(case, bed, collision, cost),

@@ -131,7 +131,7 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
     if not (case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or downward == 0.0):
         yield from _check_inlet(case, bed)
-    jet, in_a_box = case.bed.jet, case.column.shape == "box" and not vessel_of(case)
+    jet, in_a_box = case.bed.jet, not case.line and not vessel_of(case)
     if jet and not (in_a_box or jet.round or jet.depth):
         yield Issue(
             "note", "bed.jet", f"a slot across the whole vessel, {percent(share_of_jet(case, jet))} of its floor",

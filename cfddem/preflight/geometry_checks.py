@@ -49,7 +49,7 @@ def check_bed_size(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check that the particles fit into the column at the start, and the expanded bed below the lid."""
     column, diameter, start = case.column, case.bed.largest_diameter, case.bed.start
     vessel = vessel_of(case)
-    volume = column.floor_area * column.height if vessel is None else float(vessel.volumes[-1])
+    volume = case.floor_area * column.height if vessel is None else float(vessel.volumes[-1])
     fraction = bed.solid_volume / volume
     limit = SUSPENDED_SOLID_FRACTION if start == "suspended" else POURED_SOLID_FRACTION
     remedy = f"at most {int(bed.count / fraction * limit)} of these particles fit; use fewer, or a higher column"
@@ -109,16 +109,15 @@ def check_positions(case: Case) -> Iterator[Issue]:
         return
     size = np.array(case.column.size)
     outside = ~((positions >= 0.0) & (positions <= size)).all(axis=1)
-    if case.column.shape == "cylinder":
-        outside |= np.hypot(*(positions[:, :2] - 0.5 * size[:2]).T) > 0.5 * size[0]
+    outside |= case.beyond_the_side(positions) > 0.0
     if outside.any():
         row = int(np.argmax(outside))
         others = int(outside.sum()) - 1
         yield Issue(
             "error", f"bed.positions.{row}",
-            f"{[float(f'{x:.4g}') for x in positions[row]]} lies outside the column"
+            f"{[float(f'{x:.4g}') for x in positions[row]]} lies outside the {'vessel' if case.vessel else 'column'}"
             + (f", and so do {others} more" if others else ""),
-            f"the column extends from 0 to {case.column.size} m",
+            f"the column extends from 0 to {case.column.size} m" + ", the vessel within it" * bool(case.vessel),
         )  # fmt: skip
     for number, wall in enumerate(case.wall):
         with suppress(InputError, OSError, ValueError):

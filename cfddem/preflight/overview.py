@@ -6,12 +6,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from cfddem.backend.errors import InputError
 from cfddem.case.feeds import fed_count, feed_rate
 from cfddem.case.schema import Case
 from cfddem.case.vessel import vessel_of
 from cfddem.case.wall_geometry import is_closed, triangles
 from cfddem.case.walls import CaseWall
+from cfddem.fluid.cell_counts import cell_counts
 from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_downward_forces
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.issue import WIDTH
@@ -20,6 +23,9 @@ from cfddem.preflight.wall_checks import closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
 from closures.bed import ergun_gradient
+
+MOST_CUT = 100_000
+"""Cells above which the check does not look for those that a vessel cuts."""
 
 
 @dataclass(frozen=True)
@@ -161,18 +167,31 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
     for number, mask in closed_cells(case).items():
         yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
-    if case.has_smooth_walls:
-        from cfddem.case.column_grid import grid_of  # loads the compiler, which other checks lack
-        from cfddem.fluid.cut_cells import open_share
-
-        share = open_share(grid_of(case))
-        cut = int(((share > 0.0) & (share < 1.0)).sum())
-        yield Row(group, "column: cells cut by the wall", cut, "", f"of {share.size}; smooth for the fluid")
+    if case.has_smooth_walls and math.prod(cell_counts(case.column.size, case.column.cell)) <= MOST_CUT:
+        yield from _cut_cells(case, group)
     if (vessel := vessel_of(case)) is not None:
         yield Row(group, "cross-section at the floor", vessel.floor, "m2", "that walls leave open")
         yield Row(group, "cross-section at the bed surface", vessel.area_at(bed.height), "m2")
     if case.feed:
         yield Row(group, "particles at the end, at most", case.particle_count + fed_count(case))
+
+
+def _cut_cells(case: Case, group: str) -> Iterator[Row]:
+    """Cells that the vessel cuts, and how small their parts are."""
+    from cfddem.case.column_grid import grid_of  # loads the compiler, which other checks lack
+    from cfddem.fluid.cut_cells import open_share
+
+    share = np.asarray(open_share(grid_of(case)), float)
+    cut = share[(share > 0.0) & (share < 1.0)]
+    half = int((cut < 0.5).sum())
+    yield Row(group, "cells cut by the vessel", len(cut), "", f"of {share.size}; smooth for the fluid")
+    yield Row(
+        group,
+        "smallest cut cell / cell",
+        float(cut.min(initial=1.0)),
+        "",
+        f"{half} are less than half open: particles see them with a neighbour",
+    )
 
 
 def _surface(wall: CaseWall) -> tuple[float, str, str]:

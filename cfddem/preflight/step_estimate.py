@@ -53,7 +53,7 @@ def estimate_steps(case: Case, bed: BedEstimate) -> StepEstimate:
         return StepEstimate(shortest, particle, fluid_step_limits(particle, run.fluid_step, {}), None)
     cells = cell_counts(case.column.size, case.column.cell)
     spacing = [length / count for length, count in zip(case.column.size, cells)]
-    fastest, flow = max(bed.inlet / bed.voidage, case.bed.fastest_inflow), {}
+    fastest, flow = max(bed.inlet / bed.voidage, case.fastest_inflow), {}
     if fastest > 0.0:
         flow["Courant"] = courant_step(fastest, spacing)
     rates = [width**-2 for width, count in zip(spacing, cells) if count > 1]

@@ -275,8 +275,7 @@ def free_share(case: Case, corner: Point, size: Point, radius: float) -> float:
     for wall in case.wall:
         away = distance(wall, places)
         free &= ~(away < radius)
-    if case.column.shape == "cylinder":
-        free &= np.hypot(*(places[:, :2] - 0.5 * case.column.width).T) < 0.5 * case.column.width - radius
+    free &= case.beyond_the_side(places, radius) < 0.0
     return float(np.count_nonzero(free)) / SAMPLES
 
 
@@ -321,5 +320,4 @@ def _unreachable(case: Case, corner: Point, size: Point) -> bool:
     for wall in case.wall:
         if not wall.leaves_its_place and (distance(wall, places) < 0.0).all() and not wall.is_open:
             return True
-    width = case.column.width
-    return case.column.shape == "cylinder" and bool((np.hypot(*(places[:, :2] - 0.5 * width).T) > 0.5 * width).all())
+    return bool((case.beyond_the_side(places) > 0.0).all())

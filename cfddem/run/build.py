@@ -41,9 +41,10 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
-from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
+from cfddem.particles.walls.shapes import Cylinder, Plane, Turned, Wall
 from cfddem.run.division import cells_of, space_of
 from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
+from cfddem.run.patches import with_patches
 from closures.added_mass import zuber
 from closures.registry import Law, law_of
 
@@ -155,7 +156,7 @@ def materials_of(case: Case) -> np.ndarray:
 
 
 def walls_of(case: Case) -> list[Wall]:
-    """Floor and lid unless the ends are periodic, sides unless they are periodic, then the walls of the case."""
+    """Floor and lid unless the ends are periodic, sides unless they are periodic, or the vessel, then other walls."""
     width, depth, height = case.column.size
     names, first = list(case.material), next(iter(case.species.values()))
     solid = names.index(case.column.material or first.material or names[0])
@@ -163,6 +164,13 @@ def walls_of(case: Case) -> list[Wall]:
     if case.column.ends != "periodic":
         walls.append(Plane(material=solid))
         walls.append(Plane(point=(0.0, 0.0, height), normal=(0.0, 0.0, -1.0), material=solid))
+    if case.vessel:
+        spin, middle = (0.0, 0.0, case.vessel.spin), (0.5 * width, 0.5 * depth, 0.0)
+        if case.vessel.is_upright:
+            walls.append(Cylinder(point=middle, radius=case.line[0][1], spin=spin, material=solid))
+        else:
+            walls.append(Turned(line=case.line, point=middle, spin=spin, material=solid))
+        return [*walls, *case_walls(case, solid)]
     if case.column.shape == "cylinder":
         walls.append(Cylinder(point=(0.5 * width, 0.5 * width, 0.0), radius=0.5 * width, material=solid))
         return [*walls, *case_walls(case, solid)]
@@ -254,6 +262,8 @@ def boundaries_of(case: Case) -> dict[str, Condition | list[Condition]]:
         conditions |= {"z_low": NoSlip(), "z_high": NoSlip()}
     else:
         conditions |= {"z_low": _inlet(case), "z_high": Outlet()}
+    for name, side in (("z_low", "floor"), ("z_high", "lid")):
+        conditions[name] = with_patches(case, side, conditions[name])
     return conditions
 
 

@@ -31,8 +31,7 @@ def require_parallel(case: Case, ranks: int, shape: Shape | None = None) -> None
         if ranks > 1 and table.one_process:
             raise InputError(table.table, None, "left out in a run of several processes", "take one process")
     if ranks > 1 and case.has_smooth_walls:
-        limit = '"solid_cells" in a run of several processes'
-        raise InputError("column.walls", case.column.walls, limit, "take one process")
+        raise InputError("vessel", None, "left out in a run of a fluid on several processes", "take one process")
     if ranks > 1 and case.fluid:
         divide(grid_of(case), ranks, shape=shape)
 
@@ -88,8 +87,5 @@ def _expected(case: Case, position: np.ndarray) -> np.ndarray:
 
 def _sample(case: Case) -> np.ndarray:
     """Places spread over the column (n, 3) [m]."""
-    column = case.column
-    places = np.random.default_rng(0).uniform(0.0, column.size, (SAMPLE, 3))
-    if column.shape == "cylinder":
-        places = places[np.hypot(*(places[:, :2] - 0.5 * column.width).T) <= 0.5 * column.width]
-    return places
+    places = np.random.default_rng(0).uniform(0.0, case.column.size, (SAMPLE, 3))
+    return places[case.beyond_the_side(places) <= 0.0]

@@ -73,8 +73,8 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
         made.declare(SPECIES, properties.species)
     if case.liquid is not None:
         made.declare(LIQUID, liquid_of(case.liquid, made.radius, bed.seed))
-    _must_be_inside(made.position, case.column.size)
-    if case.wall:
+    _must_be_inside(made.position, case)
+    if case.wall or (case.vessel and bed.start != "poured"):
         _must_be_apart(made, walls, len(walls) - len(case.wall))
         _must_be_on_one_side(case, made.position)
     return made
@@ -105,7 +105,7 @@ def liquid_of(liquid: Liquid, radius: Array, seed: int) -> Array:
 
 def expanded_height(case: Case) -> float:
     """Height of the bed in the flow, by the balance of weight and drag; at most that of the column [m]."""
-    lowest = sum(case.volumes.values()) / (LARGEST_EXPANDED_FRACTION * case.column.floor_area)
+    lowest = sum(case.volumes.values()) / (LARGEST_EXPANDED_FRACTION * case.floor_area)
     return min(case.column.height, max(lowest, estimate_bed(case).height))
 
 
@@ -113,15 +113,13 @@ def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) ->
     """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m]."""
     column, seed = case.column, case.bed.seed
     corner, size = case.bed.start_corner or (0.0, 0.0, 0.0), case.bed.start_size or column.size
-    volume = math.prod(case.bed.start_size) if case.bed.start_size else column.floor_area * column.height
+    volume = math.prod(case.bed.start_size) if case.bed.start_size else case.floor_area * column.height
     pitch = min((volume / count) ** (1.0 / 3.0), *size)
     for _ in range(200):
         if pitch < 1.02 * largest:
             break
         places = lattice(largest, (corner, tuple(np.add(corner, size))), spacing=pitch / largest, seed=seed)
-        if column.shape == "cylinder":
-            from_axis = np.hypot(*(places[:, :2] - 0.5 * column.width).T)
-            places = places[from_axis <= 0.5 * (column.width - largest)]
+        places = places[case.beyond_the_side(places, 0.5 * largest) <= 0.0]
         if case.wall:
             places = places[clear_of_walls(places, 0.5 * largest, walls)]
         if len(places) >= count:
@@ -184,11 +182,16 @@ def in_the_box(places: Array, case: Case) -> Array:
     return inside
 
 
-def _must_be_inside(position: Array, size: tuple[float, float, float]) -> None:
+def _must_be_inside(position: Array, case: Case) -> None:
+    size = case.column.size
     outside = ~((position >= 0.0) & (position <= np.array(size))).all(axis=1)
     if outside.any():
         row = int(np.argmax(outside))
         raise InputError(f"position of particle {row}", position[row].tolist(), f"inside the column, 0 to {size} m")
+    if case.vessel and (outside := case.beyond_the_side(position) > 0.0).any():
+        row = int(np.argmax(outside))
+        remedy = "set bed.start_corner and bed.start_size"
+        raise InputError(f"position of particle {row}", position[row].tolist(), "inside the vessel", remedy)
 
 
 def periodic_directions(case: Case) -> tuple[bool, bool, bool]:

@@ -66,9 +66,7 @@ class Simulation:
         keep_freed_memory()
         particles = None if state is None else particles_in(state["particles"]["particles"])
         parts = parts_of(case, progress, particles, communicator)
-        settings = StepSettings(
-            case.reference_speed, case.run.particle_step, case.run.fluid_step, case.bed.fastest_inflow
-        )
+        settings = StepSettings(case.reference_speed, case.run.particle_step, case.run.fluid_step, case.fastest_inflow)
         self._begin(case, parts, settings, fields, callbacks, features, state)
 
     @classmethod

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from cfddem import run_case
-from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.conditions import Inlet, Outlet
@@ -19,7 +18,6 @@ from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder
 from cfddem.particles.state import sphere_volume
-from cfddem.run.division import require_parallel
 
 CENTRE, RADIUS = (0.52, 0.47, 0.0), 0.44
 GRID = within(Grid((8, 8, 10), (0.125, 0.125, 0.1)), cylinder(CENTRE, RADIUS))
@@ -79,45 +77,23 @@ def test_a_uniform_suspension_is_uniform_up_to_the_wall():
     assert np.abs(solid[held] / mean - 1.0).max() < 0.08
 
 
-COLUMN = {"width": 0.0192, "height": 0.0576, "cell": 0.0024, "walls": "smooth"}
+COLUMN = {"width": 0.0192, "height": 0.0576, "cell": 0.0024}
 
 
-@pytest.mark.parametrize(
-    ("column", "others", "message"),
-    [
-        ({}, {}, "in a cylinder whose side is no_slip"),
-        ({"shape": "cylinder", "sides": "free_slip"}, {}, "in a cylinder whose side is no_slip"),
-        (
-            {"shape": "cylinder"},
-            {"wall": [{"shape": "cylinder", "radius": 0.002, "point": [0.0096, 0.0096, 0.02], "axis": [0, 0, 1],
-                       "length": 0.01, "caps": True}]},
-            r"wall\.0\.solid.*smooth walls",
-        ),
-    ],
-)  # fmt: skip
-def test_cases_that_smooth_walls_do_not_have_are_refused(column, others, message):
-    with pytest.raises(InputError, match=message):
-        bed_of(10, column, **others)
-
-
-def bed_of(count: int, column: Mapping[str, Any], **others: Any) -> Case:
+def bed_of(count: int, vessel: Mapping[str, Any], **others: Any) -> Case:
     """A bed of seeds in air, at twice the velocity of minimum fluidisation."""
     seed = {"density": 1000.0, "youngs_modulus": 1.2e8, "poisson": 0.3, "friction": 0.1, "restitution": 0.9}
     steps = {"particle_step": 1e-5, "fluid_step": 2e-4, "reference_speed": 0.4}
     return Case(
         fluid={"density": 1.2, "viscosity": 1.8e-5},
         material={"seed": seed | {"contact_modulus": 1e6}},
-        column=COLUMN | column,
+        column=COLUMN,
+        vessel=vessel,
         bed={"diameter": 1.2e-3, "count": count, "seed": 1, "inlet_velocity": [[0.0, 0.2], [0.1, 0.75]]},
         laws={"drag": "beetstra", "lubrication": "none"},
         run={"until": 0.3, "every": 0.05, "history_every": 0.001, **steps},
         **others,
     )
-
-
-def test_several_processes_are_refused():
-    with pytest.raises(InputError, match=r"column\.walls.*one process"):
-        require_parallel(bed_of(10, {"shape": "cylinder"}), 2)
 
 
 @pytest.mark.slow

@@ -238,6 +238,56 @@ class Cone(Wall):
         return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
 
 
+@dataclass(frozen=True, kw_only=True)
+class Turned(Wall):
+    """A round vessel around the particles: a line turned about an axis, as `cfddem.fluid.surfaces.turned`.
+
+    Where the vessel is hollow between two pieces, both go on straight behind each other, so that a sphere in the corner
+    touches each once. Where an edge stands out into the vessel, the two pieces end there.
+
+    line   heights along the axis, which rise, and radii, at least two; the first and the last piece go on straight [m]
+    point  on the axis, from which heights count [m]
+    axis   direction; need not be of unit length
+    """
+
+    line: tuple[tuple[float, float], ...]
+    point: Vector = (0.0, 0.0, 0.0)
+    axis: Vector = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        points = np.asarray(self.line, float)
+        if points.ndim != 2 or points.shape[0] < 2 or points.shape[1] != 2 or not np.isfinite(points).all():
+            raise InputError("line", self.line, "at least two points (height, radius), in m")
+        if not (np.diff(points[:, 0]) > 0.0).all() or not (points[:, 1] >= 0.0).all():
+            raise InputError("line", self.line, "of rising heights, and radii of at least 0")
+        super().__post_init__()
+
+    def pieces(self) -> list[tuple[int, list[float]]]:
+        """One surface of revolution for each piece of the line."""
+        points, axis = np.asarray(self.line, float), _unit(self.axis)
+        steps = np.diff(points, axis=0)
+        slopes = steps[:, 1] / steps[:, 0]
+        stands_out = np.concatenate([[False], np.diff(slopes) > 0.0, [False]])  # an edge of the wall, not a corner
+        turns_back = stands_out.any() and (slopes < 0.0).any()
+        made = []
+        for n, (begin, step) in enumerate(zip(points[:-1], steps)):
+            along, length = step[::-1] / np.linalg.norm(step), float(np.linalg.norm(step))
+            ends = [0.0 if stands_out[n] else -np.inf, length if stands_out[n + 1] else np.inf]
+            # behind a piece with an end there may be another part of the vessel
+            both = float(turns_back and bool(np.isfinite(ends).any()))
+            place = np.add(self.point, begin[0] * axis)
+            made.append((REVOLVED, [*place, *axis, begin[1], *along, *ends, both]))
+        return made
+
+    def frame(self) -> tuple[np.ndarray, float]:
+        points, axis = np.asarray(self.line, float), _unit(self.axis)
+        return np.array([np.add(self.point, z * axis) for z in points[:, 0]]), float(points[:, 1].max())
+
+    def sweep(self) -> float:
+        """Bound of the speed of the surface [m/s]; a spin about the axis leaves the surface in place."""
+        return float(np.linalg.norm(self.velocity)) if self._spins_along(self.axis, self.point) else super().sweep()
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mesh(Wall):
     """A surface of triangles, with contacts on both sides.

@@ -1,0 +1,113 @@
+"""Patches of floor and lid, by name: inlets, outlets and closed parts for the fluid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from cfddem.backend.errors import InputError, shown
+from cfddem.case.bed import NonNegative, Positive
+from cfddem.case.materials import Checked
+
+Array = NDArray[np.float64]
+Place = tuple[float, float]
+
+OWN_KEYS: Mapping[str, tuple[str, ...]] = {
+    "whole": (),
+    "disc": ("centre", "diameter"),
+    "ring": ("centre", "diameter", "inner_diameter"),
+    "box": ("centre", "size"),
+}
+"""Keys of each shape beside those of all patches."""
+
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "whole": (), "disc": ("diameter",), "ring": ("diameter", "inner_diameter"), "box": ("size",),
+}  # fmt: skip
+
+OF_INLETS: Mapping[str, str] = {"velocity": "inlet", "profile": "inlet", "pressure": "outlet"}
+"""Keys of one kind of patch -> the kind."""
+
+
+class CasePatch(Checked):
+    """A part of floor or lid where fluid enters, leaves, or meets a wall; particles meet floor and lid everywhere."""
+
+    kind: Literal["inlet", "outlet", "wall"] = Field(description="fluid enters, leaves, or meets a wall")
+    side: Literal["floor", "lid"] = Field("floor", description="side of the column on which it is")
+    shape: Literal["whole", "disc", "ring", "box"] = Field("whole", description="the whole side, or a part of it")
+    centre: Place | None = Field(None, description="middle of the patch (x, y); default: that of the side [m]")
+    diameter: Positive | None = Field(None, description="diameter of a disc, or outer one of a ring [m]")
+    inner_diameter: Positive | None = Field(None, description="inner diameter of a ring [m]")
+    size: tuple[Positive, Positive] | None = Field(None, description="edges of a box along x and y [m]")
+    velocity: NonNegative | tuple[tuple[float, NonNegative], ...] | None = Field(
+        None, description="superficial velocity of an inlet, into the column: a number, or [time, velocity] pairs [m/s]"
+    )
+    profile: Literal["uniform", "parabolic"] = Field(
+        "uniform", description="over a disc: the same velocity, or twice the mean in the middle and 0 at the edge"
+    )
+    pressure: float = Field(0.0, description="pressure p' at an outlet [Pa]")
+
+    @model_validator(mode="after")
+    def _keys_suit_kind_and_shape(self) -> CasePatch:
+        for name in sorted({name for names in OWN_KEYS.values() for name in names} - {*OWN_KEYS[self.shape]}):
+            if getattr(self, name) is not None:
+                raise InputError(name, shown(getattr(self, name)), f'left out for shape = "{self.shape}"')
+        for name in NEEDED[self.shape]:
+            if getattr(self, name) is None:
+                raise InputError(name, None, f'given for shape = "{self.shape}"')
+        for name, kind in OF_INLETS.items():
+            if kind != self.kind and getattr(self, name) != type(self).model_fields[name].default:
+                raise InputError(name, shown(getattr(self, name)), f'left out for kind = "{self.kind}"')
+        if self.kind == "inlet" and self.velocity is None:
+            raise InputError("velocity", None, "given for an inlet")
+        if isinstance(self.velocity, tuple):
+            times = [time for time, _ in self.velocity]
+            if not times or sorted(set(times)) != times:
+                raise InputError("velocity", None, "a number, or [time, velocity] pairs in increasing time")
+        if self.inner_diameter and self.inner_diameter >= (self.diameter or 0.0):
+            raise InputError("inner_diameter", self.inner_diameter, f"below the diameter, {self.diameter:g} m")
+        if self.profile == "parabolic" and self.shape != "disc":
+            raise InputError("profile", self.profile, f'uniform for shape = "{self.shape}"', "a disc may be parabolic")
+        return self
+
+    @property
+    def highest(self) -> float:
+        """Highest superficial velocity of an inlet over time, its mean over the patch [m/s]."""
+        return max(speed for _, speed in self.velocity) if isinstance(self.velocity, tuple) else self.velocity or 0.0
+
+    @property
+    def fastest(self) -> float:
+        """Highest superficial velocity of an inlet over time and place [m/s]."""
+        return self.highest * (2.0 if self.profile == "parabolic" else 1.0)
+
+    def speed(self, time: float) -> float:
+        """Superficial velocity of an inlet at a time, its mean over the patch [m/s]."""
+        if isinstance(self.velocity, tuple):
+            return float(np.interp(time, *np.array(self.velocity).T))
+        return self.velocity or 0.0
+
+    def weight(self, x: Array, y: Array, middle: Place) -> Array:
+        """Velocity at places on the side over its mean, 0 outside of the patch [-].
+
+        middle  of the side [m]
+        """
+        across, along = x - (self.centre or middle)[0], y - (self.centre or middle)[1]
+        if self.shape == "whole":
+            return np.ones(np.shape(across + along))
+        if self.shape == "box":
+            width, depth = self.size or (0.0, 0.0)
+            return ((np.abs(across) <= 0.5 * width) & (np.abs(along) <= 0.5 * depth)).astype(float)
+        away, outer = np.hypot(across, along), 0.5 * (self.diameter or 0.0)
+        inside = (away <= outer) & (away >= 0.5 * (self.inner_diameter or 0.0))
+        return np.where(inside, 2.0 * (1.0 - (away / outer) ** 2) if self.profile == "parabolic" else 1.0, 0.0)
+
+    @property
+    def area(self) -> float:
+        """Area of the patch; infinite for a whole side [m2]."""
+        if self.size is not None:
+            return math.prod(self.size)
+        return 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2) if self.diameter else math.inf

@@ -1,0 +1,83 @@
+"""Checks of a vessel and of the patches of floor and lid: whether particles and cells fit, and patches are reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cfddem.case.patches import CasePatch
+from cfddem.case.schema import Case
+from cfddem.preflight.issue import Issue, percent
+
+FEWEST_ACROSS = 4.0
+"""Cells across the narrowest part of a vessel, below which its flow has no profile [-]."""
+
+PLACES = 120
+"""Places along x and y at which a patch is sampled."""
+
+MOSTLY = 0.99
+"""Share of a patch that must be open to the fluid for no warning [-]."""
+
+
+def check_vessel(case: Case) -> Iterator[Issue]:
+    """Check that particles fit through a vessel, and that cells resolve it."""
+    if not case.vessel:
+        return
+    narrow = 2.0 * min(radius for _, radius in case.line)
+    key = {"cylinder": "radius", "cone": "radius", "chain": "line"}[case.vessel.shape]
+    largest = case.bed.largest_diameter
+    if 0.0 < narrow < largest:
+        yield Issue(
+            "warning", f"vessel.{key}", f"{narrow:.3g} m across, less than a particle, {largest:.3g} m",
+            "use a larger radius; below about five diameters particles form arches",
+        )  # fmt: skip
+    if not case.fluid:
+        return
+    cell = case.column.cell
+    widest = max(cell[0], cell[1]) if isinstance(cell, tuple) else cell
+    if 0.0 < narrow < FEWEST_ACROSS * widest:
+        yield Issue(
+            "warning", f"vessel.{key}",
+            f"{narrow / widest:.2g} cells across the vessel where it is narrowest, {narrow:.3g} m; its flow needs "
+            f"at least {FEWEST_ACROSS:g}",
+            "use smaller cells, of at least 2 diameters, or a wider vessel",
+        )  # fmt: skip
+
+
+def check_patches(case: Case) -> Iterator[Issue]:
+    """Check that patches lie on the open part of floor or lid."""
+    for name, patch in case.patch.items():
+        share = open_share_of(case, patch)
+        if share == 0.0:
+            radius = f", a disc of {2.0 * _radius(case, patch):.3g} m" if case.line else ""
+            yield Issue(
+                "error", f"patch.{name}", f"it lies outside of the {patch.side} of the column{radius}",
+                "move its centre [x, y], in m from the corner of the column",
+            )  # fmt: skip
+        elif share < MOSTLY and patch.shape != "whole":
+            yield Issue(
+                "warning", f"patch.{name}",
+                f"{percent(1.0 - share)} of it lies outside of the {patch.side}, and has no flow",
+                "make it smaller, or move its centre",
+            )  # fmt: skip
+
+
+def open_share_of(case: Case, patch: CasePatch) -> float:
+    """Share of a patch that lies on its side of the vessel [-]; of a whole side that of the side."""
+    width, depth, height = case.column.size
+    middle = patch.centre or (0.5 * width, 0.5 * depth)
+    edges = patch.size or (2.0 * width, 2.0 * depth)
+    reach = patch.diameter or float(max(edges))
+    along = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
+    x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + along, middle[1] + along))
+    mine = patch.weight(x, y, middle) > 0.0
+    z = np.full(x.size, 0.0 if patch.side == "floor" else height)
+    inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
+    inside &= case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0
+    return float(np.count_nonzero(mine & inside)) / max(int(np.count_nonzero(mine)), 1)
+
+
+def _radius(case: Case, patch: CasePatch) -> float:
+    """Radius of a round floor or lid [m]."""
+    return float(np.interp(0.0 if patch.side == "floor" else case.column.height, *np.array(case.line).T))

@@ -1,0 +1,105 @@
+"""Patches of floor and lid as conditions of the fluid: the flow through a patch is its velocity times its area.
+
+Faces of cells do not follow the edge of a disc: through one that a patch covers in part, that part of the flow enters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from cfddem.backend.errors import InputError
+from cfddem.case.column_grid import grid_of
+from cfddem.case.patches import CasePatch
+from cfddem.case.schema import Case
+from cfddem.fluid.conditions import Condition, Inlet, NoSlip, Outlet
+from cfddem.fluid.grid import Array, Region
+
+PLACES = 24
+"""Places along an edge of a face at which a patch is sampled."""
+
+HALF = 0.5
+"""Share of a face that an outlet or a wall must cover to have it [-]."""
+
+
+def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Condition | list[Condition]:
+    """The conditions of a side with the patches of a case.
+
+    side    "floor" or "lid"
+    base    conditions without patches
+    errors  InputError for a patch that covers no opening
+    """
+    patches = {name: each for name, each in case.patch.items() if each.side == side}
+    if not patches:
+        return base
+    listed = base if isinstance(base, list) else [base]
+    covered = {name: coverage(case, each) for name, each in patches.items()}
+    for name, share in covered.items():
+        if not share.any():
+            remedy = "move it, or make it larger than a cell"
+            raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
+    made, inlets = [*listed], {name: each for name, each in patches.items() if each.kind == "inlet"}
+    if inlets:
+        speeds = [(each.speed, covered[name]) for name, each in inlets.items()]
+        entering = np.sum([share for _, share in speeds], axis=0) > 0.0
+        made.append(Inlet(_velocity(case, speeds, _before(listed[0])), where=_at(case, entering)))
+    for name, each in patches.items():
+        if each.kind != "inlet":
+            where = _at(case, covered[name] >= HALF * covered[name].max())
+            made.append(Outlet(each.pressure, where=where) if each.kind == "outlet" else NoSlip(where=where))
+    return made
+
+
+def coverage(case: Case, patch: CasePatch) -> Array:
+    """Velocity through the open part of each face of a side over that of the patch (ny, nx) [-]."""
+    grid, (width, depth, height) = grid_of(case), case.column.size
+    (nx, ny, nz), (hx, hy, _) = grid.cells, grid.spacing
+    within = (np.arange(PLACES) + 0.5) / PLACES
+    x = hx * (np.arange(nx)[:, None] + within).reshape(-1)
+    y = hy * (np.arange(ny)[:, None] + within).reshape(-1)
+    z = np.full((y.size, x.size), 0.0 if patch.side == "floor" else height)
+    places = np.stack([*np.broadcast_arrays(x, y[:, None], z)], axis=-1).reshape(-1, 3)
+    inside = (case.beyond_the_side(places) <= 0.0).reshape(z.shape) if case.vessel else np.ones(z.shape, bool)
+    inside &= np.kron(grid.open[0 if patch.side == "floor" else nz - 1], np.ones((PLACES, PLACES), bool)).astype(bool)
+
+    def per_face(values: Array) -> Array:
+        return np.asarray(values.reshape(ny, PLACES, nx, PLACES).sum(axis=(1, 3)))
+
+    weight = patch.weight(x, y[:, None], (0.5 * width, 0.5 * depth)) * inside
+    return per_face(weight) / np.maximum(per_face(inside.astype(float)), 1.0)
+
+
+def _before(condition: Condition) -> Callable[[float], float]:
+    """Velocity that enters through the whole side without patches, as a function of time."""
+    if not isinstance(condition, Inlet):
+        return lambda time: 0.0
+    speed, factor = float(condition.velocity), condition.in_time  # type: ignore[arg-type]
+    return lambda time: speed * (factor(time) if factor else 1.0)
+
+
+def _velocity(
+    case: Case, speeds: Sequence[tuple[Callable[[float], float], Array]], flow: Callable[[float], float]
+) -> Callable[[Array, Array, Array, float], Array]:
+    """Inward speed at faces: that of every patch by its share, and that of the floor by the rest."""
+    spacing = grid_of(case).spacing
+    rest = np.maximum(1.0 - np.sum([share for _, share in speeds], axis=0), 0.0)
+
+    def velocity(x: Array, y: Array, z: Array, time: float) -> Array:
+        row, column = np.floor(y / spacing[1]).astype(int), np.floor(x / spacing[0]).astype(int)
+        entering: Any = sum(speed(time) * share[row, column] for speed, share in speeds)
+        return np.asarray(entering + flow(time) * rest[row, column])
+
+    return velocity
+
+
+def _at(case: Case, chosen: np.ndarray) -> Region:
+    """The faces of a side that are chosen (ny, nx)."""
+    spacing = grid_of(case).spacing
+
+    def where(x: Array, y: Array, z: Array) -> np.ndarray:
+        row, column = np.floor(y / spacing[1]).astype(int), np.floor(x / spacing[0]).astype(int)
+        return np.asarray(chosen[row, column])
+
+    return where

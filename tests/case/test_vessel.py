@@ -1,0 +1,257 @@
+"""Vessels of a case: one line is the wall of particles and of the fluid; patches of floor and lid by name."""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from command_line import call
+
+from cfddem.backend.errors import InputError
+from cfddem.case.column_grid import grid_of
+from cfddem.case.schema import Case
+from cfddem.case.vessel import start_box, vessel_of
+from cfddem.fluid.boundaries import Boundaries
+from cfddem.fluid.cut_cells import open_share
+from cfddem.fluid.surfaces import turned
+from cfddem.particles.initial.filling import clear_of_walls
+from cfddem.particles.state import make_particles
+from cfddem.particles.walls.arrays import near_walls, wall_arrays
+from cfddem.particles.walls.shapes import Turned
+from cfddem.preflight.summary import preflight
+from cfddem.run.build import boundaries_of, laws_of, materials_of, walls_of
+from cfddem.run.division import require_parallel
+from cfddem.run.initial_particles import particles_of
+from cfddem.run.patches import coverage
+
+TEXT = """
+[fluid]
+density = 1.2
+viscosity = 1.8e-5
+
+[material.glass]
+density = 2420.0
+youngs_modulus = 6.0e10
+contact_modulus = 1.0e7
+poisson = 0.25
+restitution = 0.9
+friction = 0.3
+
+[column]
+width = 0.16
+height = 0.24
+cell = 0.01
+
+[vessel]
+shape = "cone"
+radius = 0.03
+length = 0.1733
+
+[patch.nozzle]
+kind = "inlet"
+shape = "disc"
+diameter = 0.04
+velocity = [[0.0, 4.0], [1.0, 12.0]]
+
+[bed]
+diameter = 4.0e-3
+height = 0.06
+
+[run]
+until = 0.5
+reference_speed = 2.5
+particle_step = 1e-5
+"""
+
+HEAT = {
+    "particle_temperature": 400.0, "fluid_temperature": 300.0, "conductivity": 0.026, "fluid_heat_capacity": 1000.0,
+    "heat_capacity": {"glass": 800.0},
+}  # fmt: skip
+
+CONE = [(0.0, 0.03), (0.1733, 0.08), (0.24, 0.08)]
+CHAINS = {
+    "cone": CONE,
+    "steps outward": [(0.0, 0.03), (0.05, 0.03), (0.08, 0.07), (0.2, 0.08)],
+    "bulge with a neck": [(0.0, 0.03), (0.05, 0.06), (0.1, 0.06), (0.15, 0.03), (0.24, 0.03)],
+    "waist": [(0.0, 0.07), (0.1, 0.03), (0.2, 0.07)],
+}
+
+
+def made(**given: Any) -> Case:
+    return Case.from_text(TEXT, "c.toml", {name.replace("__", "."): value for name, value in given.items()})
+
+
+def vessel(**table: Any) -> Case:
+    """A case with another vessel, and no patch."""
+    values = made().model_dump(exclude_defaults=True, exclude_none=True)
+    return Case(**(values | {"vessel": table, "patch": {}}))
+
+
+# ---------------------------------------------------------------- one line for particles and fluid
+
+
+@pytest.mark.parametrize("line", CHAINS.values(), ids=CHAINS)
+def test_particles_and_fluid_are_as_far_from_the_wall(line):
+    """Of all places in the vessel; a sphere that is not at a wall is clear of it."""
+    wall, surface = wall_arrays([Turned(line=tuple(line))]), turned(line, (0.0, 0.0, 0.0))
+    rng = np.random.default_rng(4)
+    height, angle = rng.uniform(0.0, line[-1][0], 400), rng.uniform(0.0, 2.0 * math.pi, 400)
+    radius = np.interp(height, *np.array(line).T) * np.sqrt(rng.uniform(0.0, 1.0, 400))
+    places = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=-1)
+    away = surface.distance(*places.T)
+    places, away = places[away > 1e-4], away[away > 1e-4]
+    touching = near_walls(make_particles(places, away * (1.0 + 1e-6), 1.0), wall, 0.0, 0.0)[0]
+    assert set(touching) == set(range(len(places)))
+    assert not len(near_walls(make_particles(places, away * (1.0 - 1e-6), 1.0), wall, 0.0, 0.0)[0])
+
+
+def test_a_sphere_beside_a_corner_touches_the_wall_once():
+    """Above a cone of 16 degrees it lies on the cylinder, overlapping by 1 % of its radius, 0.15 mm above their corner:
+    nearer than the end of a cone that ended there. In the corner it touches both."""
+    radius = 2e-3
+    wall, slope = wall_arrays([Turned(line=tuple(CONE))]), 0.05 / 0.1733
+    for above, contacts in ((1.5e-4, 1), (-2.0 * radius * slope, 2), (-5e-3, 1)):
+        on_cone = 0.08 + above * slope - 0.99 * radius * math.hypot(1.0, slope)
+        out, height = min(0.08 - 0.99 * radius, on_cone) if contacts == 1 else 0.08 - 0.99 * radius, CONE[1][0] + above
+        sphere = make_particles(np.array([[out, 0.0, height]]), radius, 1000.0)
+        assert len(near_walls(sphere, wall, 0.0, 0.0)[0]) == contacts
+
+
+@pytest.mark.parametrize(
+    ("table", "line"),
+    [
+        ({"shape": "cylinder", "radius": 0.05}, [(0.0, 0.05), (0.24, 0.05)]),
+        ({"shape": "cone", "radius": 0.03, "top_radius": 0.05, "length": 0.3}, [(0.0, 0.03), (0.3, 0.05)]),
+        ({"shape": "chain", "line": [[0.0, 0.03], [0.1, 0.03], [0.2, 0.06]]},
+         [(0.0, 0.03), (0.1, 0.03), (0.2, 0.06), (0.24, 0.06)]),
+    ],
+)  # fmt: skip
+def test_a_vessel_is_a_line_and_holds_what_the_cells_hold(table, line):
+    """The volume of its cells is that of its frustums; its floor is its lowest circle."""
+    case = vessel(**table)
+    assert np.allclose(case.line, line)
+    heights, radii = np.linspace(0.0, 0.24, 4001), np.interp(np.linspace(0.0, 0.24, 4001), *np.array(line).T)
+    volume = np.trapezoid(math.pi * radii**2, heights)
+    assert open_share(grid_of(case)).sum() * grid_of(case).cell_volume == pytest.approx(volume, rel=4e-3)
+    assert case.floor_area == pytest.approx(math.pi * line[0][1] ** 2)
+    shape = vessel_of(case)
+    assert (shape is None) == (len({radius for _, radius in line}) == 1)
+    if shape is not None:
+        assert shape.volumes[-1] == pytest.approx(volume, rel=1e-3)
+    pieces = case.vessel.walls_in(case.column)
+    assert [(w.point[2], w.radius) for w in pieces] == [(low, r) for (low, r), _ in pairwise(line)]
+
+
+def test_particles_start_in_the_vessel():
+    case = made(bed__start="suspended", bed__count=500, bed__height=None)
+    corner, size = start_box(case)
+    assert corner[0] >= 0.0 and size[0] == pytest.approx(0.16 / math.sqrt(2.0))
+    spheres = particles_of(case, materials_of(case), walls_of(case), laws_of(case))
+    assert clear_of_walls(spheres.position, 2e-3 * (1.0 - 1e-6), walls_of(case)).all()
+    assert (case.beyond_the_side(spheres.position, 2e-3) <= 1e-9).all()
+
+
+def test_a_vessel_survives_text_and_commands(tmp_path: Path):
+    case = made()
+    assert Case.from_text(case.to_toml()) == case
+    (tmp_path / "case.toml").write_text(TEXT)
+    drawn = call("check", str(tmp_path / "case.toml"), "--picture", str(tmp_path / "case.png"))
+    assert drawn.code == 0 and (tmp_path / "case.png").stat().st_size > 5000
+    assert "cells cut by the vessel" in drawn.out and "smallest cut cell" in drawn.out
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"vessel.top_radius": 0.1}, "vessel.top_radius = 0.1: must be within the column: at most 0.08 m"),
+        ({"vessel.line": [[0.0, 0.01], [0.1, 0.02]]}, 'vessel.line = .*left out for shape = "cone"'),
+        ({"vessel": {"shape": "chain", "line": [[0.0, 0.03], [0.1, 0.05], [0.05, 0.06]]}}, "rising heights, but 0.05"),
+        ({"vessel": {"shape": "chain", "line": [[0.1, 0.03], [0.2, 0.05]]}}, "the first at height 0, the floor"),
+        ({"vessel.length": None}, 'vessel.length: must be given for shape = "cone"'),
+        ({"column.shape": "cylinder"}, "column.shape.*left out where there is a vessel"),
+        ({"column.sides": "free_slip"}, "column.sides.*left out where there is a vessel"),
+        ({"column.walls": "smooth"}, "column.walls"),
+        ({"vessel.fill_level": 0.5}, "without a free surface"),
+        ({"heat": HEAT}, "heat: must be left out in a vessel with a fluid"),
+        ({"wall": [{"shape": "cylinder", "radius": 0.002, "point": [0.08, 0.08, 0.02], "length": 0.01, "caps": True}]},
+         r"wall\.0\.solid.*vessel"),
+        ({"patch.nozzle.side": "flor"}, "patch.nozzle.side = 'flor': must be one of floor, lid"),
+        ({"patch.nozzle.velocity": None}, "patch.nozzle.velocity: must be given for an inlet"),
+        ({"patch.nozzle.pressure": 5.0}, "patch.nozzle.pressure = 5.0: must be left out"),
+        ({"patch.nozzle.velocity": [[1.0, 1.0], [0.0, 2.0]]}, "in increasing time"),
+        ({"column.ends": "closed"}, "patch.nozzle: must be together with an outlet"),
+        ({"patch.top": {"kind": "wall", "side": "lid"}}, "together with an outlet"),
+        ({"bed.jet": {"velocity": 1.0, "width": 0.02}}, "bed.jet.*patches"),
+        ({"column.ends": "periodic"}, "patch|column.ends"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_what_a_vessel_and_its_patches_cannot_have_is_refused_in_a_line(given, said):
+    with pytest.raises(InputError, match=said) as refusal:
+        Case.from_text(TEXT, "c.toml", given)
+    assert len(str(refusal.value)) < 400
+
+
+def test_several_processes_are_refused():
+    with pytest.raises(InputError, match=r"vessel.*one process"):
+        require_parallel(made(), 2)
+
+
+# ---------------------------------------------------------------- patches
+
+
+def test_the_flow_through_a_patch_is_its_velocity_times_its_area():
+    """Of a disc that no face follows, with a flow that rises; of ring and disc together; of a parabola."""
+    case, faces = made(), {}
+    ring = {"kind": "inlet", "shape": "ring", "diameter": 0.058, "inner_diameter": 0.04, "velocity": 3.0}
+    with_ring = made(**{"patch.annulus": ring, "patch.nozzle.profile": "parabolic"})
+    for name, each in (("disc", case), ("ring", with_ring)):
+        grid = grid_of(each)
+        boundaries = Boundaries(grid, boundaries_of(each))
+        boundaries.set_inlets(0.5, np.ones(grid.padded_shape))
+        side = next(each for each in boundaries.sides if each.name == "z_low")
+        inflow = side.wall[2, 2:-3, 2:-3] * boundaries.cut.aperture[2][2, 2:-3, 2:-3]
+        faces[name] = inflow.sum() * grid.face_area(2)
+    disc, area = 8.0 * math.pi * 0.02**2, math.pi * (0.029**2 - 0.02**2)
+    assert faces["disc"] == pytest.approx(disc, rel=4e-3)
+    assert faces["ring"] == pytest.approx(disc + 3.0 * area, rel=4e-3)
+    assert coverage(with_ring, with_ring.patch["nozzle"]).max() == pytest.approx(
+        5.0 / 3.0, rel=0.01
+    )  # beside the middle
+
+
+def test_a_lid_may_be_closed_but_for_its_outlets():
+    """Later patches replace earlier ones; two outlets of a closed lid are those that are open."""
+    outlet = {"kind": "outlet", "side": "lid", "shape": "disc", "diameter": 0.03}
+    case = made(**{
+        "column.ends": "closed",
+        "patch.left": outlet | {"centre": [0.05, 0.08]}, "patch.right": outlet | {"centre": [0.11, 0.08]},
+    })  # fmt: skip
+    boundaries = Boundaries(grid_of(case), boundaries_of(case))
+    side = next(each for each in boundaries.sides if each.name == "z_high")
+    at = np.flatnonzero(side.outlet[2:-3, 2:-3].any(axis=0))
+    assert boundaries.has_outlet and set(at) <= {3, 4, 5, 6, 9, 10, 11, 12} and {4, 5, 10, 11} <= set(at)
+
+
+@pytest.mark.parametrize(
+    ("given", "key", "severity", "said"),
+    [
+        ({}, None, None, ""),
+        ({"patch.nozzle.centre": [0.02, 0.08]}, "patch.nozzle", "error", "outside of the floor .*disc of 0.06 m"),
+        ({"patch.nozzle.diameter": 0.08}, "patch.nozzle", "warning", "outside of the floor, and has no flow"),
+        ({"vessel.radius": 0.015, "patch.nozzle.diameter": 0.02}, "vessel.radius", "warning", "3 cells across"),
+        ({"vessel.radius": 0.0019, "patch": {}}, "vessel.radius", "warning", "less than a particle"),
+    ],
+)  # fmt: skip
+def test_the_pre_run_check_sees_vessel_and_patches(given, key, severity, said):
+    found = preflight(Case.from_text(TEXT, "c.toml", given)).issues
+    about = [each for each in found if each.key.startswith(("vessel", "patch", "column.cell"))]
+    if key is None:
+        assert not about
+    else:
+        assert any(each.key == key and each.severity == severity and re.search(said, each.reason) for each in about)
