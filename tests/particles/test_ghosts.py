@@ -438,9 +438,9 @@ class Counted(Rank):
 
     to_all = 0
 
-    def exchange(self, parcels: Any) -> Any:
+    def _given_by_all(self, numbers: Any) -> Any:
         self.to_all += 1
-        return super().exchange(parcels)
+        return super()._given_by_all(numbers)
 
 
 @pytest.mark.parametrize("shape", [(3, 3, 3), *map(many, [(27, 1, 1), (64, 1, 1), (4, 4, 4)])])
