@@ -15,6 +15,7 @@ from in_process_ranks import on_ranks
 from cfddem.backend.brick_shapes import Shape, place_of
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
+from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.coupling.reach import Reach
@@ -75,13 +76,13 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
     particles = {name: simulation.whole(name)[order] for name in names}
     particles["temperature"] = np.zeros(0)
     if heat := [each for each in simulation.features if isinstance(each, HeatExchange)]:
-        cells = list(heat[0].cells_for_snapshot().values())
+        cells = list(collected(heat[0].cells_for_snapshot(), simulation.communicator).values())
         particles["temperature"] = np.append(simulation.whole("temperature")[order], cells)
     row = history.row(simulation)
     measured = ("bed_height", "pressure_drop", "bed_voidage_from_pressure", "out_of_range_count")
     solids = simulation.communicator.sum(1.0 - simulation.fluid.voidage) * simulation.fluid.grid.cell_volume
     volume = simulation.communicator.sum(simulation.owned.volume)
-    return particles | simulation.fluid.checkpoint() | {
+    return particles | collected(simulation.fluid.checkpoint(), simulation.communicator) | {
         "history": np.array([row[name] for name in measured]),
         "energy": np.array([row[name] for name in row if name.startswith("energy_")] or [0.0]),
         "imbalance": np.array([row["momentum_imbalance"], row["volume_imbalance"], solids / volume - 1.0]),
@@ -206,7 +207,7 @@ def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(ranks: int) 
     def half(communicator: Communicator) -> dict[str, Any]:
         simulation = begun(case, communicator)
         advanced(simulation, 2)
-        return simulation.checkpoint()
+        return collected(simulation.checkpoint(), communicator)
 
     state = on_ranks(4, half)[0]
 
