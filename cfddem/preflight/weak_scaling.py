@@ -105,3 +105,53 @@ def weak_scaling(
     step = work + exchange
     memory = BYTES_PER_PARTICLE * (owned + ghosts)
     return Scaling(step, exchange / step, given.particle_step * owned / step, owned, ghosts, memory, best)
+
+
+HALOS, SUMS = 200.0, 60.0
+"""Exchanges of cells, and sums over all ranks, in a fluid step with its solution of the pressure; counted by
+`tests/benchmarks/bench_scaling_model.py`."""
+
+
+@dataclass(frozen=True)
+class RunCost:
+    """What a run costs one process, and how often its ranks would exchange.
+
+    seconds         of one process [s]
+    particle_steps  in the run
+    fluid_steps     in the run; 0 without a fluid
+    particles       in the run
+    """
+
+    seconds: float
+    particle_steps: float
+    fluid_steps: float
+    particles: float
+
+
+def efficiency(cost: RunCost, shape: Shape, busiest: float, machine: Machine | None = None) -> float:
+    """Speed-up of a run over the number of its ranks.
+
+    .. math:: t_p = \\frac{w}{p} t_1 + N_s (m k l + g b / B + r \\log_2 p) + N_f (h k_f l + s r \\log_2 p)
+
+    with N_s particle steps of m exchanges with k neighbours, and N_f fluid steps of h exchanges with k_f neighbours and
+    s sums.
+
+    cost     of one process
+    shape    ranks along x, y, z
+    busiest  work of the busiest rank over the mean w, ghosts included
+    machine  l, B, r, b and m; see `Machine`
+
+    >>> dry = RunCost(seconds=1000.0, particle_steps=1e5, fluid_steps=0, particles=1e5)
+    >>> round(efficiency(dry, (1, 2, 1), 1.05), 2), round(efficiency(dry, (4, 4, 4), 1.3), 2)
+    (0.93, 0.41)
+    """
+    given, ranks = machine or Machine(), math.prod(shape)
+    if ranks == 1:
+        return 1.0
+    along = [min(n, 3) for n in shape]
+    beside, reduction = math.prod(along) - 1, given.reduction * math.log2(ranks)
+    ghosts = (busiest - 1.0) * cost.particles / ranks
+    step = given.messages * beside * given.latency + ghosts * given.message / given.bandwidth + reduction
+    flow = HALOS * (sum(along) - 3) * given.latency + SUMS * reduction
+    total = busiest * cost.seconds / ranks + cost.particle_steps * step + cost.fluid_steps * flow
+    return cost.seconds / (ranks * total)
