@@ -82,7 +82,7 @@ def cost_of(case: Case) -> RunCost:
     """What a case costs one process, and how often ranks would exchange."""
     bed = estimate_bed(case)
     cost = estimate_cost(case, bed, estimate_steps(case, bed))
-    return RunCost(cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count))
+    return RunCost(cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count), case.has_films)
 
 
 def most_ranks(case: Case, cost: RunCost) -> int:
