@@ -6,7 +6,7 @@ import pickle
 import queue
 import threading
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -71,21 +71,10 @@ class Rank(Communicator):
 
     def __init__(self, rank: int, board: Board) -> None:
         self.rank, self.size, self.board = rank, board.size, board
-        self.partners: set[int] = set()  # ranks with which it has exchanged arrays or parcels
+        self.partners: set[int] = set()  # ranks with which it has exchanged arrays
 
     def broadcast(self, value: Value, root: int = 0) -> Value:
         return self.board.gather(self.rank, value)[root]  # type: ignore[no-any-return]
-
-    def exchange(self, parcels: Sequence[Value]) -> list[Value]:
-        assert len(parcels) == self.size
-        given = self.board.gather(self.rank, [pickle.dumps(parcel) for parcel in parcels])  # as between processes
-        return [pickle.loads(parcels[self.rank]) for parcels in given]
-
-    def exchange_with(self, parcels: Mapping[int, Value]) -> dict[int, Value]:
-        self.partners |= set(parcels)
-        for rank, parcel in parcels.items():
-            self.board.send(self.rank, rank, parcel)
-        return {rank: self.board.receive(rank, self.rank) for rank in parcels}
 
     def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
         self.partners |= set(outgoing) | set(incoming)
@@ -93,6 +82,9 @@ class Rank(Communicator):
             self.board.send(self.rank, rank, values)
         for rank, into in incoming.items():
             into[...] = self.board.receive(rank, self.rank)
+
+    def _given_by_all(self, numbers: np.ndarray) -> np.ndarray:
+        return np.array([each[self.rank] for each in self.board.gather(self.rank, numbers)])
 
     def _combine(self, local: Any, operation: Callable[[Any, Any], Any]) -> Any:
         total, *others = self.board.gather(self.rank, local)

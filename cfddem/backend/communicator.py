@@ -2,8 +2,8 @@
 
 A run on a cluster divides cells and particles among ranks. A rank then knows only a part of every array, so a sum, an
 extreme value or a decision over the whole array must go through a communicator. `Communicator` is that of a run in one
-process. A parallel communicator (:class:`cfddem.backend.mpi.Ranks`) replaces `_combine`, `broadcast` and `exchange`,
-and `_add`, `_largest` and `swap` for speed.
+process. A parallel communicator (:class:`cfddem.backend.mpi.Ranks`) replaces `_combine`, `broadcast`, `swap` and
+`_given_by_all`, and `_add` and `_largest` for speed.
 
 Sums are sums of whole numbers (:mod:`cfddem.backend.exact_sums`): they have the bits of one process on any number of
 ranks, however an array is divided among them. All ranks must make the same calls in the same order.
@@ -110,8 +110,8 @@ class Communicator:
 
     def gathered(self, rows: np.ndarray) -> np.ndarray:
         """The rows of the arrays of all ranks, in the order of the ranks, on rank 0; no rows on the others."""
-        parcels = self.exchange([rows if rank == 0 else rows[:0] for rank in range(self.size)])
-        return np.concatenate(parcels)
+        whole = self.joined(rows)
+        return whole if self.rank == 0 else whole[:0]
 
     def first(self, value: Value | None) -> Value | None:
         """The value of the lowest rank that passes one; None if all pass None."""
@@ -141,29 +141,40 @@ class Communicator:
     def wait(self) -> None:
         """Wait until all ranks have come here, without keeping a processor busy."""
 
-    def exchange(self, parcels: Sequence[Value]) -> list[Value]:
-        """Give parcel n to rank n, for every rank; returns what the ranks gave to this one, in their order."""
-        return list(parcels)
+    def exchange(self, parcels: Mapping[int, np.ndarray], beside: Sequence[int] | None = None) -> dict[int, np.ndarray]:
+        """Give bytes to some ranks; returns those that ranks give to this one, in the order of the ranks.
 
-    def exchange_with(self, parcels: Mapping[int, Value]) -> dict[int, Value]:
-        """Give a parcel to each of some ranks, which all give one to this rank; returns theirs.
+        Numbers of bytes go first.
 
-        Faster than `exchange` where the ranks are many: nothing is sent to the others.
+        parcels  (n,) uint8, by the rank that gets each
+        beside   the only ranks that give to this one or get from it, which name this one, too; nothing is sent to
+                 others. All ranks if None
         """
-        given: list[Any] = self.exchange([parcels.get(rank) for rank in range(self.size)])
-        return {rank: given[rank] for rank in parcels}
+        if beside is None:
+            told = self._given_by_all(np.array([len(parcels.get(rank, ())) for rank in range(self.size)], np.int64))
+            counts = dict(enumerate(told.tolist()))
+        else:
+            numbers = {rank: np.zeros(1, np.int64) for rank in sorted(beside)}
+            self.swap({rank: np.array([len(parcels.get(rank, ()))], np.int64) for rank in numbers}, numbers)
+            counts = {rank: int(number[0]) for rank, number in numbers.items()}
+        incoming = {rank: np.empty(count, np.uint8) for rank, count in counts.items() if count}
+        self.swap({rank: parcel for rank, parcel in parcels.items() if len(parcel)}, incoming)
+        return incoming
 
     def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
         """Send an array to each of some ranks, and fill those of `incoming` with what these ranks send to this one.
 
-        Both sides know the sizes. Faster than `exchange`, for what is sent to few ranks in every step.
+        Both sides know the sizes.
 
         outgoing  contiguous arrays, by the rank that gets each
         incoming  contiguous arrays of the same sizes as those that ranks send to this one, by the rank that sends each
         """
-        given = self.exchange([outgoing[rank].copy() if rank in outgoing else None for rank in range(self.size)])
         for rank, into in incoming.items():
-            into[...] = given[rank]
+            into[...] = outgoing[rank]
+
+    def _given_by_all(self, numbers: np.ndarray) -> np.ndarray:
+        """Of the arrays of all ranks, each with one number for every rank, the numbers for this one."""
+        return numbers
 
     def _add(self, whole_numbers: np.ndarray) -> np.ndarray:
         """Sum of the integer arrays of all ranks, element by element."""

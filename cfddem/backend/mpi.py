@@ -10,7 +10,7 @@ contiguous arrays to its neighbours, which costs as little by plain messages as 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -48,22 +48,17 @@ class Ranks(Communicator):
         while not arrived.Test():
             time.sleep(PAUSE)
 
-    def exchange(self, parcels: Sequence[Value]) -> list[Value]:
-        """See `Communicator.exchange`."""
-        return list(self.world.alltoall(list(parcels)))
-
-    def exchange_with(self, parcels: Mapping[int, Value]) -> dict[int, Value]:
-        """See `Communicator.exchange_with`."""
-        requests = [self.world.isend(parcel, rank, _TAG) for rank, parcel in parcels.items()]
-        given = {rank: self.world.recv(source=rank, tag=_TAG) for rank in parcels}
-        MPI.Request.Waitall(requests)
-        return given
-
     def swap(self, outgoing: Mapping[int, np.ndarray], incoming: Mapping[int, np.ndarray]) -> None:
         """See `Communicator.swap`."""
         requests = [self.world.Irecv(into, rank, _TAG) for rank, into in incoming.items()]
         requests += [self.world.Isend(values, rank, _TAG) for rank, values in outgoing.items()]
         MPI.Request.Waitall(requests)
+
+    def _given_by_all(self, numbers: np.ndarray) -> np.ndarray:
+        """See `Communicator._given_by_all`."""
+        given = np.empty_like(numbers)
+        self.world.Alltoall(numbers, given)
+        return given
 
     def joined(self, rows: np.ndarray) -> np.ndarray:
         """See `Communicator.joined`."""

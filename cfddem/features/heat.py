@@ -20,11 +20,13 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.portions import Portions
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw, Transfer, memory_of
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat
+from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
 from cfddem.fluid.solver import FluidSolver
@@ -189,9 +191,9 @@ class HeatExchange(CaseFeature):
         self.around = particles.temperature + rate / sent.implicit
         return np.asarray(step * rate)
 
-    def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
+    def cells_for_snapshot(self) -> Mapping[str, np.ndarray | Portions]:
         """The temperature of the fluid in the cells of all ranks."""
-        return {} if self.cells is None else {OF_FLUID.name: self.cells.grid.joined(self.cells.value)}
+        return {} if self.cells is None else {OF_FLUID.name: in_portions(self.cells.grid, self.cells.value, 0)}
 
     def checkpoint(self) -> dict[str, Any]:
         """The temperature of the fluid and the balance."""

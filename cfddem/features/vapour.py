@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.backend.portions import Portions
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.vapour_keys import VapourTable
+from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
 from cfddem.fluid.scalar_conditions import ScalarSides
@@ -102,9 +104,9 @@ class Vapour(CaseFeature):
             self.cells.step()
         self._made = False
 
-    def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
+    def cells_for_snapshot(self) -> Mapping[str, np.ndarray | Portions]:
         """The mass fraction in the cells of all ranks."""
-        return {OF_FLUID.name: self.cells.grid.joined(self.cells.value)}
+        return {OF_FLUID.name: in_portions(self.cells.grid, self.cells.value, 0)}
 
     def checkpoint(self) -> dict[str, Any]:
         """The mass fraction and the balance."""

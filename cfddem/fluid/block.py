@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from cfddem.backend.brick_shapes import Shape, place_of, shapes, with_ghosts
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import LARGEST, Parts, Portions
 from cfddem.fluid.grid import HIGH, Array, Grid
 from cfddem.fluid.halo import Borders
 
@@ -148,6 +149,50 @@ def put_together(values: np.ndarray, starts: Starts, communicator: Communicator,
         begin, end = end, end + part.size
         part[...] = given[begin:end].reshape(part.shape)
     return whole
+
+
+def in_portions(grid: Grid, values: np.ndarray, axis: int, faces: bool = False) -> np.ndarray | Portions:
+    """The array over the whole grid of which every rank has a part, for files; a copy in one process.
+
+    axis   that of z, which y and x follow
+    faces  whether the array has one layer more than cells along each axis
+    """
+    return _layers(grid, values, axis, faces) if isinstance(grid, Block) else values.copy()
+
+
+def _layers(block: Block, values: np.ndarray, axis: int, faces: bool) -> Portions:
+    """See `in_portions`: some layers along z after the other."""
+    communicator, starts, shape = block.communicator, block.division.starts, block.division.shape
+    before, beyond = values.shape[:axis], values.shape[axis + 3 :]
+    nz, ny, nx = (n + faces for n in block.whole.shape)
+    step = max(LARGEST // (ny * nx * math.prod(before + beyond)), 1)
+    regions = []
+    for rank in range(communicator.size):
+        place = place_of(rank, shape)
+        regions.append(region_of(starts, place, [int(faces and n + 1 == ranks) for n, ranks in zip(place, shape)])[1:])
+    mine = regions[communicator.rank]
+
+    def parts() -> Parts:
+        for first in range(0, nz, step):
+            last, everything = min(first + step, nz), (slice(None),) * axis
+
+            z = _within(mine[0], first, last)
+            own = slice(z.start - mine[0].start, z.stop - mine[0].start), *(slice(r.stop - r.start) for r in mine[1:])
+            given = communicator.gathered(values[*everything, *own].reshape(-1))
+            made, end = np.empty((*before, (last - first) * (communicator.rank == 0), ny, nx, *beyond), values.dtype), 0
+            for z, y, x in regions if communicator.rank == 0 else []:
+                z = _within(z, first, last)
+                part = made[*everything, z.start - first : z.stop - first, y, x]
+                begin, end = end, end + part.size
+                part[...] = given[begin:end].reshape(part.shape)
+            yield (*everything, slice(first, last)), made
+
+    return Portions((*before, nz, ny, nx, *beyond), values.dtype, parts)
+
+
+def _within(layers: slice, first: int, last: int) -> slice:
+    """Those of the layers that are among some others."""
+    return slice(min(max(layers.start, first), last), min(max(layers.stop, first), last))
 
 
 class Block(Grid):

@@ -14,7 +14,9 @@ from typing import Literal
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import Portions
 from cfddem.data.fields import Role
+from cfddem.fluid.block import in_portions
 from cfddem.fluid.grid import LOW, Array, Grid
 
 
@@ -101,12 +103,12 @@ class CellFields:
         """Exchange the arrays of two fields."""
         self.arrays[first], self.arrays[second] = self.arrays[second], self.arrays[first]
 
-    def checkpoint(self) -> dict[str, Array]:
+    def checkpoint(self) -> dict[str, Array | Portions]:
         """Copies of all fields that the next step depends on, over the whole grid, without ghosts."""
+        lasting = {name: self.owned(name) for name, field in self.fields.items() if field.role != "scratch"}
         return {
-            name: self.grid.joined(self.owned(name), field.place == "faces").copy()
-            for name, field in self.fields.items()
-            if field.role != "scratch"
+            name: in_portions(self.grid, array, array.ndim - 3, self.fields[name].place == "faces")
+            for name, array in lasting.items()
         }
 
     def restore(self, stored: Mapping[str, Array]) -> None:

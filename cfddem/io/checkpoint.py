@@ -7,25 +7,25 @@ checksum of the rest. Two checkpoints are kept, so that a damaged one can be rep
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import logging
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.portions import Portions
 from cfddem.io.damage import ArrayFile, memory, opened
-from cfddem.io.files import disk_error, hdf5_in_memory, reason, require_format, write_whole
+from cfddem.io.files import disk_error, put, reason, require_format, write_hdf5
 
 FORMAT = 4
 """Format of checkpoints. Checkpoints of any other format are refused."""
 
 KEPT = 2
 
-_HEAD = 512
+_HEAD, _BLOCK = 512, 1 << 20
 _WORDS = "cfddem checkpoint, format {}, sha256 of this number, a line end and all beyond byte 512: {}\n"
 _log = logging.getLogger("cfddem")
 
@@ -34,7 +34,8 @@ def write(folder: Path, state: Mapping[str, Any]) -> Path:
     """Write a checkpoint and remove the oldest.
 
     folder   of the run
-    state    nested dict of arrays (of numbers, flags or records), numbers, texts, flags, None and lists of these
+    state    nested dict of arrays (of numbers, flags or records; or `Portions` of them), numbers, texts, flags, None
+             and lists of these
     returns  the file
     errors   InputError for a value that cannot be stored; RunFailed if the disk fails, older ones are then kept
     """
@@ -43,16 +44,16 @@ def write(folder: Path, state: Mapping[str, Any]) -> Path:
         home.mkdir(exist_ok=True)
     except OSError as failure:
         raise disk_error("create", home, failure) from failure
-    image = io.BytesIO()
-    with hdf5_in_memory(image, userblock_size=_HEAD, track_order=True) as file:
-        _put(file, state, "state")
-    content = image.getbuffer()
-    content[:_HEAD] = _words(FORMAT, content).encode().ljust(_HEAD, b"\0")
-
     earlier = _files(home)
     number = 1 + int(earlier[0].stem) if earlier else 0
     path = home / f"{number:08d}.h5"
-    write_whole(path, content)
+
+    def finish(file: IO[bytes]) -> None:
+        words = _words(FORMAT, file)
+        file.seek(0)
+        file.write(words.encode().ljust(_HEAD, b"\0"))
+
+    write_hdf5(path, lambda file: _put(file, state, "state"), finish, userblock_size=_HEAD, track_order=True)
     whole = [each for each in earlier if _fault(each) is None][: KEPT - 1]
     for each in earlier:
         if each not in whole:
@@ -96,13 +97,13 @@ def _fault(path: Path) -> str | None:
     try:
         if path.stat().st_size > memory():
             return "damaged, larger than the memory of this machine"
-        content = path.read_bytes()
+        with path.open("rb") as file:
+            words = file.read(_HEAD).rstrip(b"\0").decode("ascii", "replace")
+            number = _format(words)
+            if not number.isdecimal() or words != _words(int(number), file):
+                return "damaged, wrong checksum"
     except OSError as failure:
         return reason(failure)
-    words = content[:_HEAD].rstrip(b"\0").decode("ascii", "replace")
-    number = _format(words)
-    if not number.isdecimal() or words != _words(int(number), memoryview(content)):
-        return "damaged, wrong checksum"
     return None
 
 
@@ -118,10 +119,12 @@ def _require_format(path: Path) -> None:
     require_format(path, number, FORMAT, path.parent.parent)
 
 
-def _words(number: int, content: memoryview) -> str:
+def _words(number: int, file: IO[bytes]) -> str:
     """The head of a checkpoint: its format, and a checksum of the format and the content."""
     checksum = hashlib.sha256(f"{number}\n".encode())
-    checksum.update(content[_HEAD:])
+    file.seek(_HEAD)
+    while content := file.read(_BLOCK):
+        checksum.update(content)
     return _WORDS.format(number, checksum.hexdigest())
 
 
@@ -133,10 +136,10 @@ def _put(group: Any, values: Mapping[str, Any], where: str) -> None:
             raise InputError(here, None, "named by a non-empty text without '/'")
         if isinstance(value, Mapping):
             _put(group.create_group(name, track_order=True), value, here)
-        elif isinstance(value, np.ndarray | np.generic):
+        elif isinstance(value, np.ndarray | np.generic | Portions):
             if value.dtype.hasobject or value.dtype.kind in "USMm":
                 raise InputError(here, str(value.dtype), "an array of numbers, flags or records of these")
-            group.create_dataset(name, data=value)
+            put(group, name, np.asarray(value) if isinstance(value, np.generic) else value)
         else:
             try:
                 group.create_dataset(name, data=json.dumps(value)).attrs["json"] = True

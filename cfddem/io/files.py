@@ -1,6 +1,6 @@
 """Write files that appear whole or not at all, report a failing disk in one line, and lock files.
 
-The content is assembled in memory, written to a temporary file, flushed to the disk, and renamed.
+The content is written to a temporary file, flushed to the disk, and renamed.
 """
 
 from __future__ import annotations
@@ -8,11 +8,15 @@ from __future__ import annotations
 import errno
 import io
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.portions import Portions
 
 try:
     import fcntl
@@ -23,6 +27,9 @@ try:
     import msvcrt as _windows
 except ImportError:
     _windows = None  # type: ignore[assignment]
+
+Values = np.ndarray | Portions
+Finish = Callable[[IO[bytes]], None]
 
 PARTIAL = ".partial"
 """Suffix of a file that is still being written. A killed process can leave one behind; it is never read."""
@@ -44,11 +51,51 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
     content  all of it
     errors   RunFailed with the reason of the disk; the old file is then unchanged
     """
+    with _appearing(path) as file:
+        file.write(content)
+
+
+def write_hdf5(path: Path, fill: Callable[[Any], None], finish: Finish = lambda _: None, **options: Any) -> None:
+    """Write an HDF5 file atomically, without a copy of it in memory.
+
+    path     of the file
+    fill     writes the datasets of the open HDF5 file
+    finish   completes its bytes
+    options  of `h5py.File`
+    errors   as of `write_whole`
+    """
+    import h5py
+
+    with _appearing(path) as file:
+        disk = _Disk(file)
+        try:
+            with h5py.File(disk, "w", **options) as data:
+                fill(data)
+        except (OSError, RuntimeError):
+            disk.check()
+            raise
+        disk.check()
+        finish(file)
+
+
+def put(group: Any, name: str, values: Values, **options: Any) -> Any:
+    """Write a dataset, in portions if it is given so; returns it."""
+    if not isinstance(values, Portions):
+        return group.create_dataset(name, data=values, **options)
+    dataset = group.create_dataset(name, values.shape, values.dtype, **options)
+    for index, part in values:
+        dataset[index] = part
+    return dataset
+
+
+@contextmanager
+def _appearing(path: Path) -> Iterator[IO[bytes]]:
+    """A temporary file that is moved to its place when it is whole."""
     fresh = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL}")
     try:
         fresh.unlink(missing_ok=True)
-        with fresh.open("xb") as file:  # never through a link of that name
-            file.write(content)
+        with fresh.open("x+b") as file:  # never through a link of that name
+            yield file
             file.flush()
             os.fsync(file.fileno())
         fresh.replace(path)
@@ -56,6 +103,47 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
     except OSError as failure:
         fresh.unlink(missing_ok=True)
         raise disk_error("write", path, failure) from failure
+    except BaseException:
+        fresh.unlink(missing_ok=True)
+        raise
+
+
+class _Disk:
+    """A file for h5py. It accepts all after its disk has failed, since HDF5 cannot close a file that does not."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file, self._failure = file, None
+        self.seek, self.tell, self.read = file.seek, file.tell, file.read
+
+    _failure: OSError | None
+
+    def check(self) -> None:
+        """Raise what the disk said first."""
+        if self._failure is not None:
+            raise self._failure
+
+    def _tried(self, action: Callable[[], int], otherwise: int) -> int:
+        try:
+            return otherwise if self._failure is not None else action()
+        except OSError as failure:
+            self._failure = failure
+            return otherwise
+
+    def write(self, content: Any) -> int:
+        """See `io.RawIOBase`."""
+        return self._tried(lambda: self._file.write(content), len(content))
+
+    def readinto(self, into: Any) -> int:
+        """See `io.RawIOBase`."""
+        return self._tried(lambda: self._file.readinto(into), len(into))  # type: ignore[attr-defined]
+
+    def truncate(self, size: int) -> int:
+        """See `io.RawIOBase`."""
+        return self._tried(lambda: self._file.truncate(size), size)
+
+    def flush(self) -> None:
+        """See `io.RawIOBase`."""
+        self._tried(lambda: self._file.flush() or 0, 0)
 
 
 def disk_error(verb: str, path: Path, failure: OSError) -> RunFailed:

@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import time as clock
 from array import array
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +31,10 @@ import numpy as np
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.portions import Portions, take_part
 from cfddem.case.toml_text import read_text
 from cfddem.io import checkpoint
-from cfddem.io.files import hdf5_in_memory, remove_partial, write_whole
+from cfddem.io.files import Values, hdf5_in_memory, put, remove_partial, write_hdf5, write_whole
 from cfddem.io.folder import FORMAT, lock, make_folder, read_about, read_columns, require_free, scan
 from cfddem.io.index import POINTS, GridBox, Layout, Snapshot, describe, field_name, index
 from cfddem.io.quantities import Quantities, declared, from_json
@@ -121,8 +124,8 @@ class RunFolder:
         self,
         time: float,
         step: int,
-        fluid: Mapping[str, np.ndarray] | None,
-        particles: Mapping[str, np.ndarray] | None,
+        fluid: Mapping[str, Values] | None,
+        particles: Mapping[str, Values] | None,
         collisions: np.ndarray | None = None,
     ) -> None:
         """Write the history so far, one snapshot, and the index, in this order.
@@ -140,13 +143,12 @@ class RunFolder:
         if self.snapshots and time <= self.snapshots[-1].time:
             limit = f"later than the previous snapshot at {self.snapshots[-1].time:g} s"
             raise InputError("snapshot.time", time, limit, "call drop_after first")
-        content = self._snapshot_file(
-            time, step, {"fluid": cells, "particles": points, "collisions": _columns(collisions)}
-        )
         self.flush_history()
         number = 1 + int(self.snapshots[-1].name[:8]) if self.snapshots else 0
-        snapshot = Snapshot(f"{number:08d}.h5", float(time), int(step), len(points.get(POINTS, ())))
-        write_whole(self.folder / "data" / snapshot.name, content)
+        count = points[POINTS].shape[0] if points else 0
+        snapshot, collided = Snapshot(f"{number:08d}.h5", float(time), int(step), count), _columns(collisions)
+        blocks: dict[str, Mapping[str, Values]] = {"fluid": cells, "particles": points, "collisions": collided}
+        write_hdf5(self.folder / "data" / snapshot.name, partial(self._fill, snapshot, blocks))
         self.snapshots.append(snapshot)
         self._layout = layout
         elapsed = clock.monotonic() - self._indexed_at
@@ -259,31 +261,28 @@ class RunFolder:
     def _write_about(self) -> None:
         write_whole(self.folder / "run.json", (json.dumps(self.about, indent=1) + "\n").encode())
 
-    def _snapshot_file(self, time: float, step: int, blocks: Mapping[str, Mapping[str, np.ndarray]]) -> memoryview:
-        """The bytes of a snapshot."""
-        image = io.BytesIO()
-        with hdf5_in_memory(image) as file:
-            file.attrs["time"], file.attrs["step"], file.attrs["format"] = float(time), int(step), FORMAT
-            for block, arrays in blocks.items():
-                for name, values in arrays.items():
-                    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if values.size else {}
-                    dataset = file.create_dataset(f"{block}/{name}", data=values, **packed)
-                    describe(dataset, declared(self.quantities, block, field_name(name)))
-        return image.getbuffer()
+    def _fill(self, snapshot: Snapshot, blocks: Mapping[str, Mapping[str, Values]], file: Any) -> None:
+        """Write a snapshot into an open file."""
+        file.attrs["time"], file.attrs["step"], file.attrs["format"] = snapshot.time, snapshot.step, FORMAT
+        for block, arrays in blocks.items():
+            for name, values in arrays.items():
+                packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+                dataset = put(file, f"{block}/{name}", values, **packed if math.prod(values.shape) else {})
+                describe(dataset, declared(self.quantities, block, field_name(name)))
 
-    def _cells(self, fluid: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _cells(self, fluid: Mapping[str, Values]) -> dict[str, Values]:
         """Cell fields with a leading axis of length one, in the precision of the run."""
         if (self.box is None) != (not fluid):
             raise InputError("snapshot.fluid", sorted(fluid), "given if and only if the run has a grid")
         shaped = {}
         for name, values in fluid.items():
-            values = np.asarray(values)
+            values = _known(values)
             if self.box is None or values.shape[:3] != self.box.shape or values.shape[3:] not in ((), (3,)):
                 raise InputError(f"snapshot.fluid.{name}", values.shape, "(nz, ny, nx) or (nz, ny, nx, 3) of the grid")
-            shaped[name] = self._stored(values)[None]
+            shaped[name] = _with_leading_axis(self._stored(values))
         return shaped
 
-    def _points(self, particles: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _points(self, particles: Mapping[str, Values]) -> dict[str, Values]:
         """Particle fields in the order of ids; positions under the name that VTK requires."""
         if not particles:
             if self.box is None:
@@ -291,20 +290,34 @@ class RunFolder:
             return {}
         if "position" not in particles:
             raise InputError("snapshot.particles", sorted(particles), "with the field 'position'")
-        count = len(particles["position"])
-        order = np.argsort(particles["id"], kind="stable") if "id" in particles else slice(None)
+        count, ids = _known(particles["position"]).shape[0], particles.get("id")
+        order = slice(None) if ids is None or isinstance(ids, Portions) else np.argsort(ids, kind="stable")
         shaped = {}
         for name, values in particles.items():
-            values = np.asarray(values)
-            if values.ndim not in (1, 2) or len(values) != count:
+            values = _known(values)
+            if len(values.shape) not in (1, 2) or values.shape[0] != count:
                 raise InputError(f"snapshot.particles.{name}", values.shape, f"one row for each of {count} particles")
-            shaped[POINTS if name == "position" else name] = self._stored(values[order])
+            shaped[POINTS if name == "position" else name] = self._stored(
+                values if isinstance(values, Portions) else values[order]
+            )
         return shaped
 
-    def _stored(self, values: np.ndarray) -> np.ndarray:
+    def _stored(self, values: Values) -> Values:
         """Reals in the precision of the run, flags as bytes, integers unchanged."""
         kind = self._real if values.dtype.kind == "f" else np.dtype("u1") if values.dtype.kind == "b" else values.dtype
-        return values.astype(kind, copy=False)
+        return values.as_type(kind) if isinstance(values, Portions) else values.astype(kind, copy=False)
+
+
+def _known(values: Any) -> Values:
+    """Values as an array if they are none in portions."""
+    return values if isinstance(values, Portions) else np.asarray(values)
+
+
+def _with_leading_axis(values: Values) -> Values:
+    """The same values with a first axis of length one."""
+    if not isinstance(values, Portions):
+        return np.asarray(values[None])
+    return Portions((1, *values.shape), values.dtype, lambda: (((0, *index), part) for index, part in values))
 
 
 def _box(grid: Any) -> GridBox:
@@ -327,17 +340,26 @@ def _columns(table: np.ndarray | None) -> dict[str, np.ndarray]:
 
 
 class UnwrittenFolder(RunFolder):
-    """A run folder whose writes do nothing."""
+    """A run folder whose writes do nothing but give rank 0 what it writes."""
 
     def __init__(self, folder: Path, about: dict[str, Any], case_text: str, quantities: Quantities) -> None:
         self.folder, self.about, self.case_text = folder, about, case_text
         self.quantities = {block: dict(names) for block, names in quantities.items()}
         self.snapshots, self._history = [], {}
 
+    def write_snapshot(self, time: float, step: int, fluid: Any, particles: Any, collisions: Any = None) -> None:
+        """See `RunFolder.write_snapshot`."""
+        take_part(fluid)
+        take_part(particles)
+
+    def write_checkpoint(self, state: Mapping[str, Any]) -> None:
+        """See `RunFolder.write_checkpoint`."""
+        take_part(state)
+
     def _nothing(self, *arguments: Any, **named: Any) -> None:
         """Rank 0 does it."""
 
-    write_snapshot = write_index = append_history = flush_history = write_checkpoint = _nothing
+    write_index = append_history = flush_history = _nothing
     note = drop_after = finish = _nothing
 
 

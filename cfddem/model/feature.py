@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import Portions
 from cfddem.data.fields import Field
 
 Function = Callable[[Any], Any]
@@ -49,8 +50,8 @@ class Equipment(Feature):
     def before_snapshot(self, simulation: Any) -> None:
         """Find what only snapshots hold."""
 
-    def cells_for_snapshot(self) -> Mapping[str, np.ndarray]:
-        """Its fields of the fluid in snapshots, in the cells of all ranks (nz, ny, nx)."""
+    def cells_for_snapshot(self) -> Mapping[str, np.ndarray | Portions]:
+        """Its fields of the fluid in snapshots, in the cells of all ranks (nz, ny, nx), by `in_portions`."""
         return {}
 
     def before(self, simulation: Any, step: float) -> None:

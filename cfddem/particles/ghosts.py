@@ -109,35 +109,43 @@ class Divided(Whole):
             self._move_planes(particles)
         owner = self.division.owner(particles.position)
         leave = np.flatnonzero(owner != self.communicator.rank)
-        parcels: dict[int, Any] = dict.fromkeys(self._near or ())
+
+        def remembered(rows: np.ndarray) -> dict[str, np.ndarray]:
+            return {} if edges is None else edges.of(rows, self._ids)
+
+        parcels = dict[int, np.ndarray]()
         for rank in np.unique(owner[leave]).tolist():
             go = leave[owner[leave] == rank]
-            parcels[rank] = (particles.copy(go).arrays, {} if edges is None else edges.of(old_row[go], self._ids))
+            parcels[rank] = packed(particles.copy(go).arrays, remembered(old_row[go]))
         if len(leave):
             stay = np.flatnonzero(owner == self.communicator.rank)
             particles.keep(stay)
             old_row = old_row[stay]
-        self._arrived = []
-        for comers, pairs in filter(None, self._exchanged(parcels)):
+        far = self._near is None or not parcels.keys() <= set(self._near)
+        beside = None if self.communicator.any(far) else self._near  # all write to all where a particle goes far
+        given = self.communicator.exchange(parcels, beside).values()
+        arrived = [unpacked(parcel, particles.arrays, remembered(old_row[:0])) for parcel in given]
+        if arrived:
+            comers = joined_rows([each for each, _ in arrived])
             old_row = np.append(old_row, self._known(comers["id"]))
             particles.append(particles.rows_from(comers))
-            if pairs:
-                self._arrived.append(pairs)
+        self._arrived = [pairs for _, pairs in arrived if pairs]
         return old_row
 
     def renew(self, particles: Particles, reach: float, box: np.ndarray) -> np.ndarray:
         """See `Whole.renew`."""
-        self._sent, self._received = {}, {}
         self._near = self.division.near(self.communicator.rank, reach, box)
-        parcels: dict[int, Any] = dict.fromkeys(self._near)
-        for other, rows in zip(self._near, self.division.rows_near(self._near, particles.position, reach, box)):
-            if len(rows):
-                self._sent[other], parcels[other] = rows, particles.copy(rows).arrays
-        for other, ghosts in self.communicator.exchange_with(parcels).items():
-            if ghosts is not None:
-                begin = particles.count
-                particles.add_ghosts(particles.rows_from(ghosts))
-                self._received[other] = slice(begin, particles.count)
+        found = self.division.rows_near(self._near, particles.position, reach, box)
+        self._sent, self._received = {other: rows for other, rows in zip(self._near, found) if len(rows)}, {}
+        parcels = {other: packed(particles.copy(rows).arrays) for other, rows in self._sent.items()}
+        copies, end = [], particles.count
+        for other, parcel in self.communicator.exchange(parcels, self._near).items():
+            (ghosts,) = unpacked(parcel, particles.arrays)
+            begin, end = end, end + len(ghosts["id"])
+            self._received[other] = slice(begin, end)
+            copies.append(ghosts)
+        if copies:
+            particles.add_ghosts(particles.rows_from(joined_rows(copies)))
         old_row = self._known(particles.id[particles.owned :])
         self._listed(particles)
         return old_row
@@ -167,13 +175,6 @@ class Divided(Whole):
                 begin, end = end, end + ghosts.size
                 ghosts[...] = buffer[begin:end].reshape(ghosts.shape)
 
-    def _exchanged(self, parcels: dict[int, Any]) -> list[Any]:
-        """What other ranks give to this one, in their order; all ranks write to all where a parcel goes far."""
-        far = self._near is None or len(parcels) > len(self._near)
-        if self.communicator.any(far):
-            return self.communicator.exchange([parcels.get(rank) for rank in range(self.communicator.size)])
-        return list(self.communicator.exchange_with(parcels).values())
-
     def _move_planes(self, particles: Particles) -> None:
         """Divide space anew if a rank has many more particles than the mean."""
         most, total = self.communicator.largest([particles.count]), self.communicator.sum([particles.count])
@@ -190,6 +191,32 @@ class Divided(Whole):
     def _listed(self, particles: Particles) -> None:
         """Take note of the rows of a list."""
         self._particles, self._ids, self._order = particles, particles.id.copy(), np.argsort(particles.id)
+
+
+def packed(*tables: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The bytes of tables: how many rows each has, then their arrays in the order of the names."""
+    rows = [len(next(iter(table.values()), ())) for table in tables]
+    arrays = [np.array(rows, np.int64), *(table[name] for table in tables for name in sorted(table))]
+    return np.concatenate([np.ascontiguousarray(array).reshape(-1).view(np.uint8) for array in arrays])
+
+
+def unpacked(parcel: np.ndarray, *tables: Mapping[str, np.ndarray]) -> list[dict[str, np.ndarray]]:
+    """The tables that another rank has `packed`, with the names and types of these, whose rows do not matter."""
+    end = 8 * len(tables)
+    found = []
+    for rows, table in zip(parcel[:end].view(np.int64).tolist(), tables):
+        arrays = {}
+        for name in sorted(table):
+            made = arrays[name] = np.empty((rows, *table[name].shape[1:]), table[name].dtype)
+            begin, end = end, end + made.nbytes
+            made.reshape(-1).view(np.uint8)[:] = parcel[begin:end]
+        found.append(arrays)
+    return found
+
+
+def joined_rows(tables: Sequence[Mapping[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """The rows of tables with the same fields, one table after the other."""
+    return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
 
 
 def _as_words(array: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import Portions, rows_by_id, rows_by_rank
 from cfddem.particles.listing import NeighbourLists
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
@@ -23,7 +24,7 @@ from cfddem.particles.walls.nearest_point import Walls
 def named_state(
     particles: Particles, edges: Edges, origin: np.ndarray, communicator: Communicator = SERIAL
 ) -> dict[str, Any]:
-    """The state of all ranks, on rank 0; other ranks get arrays without rows.
+    """The state of all ranks: arrays in one process, else `Portions` of them.
 
     origin   (N, 3) position of each particle when the list was made [m]
     returns  "particles" and "origin" by id, "pairs" and their "bodies" (see `Edges.ends`), and "touch" of the pairs
@@ -31,19 +32,21 @@ def named_state(
     """
     rows, mine = slice(particles.owned), np.flatnonzero(edges.first < particles.owned)
     at_walls = mine[mine >= edges.between_particles]
-    order = np.argsort(communicator.gathered(particles.id[rows]))
 
-    def by_id(values: np.ndarray) -> np.ndarray:
-        return communicator.gathered(values[rows])[order]
+    def by_id(values: np.ndarray) -> np.ndarray | Portions:
+        return rows_by_id(values[rows], particles.id[rows], communicator)
+
+    def by_rank(values: np.ndarray) -> np.ndarray | Portions:
+        return rows_by_rank(values, communicator)
 
     lasting = [name for name, field in edges.fields.items() if field.role != "scratch"]
     return {
         "particles": {name: by_id(array) for name, array in particles.lasting().items()},
         "origin": by_id(origin),
-        "pairs": {name: communicator.gathered(edges[name][mine]) for name in lasting},
-        "bodies": communicator.gathered(edges.ends(particles.id, mine)),
-        "touch": communicator.gathered(edges.touch[at_walls - edges.between_particles]),
-        "touch_bodies": communicator.gathered(edges.ends(particles.id, at_walls)),
+        "pairs": {name: by_rank(edges[name][mine]) for name in lasting},
+        "bodies": by_rank(edges.ends(particles.id, mine)),
+        "touch": by_rank(edges.touch[at_walls - edges.between_particles]),
+        "touch_bodies": by_rank(edges.ends(particles.id, at_walls)),
     }
 
 

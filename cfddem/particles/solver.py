@@ -274,7 +274,7 @@ class ParticleSolver:
         self.held = True
 
     def checkpoint(self) -> dict[str, Any]:
-        """Copies of everything that the next step depends on; of several ranks, on rank 0 and by ids."""
+        """Copies of everything that the next step depends on; of several ranks, by ids and in `Portions`."""
         if self.communicator.size > 1:
             state = named_state(self.particles, self.edges, self._origin, self.communicator)
         else:

@@ -93,6 +93,8 @@ class CostEstimate:
     disk: float  # [byte]
     snapshots: float
     cells_dominate: bool  # cells take more memory than particles
+    particle_steps: float
+    fluid_steps: float
 
 
 def estimate_cost(case: Case, bed: BedEstimate, steps: StepEstimate) -> CostEstimate:
@@ -109,6 +111,8 @@ def estimate_cost(case: Case, bed: BedEstimate, steps: StepEstimate) -> CostEsti
         snapshots * (120.0 * count + 40.0 * cells),
         snapshots,
         BYTES_PER_CELL * cells > BYTES_PER_PARTICLE * count,
+        particle_steps,
+        fluid_steps * bool(cells),
     )
 
 

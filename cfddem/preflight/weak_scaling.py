@@ -105,3 +105,65 @@ def weak_scaling(
     step = work + exchange
     memory = BYTES_PER_PARTICLE * (owned + ghosts)
     return Scaling(step, exchange / step, given.particle_step * owned / step, owned, ghosts, memory, best)
+
+
+CALL = 25e-6
+"""Processor time of a rank for each exchange and each sum, beside the network [s]."""
+
+WITH_FILMS, DRY = (4.0, 25.0), (1.0, 1.0)
+"""Exchanges and sums over all ranks in a particle step; films are solved together by iteration."""
+
+HALOS, SUMS = 100.0, 80.0
+"""Exchanges of cells for each divided axis, and sums over all ranks, in a fluid step with its solution of the pressure.
+
+Counted and measured by `tests/benchmarks/bench_scaling_model.py`; `HALOS` grow from 33 for few cells to 150 for 64^3.
+"""
+
+
+@dataclass(frozen=True)
+class RunCost:
+    """What a run costs one process, and how often its ranks would exchange.
+
+    seconds         of one process [s]
+    particle_steps  in the run
+    fluid_steps     in the run; 0 without a fluid
+    particles       in the run
+    films           between particles, in the run
+    """
+
+    seconds: float
+    particle_steps: float
+    fluid_steps: float
+    particles: float
+    films: bool = False
+
+
+def efficiency(cost: RunCost, shape: Shape, busiest: float, machine: Machine | None = None) -> float:
+    """Speed-up of a run over the number of its ranks.
+
+    .. math:: t_p = \\frac{w}{p} t_1 + N_s (m (k l + c) + g b / B + s (r \\log_2 p + c))
+              + N_f (h a (2 l + c) + s_f (r \\log_2 p + c))
+
+    with N_s particle steps of m exchanges with k neighbours and s sums, N_f fluid steps of h exchanges along each of a
+    divided axes and s_f sums, and the time c of a rank for each of these.
+
+    cost     of one process
+    shape    ranks along x, y, z
+    busiest  work of the busiest rank over the mean w, ghosts included
+    machine  l, B, r and b; see `Machine`
+
+    >>> dry = RunCost(seconds=1000.0, particle_steps=1e5, fluid_steps=0, particles=1e5)
+    >>> round(efficiency(dry, (1, 2, 1), 1.05), 2), round(efficiency(dry, (4, 4, 4), 1.3), 2)
+    (0.93, 0.36)
+    """
+    given, ranks = machine or Machine(), math.prod(shape)
+    if ranks == 1:
+        return 1.0
+    beside, reduction = math.prod(min(n, 3) for n in shape) - 1, given.reduction * math.log2(ranks) + CALL
+    exchanges, sums = WITH_FILMS if cost.films else DRY
+    ghosts = (busiest - 1.0) * cost.particles / ranks
+    step = exchanges * (beside * given.latency + CALL) + ghosts * given.message / given.bandwidth + sums * reduction
+    divided = sum(n > 1 for n in shape)
+    flow = HALOS * divided * (2.0 * given.latency + CALL) + SUMS * reduction
+    total = busiest * cost.seconds / ranks + cost.particle_steps * step + cost.fluid_steps * flow
+    return cost.seconds / (ranks * total)

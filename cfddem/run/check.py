@@ -11,7 +11,8 @@ from cfddem.preflight.checks import check_quantities
 from cfddem.preflight.issue import Issue
 from cfddem.preflight.overview import Row
 from cfddem.preflight.summary import Preflight, preflight
-from cfddem.run.division import expected_division, require_parallel
+from cfddem.preflight.weak_scaling import efficiency
+from cfddem.run.division import WORTHWHILE, cost_of, expected_division, most_ranks, require_parallel
 from cfddem.run.history import units_of
 
 MOST_RANKS = 100_000
@@ -51,8 +52,18 @@ def _with_ranks(result: Preflight, case: Case, ranks: int, shape: Shape | None) 
     share = f", about {count / ranks:.3g} particles each" if count >= ranks else "; some hold no particle"
     (x, y, z), work = expected_division(case, ranks, shape)
     chosen = "as given" if shape else "the least of all shapes"
+    cost = cost_of(case)
+    most = most_ranks(case, cost)
     rows = (
         Row("several processes", "ranks", ranks, "", f"can share the case{share}"),
         Row("several processes", "most / mean work", work, "", f"{x} x {y} x {z} bricks, {chosen}"),
+        Row(
+            "several processes",
+            "efficiency",
+            efficiency(cost, (x, y, z), work),
+            "",
+            "speed-up over ranks, by the model",
+        ),
+        Row("several processes", "recommended ranks", most, "", f"the most with {WORTHWHILE:.0%} efficiency"),
     )
     return replace(result, rows=(*result.rows, *rows))

@@ -14,9 +14,14 @@ from cfddem.case.schema import Case
 from cfddem.fluid.block import Division, divide
 from cfddem.particles.bricks import Bricks
 from cfddem.preflight.bed_estimate import estimate_bed
+from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
+from cfddem.preflight.weak_scaling import RunCost, efficiency
 
 GHOSTS = 1.1
 """About how far from a brick its ghosts lie, in diameters."""
+
+WORTHWHILE = 0.7
+"""Efficiency from which more ranks are recommended."""
 
 SAMPLE = 20_000
 """Places that stand for the bed where no particles have been made yet."""
@@ -70,6 +75,27 @@ def expected_division(case: Case, ranks: int, shape: Shape | None = None) -> tup
         return cells.shape, cells.work(grid_of(case), places)
     bricks = Bricks.balanced(shape, places) if shape else _dry(case, places, ranks)
     return bricks.shape, bricks.work(places, GHOSTS * case.bed.largest_diameter)
+
+
+def cost_of(case: Case) -> RunCost:
+    """What a case costs one process, and how often ranks would exchange."""
+    bed = estimate_bed(case)
+    cost = estimate_cost(case, bed, estimate_steps(case, bed))
+    return RunCost(cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count), case.has_films)
+
+
+def most_ranks(case: Case, cost: RunCost) -> int:
+    """The most ranks, of 1, 2, 3, 4, 6, 8, 12 and so on, at which the efficiency is worthwhile by the model."""
+    most = 1
+    for ranks in sorted(n * 2**k for k in range(1, 20) for n in (1, 1.5) if n * 2**k <= case.particle_count):
+        try:
+            shape, work = expected_division(case, int(ranks))
+        except InputError:  # too few layers of cells
+            break
+        if efficiency(cost, shape, work) < WORTHWHILE:
+            break
+        most = int(ranks)
+    return most
 
 
 def _dry(case: Case, places: np.ndarray, ranks: int) -> Bricks:

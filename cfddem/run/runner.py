@@ -14,12 +14,14 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed, RunStopped, UnstableStep
+from cfddem.backend.portions import Portions
 from cfddem.backend.stopwatch import Stopwatch
 from cfddem.case.column_grid import grid_of
 from cfddem.case.compare import require_measured_units
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
+from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import FLUID_FIELDS
 from cfddem.io import checkpoint
 from cfddem.io.folder import (
@@ -333,13 +335,14 @@ class Run:
     def _write_snapshot(self) -> None:
         simulation, solver = self.simulation, self.simulation.particle_solver
         with simulation.wall.part("snapshots"):
-            fluid: dict[str, np.ndarray] | None = None
+            fluid: dict[str, np.ndarray | Portions] | None = None
             if simulation.fluid is not None:
-                fluid = {name: simulation.fluid.whole(name) for name in RECORDED}
+                grid = simulation.fluid.grid
+                fluid = {name: in_portions(grid, getattr(simulation.fluid, name), 0) for name in RECORDED}
                 for feature in simulation.features:
                     fluid |= feature.cells_for_snapshot()
                 if SOLID in self.folder.quantities.get("fluid", {}):
-                    fluid[SOLID] = ~simulation.fluid.grid.whole.open
+                    fluid[SOLID] = ~grid.whole.open
             collisions = solver.collisions.take() if solver.collisions else None
             self.folder.write_snapshot(simulation.time, solver.steps, fluid, simulation.snapshot(), collisions)
         due = clock.monotonic() - self._checkpoint_at > self._checkpoint_cost / CHECKPOINT_SHARE

@@ -13,6 +13,7 @@ from cfddem.backend import html
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 from cfddem.backend.launch import keep_freed_memory
+from cfddem.backend.portions import Portions, rows_by_id
 from cfddem.case.schema import Case
 from cfddem.coupling.coupling import Coupling, Uncoupled
 from cfddem.coupling.force_list import require_features
@@ -215,11 +216,12 @@ class Simulation:
         order = np.argsort(self.communicator.joined(self.owned.id))
         return self.communicator.joined(self.owned[name])[order]
 
-    def snapshot(self) -> dict[str, np.ndarray]:
-        """The fields of the particles that a snapshot contains; those of all ranks on rank 0, no rows on the others."""
+    def snapshot(self) -> dict[str, np.ndarray | Portions]:
+        """The fields of the particles of all ranks that a snapshot contains, in the order of the ids."""
         for feature in self.features:
             feature.before_snapshot(self)
-        return {name: self.communicator.gathered(array) for name, array in self.owned.snapshot().items()}
+        owned, ranks = self.owned, self.communicator
+        return {name: rows_by_id(array, owned.id, ranks) for name, array in owned.snapshot().items()}
 
     def step(self, until: float = math.inf) -> None:
         """Make one fluid step and the particle steps within it; some step ends exactly at `until` [s]."""
@@ -276,7 +278,7 @@ class Simulation:
     # ------------------------------------------------------------ checkpoints
 
     def checkpoint(self) -> dict[str, Any]:
-        """Everything that the next step depends on."""
+        """Everything that the next step depends on; on several ranks with `Portions` of what they share."""
         parts: dict[str, Any] = {
             "steps": self.steps,
             "last_step": self.last_step,

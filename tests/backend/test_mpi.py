@@ -17,6 +17,11 @@ from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
 
 
+def parcel(giver: int, taker: int) -> np.ndarray:
+    """Bytes of a length of their own; none from the first to itself."""
+    return np.array([giver, taker] * (giver + taker), np.uint8)
+
+
 def reductions(communicator: Communicator, values: list[np.ndarray]) -> dict[str, Any]:
     """What a rank gets from all calls."""
     rank, mine = communicator.rank, values[communicator.rank]
@@ -34,8 +39,8 @@ def reductions(communicator: Communicator, values: list[np.ndarray]) -> dict[str
         "flags": communicator.joined(mine[:rank] > 0.0),
         "first": communicator.first(f"rank {rank}" if rank else None),
         "broadcast": communicator.broadcast({"from": rank}, 1),
-        "exchange": communicator.exchange([(rank, n) for n in range(communicator.size)]),
-        "beside": communicator.exchange_with({n: (rank, n) for n in range(communicator.size) if abs(n - rank) == 1}),
+        "exchange": communicator.exchange({n: parcel(rank, n) for n in range(communicator.size)}),
+        "beside": communicator.exchange({0: parcel(rank, 0)} if rank == 1 else {}, [[1], [0, 2], [1]][rank]),
         "swap": incoming,
     }  # fmt: skip
 
@@ -60,8 +65,9 @@ def test_all_ranks_get_the_bits_of_one_process() -> None:
         assert np.array_equal(each["gathered"], gathered)
         assert np.array_equal(each["flags"], np.concatenate([v[:n] > 0.0 for n, v in enumerate(values)]))
         assert np.array_equal(each["joined"], np.concatenate(values)) and each["first"] == "rank 1"
-        assert each["beside"] == {n: (n, rank) for n in range(3) if abs(n - rank) == 1}
-        assert each["broadcast"] == {"from": 1} and each["exchange"] == [(n, rank) for n in range(3)]
+        assert {n: list(got) for n, got in each["beside"].items()} == ({1: [1, 0]} if rank == 0 else {})
+        given = {n: list(parcel(n, rank)) for n in range(3) if n + rank}  # rank 0 gives itself nothing
+        assert each["broadcast"] == {"from": 1} and {n: list(got) for n, got in each["exchange"].items()} == given
         assert all(
             np.array_equal(got, np.stack([v, v + rank], axis=1)) for got, v in zip(each["swap"].values(), values)
         )

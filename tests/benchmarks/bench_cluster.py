@@ -85,7 +85,7 @@ def main(a_rank: int, film: bool) -> None:
     exchanges = len(halo.seconds) / STEPS
     row = [1e3 * float(np.median(steps)), halo.median * exchanges, reduce.median, lists.median, migrate.median,
            renew.median, run.particles.count - run.particles.owned, len(lists.seconds)]  # fmt: skip
-    rows = np.array(communicator.exchange([row] * size))
+    rows = communicator.joined(np.array([row]))
     if communicator.rank == 0:
         names = ("step ms", "halo ms", "reduction ms", "list ms", "migration ms", "ghosts ms", "ghosts", "lists")
         print(

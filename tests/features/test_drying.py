@@ -11,6 +11,7 @@ from test_heat_in_fluid import SEEDS, case_of, lattice
 
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.heat import HeatExchange
@@ -117,6 +118,7 @@ def dried(simulation: Simulation, steps: int) -> dict[str, np.ndarray]:
         simulation.step()
     order, parts = np.argsort(simulation.whole("id")), (simulation.feature(HeatExchange), simulation.feature(Vapour))
     cells = {name: values for each in parts for name, values in each.cells_for_snapshot().items()}
+    cells = collected(cells, simulation.communicator)
     particles = {
         f"{name} of particles": simulation.whole(name)[order] for name in ("temperature", "radius", "position")
     }

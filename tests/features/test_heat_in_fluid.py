@@ -18,6 +18,7 @@ from two_phase_balance import Balances, TwoPhaseBalance
 from cfddem import open_run
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
 from cfddem.features.heat import HeatExchange, heat_imbalance
 from cfddem.fluid.conditions import FreeSlip, Inlet, Outlet, Periodic
@@ -357,7 +358,7 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, np.ndarray]:
     for _ in range(steps):
         simulation.step()
     heat, order = simulation.feature(HeatExchange), np.argsort(simulation.whole("id"))
-    (cells,) = heat.cells_for_snapshot().values()
+    (cells,) = collected(heat.cells_for_snapshot(), simulation.communicator).values()
     values = {name: value for name, value in row(simulation).items() if "heat" in name or "temperature" in name}
     return {"particles": simulation.whole("temperature")[order], "cells": cells, "row": np.array(list(values.values()))}
 

@@ -12,6 +12,7 @@ from test_fluid_pressure import CASES, equation
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
+from cfddem.backend.portions import collected
 from cfddem.fluid import budgets
 from cfddem.fluid.block import Block, Division, divide
 from cfddem.fluid.conditions import SIDES, FreeSlip, Inlet, NoSlip, Outlet, Periodic, discs
@@ -184,7 +185,7 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
         mine = np.ravel_multi_index(inside, division.shape) == fluid.communicator.rank
     velocity = np.zeros((len(points), 3))
     velocity[mine] = fluid.velocity_at(points[mine])
-    return fluid.checkpoint() | {
+    return collected(fluid.checkpoint(), fluid.communicator) | {
         "viscous force": grid.joined(fluid.cell_viscous_force()),
         "pressure gradient": grid.joined(fluid.cell_pressure_gradient()),
         "drag": grid.joined(np.moveaxis(budgets.drag_exchange(fluid), -1, 0)),
@@ -227,7 +228,7 @@ def test_a_checkpoint_of_three_ranks_goes_on_with_fewer(ranks: int) -> None:
     def half(communicator: Communicator) -> dict[str, Any]:
         part = fluid_of(name, communicator, bricks((13, 9, 12), 3, 1, 1))
         advanced(part)
-        return part.checkpoint()
+        return collected(part.checkpoint(), communicator)
 
     state = on_ranks(3, half)[1]
 
@@ -235,7 +236,7 @@ def test_a_checkpoint_of_three_ranks_goes_on_with_fewer(ranks: int) -> None:
         part = fluid_of(name, communicator, bricks((13, 9, 12), ranks, 1, 1) if ranks > 1 else None)
         part.restore(state)
         advanced(part)
-        return part.checkpoint()
+        return collected(part.checkpoint(), communicator)
 
     whole = fluid_of(name)
     advanced(whole)

@@ -18,6 +18,8 @@ from cfddem.backend.json_text import as_json
 def test_check_gives_what_the_command_prints() -> None:
     case = cfddem.gallery()["liquid-bed"]
     found = cfddem.check(case, ranks=2)
+    numbers = {row.name: row.value for row in found.rows if row.group == "several processes"}
+    assert 0.0 < numbers["efficiency"] < 1.0 and numbers["recommended ranks"] == 1  # few particles
     assert isinstance(found, cfddem.Preflight) and found.status == "ok" and "ranks" in [row.name for row in found.rows]
     assert f"{found}\n" == call("check", "liquid-bed", "--ranks", "2").out
     with pytest.raises(cfddem.CfddemError, match=r"ranks = 10+: must be 1 to 100000"):  # at once

@@ -15,6 +15,7 @@ from in_process_ranks import Rank, on_ranks
 from cfddem.backend.brick_shapes import place_of
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.portions import collected
 from cfddem.case.materials import Material
 from cfddem.case.schema import Case
 from cfddem.particles import listing
@@ -273,7 +274,7 @@ def test_a_divided_run_is_resumed_with_the_same_bits() -> None:
             finished(spheres.copy(), given, 0, communicator=communicator, division=division) for _ in range(2)
         )
         straight.advance(STEP, 70)
-        again.restore(communicator.broadcast(straight.checkpoint()))
+        again.restore(collected(straight.checkpoint(), communicator))
         for run in (straight, again):
             run.advance(STEP, 70)
         return state(again), state(straight)
@@ -297,7 +298,7 @@ def test_a_checkpoint_goes_on_with_another_number_of_ranks(film: bool, liquid: b
     def begun(communicator: Communicator) -> Any:
         run = made(communicator)
         run.advance(STEP, 70)
-        return run.checkpoint()
+        return collected(run.checkpoint(), communicator)
 
     def resumed(communicator: Communicator) -> dict[str, np.ndarray]:
         run = made(communicator)
@@ -438,9 +439,9 @@ class Counted(Rank):
 
     to_all = 0
 
-    def exchange(self, parcels: Any) -> Any:
+    def _given_by_all(self, numbers: Any) -> Any:
         self.to_all += 1
-        return super().exchange(parcels)
+        return super()._given_by_all(numbers)
 
 
 @pytest.mark.parametrize("shape", [(3, 3, 3), *map(many, [(27, 1, 1), (64, 1, 1), (4, 4, 4)])])

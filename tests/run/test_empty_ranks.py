@@ -17,6 +17,7 @@ from in_process_ranks import on_ranks
 from test_coupling_ranks import ALL_FORCES, TIGHT, case_of
 
 from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.portions import collected
 from cfddem.fluid.pressure import ranks as shared
 from cfddem.io.reading import open_run
 from cfddem.run import history
@@ -102,7 +103,7 @@ def after(
         counts.append(simulation.owned.count)
     order = np.argsort(simulation.whole("id"))
     fields = {name: simulation.whole(name)[order] for name in ("id", "position", "velocity", "spin", "force")}
-    return fields, history.row(simulation), simulation.checkpoint(), counts
+    return fields, history.row(simulation), collected(simulation.checkpoint(), communicator), counts
 
 
 def assert_same(one: tuple[Any, ...], other: tuple[Any, ...]) -> None:
