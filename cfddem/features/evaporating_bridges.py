@@ -12,6 +12,7 @@ import numpy as np
 
 from cfddem.features.evaporation_loops import menisci, taken_from
 from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.system import BridgeSystem
 
 
 class Menisci:
@@ -31,7 +32,7 @@ class Menisci:
         self.area, self.mass = np.zeros(self.count), np.zeros(self.count)
         if parts:
             menisci(
-                self.rows, density, solver.system, self.body, self.parts, self.masses, self.area, self.mass
+                self.rows, density, BridgeSystem.of(solver.system), self.body, self.parts, self.masses, self.area, self.mass
             )  # fmt: skip
 
     def lose(self, lost: np.ndarray) -> float:

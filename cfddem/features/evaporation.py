@@ -90,7 +90,7 @@ class EvaporationOfLiquid(CaseFeature):
             diameter=2.0 * particles.radius,
             sherwood=heat.law.numbers(flow, particles.viscosity / (self.fluid.density * self.diffusivity)),
             gas=heat.around,
-            fraction=vapour.around(simulation) if vapour else np.full(count, self.fraction),
+            fraction=heat.humidity if vapour else np.full(count, self.fraction),
             film=film,
             menisci=menisci.area if menisci else np.zeros(count),
             response=heat.response,

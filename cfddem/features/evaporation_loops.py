@@ -63,11 +63,13 @@ def saturated(temperature, air):
 
 @inline
 def drive(temperature, gas, fraction, air):
-    """Driving force at the temperature of a surface [-], in a gas of a temperature and a mass fraction."""
+    """Driving force at the temperature of a surface, in a gas of a temperature and a mass fraction, and the mass
+    fraction at the surface [-]."""
     saturation = saturated(temperature, air)
+    at_surface = vapour_fraction(saturation, air.pressure)
     if air.stefan:
-        return stefan_drive(vapour_fraction(saturation, air.pressure), fraction)
-    return dilute_drive(saturation, vapour_pressure(fraction, air.pressure), gas, air.density)
+        return stefan_drive(at_surface, fraction), at_surface
+    return dilute_drive(saturation, vapour_pressure(fraction, air.pressure), gas, air.density), at_surface
 
 
 @serial
@@ -167,15 +169,17 @@ def evaporate(surfaces, air, step):
         slowness, gas, fraction = surfaces.response[i], surfaces.gas[i], surfaces.fraction[i]
         scale = slowness * transport
         low = middle = begin
-        latent, driven = latent_heat(begin), drive(begin, gas, fraction, air)  # at `middle`
+        latent = latent_heat(begin)  # these three at `middle`
+        driven, at_surface = drive(begin, gas, fraction, air)
         at_low = scale * latent * driven  # of T - T' + s L m
         high = max(begin - at_low, 200.0)
-        at_high = high - begin + scale * latent_heat(high) * drive(high, gas, fraction, air)
+        at_high = high - begin + scale * latent_heat(high) * drive(high, gas, fraction, air)[0]
         for _ in range(100):
             if abs(high - low) <= CLOSEST or at_low == at_high:
                 break
             middle = high - at_high * (high - low) / (at_high - at_low)  # regula falsi, as in Illinois
-            latent, driven = latent_heat(middle), drive(middle, gas, fraction, air)
+            latent = latent_heat(middle)
+            driven, at_surface = drive(middle, gas, fraction, air)
             value = middle - begin + scale * latent * driven
             if abs(value) <= CLOSEST:
                 break
@@ -190,7 +194,7 @@ def evaporate(surfaces, air, step):
         mass = surfaces.mass[i] + surfaces.bridged[i]
         if mass < passing * transport:
             middle = begin - slowness * latent_heat(begin) * mass / step
-            latent = latent_heat(middle)
+            latent, at_surface = latent_heat(middle), vapour_fraction(saturated(middle, air), air.pressure)
         surfaces.temperature[i] = middle
         surfaces.heat[i] = mass * latent
-        surfaces.saturated[i] = vapour_fraction(saturated(middle, air), air.pressure)
+        surfaces.saturated[i] = at_surface
