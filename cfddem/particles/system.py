@@ -90,7 +90,6 @@ class BridgeSystem(NamedTuple):
     edges: _Joined
     memory: _Bridges
     shift: np.ndarray
-    parameters: Parameters
 
     @classmethod
     def of(cls, system: System) -> BridgeSystem:
@@ -99,5 +98,4 @@ class BridgeSystem(NamedTuple):
         return cls(
             *(kind(*(getattr(part, name) for name in kind._fields)) for kind, part in parts),  # type: ignore[call-arg]
             system.shift,
-            system.parameters,
         )

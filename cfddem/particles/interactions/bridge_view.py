@@ -135,7 +135,8 @@ class Bridges(ParticleFeature):
         lost     volume (n,), below 0 where vapour condenses [m3]
         returns  energy of the pulls that is gone, of bridges whose first body this process owns [J]
         """
-        return float(self._dry(rows, lost, BridgeSystem.of(self._solver.system)))
+        system = self._solver.system
+        return float(self._dry(rows, lost, BridgeSystem.of(system), system.parameters))
 
     @cached_property
     def _dry(self) -> Any:
@@ -233,9 +234,9 @@ def _break(system):
 
 
 @serial
-def _dry(rows, lost, system):
+def _dry(rows, lost, system, p):
     """See `Bridges.dry`; returns the energy of the pulls that is gone [J]."""
-    memory, p, edges, energy = system.memory, system.parameters, system.edges, 0.0
+    memory, edges, energy = system.memory, system.edges, 0.0
     for n in range(len(rows)):
         k = rows[n]
         _, _, gap = geometry(k, system)
