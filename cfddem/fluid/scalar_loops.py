@@ -124,12 +124,12 @@ def move(value, old, carried_by, stage, step, unlimited, new):
     old    before the step [s]
     new    after the step
     """
-    shape, steps, inverse, second = value.shape, strides(value.shape), carried_by.inverse, 0.5 * stage
+    shape, steps, second = value.shape, strides(value.shape), 0.5 * stage
+    stored, growth, flux, diffusivity, gate, places, rules, both, inverse = carried_by
     value, old, new = value.reshape(-1), old.reshape(-1), new.reshape(-1)
-    stored, growth = carried_by.stored.reshape(-1), carried_by.growth.reshape(-1)
-    diffusivity, flux = carried_by.diffusivity.reshape(-1), carried_by.flux.reshape(3, -1)
-    gate, both = carried_by.gate.reshape(3, -1), carried_by.through.reshape(2, 3, -1)
-    places, rules, through = carried_by.places, carried_by.rules, both[stage]
+    stored, growth, diffusivity = stored.reshape(-1), growth.reshape(-1), diffusivity.reshape(-1)
+    flux, gate, both = flux.reshape(3, -1), gate.reshape(3, -1), both.reshape(2, 3, -1)
+    through = both[stage]
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
         for d in range(3):
