@@ -55,9 +55,14 @@ class Communicator:
         array = np.asarray(values)
         if array.dtype.kind in "biu":
             return _plain(self._add(np.asarray(array.sum(axis=axis, dtype=np.int64))))
-        from cfddem.backend.exact_sums_loops import largest_of_rows, split  # loads the compiler, which checks lack
+        # loads the compiler, which checks lack
+        from cfddem.backend.exact_sums_loops import largest_of_rows, split, sums_of_rows
 
         rows, kept = _rows(array.astype(float, copy=False), axis)
+        if self.size == 1:  # the same in one call
+            found = np.empty(len(rows))
+            sums_of_rows(rows, rows.view(np.int64), found, found.view(np.int64))
+            return found.reshape(kept) if kept else float(found[0])
         most, parts = np.zeros(len(rows)), np.zeros((2, len(rows)), np.int64)
         largest_of_rows(rows.view(np.int64), most.view(np.int64))
         most = self._largest(most)

@@ -119,9 +119,13 @@ class Transfer:
         weight  W: the cell has given W h (b* v* - b* u) per volume (nz, ny, nx, m) [-]
         seen    u, the value of the fluid in its implicit step (nz, ny, nx, m)
         """
-        kernel, value = self.kernel, _columns(particles[self.value])
         fields = np.concatenate([np.moveaxis(each, -1, 0) for each in (weight, weight * seen)])
-        gathered, rate = kernel.sample(cell_map.stencil, cell_map.radius, fields), np.empty(value.shape)
+        return self.receive(particles, sent, self.kernel.sample(cell_map.stencil, cell_map.radius, fields))
+
+    def receive(self, particles: Particles, sent: ImplicitCoefficients, gathered: Array) -> Array:
+        """As `apply`, from the means of W and W u around every particle (N, 2 m); further columns are not used."""
+        value = _columns(particles[self.value])
+        rate = np.empty(value.shape)
         before, received = (_columns(particles[name]) for name in (self.before, self.received[0]))
         _receive(gathered, sent.implicit, sent.target, sent.step, value, rate, before, received)
         self.last_step = sent.step

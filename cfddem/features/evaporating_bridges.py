@@ -12,6 +12,7 @@ import numpy as np
 
 from cfddem.features.evaporation_loops import menisci, taken_from
 from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.system import BridgeSystem
 
 
 class Menisci:
@@ -30,9 +31,8 @@ class Menisci:
         self.body, self.parts, self.masses = np.empty(parts, np.int64), np.empty(parts), np.empty(parts)
         self.area, self.mass = np.zeros(self.count), np.zeros(self.count)
         if parts:
-            menisci(
-                self.rows, density, solver.system, self.body, self.parts, self.masses, self.area, self.mass
-            )  # fmt: skip
+            system = BridgeSystem.of(solver.system)
+            menisci(self.rows, density, system, self.body, self.parts, self.masses, self.area, self.mass)
 
     def lose(self, lost: np.ndarray) -> float:
         """Take from the bridges what every particle loses from its parts of them (N,) [kg]; returns the energy of the

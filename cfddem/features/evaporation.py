@@ -25,7 +25,7 @@ from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.evaporating_bridges import Menisci
 from cfddem.features.evaporating_walls import WallFilms
 from cfddem.features.evaporation_keys import Evaporation
-from cfddem.features.evaporation_loops import Air, Surfaces, conductance_of_vapour, evaporate, share_out
+from cfddem.features.evaporation_loops import FOUND, Air, Surfaces, evaporate, settle
 from cfddem.features.heat import HeatExchange
 from cfddem.features.heat_keys import Heat
 from cfddem.features.liquid import LiquidOnParticles
@@ -37,7 +37,7 @@ from closures.kinds import DRYING_ARGUMENTS
 SMALLEST = 1e-6
 """Radius of a drop that has evaporated [m]."""
 
-_NONE = np.zeros(0, np.int64)
+_NONE, _NOTHING = np.zeros(0, np.int64), np.zeros(0)
 
 
 class EvaporationOfLiquid(CaseFeature):
@@ -61,6 +61,7 @@ class EvaporationOfLiquid(CaseFeature):
         share = adapted(law.function, ", ".join(DRYING_ARGUMENTS), {name: name for name in DRYING_ARGUMENTS})
         self._evaporate = specialise(evaporate, {"drying_share": share})
         self.drops = np.array([name in keys.drops for name in case.material])
+        self.any_drops = bool(self.drops.any())  # local: materials
         self.mass, self.heat = 0.0, 0.0
         self.walls: WallFilms | None = None
         if keys.wall_coefficient > 0.0:
@@ -79,42 +80,37 @@ class EvaporationOfLiquid(CaseFeature):
     def before(self, simulation: Any, step: float) -> None:
         """Evaporate over the step [s], after the exchange of heat with the gas."""
         particles, heat, keys = simulation.owned, simulation.feature(HeatExchange), self.keys
-        count, flow, begin = particles.count, simulation.terms.flow, particles.temperature.copy()
-        on_films = particles.liquid if "liquid" in particles else np.zeros(count)
-        film, mass = on_films.copy(), on_films * keys.liquid_density
-        is_drop = self._drops(particles, film, mass)
+        count, has_films = particles.count, "liquid" in particles
+        films = particles.liquid if has_films else np.zeros(count)
+        film, mass, is_drop = self._with_drops(particles, films, films * keys.liquid_density)
         vapour = simulation.feature(Vapour) if self.gains else None
-        menisci = Menisci(simulation, keys.liquid_density) if "liquid" in particles else None
+        menisci = Menisci(simulation, keys.liquid_density) if has_films else None
         surfaces = Surfaces(
-            temperature=begin.copy(),
-            diameter=2.0 * particles.radius,
-            sherwood=heat.law.numbers(flow, particles.viscosity / (self.fluid.density * self.diffusivity)),
-            gas=heat.around,
-            fraction=vapour.around(simulation) if vapour else np.full(count, self.fraction),
-            film=film,
-            menisci=menisci.area if menisci else np.zeros(count),
-            response=heat.response,
-            mass=mass,
-            bridged=menisci.mass.copy() if menisci else np.zeros(count),
-            heat=np.zeros(count),
-            saturated=np.zeros(count),
+            particles.temperature,
+            2.0 * particles.radius,
+            heat.law.numbers(simulation.terms.flow, particles.viscosity / (self.fluid.density * self.diffusivity)),
+            heat.around,
+            heat.humidity if vapour else np.full(count, self.fraction),
+            film,
+            menisci.area if menisci else np.zeros(count),
+            heat.response,
+            mass,
+            menisci.mass if menisci else np.zeros(count),
+            *np.empty((FOUND, count)),
         )
-        there = surfaces.mass.copy(), surfaces.bridged.copy()
         air = Air(keys.pressure, self.fluid.density, self.diffusivity, keys.rate == "stefan", keys.full_thickness)
         self._evaporate(surfaces, air, step)
+        taken = _NOTHING  # by the cells, which take it implicitly
         if vapour:
-            _give(simulation, vapour, surfaces, begin, there, step)
-        lost, of_bridges = surfaces.mass, surfaces.bridged
-        particles.temperature[...] = surfaces.temperature
-        from_films = lost / keys.liquid_density
-        from_films[is_drop] = 0.0
-        self._remove(particles, lost, from_films, is_drop)
-        volume = from_films + of_bridges / keys.liquid_density
-        sums = self.communicator.sum([lost + of_bridges, surfaces.heat, volume], axis=1)
+            taken = -vapour.exchange(simulation, surfaces.conductance, surfaces.saturated, step)
+        terms = np.empty((3, count))
+        settle(surfaces, taken, step, keys.liquid_density, particles.temperature, films, terms)
+        self._shrink(particles, surfaces.mass, is_drop)
+        sums = self.communicator.sum(terms, axis=1)
         self.mass += float(sums[0])
         self.heat += float(sums[1])
         if menisci:
-            energy, energies = menisci.lose(of_bridges), simulation.particle_solver.energies
+            energy, energies = menisci.lose(surfaces.bridged), simulation.particle_solver.energies
             if energies:
                 energies.add(DRIED, energy)
             simulation.feature(LiquidOnParticles).evaporated += float(sums[2])
@@ -124,21 +120,19 @@ class EvaporationOfLiquid(CaseFeature):
             self.mass += gone * keys.liquid_density
             simulation.feature(LiquidOnParticles).evaporated += gone
 
-    def _drops(self, particles: Any, film: np.ndarray, mass: np.ndarray) -> np.ndarray:
-        """Rows of the particles that are drops, whose film is infinite and whose mass [kg] can all evaporate but that
-        of the smallest drop."""
-        is_drop = np.flatnonzero(self.drops[particles.material]) if self.drops.any() else _NONE  # local: materials
+    def _with_drops(self, particles: Any, film: Any, mass: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Films [m3] and the mass that can evaporate [kg], with those of drops, and the rows of these: their film is
+        infinite, and all can evaporate but the smallest drop."""
+        is_drop = np.flatnonzero(self.drops[particles.material]) if self.any_drops else _NONE
         if len(is_drop):
+            film, mass = film.copy(), mass.copy()
             film[is_drop] = np.inf
             smallest = particles.density[is_drop] * (4.0 / 3.0 * math.pi * SMALLEST**3)
             mass[is_drop] = np.maximum(particles.mass[is_drop] - smallest, 0.0)
-        return is_drop
+        return film, mass, is_drop
 
-    def _remove(self, particles: Any, lost: np.ndarray, from_films: np.ndarray, is_drop: np.ndarray) -> None:
-        """Take a volume [m3] from films, and the mass `lost` [kg] from drops, which shrink."""
-        if "liquid" in particles:
-            left = particles.liquid - from_films
-            particles.liquid[...] = np.where(left > 1e-12 * particles.liquid, left, 0.0)
+    def _shrink(self, particles: Any, lost: np.ndarray, is_drop: np.ndarray) -> None:
+        """Take the mass `lost` [kg] from drops."""
         if len(is_drop):
             ratio = 1.0 - lost[is_drop] / particles.mass[is_drop]
             particles.radius[is_drop] *= np.cbrt(ratio)
@@ -155,25 +149,6 @@ class EvaporationOfLiquid(CaseFeature):
         self.mass, self.heat = float(state["mass"]), float(state["heat"])
         if self.walls:
             self.walls.restore(state["walls"])
-
-
-def _give(
-    simulation: Any,
-    vapour: Vapour,
-    surfaces: Surfaces,
-    begin: np.ndarray,
-    there: tuple[np.ndarray, np.ndarray],
-    step: float,
-) -> None:
-    """Give the vapour to the cells, which take it implicitly; surfaces then have what the cells took.
-
-    begin  temperature of the surfaces before [K]
-    there  liquid that can evaporate, of films and of bridges [kg]
-    """
-    conductance, latent = np.empty((2, len(begin)))
-    conductance_of_vapour(surfaces, *there, step, conductance, latent)
-    taken = -vapour.exchange(simulation, conductance, surfaces.saturated, step)
-    share_out(surfaces, begin, *there, taken, latent, step)
 
 
 def evaporated_mass(simulation: Any) -> float:

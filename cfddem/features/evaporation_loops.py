@@ -31,7 +31,7 @@ CLOSEST = 1e-9
 class Surfaces(NamedTuple):
     """Wet surfaces of n particles."""
 
-    temperature: np.ndarray  # after the exchange of heat with the gas alone; written [K]
+    begin: np.ndarray  # temperature after the exchange of heat with the gas alone [K]
     diameter: np.ndarray  # [m]
     sherwood: np.ndarray  # [-]
     gas: np.ndarray  # temperature of the gas around [K]
@@ -39,10 +39,20 @@ class Surfaces(NamedTuple):
     film: np.ndarray  # volume of liquid on the surface; infinite for a drop [m3]
     menisci: np.ndarray  # area of the particle's part of its bridges [m2]
     response: np.ndarray  # cooling by a loss of 1 W over the step [K/W]
-    mass: np.ndarray  # of liquid that is there; what evaporates is written, negative for vapour that condenses [kg]
-    bridged: np.ndarray  # the same of the particle's part of its bridges [kg]
-    heat: np.ndarray  # latent heat of what evaporates; written [J]
-    saturated: np.ndarray  # mass fraction of the vapour at the surface; written [-]
+    there: np.ndarray  # mass of liquid that can evaporate [kg]
+    in_bridges: np.ndarray  # the same in the particle's part of its bridges [kg]
+    # all below is found
+    temperature: np.ndarray  # [K]
+    mass: np.ndarray  # that evaporates, negative for vapour that condenses [kg]
+    bridged: np.ndarray  # the same of bridges [kg]
+    heat: np.ndarray  # latent heat of what evaporates [J]
+    saturated: np.ndarray  # mass fraction of the vapour at the surface [-]
+    conductance: np.ndarray  # that gives the cells what evaporates, at most what is there [kg/s]
+    latent: np.ndarray  # heat [J/kg]
+
+
+FOUND = 7
+"""Number of what is found."""
 
 
 class Air(NamedTuple):
@@ -63,11 +73,13 @@ def saturated(temperature, air):
 
 @inline
 def drive(temperature, gas, fraction, air):
-    """Driving force at the temperature of a surface [-], in a gas of a temperature and a mass fraction."""
+    """Driving force at the temperature of a surface, in a gas of a temperature and a mass fraction, and the mass
+    fraction at the surface [-]."""
     saturation = saturated(temperature, air)
+    at_surface = vapour_fraction(saturation, air.pressure)
     if air.stefan:
-        return stefan_drive(vapour_fraction(saturation, air.pressure), fraction)
-    return dilute_drive(saturation, vapour_pressure(fraction, air.pressure), gas, air.density)
+        return stefan_drive(at_surface, fraction), at_surface
+    return dilute_drive(saturation, vapour_pressure(fraction, air.pressure), gas, air.density), at_surface
 
 
 @serial
@@ -116,33 +128,6 @@ def taken_from(body, parts, masses, area, lost, taken):
 
 
 @serial
-def conductance_of_vapour(surfaces, there, there_in_bridges, step, conductance, latent):
-    """Conductance that gives the cells what evaporates, at most what is there (N,) [kg/s]; latent heat (N,) [J/kg]."""
-    for i in range(len(conductance)):
-        mass, difference = surfaces.mass[i] + surfaces.bridged[i], surfaces.saturated[i] - surfaces.fraction[i]
-        most = (there[i] + there_in_bridges[i]) / (step * max(surfaces.saturated[i], 1e-300))
-        wanted = mass / step / difference if abs(difference) > 1e-12 else 0.0
-        conductance[i] = max(min(wanted, most), 0.0)
-        latent[i] = surfaces.heat[i] / mass if mass != 0.0 else surfaces.heat[i]
-
-
-@serial
-def share_out(surfaces, begin, there, there_in_bridges, taken, latent, step):
-    """Let surfaces lose what cells took (N,) [kg]: films and bridges by their rates, as far as there is liquid.
-
-    begin  temperature of the surfaces before [K]
-    """
-    for i in range(len(taken)):
-        mass = surfaces.mass[i] + surfaces.bridged[i]
-        of_bridges = taken[i] * (surfaces.bridged[i] / mass if mass != 0.0 else 0.0)
-        most = there_in_bridges[i] if there_in_bridges[i] > 0.0 else 0.0
-        of_bridges = min(max(of_bridges, taken[i] - there[i]), most)
-        surfaces.bridged[i], surfaces.mass[i] = of_bridges, taken[i] - of_bridges
-        surfaces.heat[i] = latent[i] * taken[i]
-        surfaces.temperature[i] = begin[i] - surfaces.response[i] * surfaces.heat[i] / step
-
-
-@serial
 def evaporate(surfaces, air, step):
     """Let every surface evaporate over a step [s], at the temperature that it comes to: implicit. Films and bridges of
     a particle are at its temperature, with the same transport per area.
@@ -150,9 +135,10 @@ def evaporate(surfaces, air, step):
     The new temperature solves T = T' - s L(T) m(T), where m falls with T: the root is between T' and what m(T') gives.
     """
     for i in range(len(surfaces.mass)):
-        there, begin, diameter = surfaces.mass[i], surfaces.temperature[i], surfaces.diameter[i]
-        in_bridges, sherwood, film = surfaces.bridged[i], surfaces.sherwood[i], surfaces.film[i]
+        there, begin, diameter = surfaces.there[i], surfaces.begin[i], surfaces.diameter[i]
+        in_bridges, sherwood, film = surfaces.in_bridges[i], surfaces.sherwood[i], surfaces.film[i]
         surfaces.mass[i] = surfaces.bridged[i] = surfaces.heat[i] = surfaces.saturated[i] = 0.0
+        surfaces.temperature[i], surfaces.conductance[i], surfaces.latent[i] = begin, 0.0, 0.0
         if not (there > 0.0 or in_bridges > 0.0):
             continue
         area, share = math.pi * diameter**2, 1.0
@@ -167,15 +153,17 @@ def evaporate(surfaces, air, step):
         slowness, gas, fraction = surfaces.response[i], surfaces.gas[i], surfaces.fraction[i]
         scale = slowness * transport
         low = middle = begin
-        latent, driven = latent_heat(begin), drive(begin, gas, fraction, air)  # at `middle`
+        latent = latent_heat(begin)  # these three at `middle`
+        driven, at_surface = drive(begin, gas, fraction, air)
         at_low = scale * latent * driven  # of T - T' + s L m
         high = max(begin - at_low, 200.0)
-        at_high = high - begin + scale * latent_heat(high) * drive(high, gas, fraction, air)
+        at_high = high - begin + scale * latent_heat(high) * drive(high, gas, fraction, air)[0]
         for _ in range(100):
             if abs(high - low) <= CLOSEST or at_low == at_high:
                 break
             middle = high - at_high * (high - low) / (at_high - at_low)  # regula falsi, as in Illinois
-            latent, driven = latent_heat(middle), drive(middle, gas, fraction, air)
+            latent = latent_heat(middle)
+            driven, at_surface = drive(middle, gas, fraction, air)
             value = middle - begin + scale * latent * driven
             if abs(value) <= CLOSEST:
                 break
@@ -190,7 +178,36 @@ def evaporate(surfaces, air, step):
         mass = surfaces.mass[i] + surfaces.bridged[i]
         if mass < passing * transport:
             middle = begin - slowness * latent_heat(begin) * mass / step
-            latent = latent_heat(middle)
+            latent, at_surface = latent_heat(middle), vapour_fraction(saturated(middle, air), air.pressure)
         surfaces.temperature[i] = middle
         surfaces.heat[i] = mass * latent
-        surfaces.saturated[i] = vapour_fraction(saturated(middle, air), air.pressure)
+        surfaces.saturated[i] = at_surface
+        difference, most = at_surface - fraction, (there + in_bridges) / (step * max(at_surface, 1e-300))
+        wanted = mass / step / difference if abs(difference) > 1e-12 else 0.0
+        surfaces.conductance[i] = max(min(wanted, most), 0.0)
+        surfaces.latent[i] = surfaces.heat[i] / mass if mass != 0.0 else surfaces.heat[i]
+
+
+@serial
+def settle(surfaces, taken, step, density, temperature, liquid, sums):
+    """Give particles the temperature (N,) [K] and the liquid of their films (N,) [m3] after evaporation.
+
+    taken    mass that cells took from every surface [kg], which films and bridges then lose by their rates, as far as
+             there is liquid; empty where the vapour goes nowhere
+    density  of the liquid [kg/m3]
+    sums     mass [kg], latent heat [J] and volume of films and bridges [m3] that every particle loses; written (3, N)
+    """
+    for i in range(len(temperature)):
+        if len(taken):
+            mass = surfaces.mass[i] + surfaces.bridged[i]
+            of_bridges = taken[i] * (surfaces.bridged[i] / mass if mass != 0.0 else 0.0)
+            of_bridges = min(max(of_bridges, taken[i] - surfaces.there[i]), max(surfaces.in_bridges[i], 0.0))
+            surfaces.bridged[i], surfaces.mass[i] = of_bridges, taken[i] - of_bridges
+            surfaces.heat[i] = surfaces.latent[i] * taken[i]
+            surfaces.temperature[i] = surfaces.begin[i] - surfaces.response[i] * surfaces.heat[i] / step
+        of_film = surfaces.mass[i] / density if surfaces.film[i] < math.inf else 0.0
+        left = liquid[i] - of_film
+        liquid[i] = left if left > 1e-12 * liquid[i] else 0.0
+        temperature[i] = surfaces.temperature[i]
+        sums[0, i], sums[1, i] = surfaces.mass[i] + surfaces.bridged[i], surfaces.heat[i]
+        sums[2, i] = of_film + surfaces.bridged[i] / density

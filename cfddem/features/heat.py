@@ -26,6 +26,7 @@ from cfddem.coupling.transfer import ExchangeLaw, Transfer, memory_of
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.heat_keys import Heat
+from cfddem.features.vapour import Vapour
 from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import CellField
 from cfddem.fluid.scalar import Scalar, ScalarKind
@@ -48,6 +49,7 @@ class HeatExchange(CaseFeature):
     other              change of the heat in the particles between exchanges: by feeds, outlets and a user [J]
     last               heat in the particles after the last exchange, from their state [J]
     around             temperature of the fluid around every particle in the last exchange (N,) [K]
+    humidity           mass fraction of the vapour there, before its step, in a case with [vapour] (N,) [-]
     response           by how much a sink of 1 W, over the step of the last exchange, cools every particle (N,) [K/W];
                        less than the step over its capacity where the fluid gives heat within the step
     """
@@ -60,7 +62,7 @@ class HeatExchange(CaseFeature):
         assert keys is not None and law is not None
         self.keys, self.capacities, self.law = keys, keys.capacities(case), ExchangeLaw(law)
         self.fluid_temperature, self.given = keys.fluid_temperature, 0.0
-        self.communicator = simulation.communicator
+        self.communicator, self.humid = simulation.communicator, Vapour.is_in(case)
         self.cells: Scalar | None = None
         if keys.in_cells(case):
             fluid, kernel = simulation.required_fluid, simulation.required_coupling.kernel
@@ -77,6 +79,7 @@ class HeatExchange(CaseFeature):
         self.start = self.stored(simulation.owned)
         self.scale, self.other, self.last, self.sprayed = 0.0, 0.0, self.start, 0.0
         self.around, self.response = np.full(simulation.owned.count, self.fluid_temperature), np.zeros(0)
+        self.humidity = np.zeros(0)
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:
@@ -157,7 +160,7 @@ class HeatExchange(CaseFeature):
         if self.cells is None:
             received = self._from_uniform(particles, capacity, self.conductance(terms), step)
         else:
-            received = self._from_cells(self.cells, particles, terms, step)
+            received = self._from_cells(self.cells, simulation, step)
             self.response = step / capacity
         particles.temperature += received / capacity
         after = self._above(particles, capacity)
@@ -179,16 +182,20 @@ class HeatExchange(CaseFeature):
         )
         return np.asarray(exchanged * (self.fluid_temperature - particles.temperature))
 
-    def _from_cells(self, cells: Scalar, particles: Any, terms: Any, step: float) -> np.ndarray:
+    def _from_cells(self, cells: Scalar, simulation: Any, step: float) -> np.ndarray:
         """Heat that every particle receives from the cells around (N,) [J]; the cells make their step.
 
         Other heat of the particles, by contacts or evaporation, has been added to their temperatures before.
         """
+        particles, terms = simulation.owned, simulation.terms
+        kernel, cell_map = self.transfer.kernel, terms.cell_map
         self.transfer.last_step = 0.0
-        sent = self.transfer.prepare(particles, terms.cell_map, self.conductance(terms), step)
-        seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])[..., None]
-        rate = self.transfer.apply(particles, terms.cell_map, sent, np.ones_like(seen), seen)[:, 0]
-        self.around = particles.temperature + rate / sent.implicit
+        sent = self.transfer.prepare(particles, cell_map, self.conductance(terms), step)
+        seen = cells.step(sent.cell_conductance, sent.cell_product[..., 0])
+        humid = [simulation.feature(Vapour).cells.value] if self.humid else []
+        gathered = kernel.sample(cell_map.stencil, cell_map.radius, np.stack([np.ones_like(seen), seen, *humid]))
+        rate = self.transfer.receive(particles, sent, gathered)[:, 0]
+        self.around, self.humidity = particles.temperature + rate / sent.implicit, gathered[:, -1]
         return np.asarray(step * rate)
 
     def cells_for_snapshot(self) -> Mapping[str, np.ndarray | Portions]:

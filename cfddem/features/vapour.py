@@ -72,12 +72,6 @@ class Vapour(CaseFeature):
         numbers = self.law.numbers(terms.flow, particles.viscosity / self.conductivity)
         return np.asarray(2.0 * math.pi * particles.radius * self.conductivity * numbers)
 
-    def around(self, simulation: Any) -> np.ndarray:
-        """Mass fraction in the cells around every particle now (N,) [-]."""
-        kernel, cell_map = simulation.required_coupling.kernel, simulation.terms.cell_map
-        gathered = kernel.sample(cell_map.stencil, cell_map.radius, self.cells.value[None])
-        return np.asarray(gathered[:, 0])
-
     def exchange(self, simulation: Any, conductance: np.ndarray, surface: np.ndarray, step: float) -> np.ndarray:
         """Make the step of the vapour with particles that exchange with it; at most once in a step.
 

@@ -30,12 +30,16 @@ from cfddem.fluid.fields import CellField, CellFields
 from cfddem.fluid.grid import Array
 from cfddem.fluid.scalar_conditions import ScalarSides
 from cfddem.fluid.scalar_loops import (
-    balance,
+    Carried,
+    add_flows,
+    cell_flows,
     cell_rates,
     diffusivities,
+    followed_voidage,
+    move,
     relax,
-    through_faces,
-    through_sides,
+    sort_flows,
+    take_exchange,
     volume_fluxes,
 )
 from cfddem.fluid.scalar_sides import SideFaces
@@ -69,6 +73,51 @@ class ScalarKind:
     unlimited: bool = False
 
 
+class ScalarFlow:
+    """The flow that carries all scalars of a fluid, found once in a step.
+
+    flux     eps u through every face, with the correction that lets the stored voidage follow that of the fluid [m/s]
+    gate     1 between two open cells, 0 at solid cells and sides
+    growth   net outflow of every cell, outflow: twice what leaves it [1/s]
+    lost     stored voidage less that of the fluid [-]
+    least    of the stored voidage of every cell in the step (nz, ny, nx) [-]
+    """
+
+    def __init__(self, fluid: FluidSolver) -> None:
+        self.fluid, self.time = fluid, math.nan
+        cells = [CellField(each, "", "") for each in ("growth", "outflow", "lost")]
+        self.fields = CellFields(fluid.grid, [*cells, *(CellField(each, "", "", "faces") for each in ("flux", "gate"))])
+        self.least = np.ones(fluid.grid.shape)
+        self.growth = self.fields.owned("growth")
+        is_open = fluid.boundaries.halo.padded(fluid.grid.open, outside=0.0)
+        for d in range(3):
+            self.fields.gate[d] = is_open * np.roll(is_open, 1, axis=2 - d)
+
+    def follow(self, name: str, stored: Array) -> None:
+        """Follow the step that the fluid has made, unless another scalar has let it.
+
+        name    of the scalar
+        stored  its voidage before, padded; that of all scalars is the same but for rounding
+        """
+        fluid, fields = self.fluid, self.fields
+        if self.time == fluid.time:
+            return
+        step, inverse, of_fluid = fluid.last_step, fluid.inverse_spacing, fluid.fields
+        followed_voidage(stored, of_fluid.voidage, of_fluid.voidage_rate, fluid.open_cells, step, fields.lost)
+        fluid.boundaries.halo.fill(fields.lost)
+        strength = FOLLOW / (step * inverse)
+        volume_fluxes(of_fluid.velocity, of_fluid.mean_voidage, fields.lost, fields.gate, strength, fields.flux)
+        cell_flows(
+            fields.flux, stored, fluid.open_cells, inverse, step, fields.growth, fields.outflow, self.least
+        )  # fmt: skip
+        if fluid.communicator.smallest(self.least) <= 0.0:
+            raise RunFailed(
+                f"{name} of the fluid: a cell loses all of its fluid in the step of {step:.3g} s to "
+                f"t = {fluid.time:g} s; take shorter fluid steps"
+            )
+        self.time = fluid.time
+
+
 class Scalar:
     """A scalar of a fluid, in every cell.
 
@@ -76,8 +125,9 @@ class Scalar:
     kind   what it is
     sides  conditions on the sides
 
+    flow   that carries it and all other scalars of the fluid
     sums   since the start, of the value above `kind.start` times capacity [J] or [kg]: "inflow", "outflow", "walls",
-           "exchange" from the particles, "displaced" by particles that entered or left
+           "displaced" by particles that entered or left
     leaving  mean value of what left through outlets in the last step in which something did; at first that at the start
     """
 
@@ -86,32 +136,24 @@ class Scalar:
         if self.grid.walls:
             remedy = "take Grid.with_solid instead of smooth walls"
             raise InputError("walls", None, "solid cells where the fluid has a temperature or a vapour", remedy)
-        cells = ("value", "stored", "next", "growth", "rate", "lost", "diffusivity", "coefficient", "target", "missed")
+        others = [each for each in fluid.followers if isinstance(each, Scalar)]
+        self.flow = others[0].flow if others else ScalarFlow(fluid)
         roles: Mapping[str, Any] = {"value": "state", "stored": "state"}
         initial = {"value": kind.start, "next": kind.start, "stored": 1.0}
+        names = ("value", "stored", "next", "diffusivity", "coefficient", "target", "missed")
         self.fields = CellFields(
             self.grid,
-            [
-                *(
-                    CellField(each, "", "", "cells", roles.get(each, "scratch"), initial.get(each, 0.0))
-                    for each in cells
-                ),
-                *(CellField(each, "", "", "faces") for each in ("flux", "gate")),
-            ],
+            [CellField(each, "", "", "cells", roles.get(each, "scratch"), initial.get(each, 0.0)) for each in names],
         )
         self._through = np.zeros((2, 3, *self.grid.padded_shape))
         self._faces = SideFaces.of(fluid.boundaries, sides, kind.capacity)
-        self._side = self._faces.places[:, 0], self._faces.places[:, 1]  # where the faces of sides are
-        names = ("stored", "lost", "growth", "rate", "coefficient", "target", "missed")
-        self._cells = {name: self.fields.owned(name) for name in names}  # views of what is never exchanged
-        is_open = fluid.boundaries.halo.padded(self.grid.open, outside=0.0)
-        for d in range(3):
-            self.fields.gate[d] = is_open * np.roll(is_open, 1, axis=2 - d)
+        self._cells = {name: self.fields.owned(name) for name in ("stored", "target", "missed")}  # never exchanged
+        self._rate = np.zeros(self.grid.shape)
         self._wall_rate = self._rate_of_walls()
         self.fields.owned("stored")[:] = fluid.voidage
-        self.sums = dict.fromkeys(("inflow", "outflow", "walls", "exchange", "displaced"), 0.0)
+        self.sums = dict.fromkeys(("inflow", "outflow", "walls", "displaced"), 0.0)
         self.leaving, self.parts = kind.start, 1
-        fluid.followers.append(self.displaced)
+        fluid.followers.append(self)
 
     # ------------------------------------------------------------ values
 
@@ -152,94 +194,64 @@ class Scalar:
         product      beta times the value of the particles (nz, ny, nx)
         returns      value that the exchange has seen (nz, ny, nx): it has given beta (v - seen) per volume and time
         """
-        step = self.fluid.last_step
-        parts = self._find_fluxes(step)
+        step, fields = self.fluid.last_step, self.fields
+        self.flow.follow(self.kind.name, fields.stored)
+        parts = self._parts_of(step)
         exchanging = coefficient is not None and product is not None
         if exchanging:
-            self._take_exchange(coefficient, product)
-        of_sides = np.asarray(self.fields.flux.reshape(3, -1)[self._side])
-        flows = np.zeros(len(of_sides))
+            take_exchange(
+                coefficient, product, fields.value, self.kind.capacity, fields.coefficient, fields.target, fields.missed
+            )
+        flows = np.zeros(len(self._faces.places))
         for _ in range(parts):
             if exchanging:
                 self._relax(0.5 * step / parts)
-            self._move(step / parts, of_sides, flows)
+            carried_by = self._move(step / parts)
+            add_flows(carried_by, self.kind.start, step / parts, flows)
             if exchanging:
                 self._relax(0.5 * step / parts)
-        self._count(of_sides, flows)
-        seen: Array = self._cells["target"] - self._cells["missed"] * (0.5 / parts)
-        if coefficient is not None and product is not None:
-            given = float(self.fluid.communicator.sum(product - coefficient * seen))
-            self.sums["exchange"] += step * self.grid.cell_volume * given
-        return seen
+        self._count(carried_by, flows)
+        return np.asarray(self._cells["target"] - self._cells["missed"] * (0.5 / parts))
 
-    def _find_fluxes(self, step: float) -> int:
-        """Flux of the fluid, diffusivity, and rates of cells; returns into how many parts the step is divided."""
-        fluid, fields, inverse = self.fluid, self.fields, self.fluid.inverse_spacing
-        earlier = fluid.voidage - step * fluid.fields.owned("voidage_rate")
-        self._cells["lost"][:] = (self._cells["stored"] - earlier) * fluid.open_cells
-        fluid.boundaries.halo.fill(fields.lost)
-        strength = FOLLOW / (step * inverse)
-        volume_fluxes(fluid.fields.velocity, fluid.fields.mean_voidage, fields.lost, fields.gate, strength, fields.flux)
+    def _parts_of(self, step: float) -> int:
+        """Find the diffusivity, and into how many parts the step is divided."""
+        fluid, fields, flow = self.fluid, self.fields, self.flow
         molecular = self.kind.conductivity / self.kind.capacity
         diffusivities(fluid.fields.mean_voidage, molecular, self.kind.spread == "none", fields.diffusivity)
-        cell_rates(fields.flux, fields.diffusivity, inverse, fields.growth, fields.rate)
-        growth, stored = self._cells["growth"], self._cells["stored"]
-        growth *= fluid.open_cells
-        least = np.minimum(stored, stored - step * growth)
-        if fluid.communicator.smallest(least) <= 0.0:
-            raise RunFailed(
-                f"{self.kind.name} of the fluid: a cell loses all of its fluid in the step of {step:.3g} s to "
-                f"t = {fluid.time:g} s; take shorter fluid steps"
-            )
-        rate = (self._cells["rate"] + self._wall_rate) * fluid.open_cells
-        self.parts = max(1, math.ceil(step * fluid.communicator.largest(rate / least) * (1.0 - 1e-9)))
+        cell_rates(
+            flow.fields.outflow, fields.diffusivity, self._wall_rate, flow.least, fluid.open_cells,
+            fluid.inverse_spacing, self._rate,
+        )  # fmt: skip
+        self.parts = max(1, math.ceil(step * fluid.communicator.largest(self._rate) * (1.0 - 1e-9)))
         return self.parts
-
-    def _take_exchange(self, coefficient: Any, product: Any) -> None:
-        """Coefficient over capacity, and value of the particles in every cell."""
-        self._cells["coefficient"][:] = coefficient / self.kind.capacity
-        there = coefficient > 0.0
-        self._cells["target"][:] = np.where(there, product / np.where(there, coefficient, 1.0), self.value)
-        self.fields.missed.fill(0.0)
 
     def _relax(self, step: float) -> None:
         """Exchange with the particles."""
         fields = self.fields
         relax(fields.value, fields.stored, fields.coefficient, fields.target, step, fields.missed)
 
-    def _move(self, step: float, of_sides: Array, flows: Array) -> None:
-        """Advection, diffusion and the flux of walls over a step [s]; adds what came through every face of a side.
-
-        of_sides  eps u through these, along their axes (m,) [m/s]
-        """
-        fields, inverse, through = self.fields, self.fluid.inverse_spacing, self._through
-        for stage, second in ((0, 0.0), (1, 0.5)):
+    def _move(self, step: float) -> Carried:
+        """Advection, diffusion and the flux of walls over a step [s]."""
+        fields, of_flow = self.fields, self.flow.fields
+        carried_by = Carried(
+            fields.stored, of_flow.growth, of_flow.flux, fields.diffusivity, of_flow.gate,
+            self._faces.places, self._faces.rules, self._through, self.fluid.inverse_spacing,
+        )  # fmt: skip
+        for stage in (0, 1):
             value = fields.next if stage else fields.value
             self.fluid.boundaries.halo.fill(value)
-            through_faces(
-                value, fields.flux, fields.diffusivity, fields.gate, inverse, float(self.kind.unlimited), through[stage]
-            )
-            through_sides(
-                value.reshape(-1), fields.flux.reshape(3, -1), fields.diffusivity.reshape(-1),
-                self._faces.places, self._faces.rules, inverse, through[stage].reshape(3, -1),
-            )  # fmt: skip
-            balance(fields.value, fields.stored, fields.growth, through, second, step, inverse, fields.next)
+            move(value, fields.value, carried_by, stage, step, float(self.kind.unlimited), fields.next)
             if self.grid.solid is not None:
                 self.grid.inner(fields.next)[self.grid.solid] = self.kind.start
         fields.swap("value", "next")
-        self._cells["stored"][:] -= step * self._cells["growth"]
-        one, other = (each.reshape(3, -1)[self._side] for each in through)
-        flows += step * self._faces.places[:, 3] * (0.5 * (one + other) - self.kind.start * of_sides)
+        self._cells["stored"][:] -= step * self.flow.growth
+        return carried_by
 
-    def _count(self, of_sides: Array, flows: Array) -> None:
-        """Add what came through the sides in a step to the sums."""
-        faces, into = self._faces, of_sides * self._faces.places[:, 3]
-        brought = flows * faces.area * self.kind.capacity
-        leaves = ~faces.wall & (into < 0.0)
-        terms = np.where([~faces.wall & ~leaves, leaves, faces.wall], brought, 0.0)
-        inflow, outflow, walls, left = self.fluid.communicator.sum(
-            np.append(terms, [np.where(leaves, into * faces.area, 0.0)], axis=0), axis=1
-        ).tolist()
+    def _count(self, carried_by: Carried, flows: Array) -> None:
+        """Add what came through every face of a side in a step to the sums."""
+        terms = np.empty((4, len(flows)))
+        sort_flows(carried_by, flows, self._faces.area, self._faces.wall, self.kind.capacity, terms)
+        inflow, outflow, walls, left = self.fluid.communicator.sum(terms, axis=1).tolist()
         left *= -self.fluid.last_step
         self.sums["inflow"] += inflow
         self.sums["outflow"] -= outflow

@@ -3,12 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 import closures.compiled  # noqa: F401  lets compiled loops call laws by their names
 from cfddem.backend.compile import inline, prange, serial, threaded
 from cfddem.fluid.grid import LOW
 from cfddem.fluid.momentum import carried, inside, line, strides
 from closures.heat_transfer import zehner_schluender
+
+
+@threaded
+def followed_voidage(stored, voidage, rate, is_open, step, lost):
+    """Stored voidage less that of the fluid at the beginning of the step [s], to `lost` in open cells.
+
+    stored, voidage, rate [1/s], lost  padded
+    """
+    for k in prange(is_open.shape[0]):
+        for j in range(is_open.shape[1]):
+            for i in range(is_open.shape[2]):
+                at = k + LOW, j + LOW, i + LOW
+                lost[at] = (stored[at] - (voidage[at] - step * rate[at])) * is_open[k, j, i]
 
 
 @threaded
@@ -33,25 +49,42 @@ def volume_fluxes(velocity, voidage, lost, gate, strength, flux):
 
 
 @threaded
-def cell_rates(flux, diffusivity, inverse, growth, rate):
-    """Outflow of every cell, and the rate at which its value can change: a step below its inverse is bounded [1/s].
+def cell_flows(flux, stored, is_open, inverse, step, growth, outflow, least):
+    """Net outflow of every cell to `growth`, twice what leaves it to `outflow` [1/s], and the least of its stored
+    voidage in the step to `least` (nz, ny, nx) [-].
 
     A limited value on a face lies between the cells on both sides, so that what leaves a cell counts twice.
     """
-    shape, steps = diffusivity.shape, strides(diffusivity.shape)
-    diffusivity, growth, rate = diffusivity.reshape(-1), growth.reshape(-1), rate.reshape(-1)
-    flux = flux.reshape(3, -1)
-    spread = 4.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
+    shape, steps = stored.shape, strides(stored.shape)
+    flat_growth, flat_outflow, flux = growth.reshape(-1), outflow.reshape(-1), flux.reshape(3, -1)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
-        d_here, grows, out = line(diffusivity, at, n), line(growth, at, n), line(rate, at, n)
+        grows, out = line(flat_growth, at, n), line(flat_outflow, at, n)
         for i in range(n):
-            grows[i], out[i] = 0.0, spread * d_here[i]
+            grows[i] = out[i] = 0.0
         for d in range(3):
             low, high = line(flux[d], at, n), line(flux[d], at + steps[d], n)
             for i in range(n):
                 grows[i] += (high[i] - low[i]) * inverse[d]
                 out[i] += 2.0 * (max(high[i], 0.0) + max(-low[i], 0.0)) * inverse[d]
+    for k in prange(is_open.shape[0]):
+        for j in range(is_open.shape[1]):
+            for i in range(is_open.shape[2]):
+                at = k + LOW, j + LOW, i + LOW
+                growth[at] *= is_open[k, j, i]
+                least[k, j, i] = min(stored[at], stored[at] - step * growth[at])
+
+
+@threaded
+def cell_rates(outflow, diffusivity, of_walls, least, is_open, inverse, rate):
+    """Rate at which the value of every cell can change: a step below its inverse is bounded (nz, ny, nx) [1/s]."""
+    spread = 4.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
+    for k in prange(is_open.shape[0]):
+        for j in range(is_open.shape[1]):
+            for i in range(is_open.shape[2]):
+                at = k + LOW, j + LOW, i + LOW
+                fastest = outflow[at] + spread * diffusivity[at] + of_walls[k, j, i]
+                rate[k, j, i] = fastest * is_open[k, j, i] / least[k, j, i]
 
 
 @threaded
@@ -62,12 +95,41 @@ def diffusivities(voidage, molecular, straight, diffusivity):
         diffusivity[n] = molecular * (voidage[n] if straight else zehner_schluender(voidage[n]))
 
 
+class Carried(NamedTuple):
+    """What moves a scalar in a step, padded but for the sides.
+
+    places   (m, 4) axis, flat index of the face, of its cell, and +1 where the way into the cell is along the axis
+    rules    (m, 6) value that an inflow brings, NaN for that of the cell; coefficient [m/s], infinite for a given value
+             on the face; value outside; given flux; share of the area; 1 where it is in series with the half cell
+    through  (2, 3, ...) what goes through every face, per area along its axis, in both stages
+    """
+
+    stored: np.ndarray  # voidage [-]
+    growth: np.ndarray  # net outflow [1/s]
+    flux: np.ndarray  # of the fluid (3, ...) [m/s]
+    diffusivity: np.ndarray  # [m2/s]
+    gate: np.ndarray  # (3, ...) 1 between two open cells
+    places: np.ndarray
+    rules: np.ndarray
+    through: np.ndarray
+    inverse: np.ndarray  # of the spacing along x, y, z [1/m]
+
+
 @threaded
-def through_faces(value, flux, diffusivity, gate, inverse, unlimited, through):
-    """What flow and diffusion carry through every face, per area; sides of the box are set by `through_sides`."""
-    shape, steps = value.shape, strides(value.shape)
-    value, diffusivity = value.reshape(-1), diffusivity.reshape(-1)
-    flux, gate, through = flux.reshape(3, -1), gate.reshape(3, -1), through.reshape(3, -1)
+def move(value, old, carried_by, stage, step, unlimited, new):
+    """One of Heun's two stages, 0 and 1: what flow and diffusion carry through every face, sides of the box included,
+    and the balance of every cell.
+
+    value  of the stage
+    old    before the step [s]
+    new    after the step
+    """
+    shape, steps, second = value.shape, strides(value.shape), 0.5 * stage
+    stored, growth, flux, diffusivity, gate, places, rules, both, inverse = carried_by
+    value, old, new = value.reshape(-1), old.reshape(-1), new.reshape(-1)
+    stored, growth, diffusivity = stored.reshape(-1), growth.reshape(-1), diffusivity.reshape(-1)
+    flux, gate, both = flux.reshape(3, -1), gate.reshape(3, -1), both.reshape(2, 3, -1)
+    through = both[stage]
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
         for d in range(3):
@@ -79,49 +141,56 @@ def through_faces(value, flux, diffusivity, gate, inverse, unlimited, through):
                 spread = 0.5 * is_open[i] * (d_low[i] + d_high[i]) * inverse[d]
                 moved = carried(f[i], far_low[i], low[i], high[i], far_high[i], unlimited)
                 out[i] = moved - spread * (high[i] - low[i])
-
-
-@serial
-def through_sides(value, flux, diffusivity, places, rules, inverse, through):
-    """Set what is carried through the faces of sides and solid cells.
-
-    places   (m, 4) axis, flat index of the face, of its cell, and +1 where the way into the cell is along the axis
-    rules    (m, 6) value that an inflow brings, NaN for that of the cell; coefficient [m/s], infinite for a given value
-             on the face; value outside; given flux; share of the area; 1 where it is in series with the half cell
-    through  (3, size), per area along the axis
-    """
     for n in range(len(places)):
         axis, face, cell, inward = places[n]
         brought, coefficient, outside, given, share, in_series = rules[n]
-        own, f = value[cell], flux[axis, face]
-        enters = f * inward > 0.0 and not math.isnan(brought)
+        own, through_side = value[cell], flux[axis, face]
+        enters = through_side * inward > 0.0 and not math.isnan(brought)
         if in_series != 0.0:
             half = 2.0 * diffusivity[cell] * inverse[axis]
             coefficient = half if math.isinf(coefficient) else coefficient * half / (coefficient + half)
-        through[axis, face] = f * (brought if enters else own)
+        through[axis, face] = through_side * (brought if enters else own)
         if coefficient != 0.0 or given != 0.0:
             through[axis, face] += inward * share * (coefficient * (outside - own) + given)
-
-
-@threaded
-def balance(value, stored, growth, through, second, step, inverse, new):
-    """Value after a step from what went through the faces, (2, 3, ...), the second with this weight."""
-    shape, steps = value.shape, strides(value.shape)
-    value, stored, growth, new = value.reshape(-1), stored.reshape(-1), growth.reshape(-1), new.reshape(-1)
-    through = through.reshape(2, 3, -1)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
-        old, e, grows, out = line(value, at, n), line(stored, at, n), line(growth, at, n), line(new, at, n)
+        was, e, grows, out = line(old, at, n), line(stored, at, n), line(growth, at, n), line(new, at, n)
         for i in range(n):
-            out[i] = e[i] * old[i]
+            out[i] = e[i] * was[i]
         for d in range(3):
-            a_low, a_high = line(through[0, d], at, n), line(through[0, d], at + steps[d], n)
-            b_low, b_high = line(through[1, d], at, n), line(through[1, d], at + steps[d], n)
+            a_low, a_high = line(both[0, d], at, n), line(both[0, d], at + steps[d], n)
+            b_low, b_high = line(both[1, d], at, n), line(both[1, d], at + steps[d], n)
             for i in range(n):
                 left = (1.0 - second) * (a_high[i] - a_low[i]) + second * (b_high[i] - b_low[i])
                 out[i] -= step * inverse[d] * left
         for i in range(n):
             out[i] /= e[i] - step * grows[i]
+
+
+@serial
+def add_flows(carried_by, start, step, flows):
+    """Add what came in along its axis through the face of every side in a step, above that of the value `start`."""
+    flux, through = carried_by.flux.reshape(3, -1), carried_by.through.reshape(2, 3, -1)
+    for n in range(len(flows)):
+        axis, face, _, inward = carried_by.places[n]
+        mean = 0.5 * (through[0, axis, face] + through[1, axis, face])
+        flows[n] += step * inward * (mean - start * flux[axis, face])
+
+
+@serial
+def sort_flows(carried_by, flows, area, wall, capacity, sums):
+    """What came in through inlets, outlets and walls, and the fluid that left, of every face of a side (4, m).
+
+    area, wall  of the face [m2], and whether it is a wall (m,)
+    """
+    flux = carried_by.flux.reshape(3, -1)
+    for n in range(len(flows)):
+        axis, face, _, inward = carried_by.places[n]
+        into = flux[axis, face] * inward
+        sums[:, n] = 0.0
+        sums[2 if wall[n] else (1 if into < 0.0 else 0), n] = flows[n] * area[n] * capacity
+        if not wall[n] and into < 0.0:
+            sums[3, n] = into * area[n]
 
 
 @inline
@@ -143,3 +212,17 @@ def relax(value, stored, coefficient, target, step, missed):
         mean = (target[n] - value[n]) * mean_of_decay(stiffness)
         value[n] += stiffness * mean
         missed[n] += mean
+
+
+@threaded
+def take_exchange(coefficient, product, value, capacity, rate, target, missed):
+    """Coefficient over capacity [1/s], and value of the particles in every cell; that of the fluid without particles.
+
+    coefficient, product  (nz, ny, nx); others padded
+    """
+    for k in prange(coefficient.shape[0]):
+        for j in range(coefficient.shape[1]):
+            for i in range(coefficient.shape[2]):
+                at, b = (k + LOW, j + LOW, i + LOW), coefficient[k, j, i]
+                rate[at], missed[at] = b / capacity, 0.0
+                target[at] = product[k, j, i] / b if b > 0.0 else value[at]

@@ -13,7 +13,7 @@ from cfddem.fluid.scalar_conditions import SOLID, FluxWall, HeldWall, ScalarSide
 
 
 class SideFaces(NamedTuple):
-    """Faces of sides and solid cells; see `cfddem.fluid.scalar_loops.through_sides`."""
+    """Faces of sides and solid cells; see `cfddem.fluid.scalar_loops.Carried`."""
 
     places: np.ndarray  # (m, 4)
     rules: Array  # (m, 6)

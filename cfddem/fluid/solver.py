@@ -77,8 +77,8 @@ class FluidSolver:
 
     Attributes: `fields`, padded arrays by name (see `cfddem.fluid.fields`); `faces`, kinds of faces; `face_areas`,
     area of a face normal to x, y, z [m2]; `open_cells` (nz, ny, nx), 1 where a cell is open, 0 where it is solid;
-    `time`, `last_step`, length of the step just made [s]; `followers`, called before the voidage changes without a
-    flow, by (nz, ny, nx); `body_forces`, more sources. Methods return plain arrays in the order of `cfddem.fluid.grid`.
+    `time`, `last_step`, length of the step just made [s]; `followers`, told by `displaced` before the voidage changes
+    without a flow; `body_forces`, more sources. Methods return plain arrays in the order of `cfddem.fluid.grid`.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class FluidSolver:
         self.density, self.model, self.gravity = float(density), model, np.asarray(gravity, dtype=float)
         self.tolerance, self.passes = float(tolerance), int(passes)
         self.time, self.last_step = 0.0, 0.0
-        self.followers: list[Callable[[Array], None]] = []
+        self.followers: list[Any] = []
         self.body_forces: list[Callable[[], Array]] = []
         self.fields, self.faces = CellFields(grid, FLUID_FIELDS), sides.faces()
         self.model_b, self._central = float(model == "B"), float(convection == "central")
@@ -331,7 +331,7 @@ class FluidSolver:
         voidage = np.minimum(self.voidage + change, 1.0)  # where all particles leave a cell, up to rounding
         voidage = checked_voidage(self.grid, voidage, self.communicator)
         for follow in self.followers:
-            follow(voidage - self.voidage)
+            follow.displaced(voidage - self.voidage)
         self.voidage[:] = voidage
 
     def set_velocity(self, velocity: Sequence[Any]) -> None:

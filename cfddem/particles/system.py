@@ -56,3 +56,46 @@ class PairSystem(NamedTuple):
     rows: np.ndarray  # of the pair table, one after the other
     kinds: np.uint64  # number of materials
     parameters: Parameters
+
+
+class _Spheres(NamedTuple):
+    position: np.ndarray
+    radius: np.ndarray
+    inverse_mass: np.ndarray
+    owned: int
+
+
+class _Joined(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+    image: np.ndarray
+    between_particles: int
+    touch: np.ndarray
+
+
+class _Bridges(NamedTuple):
+    bridge_film: np.ndarray
+    bridge_volume: np.ndarray
+    bridge_gap: np.ndarray
+    closed_along: np.ndarray
+    closed_across: np.ndarray
+
+
+@struct
+class BridgeSystem(NamedTuple):
+    """The part of a `System` that loops over bridges take once in a fluid step, when handing all of it over would take
+    longer than the loop."""
+
+    particles: _Spheres
+    edges: _Joined
+    memory: _Bridges
+    shift: np.ndarray
+
+    @classmethod
+    def of(cls, system: System) -> BridgeSystem:
+        """That part of a system."""
+        parts = zip((_Spheres, _Joined, _Bridges), system[:3])
+        return cls(
+            *(kind(*(getattr(part, name) for name in kind._fields)) for kind, part in parts),  # type: ignore[call-arg]
+            system.shift,
+        )

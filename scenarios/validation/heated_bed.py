@@ -21,6 +21,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize
+from scipy.special import erfc, erfcx
 
 from cfddem import Material, ParticleSolver, Plane, make_particles, pair_table
 from cfddem.case.schema import Case
@@ -108,6 +110,30 @@ def measured(depth: float) -> np.ndarray:
     time, value = columns[1][rows], columns[2][rows]
     near = [(time > 3900.0) if at == TIMES[-1] else (np.abs(time - at) <= 150.0) for at in TIMES]
     return np.array([value[each].mean() for each in near])  # local: of a table
+
+
+def slab(time: np.ndarray, depth: float, diffusivity: float, lag: float) -> np.ndarray:
+    """Temperature of a deep slab that a plate heats from t = 0, at a depth [m] (n,) [C].
+
+    lag  resistance between plate and slab, as the thickness of so much slab [m]
+    """
+    reach = 2.0 * np.sqrt(diffusivity * time)
+    near, far = depth / reach, depth / reach + 0.5 * reach / lag
+    return np.asarray(COLD + (HOT - COLD) * (erfc(near) - np.exp(-(near**2)) * erfcx(far)))
+
+
+def as_slab(found: Mapping[float, np.ndarray]) -> tuple[float, float, float]:
+    """The slab nearest to temperatures by depth [cm] at `TIMES`: its diffusivity [m2/s], its lag [m], and the largest
+    difference [K]."""
+    time = np.array(TIMES, float)
+
+    def apart(numbers: np.ndarray) -> float:
+        each = (slab(time, 0.01 * depth, *np.exp(numbers)) - values for depth, values in found.items())
+        return float(np.abs(np.concatenate(list(each))).max())  # local: of a few curves
+
+    starts = [np.log([3e-7, lag]) for lag in (1e-4, 3e-3)]
+    best = min((minimize(apart, start, method="Nelder-Mead") for start in starts), key=lambda result: result.fun)
+    return (*np.exp(best.x).tolist(), float(best.fun))
 
 
 def rough(curves: Curves) -> list[Row]:

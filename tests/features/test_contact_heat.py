@@ -366,6 +366,20 @@ def test_a_heated_bed_has_the_same_bits_on_two_threads() -> None:
 @pytest.mark.slow
 def test_the_heated_bed_of_beaulieu_holds_its_limits_but_for_the_upper_depth() -> None:
     """At 4.0 cm it is 1.4 K colder than measured, within the measurement's error of 2.2 K."""
-    failed = [each for each in heated_bed.rough({}) if each.verdict != "holds"]
+    curves: dict[str, Any] = {}
+    failed = [each for each in heated_bed.rough(curves) if each.verdict != "holds"]
+    found = {depth: curves["rough"][f"at {depth:g} cm"][0] for depth in heated_bed.LIMITS}
+    diffusivity, lag, apart = heated_bed.as_slab(found)
+    print(f"as a slab: {diffusivity:.3g} m2/s, {1e3 * lag:.2f} mm from the plate, within {apart:.2f} K")
+    assert apart < 0.25 and diffusivity == pytest.approx(3.2e-7, rel=0.05) and lag == pytest.approx(5.5e-3, rel=0.1)
     assert len(failed) == 1 and "at 4 cm" in failed[0].quantity
     assert failed[0].difference == pytest.approx(-1.4, abs=0.1)
+
+
+def test_the_measurement_of_beaulieu_is_that_of_a_slab_that_touches_the_plate() -> None:
+    """A known slab is found, and the measured one has no resistance at the plate: that of the run is 5.5 mm away."""
+    time = np.array(heated_bed.TIMES, float)
+    made = {depth: heated_bed.slab(time, 0.01 * depth, 3e-7, 4e-3) for depth in heated_bed.LIMITS}
+    assert heated_bed.as_slab(made)[:2] == pytest.approx((3e-7, 4e-3), rel=0.01)
+    diffusivity, lag, apart = heated_bed.as_slab({depth: heated_bed.measured(depth) for depth in heated_bed.LIMITS})
+    assert diffusivity == pytest.approx(2.75e-7, rel=0.02) and lag < 1e-4 and apart < 0.5

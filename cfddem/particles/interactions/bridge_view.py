@@ -24,6 +24,7 @@ from cfddem.particles.interactions.wall_liquid import gained_by_walls, with_room
 from cfddem.particles.pair_graph import Edges, geometry
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles
+from cfddem.particles.system import BridgeSystem
 from cfddem.particles.walls.nearest_point import Walls
 
 GROWTH = 1.25
@@ -134,7 +135,8 @@ class Bridges(ParticleFeature):
         lost     volume (n,), below 0 where vapour condenses [m3]
         returns  energy of the pulls that is gone, of bridges whose first body this process owns [J]
         """
-        return float(self._dry(rows, lost, self._solver.system))
+        system = self._solver.system
+        return float(self._dry(rows, lost, BridgeSystem.of(system), system.parameters))
 
     @cached_property
     def _dry(self) -> Any:
@@ -232,9 +234,9 @@ def _break(system):
 
 
 @serial
-def _dry(rows, lost, system):
+def _dry(rows, lost, system, p):
     """See `Bridges.dry`; returns the energy of the pulls that is gone [J]."""
-    memory, p, edges, energy = system.memory, system.parameters, system.edges, 0.0
+    memory, edges, energy = system.memory, system.edges, 0.0
     for n in range(len(rows)):
         k = rows[n]
         _, _, gap = geometry(k, system)
