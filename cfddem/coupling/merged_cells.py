@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from cfddem.backend.errors import InputError
-from cfddem.fluid.cut_cells import CutCells
+from cfddem.fluid.cut_cells import cut_cells_of_box
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.halo import Halo
 
@@ -57,7 +57,7 @@ class MergedCells(SingleCells):
     def __init__(self, grid: Grid, periodic: Any) -> None:
         if grid.whole is not grid:
             raise InputError("ranks", None, "1 for particles within smooth walls", "take one process, or solid cells")
-        self._cut = CutCells(grid, Halo(grid.cells, periodic))
+        self._cut = cut_cells_of_box(grid, tuple(bool(each) for each in periodic))
         open_share = self._cut.own_volume() * grid.open
         small = open_share < LEAST
         if small.all():

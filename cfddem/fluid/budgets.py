@@ -132,9 +132,10 @@ def works(fluid: FluidSolver) -> Works:
     fluid.boundaries.fill_pressure(fields.pressure)
     start = fluid.viscous_force(fields.other_velocity, fields.other_voidage)
     end = fluid.viscous_force(fields.stage_velocity, fields.mean_voidage)
-    sums: dict[str, float] = {}
+    stiff, sums = np.zeros_like(start), dict[str, float]()
+    fluid.walls.add_held(fluid.density, fluid.last_step, stiff)
     for d in range(3):
-        for name, work in _work_on_faces(fluid, d, 0.5 * (start[d] + end[d])).items():
+        for name, work in _work_on_faces(fluid, d, 0.5 * (start[d] + end[d]), stiff[d]).items():
             sums[name] = sums.get(name, 0.0) + fluid.communicator.sum(work * volumes[d])
     pressed, brought, held = _at_sides(fluid)
     return Works(
@@ -176,8 +177,9 @@ def face_volumes(fluid: FluidSolver) -> Array:
     return np.asarray(volumes * fluid.faces.solved)
 
 
-def _work_on_faces(fluid: FluidSolver, d: int, stress: Array) -> dict[str, Array]:
-    """Work of each term per volume on the faces normal to d, padded [J/m3]; stress is the mean viscous force [N/m3]."""
+def _work_on_faces(fluid: FluidSolver, d: int, stress: Array, stiff: Array) -> dict[str, Array]:
+    """Work of each term per volume on the faces normal to d, padded [J/m3]; stress is the mean viscous force, stiff
+    what of it was implicit [N/m3]."""
     fields, h, rho = fluid.fields, fluid.last_step, fluid.density
     old, new = fields.other_velocity[d], fields.velocity[d]
     mean = 0.5 * (old + new)
@@ -194,7 +196,7 @@ def _work_on_faces(fluid: FluidSolver, d: int, stress: Array) -> dict[str, Array
         "pressure": -h * centred * gradient * mean,
         "driving": h * centred * driving * mean,
         "model_b": h * of_particles * (driving - gradient) * mean,
-        "viscous": h * stress * mean,
+        "viscous": h * (stress + stiff) * mean,
         "carried": h * (explicit - stress) * mean - 0.5 * rho * (ended - stored) * old * new,
         "drag": h * drag * acting,
         "implicit": h * drag * (mean - acting),
@@ -239,7 +241,10 @@ def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarr
     old, new = layer(fields.other_velocity[d], at_face), layer(fields.velocity[d], at_face)
     mean = 0.5 * (old + new)
     voidage = layer(on_faces(fields.centred_voidage, d), at_face)
-    flow = side.inward * voidage * mean * h * fluid.grid.face_area(d)  # volume that came in [m3]
+    cut = fluid.boundaries.cut
+    apertures, volumes = (np.broadcast_to(each, fluid.fields.drag.shape) for each in (cut.of_faces(d), cut.volume))
+    area = fluid.grid.face_area(d) * layer(apertures, at_face)
+    flow = side.inward * voidage * mean * h * area  # volume that came in [m3]
     pressure = np.where(inlet, layer(fields.pressure, inside), _inner(side.pressure))
     pressed = (flow * pressure)[inlet | outlet]
 
@@ -251,7 +256,7 @@ def _at_side(fluid: FluidSolver, side: Side, inlet: np.ndarray, outlet: np.ndarr
     drag, momentum = layer(fields.drag, inside), layer(fields.drag_momentum[d], inside)
     theta = implicitness.py_func(drag * h / (fluid.density * layer(fields.centred_voidage, inside)))
     acting = theta * new + (1.0 - theta) * old
-    work = 0.5 * h * fluid.grid.cell_volume * (drag * acting - momentum) * acting
+    work = 0.5 * h * fluid.grid.cell_volume * layer(volumes, inside) * (drag * acting - momentum) * acting
     return pressed, brought, work[inlet]
 
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -205,22 +206,20 @@ def volumes(surface: Surface, spacing: Sequence[float], *centres: Array) -> Arra
 
 
 class WholeCells:
-    """Of a grid without smooth walls: all cells and faces are whole."""
+    """Of a grid without smooth walls: all cells and faces are whole.
+
+    shares  apertures and volumes for compiled loops; none here
+    cells   numbers of the cells that walls cut, without ghosts; none here
+    """
 
     volume: Any = 1.0
     aperture: Any = 1.0
     beyond: Any = 0.0
+    shares: tuple[Array, ...] = ()
+    cells: NDArray[np.int64] = np.zeros(0, np.int64)
 
     def close(self, solved: Array, blocked: NDArray[np.bool_]) -> None:
         """Mark the faces that walls close, as of :class:`cfddem.fluid.boundaries.Faces`."""
-
-    def open_part(self, velocity: Array) -> Array:
-        """A face field (3, ...) times the apertures."""
-        return velocity
-
-    def held(self, cells: Array) -> Array:
-        """A padded cell field times the volumes."""
-        return cells
 
     def of_faces(self, d: int) -> Array | float:
         """Apertures of the faces normal to d, padded."""
@@ -237,7 +236,20 @@ class WholeCells:
 
 def cut_cells(grid: Grid, halo: Halo) -> WholeCells:
     """The cut cells of a grid with smooth walls, or its whole cells."""
-    return CutCells(grid, halo) if grid.walls else WholeCells()
+    if not grid.walls:
+        return WholeCells()
+    if grid.whole is grid:
+        return cut_cells_of_box(grid, tuple(bool(each) for each in halo.periodic))
+    return CutCells(grid, halo)
+
+
+@lru_cache(maxsize=2)
+def cut_cells_of_box(grid: Grid, periodic: tuple[bool, ...]) -> CutCells:
+    """The cut cells of a whole grid with smooth walls: made once for the fluid and for the kernel of its particles.
+
+    periodic  whether x, y, z are periodic
+    """
+    return CutCells(grid, Halo(grid.cells, np.array(periodic)))
 
 
 class CutCells(WholeCells):
@@ -279,6 +291,13 @@ class CutCells(WholeCells):
         halo.fill(self.volume, extend=False)
         for field in (self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve, self.beyond):
             halo.fill_faces(field)
+        self.shares = self.aperture, self.volume
+        touched = (grid.inner(self.volume) < 1.0) & grid.open
+        for d in range(3):
+            for side in range(2):
+                faces = np.roll(self.aperture[d], -side, axis=2 - d)
+                touched |= (grid.inner(faces) < 1.0) & grid.open
+        self.cells = np.flatnonzero(touched)
 
     def points(self, offset: Sequence[float]) -> list[Array]:
         """Coordinates x, y, z at a place in every padded cell, full arrays [m]."""
@@ -294,14 +313,6 @@ class CutCells(WholeCells):
         closed = self.aperture == 0.0
         solved[closed] = 0.0
         blocked |= closed
-
-    def open_part(self, velocity: Array) -> Array:
-        """See `WholeCells.open_part`."""
-        return np.asarray(velocity * self.aperture)
-
-    def held(self, cells: Array) -> Array:
-        """See `WholeCells.held`."""
-        return np.asarray(cells * self.volume)
 
     def of_faces(self, d: int) -> Array:
         """See `WholeCells.of_faces`."""

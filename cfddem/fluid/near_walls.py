@@ -25,28 +25,35 @@ import numpy as np
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.cut_cells import CutCells, section
 from cfddem.fluid.fields import CellFields
-from cfddem.fluid.grid import Array
-from cfddem.fluid.near_walls_loops import FULL, cut_transport, hold_near_walls
+from cfddem.fluid.grid import Array, on_faces
+from cfddem.fluid.momentum import implicitness
+from cfddem.fluid.near_walls_loops import BLOCK, FULL, cut_transport, hold_near_walls, shut
 
 LEAST_RISE = 0.4
 """How much farther from the wall the next face must be, for a curvature to be taken, in cells."""
 
 
 class Faces(NamedTuple):
-    """Faces of one component near walls; flat indices of padded fields."""
+    """Faces of one component near walls, in blocks of `BLOCK` faces of one plane of the grid; the last block of a plane
+    is filled up with copies of its last face. Blocks of one pattern have the same walls around them: the planes of an
+    upright column have one pattern each. Flat indices of padded fields are unsigned: none counts from the end.
+
+    Along each direction e of three there are eight weights: of the face before, the face itself and the next ones away
+    from the wall of both in the stress below, and of the face itself, the one behind and the next ones in that above.
+    Each has the area of its momentum face over the open volume in it.
+    """
 
     axis: int
-    at: Any  # (n,) the faces
-    share: Array  # (n,) of the momentum cell that is open
-    area: Array  # (n, 6) of its faces below and above along x, y, z, per open volume [1/m]
-    index: Any  # (n, 6, 4) velocities that make the gradient there
-    weight: Array  # (n, 6, 4) of each [1/m]
-    constant: Array  # (n, 6) the part that walls which slide add [1/s]
-    wall_index: Any  # (n, 2) velocities that make the pull of the wall
-    wall_weight: Array  # (n, 2) [1/m2]
-    wall_constant: Array  # (n,) [1/m/s]
-    stiff: Array  # (n,) weight of the own velocity in the stress, over that in a whole cell [1/m2]
-    aperture: Array  # (3, ...) of all faces
+    place: Any  # (blocks, BLOCK) the faces, less two planes
+    pattern: Any  # (blocks,)
+    share: Array  # (patterns, BLOCK) of the momentum cell that is open
+    weight: Array  # (patterns, 3, 8, BLOCK) of velocities in the gradients [1/m2]
+    constant: Array  # (patterns, 3, 2, BLOCK) the part that walls which slide add [1/m/s]; no patterns if none does
+    next: Any  # (patterns, 3, 2, BLOCK) next faces away from the wall, less `place`: of the face before, the one behind
+    farther: Any  # (patterns, BLOCK) the next face away from the wall, less `place`
+    pull: Array  # (patterns, 3, BLOCK) of the wall: weights of the face and that next one [1/m2], a constant [1/m/s]
+    stiff_at: Any  # (m,) the faces with a stress that is stiffer than in a whole cell
+    stiff: Array  # (m,) how much stiffer, over the own velocity [1/m2]
     inverse: Array  # (3,) 1/spacing [1/m]
 
 
@@ -65,6 +72,9 @@ class NoWalls:
         """Take the stiff part of the stress into a predicted velocity and its mobility; the stress of the stage before
         has this weight."""
 
+    def add_held(self, density: float, step: float, force: Array) -> None:
+        """Add what was implicit in the last step to the mean stress of its start and end (3, ...) [N/m3]."""
+
 
 class NearWalls(NoWalls):
     """The faces of a fluid near smooth walls.
@@ -78,32 +88,41 @@ class NearWalls(NoWalls):
         self.fields, cut = fields, boundaries.cut
         assert isinstance(cut, CutCells)
         self.profiles = [_profiles(cut, d) for d in range(3)]
-        self._resistance = [np.zeros(0)] * 3
         outlets = [(side.axis, side.face(cut.grid)) for side in boundaries.sides if side.outlet.any()]
         self.components = [_faces_of(cut, d, solved[d] > 0.0, self.profiles[d], outlets) for d in range(3)]
+        self._resistance = [np.zeros(faces.stiff.size) for faces in self.components]
+        self._cut = [_cut_faces(cut.aperture[e], e, self.components) for e in range(3)]
 
     def replace(self, velocity: Array, viscosity: Array, density: float, central: float, force: Array) -> None:
-        """See `NoWalls.replace`; `fields.flux` is that of the velocity."""
+        """See `NoWalls.replace`; `fields.flux`, that of the velocity, becomes that through the open parts of faces."""
+        flux = self.fields.flux
+        for e, (at, share) in enumerate(self._cut):
+            shut(at, share, flux[e])
         for d, faces in enumerate(self.components):
-            cut_transport(faces, velocity[d], self.fields.flux, viscosity, density, central, force[d])
+            cut_transport(faces, velocity[d], flux, viscosity, density, central, force[d])
 
     def hold(self, new: Array, density: float, model_b: float, step: float, weight: float) -> None:
         """See `NoWalls.hold`."""
         fields = self.fields
         for d, faces in enumerate(self.components):
-            if weight == 0.0:  # both stages have the same mobility, and with it the same pressure equation
-                self._resistance[d] = faces.stiff * _on_faces(fields.effective_viscosity, faces)
-            voidage, old = _on_faces(fields.centred_voidage, faces), fields.velocity[d]
-            inertia = np.stack([density * voidage, voidage + model_b * (1.0 - voidage)])
-            explicit = (1.0 - weight) * old + weight * fields.stage_velocity[d] if weight else old
-            hold_near_walls(faces, old, explicit, inertia, self._resistance[d], step, new[d], fields.mobility[d])
+            velocities = fields.velocity[d], fields.stage_velocity[d], new[d]
+            hold_near_walls(
+                faces, fields.effective_viscosity, fields.centred_voidage, velocities, fields.mobility[d],
+                self._resistance[d], (density, model_b), (step, weight),
+            )  # fmt: skip
 
-
-def _on_faces(cells: Array, faces: Faces) -> Array:
-    """Mean of the two cells of every face near walls (n,)."""
-    back = (1, cells.shape[2], cells.shape[1] * cells.shape[2])[faces.axis]
-    flat = cells.ravel()
-    return np.asarray(0.5 * (flat[faces.at] + flat[faces.at - back]))
+    def add_held(self, density: float, step: float, force: Array) -> None:
+        """See `NoWalls.add_held`."""
+        fields = self.fields
+        for d, (faces, resistance) in enumerate(zip(self.components, self._resistance)):
+            at = faces.stiff_at.astype(np.int64)
+            old, stage, new = (
+                each[d].ravel()[at] for each in (fields.other_velocity, fields.stage_velocity, fields.velocity)
+            )
+            theta = implicitness.py_func(
+                resistance * step / (density * on_faces(fields.centred_voidage, d).ravel()[at])
+            )
+            force[d].reshape(-1)[at] += resistance * (0.5 * (old + stage) - theta * new - (1.0 - theta) * old)
 
 
 def near_walls(boundaries: Boundaries, fields: CellFields, solved: Array) -> NoWalls:
@@ -137,29 +156,71 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
     open_share = share.ravel()[at]
     wall_area = np.linalg.norm(missing.reshape(3, -1)[:, at], axis=0) / open_share
 
-    area, weight, constant = np.zeros((at.size, 6)), np.zeros((at.size, 6, 4)), np.zeros((at.size, 6))
-    index = np.zeros((at.size, 6, 4), np.int64)
-    stiff, whole = np.zeros(at.size), 0.0
+    weight, constant, stiff = np.zeros((3, 8, at.size)), np.zeros((3, 2, at.size)), np.zeros(at.size)
+    further, place = np.zeros((3, 2, at.size), np.uint32), at - 2 * steps[2]
     for e in range(3):
         for side in range(2):
-            m, high = 2 * e + side, at + side * steps[e]
-            cross = sections[e][side]
-            area[:, m] = cross.share.ravel()[at] * inverse[e] / open_share
-            distance = cross.distance.ravel()[at]
-            index[:, m], weight[:, m], constant[:, m] = _gradient(profiles, high - steps[e], high, distance, inverse[e])
-            stiff -= (2 * side - 1) * area[:, m] * weight[:, m, 1 - side]
-        whole += 2.0 * inverse[e] ** 2
-    pull = profiles.shear[:, at].T * wall_area[:, None]
-    wall_index = np.stack([at, profiles.next[at]], axis=-1)
-    wall_constant = -(pull * profiles.sliding[wall_index]).sum(axis=1)
-    stiff = np.maximum(stiff + pull[:, 0] - whole, 0.0)
+            high, cross = at + side * steps[e], sections[e][side]
+            area = cross.share.ravel()[at] * inverse[e] / open_share
+            made, of_walls = _gradient(profiles, high - steps[e], high, cross.distance.ravel()[at], inverse[e])
+            weight[e, 4 * side : 4 * side + 4], constant[e, side] = area * made, area * of_walls
+            stiff += weight[e, 1] if side == 0 else -weight[e, 4]
+        further[e] = profiles.next[at - steps[e]] - place, profiles.next[at + steps[e]] - place
+    stiff -= 2.0 * float(np.sum(inverse**2))
+    farther, pull = profiles.next[at], np.zeros((3, at.size))
+    pull[:2] = profiles.shear[:, at] * wall_area
+    pull[2] = -(pull[:2] * profiles.sliding[[at, farther]]).sum(axis=0)
+    stiff += pull[0]
+    held = stiff > 0.0
     # beyond an outlet the fluid is not continuous: convection and growth there act on equally much fluid, or u grows
     at_outlet = np.isin(at // steps[d] % shape[2 - d], [layer for axis, layer in outlets if axis == d])
     acting = np.where(at_outlet, np.maximum(open_share, FULL), open_share)
+    fill = _in_blocks(at // steps[2])
+    beside: Any = (farther - place).astype(np.uint32)
+    scaled = [weight / inverse.max() ** 2, constant, pull / inverse.max() ** 2, acting, further, beside]
+    pattern, first = _patterns(scaled, fill)
+
+    def of_patterns(values: Any) -> Any:
+        return np.ascontiguousarray(np.moveaxis(values[..., fill[first]], -2, 0))
+
     return Faces(
-        d, at, acting, area, index, weight, constant, wall_index, pull, wall_constant, stiff, cut.aperture,
-        inverse,
+        d, place.astype(np.uint32)[fill], pattern, of_patterns(acting), of_patterns(weight),
+        of_patterns(constant) if constant.any() else np.zeros((0, 3, 2, BLOCK)), of_patterns(further),
+        of_patterns(beside), of_patterns(pull), at[held].astype(np.uint32), stiff[held], inverse,
     )  # fmt: skip
+
+
+def _in_blocks(planes: Any) -> Any:
+    """Numbers of faces in blocks (blocks, BLOCK), each of one plane."""
+    begins = np.flatnonzero(np.diff(planes, prepend=-1))
+    blocks = []
+    for begin, end in zip(begins, [*begins[1:], planes.size]):
+        count = -(-(end - begin) // BLOCK) * BLOCK
+        blocks.append(np.minimum(np.arange(begin, begin + count), end - 1).reshape(-1, BLOCK))
+    return np.concatenate(blocks) if blocks else np.zeros((0, BLOCK), np.int64)
+
+
+def _patterns(values: Sequence[Array], fill: Any) -> tuple[Any, Any]:
+    """Which blocks have equal values up to round-off: the pattern of each block, and the first block of each."""
+    known: dict[bytes, int] = {}
+    number = []
+    for block in fill:
+        key = b"".join((np.round(each[..., block].astype(float), 9) + 0.0).tobytes() for each in values)
+        number.append(known.setdefault(key, len(known)))
+    pattern = np.array(number, np.int64)
+    return pattern, np.unique(pattern, return_index=True)[1]
+
+
+def _cut_faces(aperture: Array, e: int, components: Sequence[Faces]) -> tuple[Any, Array]:
+    """Faces normal to e that walls cut and momentum cells near them use: flat indices, and open shares."""
+    plane, row = aperture.shape[1] * aperture.shape[2], aperture.shape[2]
+    used = []
+    for faces in components:
+        at, before = faces.place.ravel().astype(np.int64) + 2 * plane, (1, row, plane)[faces.axis]
+        used += [at, at - before, at + (1, row, plane)[e], at + (1, row, plane)[e] - before]
+    here, share = np.unique(np.concatenate(used)), aperture.ravel()
+    here = here[share[here] < 1.0]
+    return here.astype(np.uint32), share[here]
 
 
 def _sections(cut: CutCells, d: int, e: int) -> list[Any]:
@@ -210,8 +271,9 @@ def _profiles(cut: CutCells, d: int) -> Profiles:
     )  # fmt: skip
 
 
-def _gradient(of: Profiles, low: Any, high: Any, distance: Array, inverse: float) -> tuple[Any, Array, Array]:
-    """Velocities, weights and a constant that make the gradient between faces.
+def _gradient(of: Profiles, low: Any, high: Any, distance: Array, inverse: float) -> tuple[Array, Array]:
+    """Weights of velocities, and a constant, that make the gradient between faces: (4, n) of the low and high one and
+    the next ones away from the wall of both, and (n,).
 
     low, high  flat indices of the faces
     distance   mean, of the open part between them [m]
@@ -222,15 +284,15 @@ def _gradient(of: Profiles, low: Any, high: Any, distance: Array, inverse: float
     shift = of.shift[high] - of.shift[low]
     rise = (of.distance[high] - of.distance[low]) - shift
     bend = shift * both + rise * (both - 2.0 * distance)
-    index = np.stack([low, high, of.next[low], of.next[high]], axis=-1)
+    index = np.stack([low, high, of.next[low], of.next[high]])
     weight, sliding = np.zeros(index.shape), of.sliding[index]
     for place, face in enumerate((low, high)):
         trust = np.where(some, of.distance[face] / np.where(some, both, 1.0), 0.0)
-        for own, column in ((0, place), (1, place + 2)):
-            weight[:, column] += trust * (bend * of.curvature[own][face] - shift * of.shear[own][face])
-    constant = -(weight * sliding).sum(axis=1) - (of.swerve[high] - of.swerve[low])
-    for column, sign in ((0, -1.0), (1, 1.0)):
-        is_open = of.is_open[index[:, column]]
-        weight[:, column] += np.where(is_open, sign, 0.0)
-        constant += np.where(is_open, 0.0, sign * sliding[:, column])
-    return index, weight * inverse, constant * inverse
+        for own, row in ((0, place), (1, place + 2)):
+            weight[row] += trust * (bend * of.curvature[own][face] - shift * of.shear[own][face])
+    constant = -(weight * sliding).sum(axis=0) - (of.swerve[high] - of.swerve[low])
+    for row, sign in ((0, -1.0), (1, 1.0)):
+        is_open = of.is_open[index[row]]
+        weight[row] += np.where(is_open, sign, 0.0)
+        constant += np.where(is_open, 0.0, sign * sliding[row])
+    return weight * inverse, constant * inverse

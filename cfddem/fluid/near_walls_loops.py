@@ -1,9 +1,14 @@
-"""Loops over the faces near smooth walls: convection and viscous stress of cut momentum cells, and their stiff part."""
+"""Loops over the faces near smooth walls: convection and viscous stress of cut momentum cells, and their stiff part.
+
+Faces are taken in blocks, along each direction in turn, so that several are computed at once.
+"""
 
 from __future__ import annotations
 
-from cfddem.backend.compile import prange, threaded
-from cfddem.fluid.momentum import carried, implicitness
+import numpy as np
+
+from cfddem.backend.compile import prange, threaded, vector_inline
+from cfddem.fluid.momentum import carried, implicitness, strides
 
 FULL = 0.5
 """Share of a momentum cell below which its convection acts on so much fluid."""
@@ -11,67 +16,160 @@ FULL = 0.5
 EMPTY = 0.01
 """As `FULL`, for the change of the fluid that the cell holds."""
 
+BLOCK = 64
+"""Faces that are computed together."""
+
+
+@threaded
+def shut(at, share, flux):
+    """Take the open parts of some faces from the flux through all of them, a padded component."""
+    flux = flux.reshape(-1)
+    for n in prange(at.size):
+        flux[at[n]] *= share[n]
+
 
 @threaded
 def cut_transport(faces, velocity, flux, viscosity, density, central, rate):
     """Write div(eps mu grad u) - div(rho eps u u) per volume of the fluid on the faces of a component near walls.
 
     faces      `cfddem.fluid.near_walls.Faces` of the component
-    velocity   padded component; flux (3, ...) eps u, times the aperture that `faces` has; viscosity eps mu of cells
+    velocity   padded component; flux (3, ...) eps u times the open share of a face; viscosity eps mu of cells
     rate       written
     """
-    shape, d = viscosity.shape, faces.axis
-    steps = (1, shape[2], shape[1] * shape[2])
-    u, mu, out = velocity.reshape(-1), viscosity.reshape(-1), rate.reshape(-1)
-    flux, aperture = flux.reshape(3, -1), faces.aperture.reshape(3, -1)
-    back = steps[d]
-    for n in prange(faces.at.size):
-        p = faces.at[n]
-        here = u[p]
-        stress = carried_away = growth = 0.0
+    steps = strides(viscosity.shape)
+    u, mu, out, flux = velocity.reshape(-1), viscosity.reshape(-1), rate.reshape(-1), flux.reshape(3, -1)
+    for block in prange(len(faces.place)):
+        pattern, known, sums = faces.pattern[block], np.empty((8, BLOCK)), np.zeros((3, BLOCK))
+        _gather(faces, block, pattern, steps, u, mu, known)
         for e in range(3):
-            step = steps[e]
-            for side in range(2):
-                sign = 2.0 * side - 1.0
-                edge = p + side * step
-                if e == d:
-                    first, second = edge - step, edge
-                    at_edge = mu[edge - step]
-                else:
-                    first, second = edge - back, edge
-                    at_edge = 0.25 * (mu[edge] + mu[edge - back] + mu[edge - step] + mu[edge - step - back])
-                m = 2 * e + side
-                slope = faces.constant[n, m]
-                for each in range(4):
-                    slope += faces.weight[n, m, each] * u[faces.index[n, m, each]]
-                stress += sign * faces.area[n, m] * at_edge * slope
-                through = 0.5 * (aperture[e, first] * flux[e, first] + aperture[e, second] * flux[e, second])
-                value = carried(through, u[edge - 2 * step], u[edge - step], u[edge], u[edge + step], central)
-                carried_away += sign * faces.inverse[e] * (value - through * here)
-                growth += sign * faces.inverse[e] * through
-        at_face = 0.5 * (mu[p] + mu[p - back])
-        pull = faces.wall_constant[n]
-        for each in range(2):
-            pull += faces.wall_weight[n, each] * u[faces.wall_index[n, each]]
-        share = faces.share[n]
-        convection = carried_away / max(share, FULL) + here * growth / max(share, EMPTY)
-        out[p] = stress - at_face * pull - density * convection
+            if e == faces.axis:
+                _take_centres(faces, block, steps[e], 2 * steps[2], flux[e], known)
+            else:
+                _take_edges(faces, block, (steps[e], steps[faces.axis]), 2 * steps[2], flux[e], mu, known)
+            _balance(faces, (block, pattern, e), steps, u, central, known, sums)
+        _per_volume(faces, pattern, known, density, sums)
+        place, within = faces.place[block], out[2 * steps[2] :]
+        for i in range(BLOCK):
+            within[place[i]] = sums[0, i]
+
+
+@vector_inline
+def _gather(faces, block, pattern, steps, u, mu, known):
+    """Write what all directions use: velocities of the faces of a block and of the next ones, viscosities beside."""
+    at, farther, back, first = faces.place[block], faces.farther[pattern], steps[faces.axis], 2 * steps[2]
+    # places count from `first`, the first face that all neighbours can have, in all slices
+    here, left, right = u[first:], mu[first - back :], mu[first:]
+    velocity, other, m_left, m_right = known[0], known[1], known[2], known[3]
+    for i in range(velocity.size):
+        p = at[i]
+        velocity[i], other[i], m_left[i], m_right[i] = here[p], u[p + farther[i]], left[p], right[p]
+
+
+@vector_inline
+def _take_centres(faces, block, step, first, flux, known):
+    """Write viscosity and flux on the momentum faces of a block along its own axis, which are centres of cells."""
+    at, low, here, high = faces.place[block], flux[first - step :], flux[first:], flux[first + step :]
+    m_left, m_right, m_low, m_high, inward, outward = known[2:]
+    for i in range(at.size):
+        p = at[i]
+        m_low[i], m_high[i] = m_left[i], m_right[i]
+        inward[i], outward[i] = 0.5 * (low[p] + here[p]), 0.5 * (here[p] + high[p])
+
+
+@vector_inline
+def _take_edges(faces, block, steps, first, flux, mu, known):
+    """As `_take_centres`, along another axis, where momentum faces lie around edges of the grid."""
+    at, (step, back) = faces.place[block], steps
+    f_left_low, f_left_high = flux[first - back :], flux[first - back + step :]
+    f_right_low, f_right_high = flux[first:], flux[first + step :]
+    m_left_low, m_left_high = mu[first - back - step :], mu[first - back + step :]
+    m_right_low, m_right_high = mu[first - step :], mu[first + step :]
+    m_left, m_right, m_low, m_high, inward, outward = known[2:]
+    for i in range(at.size):
+        p, beside = at[i], m_left[i] + m_right[i]
+        m_low[i] = 0.25 * (m_left_low[p] + m_right_low[p] + beside)
+        m_high[i] = 0.25 * (m_left_high[p] + m_right_high[p] + beside)
+        inward[i], outward[i] = 0.5 * (f_left_low[p] + f_right_low[p]), 0.5 * (f_left_high[p] + f_right_high[p])
+
+
+@vector_inline
+def _balance(faces, which, steps, u, central, known, sums):
+    """Add the parts of both momentum faces of a block along e: stress, convection, growth of the fluid."""
+    stress, away, growth = sums
+    block, pattern, e = which
+    at, step, first = faces.place[block], steps[e], 2 * steps[2]
+    low2, low, high, high2 = u[first - 2 * step :], u[first - step :], u[first + step :], u[first + 2 * step :]
+    here, farther, m_low, m_high, inward, outward = known[0], known[1], known[4], known[5], known[6], known[7]
+    next_low, next_high = faces.next[pattern, e, 0], faces.next[pattern, e, 1]
+    w, inverse = faces.weight[pattern, e], faces.inverse[e]
+    w0, w1, w2, w3, w4, w5, w6, w7 = w[0], w[1], w[2], w[3], w[4], w[5], w[6], w[7]
+    for i in range(stress.size):
+        p, u2 = at[i], here[i]
+        u1, u3 = low[p], high[p]
+        pull_low = w0[i] * u1 + w1[i] * u2 + w2[i] * u[p + next_low[i]] + w3[i] * farther[i]
+        pull_high = w4[i] * u2 + w5[i] * u3 + w6[i] * farther[i] + w7[i] * u[p + next_high[i]]
+        stress[i] += m_high[i] * pull_high - m_low[i] * pull_low
+        value_low = carried(inward[i], low2[p], u1, u2, u3, central)
+        value_high = carried(outward[i], u1, u2, u3, high2[p], central)
+        away[i] += inverse * ((value_high - outward[i] * u2) - (value_low - inward[i] * u2))
+        growth[i] += inverse * (outward[i] - inward[i])
+    if len(faces.constant) > 0:  # walls slide
+        c_low, c_high = faces.constant[pattern, e, 0], faces.constant[pattern, e, 1]
+        for i in range(stress.size):
+            stress[i] += m_high[i] * c_high[i] - m_low[i] * c_low[i]
+
+
+@vector_inline
+def _per_volume(faces, pattern, known, density, sums):
+    """Take the pull of the wall into the stress of a block, and convection and growth per volume."""
+    stress, away, growth = sums
+    here, farther, left, right = known[0], known[1], known[2], known[3]
+    share, own, other = faces.share[pattern], faces.pull[pattern, 0], faces.pull[pattern, 1]
+    constant = faces.pull[pattern, 2]
+    for i in range(stress.size):
+        pull = constant[i] + own[i] * here[i] + other[i] * farther[i]
+        convection = away[i] / max(share[i], FULL) + here[i] * growth[i] / max(share[i], EMPTY)
+        stress[i] -= 0.5 * (left[i] + right[i]) * pull + density * convection
 
 
 @threaded
-def hold_near_walls(faces, velocity, stage, inertia, resistance, step, new, mobility):
+def hold_near_walls(faces, viscosity, voidage, velocities, mobility, resistance, fluid, step):
     """Take the stiff part of the stress near walls into a predicted component, implicitly, as `predict` takes drag.
 
-    velocity    at the start of the step; stage: the mean of those whose stress was taken explicitly; padded components
-    inertia     (2, n) of the faces: rho eps, and how much of a pressure gradient acts on the fluid
-    resistance  (n,) stiff part of the stress over the velocity [kg/m3/s]
-    new, mobility  padded component
+    viscosity   eps mu, and voidage in the middle of the step, padded
+    velocities  padded components: at the start of the step, of the stage before, the predicted one
+    mobility    padded component
+    resistance  of the stiff faces, stiff part of the stress over the velocity [kg/m3/s], written in the first stage
+    fluid       its density [kg/m3], and 1 in model B
+    step        [s], and the weight of the stress of the stage before, 0 in the first stage
     """
-    old, explicit, new, mobility = velocity.reshape(-1), stage.reshape(-1), new.reshape(-1), mobility.reshape(-1)
-    for n in prange(faces.at.size):
-        p = faces.at[n]
-        theta = implicitness(resistance[n] * step / inertia[0, n])
-        loose = step * inertia[1, n] / mobility[p]
-        held = loose + step * theta * resistance[n]
-        new[p] = (loose * new[p] + step * resistance[n] * (explicit[p] - (1.0 - theta) * old[p])) / held
-        mobility[p] *= loose / held
+    old, stage, new = velocities
+    old, stage, new, mobility = old.reshape(-1), stage.reshape(-1), new.reshape(-1), mobility.reshape(-1)
+    mu, eps, back = viscosity.reshape(-1), voidage.reshape(-1), strides(voidage.shape)[faces.axis]
+    count = faces.stiff_at.size
+    for block in prange((count + BLOCK - 1) // BLOCK):
+        begin, end = block * BLOCK, min((block + 1) * BLOCK, count)
+        at, of_block, held = faces.stiff_at[begin:end], resistance[begin:end], np.empty((2, end - begin))
+        if step[1] == 0.0:  # both stages have the same mobility, and with it the same pressure equation
+            stiff = faces.stiff[begin:end]
+            for i in range(at.size):
+                of_block[i] = stiff[i] * (0.5 * (mu[at[i]] + mu[at[i] - back]))
+        _held(at, (eps, back), (old, stage, new, mobility), of_block, fluid, step, held)
+        for i in range(at.size):
+            new[at[i]], mobility[at[i]] = held[0, i], held[1, i]
+
+
+@vector_inline
+def _held(at, voidage, faces, resistance, fluid, step, held):
+    """Write velocity and mobility of a block."""
+    (eps, back), (old, stage, new, mobility), (density, model_b), (step, weight) = voidage, faces, fluid, step
+    velocity, lost = held
+    for i in range(velocity.size):
+        p, stiffness = at[i], resistance[i]
+        at_face, before, moved = 0.5 * (eps[p] + eps[p - back]), old[p], mobility[p]
+        explicit = (1.0 - weight) * before + weight * stage[p]  # as the explicit stress, of both stages
+        theta = implicitness(stiffness * step / (density * at_face))
+        loose = step * (at_face + model_b * (1.0 - at_face))
+        slow = 1.0 / (loose + step * theta * stiffness * moved)
+        velocity[i] = (loose * new[p] + step * stiffness * moved * (explicit - (1.0 - theta) * before)) * slow
+        lost[i] = moved * loose * slow

@@ -1,47 +1,115 @@
-"""The viscous force of a fluid on its smooth walls."""
+"""The force of a fluid on its smooth walls."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from cfddem.fluid.cut_cells import CutCells
-from cfddem.fluid.grid import Array, layers
+from cfddem.fluid.grid import Array
 from cfddem.fluid.solver import FluidSolver
+
+AROUND = 2.5
+"""Faces so near a place on a wall give the shear rate there, in cells."""
+
+AT_ONCE = 4_000
+"""Places that are fitted together, to save memory."""
 
 
 def force_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
     r"""Viscous force of the fluid on the smooth wall of every cut cell: places (n, 3) [m], and forces (n, 3) [N].
 
-    .. math:: \tau\cdot n = \varepsilon\mu\,(g - w\cdot\nabla n)
+    .. math:: \tau\cdot n = \varepsilon\mu\,\partial_n (u - W)
 
-    with the shear rate g at the wall, the normal n into the fluid and the velocity w with which the wall slides along
-    itself: the transposed part of the stress is :math:`n_j\partial_d w_j = -w_j\partial_d n_j`. The place is the
-    point of the wall nearest to the centre of the cell. The pressure is not in the force.
+    at the wall, whose normal n points into the fluid. W is the velocity of a rigid body that moves as the wall does
+    there: the wall's velocity w, and :math:`\delta\,w\cdot\nabla n` more at the distance :math:`\delta`. A rigid
+    body has no stress, and what is left of the velocity is small where a wall turns with its fluid. The place is the
+    point of the wall nearest to the centre of the cell. The pressure is not in the force: see `pressure_on_walls`.
     """
     cut, grid = fluid.boundaries.cut, fluid.grid
     if not isinstance(cut, CutCells):
         return np.zeros((0, 3)), np.zeros((0, 3))
-    area = np.array([np.diff(grid.inner_faces(cut.aperture[d], d), axis=2 - d) * grid.face_area(d) for d in range(3)])
-    wetted = np.linalg.norm(area, axis=0) * grid.open
+    wetted = np.linalg.norm(_area(cut), axis=0)
     here = np.flatnonzero(wetted)
-    place = _on_wall(cut, [np.ravel(each)[here] for each in np.broadcast_arrays(*grid.centres())])
+    place = _places(cut, here)
     fluid.rates()  # brings the effective viscosity up to date
     pull = (wetted * grid.inner(fluid.fields.effective_viscosity)).ravel()[here]
-    shear = np.stack([_shear(fluid, cut, d).ravel()[here] for d in range(3)], axis=-1)
-    return place, pull[:, None] * (shear - _turning(cut, list(place.T)))
+    return place, pull[:, None] * np.stack([_shear(fluid, cut, here, place, d) for d in range(3)], axis=-1)
 
 
-def _shear(fluid: FluidSolver, cut: CutCells, d: int) -> Array:
-    """Shear rate of component d at the wall (nz, ny, nx) [1/s]: of both faces, the more the farther from the wall."""
-    profiles = fluid.walls.profiles[d]
-    relative = fluid.fields.velocity[d].ravel() - profiles.sliding
-    rate = profiles.shear[0] * relative + profiles.shear[1] * relative[profiles.next]
-    moments = profiles.distance, profiles.distance * rate
-    weight, moment = (fluid.grid.inner_faces(each.reshape(cut.volume.shape), d) for each in moments)
-    low, high = layers(d, slice(None, -1)), layers(d, slice(1, None))
-    return np.asarray((moment[low] + moment[high]) / np.maximum(weight[low] + weight[high], 1e-300))
+def pressure_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
+    """Force of the pressure p' on the smooth wall of every cut cell, as `force_on_walls`.
+
+    The pressure of a cell is that at its centre; its gradient there leads to the wall.
+    """
+    cut, grid = fluid.boundaries.cut, fluid.grid
+    if not isinstance(cut, CutCells):
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    area = _area(cut).reshape(3, -1)
+    here = np.flatnonzero(area.any(axis=0))
+    place = _places(cut, here)
+    centre = np.stack([np.ravel(each)[here] for each in np.broadcast_arrays(*grid.centres())], axis=-1)
+    slope = fluid.cell_pressure_gradient().reshape(3, -1)[:, here].T
+    pressure = fluid.pressure.ravel()[here] + (slope * (place - centre)).sum(axis=1)
+    return place, -pressure[:, None] * area[:, here].T
+
+
+def _area(cut: CutCells) -> Array:
+    """Area of the wall in every cell, a vector into the fluid (3, nz, ny, nx) [m2]."""
+    grid = cut.grid
+    area = [np.diff(grid.inner_faces(cut.aperture[d], d), axis=2 - d) * grid.face_area(d) for d in range(3)]
+    return np.array(area) * grid.open
+
+
+def _places(cut: CutCells, here: Any) -> Array:
+    """Points of the wall nearest to the centres of some cells (n, 3) [m]."""
+    return _on_wall(cut, [np.ravel(each)[here] for each in np.broadcast_arrays(*cut.grid.centres())])
+
+
+# ---------------------------------------------------------------- shear rates
+
+
+def _shear(fluid: FluidSolver, cut: CutCells, here: Any, place: Array, d: int) -> Array:
+    r"""Shear rate of component d, less that of a rigid body that moves with the wall, at places on it (n,) [1/s]."""
+    shape = cut.volume.shape
+    k, j, i = (each.ravel() for each in np.meshgrid(*(np.arange(-2, 3 + (e == d)) for e in (2, 1, 0)), indexing="ij"))
+    cells = cut.grid.inner(np.arange(cut.volume.size).reshape(shape)).ravel()[here]
+    faces = cells[:, None] + (k * shape[1] + j) * shape[2] + i
+    at = [np.ravel(each) for each in cut.points([0.5 * (e != d) for e in range(3)])]
+    relative = fluid.fields.velocity[d].ravel() - cut.sliding[d].ravel()
+    slides = np.unique(faces[(cut.sliding[d].ravel() * cut.distance[d].ravel() != 0.0)[faces]])
+    if slides.size:
+        wall = _on_wall(cut, [each[slides] for each in at])
+        relative[slides] -= cut.distance[d].ravel()[slides] * _turning(cut, list(wall.T))[:, d]
+    rate = np.zeros(here.size)
+    for begin in range(0, here.size, AT_ONCE):
+        some = slice(begin, begin + AT_ONCE)
+        share = _fit(fluid, cut, faces[some], np.stack([each[faces[some]] for each in at], axis=-1), place[some], d)
+        rate[some] = (share * np.where(share != 0.0, relative[faces[some]], 0.0)).sum(axis=1)
+    return rate
+
+
+def _fit(fluid: FluidSolver, cut: CutCells, faces: Any, at: Array, place: Array, d: int) -> Array:
+    r"""Weights of velocities on faces (n, m) in the shear rate g at places on a wall.
+
+    Around a place the velocity over the distance is :math:`g + a\cdot t - c\,\delta`, with t along the wall: a fit of
+    least squares to the means on faces, the more the farther from the wall and the nearer to the place.
+
+    at  centres of the faces (n, m, 3) [m]
+    """
+    distance, depth, scale = cut.distance[d].ravel()[faces], cut.depth[d].ravel()[faces], min(cut.grid.spacing)
+    known = (distance > 0.0) & (fluid.faces.solved[d].ravel()[faces] > 0.0)
+    along = at - place[:, None]
+    near = 1.0 - ((along / np.array(cut.grid.spacing)) ** 2).sum(axis=-1) / AROUND**2
+    weight = known * (distance * np.maximum(near, 0.0)) ** 2
+    normal = np.stack(_slopes(cut, list(place.T)), axis=-1)[:, None]
+    along -= (along * normal).sum(axis=-1, keepdims=True) * normal
+    model = np.concatenate([np.ones((*faces.shape, 1)), along / scale, depth[..., None] / scale], axis=-1)
+    moments = np.einsum("nfa,nf,nfb->nab", model, weight, model)
+    inverse = np.linalg.pinv(moments, rcond=1e-6, hermitian=True)  # a place may see no faces to one side
+    return np.asarray(np.einsum("na,nfa,nf->nf", inverse[:, 0], model, weight) / np.maximum(distance, 1e-300))
 
 
 def _turning(cut: CutCells, points: list[Array]) -> Array:

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from cfddem import run_case
+from cfddem.analysis.report import report
 from cfddem.case.schema import Case
 from cfddem.coupling.kernel import FilterKernel
+from cfddem.fluid import budgets
 from cfddem.fluid.conditions import Inlet, Outlet
 from cfddem.fluid.cut_cells import open_share, within
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder
 from cfddem.particles.state import sphere_volume
+from cfddem.run.simulation import Simulation
 
 CENTRE, RADIUS = (0.52, 0.47, 0.0), 0.44
 GRID = within(Grid((8, 8, 10), (0.125, 0.125, 0.1)), cylinder(CENTRE, RADIUS))
@@ -112,3 +115,20 @@ def test_the_pressure_drop_of_a_bubbling_bed_is_its_weight(tmp_path):
     lasted = times[last] - times[first]
     weight = 2200 * sphere_volume(0.6e-3) * (1000.0 - 1.2) * 9.81 / area
     assert carried / lasted == pytest.approx(weight + (momentum(last) - momentum(first)) / area / lasted, rel=5e-3)
+
+
+@pytest.mark.slow
+def test_a_bed_in_a_round_column_accounts_for_its_energy(tmp_path):
+    """Works of the terms of the fluid add up to its kinetic energy; the remainder is below 1 % of what was put in."""
+    case = bed_of(800, {"shape": "cylinder"}).with_(**{"run.until": 0.02, "run.energy_budget": True})
+    simulation = Simulation(case.with_(**{"run.energy_budget": False}))
+    fluid = simulation.required_fluid
+    for _ in range(20):
+        before = budgets.kinetic_energy(fluid)
+        simulation.step()
+        done = budgets.works(fluid)
+        assert done.kinetic == pytest.approx(budgets.kinetic_energy(fluid) - before, rel=1e-9)
+        assert sum(done) - done.kinetic - done.held == pytest.approx(done.kinetic, abs=1e-9 * sum(map(abs, done)))
+    run_case(case, tmp_path / "bed")
+    ledger = report(tmp_path / "bed").energy
+    assert abs(ledger["remainder"]) < 0.01 * ledger["put_in"], ledger

@@ -77,15 +77,14 @@ def test_turning_cylinders_drag_the_fluid(inner, outer):
 
 @pytest.mark.slow
 def test_torques_between_cylinders_are_met_within_a_percent():
-    """The inner one turns, then the outer one; 16 cells across the gap. On the outer one while it turns the torque is
-    the small difference of two parts of the stress, and is met to 3 %."""
+    """The inner one turns, then the outer one; 16 cells across the gap."""
     on_inner, on_outer, wrong = couette(16, 1.0, 0.0)
     assert on_inner == pytest.approx(1.0, abs=0.01)
     assert on_outer == pytest.approx(1.0, abs=0.01)
     assert wrong < 0.0003
     on_inner, on_outer, wrong = couette(16, 0.0, 1.0)
     assert on_inner == pytest.approx(1.0, abs=0.01)
-    assert on_outer == pytest.approx(1.0, abs=0.03)
+    assert on_outer == pytest.approx(1.0, abs=0.01)
     assert wrong < 0.0003
 
 
@@ -172,8 +171,7 @@ def test_the_pressure_needs_few_more_iterations_than_in_the_box():
 def test_a_box_has_nothing_of_smooth_walls():
     fluid = FluidSolver(Grid((4, 4, 4), (0.1,) * 3), THROUGH, density=1.0, viscosity=1e-3)
     assert type(fluid.walls) is NoWalls
-    field = fluid.fields.velocity
-    assert fluid.boundaries.cut.open_part(field) is field
+    assert fluid.boundaries.cut.shares == ()
     assert len(force_on_walls(fluid)[0]) == 0
 
 

@@ -10,10 +10,12 @@ is the pressure equation with face coefficients eps_f m_f A_f / h. An outlet has
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
 from cfddem.backend.communicator import Communicator
-from cfddem.backend.compile import prange, threaded
+from cfddem.backend.compile import inline, prange, threaded
 from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import refuse_nan
 from cfddem.fluid.fields import CellFields
@@ -52,12 +54,13 @@ class Projection:
         grid, boundaries, fields, equation, missing = (
             self.grid, self.boundaries, self.fields, self._equation, self._missing,
         )  # fmt: skip
-        ax, ay, az, anchor = equation.coefficients
-        cut, rate = boundaries.cut, boundaries.cut.held(fields.new_voidage_rate)
-        assemble(
-            cut.open_part(velocity), cut.open_part(fields.mobility), voidage, rate, self._open, fresh,
-            boundaries.halo.ends, self._areas, self._inverse, ax, ay, az, anchor, missing,
+        flow = Flow(
+            velocity, fields.mobility, voidage, fields.new_voidage_rate, self._open, boundaries.halo.ends, self._areas,
+            self._inverse,
         )  # fmt: skip
+        assemble(flow, fresh, (*equation.coefficients, missing))
+        if boundaries.cut.cells.size:
+            assemble_cut(flow, boundaries.cut.shares, fresh, boundaries.cut.cells, (*equation.coefficients, missing))
         if fresh:
             equation.prepare()
         refuse_nan(grid, missing, time, self.communicator)
@@ -73,50 +76,102 @@ class Projection:
         return iterations
 
 
-@threaded
-def assemble(
-    velocity, mobility, voidage, rate, open_cells, fresh, ends, areas, inverse, ax, ay, az, anchor, b
-):  # fmt: skip
-    """Right-hand side of the pressure equation and, if fresh, its coefficients.
+class Flow(NamedTuple):
+    """What the pressure equation is made of.
 
-    b = -(V d eps/dt + outflow of eps u) of every open cell (nz, ny, nx) [m3/s]; rate is d eps/dt, padded [1/s]; ends
-    (3, 2) tells where the box ends below and above along x, y, z.
+    velocity, mobility  padded faces
+    voidage, rate       padded cells; rate is d eps/dt [1/s]
+    open_cells          (nz, ny, nx) 1 where open
+    ends                (3, 2) where the box ends below and above along x, y, z
+    areas, inverse      of faces normal to x, y, z [m2], and 1/spacing [1/m]
     """
-    nz, ny, nx = b.shape
+
+    velocity: Array
+    mobility: Array
+    voidage: Array
+    rate: Array
+    open_cells: Array
+    ends: Any
+    areas: Array
+    inverse: Array
+
+
+@inline
+def open_face(shares, d, k, j, i):
+    """Open share of a face; 1 without shares, which is known when the loop is compiled."""
+    if len(shares) == 0:
+        return 1.0
+    return shares[0][d, k, j, i]
+
+
+@inline
+def open_cell(shares, k, j, i):
+    """Open share of a cell, as `open_face`."""
+    if len(shares) == 0:
+        return 1.0
+    return shares[1][k, j, i]
+
+
+@threaded
+def assemble(flow, fresh, equation):
+    """Right-hand side of the pressure equation and, if fresh, its coefficients, of whole cells.
+
+    flow      `Flow`
+    equation  ax, ay, az, anchor and b, all (nz, ny, nx)
+    """
+    nz, ny, nx = flow.open_cells.shape
     for k in prange(nz):
         for j in range(ny):
             for i in range(nx):
-                kk, jj, ii = k + LOW, j + LOW, i + LOW
-                outflow, held = rate[kk, jj, ii] * areas[0] / inverse[0], 0.0
-                here = voidage[kk, jj, ii]
-                for d in range(velocity.shape[0]):
-                    dk, dj, di = UNIT[d]
-                    below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here)
-                    above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
-                    outflow += areas[d] * (
-                        above * velocity[d, kk + dk, jj + dj, ii + di] - below * velocity[d, kk, jj, ii]
-                    )
-                    if fresh:
-                        a_below = below * mobility[d, kk, jj, ii] * areas[d] * inverse[d]
-                        a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
-                        place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
-                        # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
-                        if ends[d, 0] and place == 0:
-                            held += 2.0 * a_below
-                            a_below = 0.0
-                        if ends[d, 1] and place == cells - 1:
-                            held += 2.0 * a_above
-                        if cells == 1:
-                            a_below = 0.0
-                        if d == 0:
-                            ax[k, j, i] = a_below
-                        elif d == 1:
-                            ay[k, j, i] = a_below
-                        else:
-                            az[k, j, i] = a_below
-                b[k, j, i] = -outflow * open_cells[k, j, i]
-                if fresh:
-                    anchor[k, j, i] = held
+                balance_cell(flow, (), fresh, equation, k, j, i)
+
+
+@threaded
+def assemble_cut(flow, shares, fresh, cells, equation):
+    """As `assemble`, of cut cells: their numbers, with the shares of faces and cells."""
+    ny, nx = flow.open_cells.shape[1:]
+    for n in prange(cells.size):
+        k, row = divmod(cells[n], ny * nx)
+        j, i = divmod(row, nx)
+        balance_cell(flow, shares, fresh, equation, k, j, i)
+
+
+@inline
+def balance_cell(flow, shares, fresh, equation, k, j, i):
+    """b = -(V d eps/dt + outflow of eps u) of a cell [m3/s] and, if fresh, its coefficients and anchor."""
+    velocity, mobility, voidage, areas, inverse = flow.velocity, flow.mobility, flow.voidage, flow.areas, flow.inverse
+    (nz, ny, nx), ends = flow.open_cells.shape, flow.ends
+    ax, ay, az, anchor, b = equation
+    kk, jj, ii = k + LOW, j + LOW, i + LOW
+    outflow, held = flow.rate[kk, jj, ii] * open_cell(shares, kk, jj, ii) * areas[0] / inverse[0], 0.0
+    here = voidage[kk, jj, ii]
+    for d in range(3):
+        dk, dj, di = UNIT[d]
+        below = 0.5 * (voidage[kk - dk, jj - dj, ii - di] + here) * open_face(shares, d, kk, jj, ii)
+        above = 0.5 * (here + voidage[kk + dk, jj + dj, ii + di])
+        above *= open_face(shares, d, kk + dk, jj + dj, ii + di)
+        outflow += areas[d] * (above * velocity[d, kk + dk, jj + dj, ii + di] - below * velocity[d, kk, jj, ii])
+        if fresh:
+            a_below = below * mobility[d, kk, jj, ii] * areas[d] * inverse[d]
+            a_above = above * mobility[d, kk + dk, jj + dj, ii + di] * areas[d] * inverse[d]
+            place, cells = (i, nx) if d == 0 else ((j, ny) if d == 1 else (k, nz))
+            # An unknown velocity on a boundary face: an outlet, its pressure half a cell away.
+            if ends[d, 0] and place == 0:
+                held += 2.0 * a_below
+                a_below = 0.0
+            if ends[d, 1] and place == cells - 1:
+                held += 2.0 * a_above
+            if cells == 1:
+                a_below = 0.0
+            if d == 0:
+                ax[k, j, i] = a_below
+            elif d == 1:
+                ay[k, j, i] = a_below
+            else:
+                az[k, j, i] = a_below
+    b[k, j, i] = -outflow * flow.open_cells[k, j, i]
+    if fresh:
+        anchor[k, j, i] = held
 
 
 @threaded
