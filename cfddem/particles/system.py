@@ -96,6 +96,6 @@ class BridgeSystem(NamedTuple):
         """That part of a system."""
         parts = zip((_Spheres, _Joined, _Bridges), system[:3])
         return cls(
-            *(kind(*(getattr(part, name) for name in kind._fields)) for kind, part in parts),  # type: ignore[call-arg]
+            *(kind(*(getattr(part, name) for name in kind._fields)) for kind, part in parts),  # type: ignore[attr-defined, call-arg]
             system.shift,
         )
