@@ -283,6 +283,7 @@ class RunData:
 
         read = {"fluid": self.fluid, "particles": self._particle_field}[block]
         variables: dict[str, Any] = {}
+        forms: dict[str, np.ndarray] = {}
         with self._opened(-1) as data:
             for key, each in data.file[block].items():
                 name = field_name(key)
@@ -290,9 +291,12 @@ class RunData:
                 form = blank(each.dtype, each.shape[1:] if block == "fluid" else each.shape)
                 if self.grid is not None and block == "fluid":
                     require_cells(form, name, self.grid.shape)
-                last = () if form.ndim == len(axes) else ("component",)
+                forms[name] = form
+                last = () if form.ndim == len(axes) else ("component" if form.shape[-1:] == (3,) else f"{name}_component",)
                 values = series(partial(read, name), len(self.snapshots), form)
                 variables[prefix + name] = ("time", *axes, *last), values, self._labels(block, name)
+            if block == "particles":
+                require_particles(forms)
         return variables
 
     def _labels(self, block: str, name: str) -> dict[str, str]:

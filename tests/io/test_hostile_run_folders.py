@@ -181,3 +181,14 @@ def test_an_array_in_the_place_of_the_particle_fields_is_damage(tmp_path: Path) 
         file["particles"] = np.ones((3, 4))
     with pytest.raises(RunFailed, match=r"\.h5: the file is damaged"):
         _ = open_run(folder).particle_fields
+
+
+@pytest.mark.parametrize("shape", [(), (2, 3, 4), (7,)])
+def test_a_particle_field_of_another_shape_is_damage_in_a_dataset(shape: tuple[int, ...], tmp_path: Path) -> None:
+    pytest.importorskip("xarray")
+    folder = made_up(tmp_path / "run", rows=101)
+    with h5py.File(sorted((folder / "data").glob("*.h5"))[-1], "r+") as file:
+        del file["particles/radius"]
+        file["particles/radius"] = np.ones(shape)
+    with pytest.raises(RunFailed, match=r"\.h5: the file is damaged \(particle"):
+        open_run(folder).dataset()
