@@ -59,6 +59,8 @@ def layer_map(run: RunData, case: Case, layer: float | None = None) -> LayerMap:
     rows = []
     for place in range(len(run.times)):
         particles = run.particles(place)
+        if not {"position", "radius"} <= {*particles}:
+            raise InputError("snapshot", place, "one with positions and radii of particles", "its file is damaged")
         rows.append(layer_solid_fraction(particles["position"], particles["radius"], edges, case.floor_area))
     return LayerMap(run.times, 0.5 * (edges[1:] + edges[:-1]), np.array(rows))
 

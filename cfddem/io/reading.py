@@ -292,7 +292,8 @@ class RunData:
                 if self.grid is not None and block == "fluid":
                     require_cells(form, name, self.grid.shape)
                 forms[name] = form
-                last = () if form.ndim == len(axes) else ("component" if form.shape[-1:] == (3,) else f"{name}_component",)
+                component = "component" if form.shape[-1:] == (3,) else f"{name}_component"
+                last = () if form.ndim == len(axes) else (component,)
                 values = series(partial(read, name), len(self.snapshots), form)
                 variables[prefix + name] = ("time", *axes, *last), values, self._labels(block, name)
             if block == "particles":

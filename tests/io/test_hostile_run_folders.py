@@ -192,3 +192,12 @@ def test_a_particle_field_of_another_shape_is_damage_in_a_dataset(shape: tuple[i
         file["particles/radius"] = np.ones(shape)
     with pytest.raises(RunFailed, match=r"\.h5: the file is damaged \(particle"):
         open_run(folder).dataset()
+
+
+@pytest.mark.parametrize("name", ["Points", "radius"])
+def test_waves_of_a_run_without_positions_or_radii_are_refused(name: str, tmp_path: Path) -> None:
+    folder = made_up(tmp_path / "run", rows=101)
+    with h5py.File(folder / "data" / "00000000.h5", "r+") as file:
+        del file[f"particles/{name}"]
+    done = call("view", str(folder), "--waves")
+    assert done.code == 2 and "snapshot = 0: must be one with positions and radii" in one_line(done.err), done
