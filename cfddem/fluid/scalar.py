@@ -137,7 +137,7 @@ class Scalar:
             remedy = "take Grid.with_solid instead of smooth walls"
             raise InputError("walls", None, "solid cells where the fluid has a temperature or a vapour", remedy)
         others = [each for each in fluid.followers if isinstance(each, Scalar)]
-        self.flow = others[0].flow if others else ScalarFlow(fluid)
+        self.flow: ScalarFlow = others[0].flow if others else ScalarFlow(fluid)
         roles: Mapping[str, Any] = {"value": "state", "stored": "state"}
         initial = {"value": kind.start, "next": kind.start, "stored": 1.0}
         names = ("value", "stored", "next", "diffusivity", "coefficient", "target", "missed")
