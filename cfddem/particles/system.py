@@ -94,8 +94,8 @@ class BridgeSystem(NamedTuple):
     @classmethod
     def of(cls, system: System) -> BridgeSystem:
         """That part of a system."""
-        parts = zip((_Spheres, _Joined, _Bridges), system[:3])
-        return cls(
-            *(kind(*(getattr(part, name) for name in kind._fields)) for kind, part in parts),  # type: ignore[attr-defined, call-arg]
+        kinds: tuple[Any, ...] = (_Spheres, _Joined, _Bridges)
+        return cls(  # type: ignore[call-arg]
+            *(kind(*(getattr(part, name) for name in kind._fields)) for kind, part in zip(kinds, system)),
             system.shift,
         )
