@@ -104,7 +104,9 @@ def _without_moved_keys(
         first, header = (*table, words[0]), _header(home, model.model_fields[home])
         limit = f"below a line {header}, as {', '.join(words[1:MOST])} after it"
         errors.append((first, InputError(dotted(first), None, limit, "the line is missing")))
-        moved = {(home,), *((*table, word) for word in words)}
+        owner = model.model_fields[home]
+        shared = [str(key[-1]) for key in reported if key[:-1] == table and _has_all(owner, [str(key[-1])])]
+        moved = {(home,), *((*table, word) for word in (*words, *shared))}
         reported = {key: several for key, several in reported.items() if key not in moved}
     return reported, errors
 

@@ -94,7 +94,8 @@ class Case(CaseTables):
         of_lid = [kind for kind, side, shape in kinds if side == "lid" and shape == "whole"]
         leaves = ends == "flow" and not {"wall", "inlet"} & {*of_lid}
         inlets = [name for name, each in self.patch.items() if each.kind == "inlet"]
-        enters = [f"patch.{name}" for name in inlets] + ["bed.inlet_velocity"] * (ends == "flow")
+        flows = self.bed.highest_inlet_velocity > 0.0
+        enters = [f"patch.{name}" for name in inlets] + ["bed.inlet_velocity"] * (ends == "flow" and flows)
         if enters and not leaves and "outlet" not in {kind for kind, _, _ in kinds}:
             remedy = 'give a patch of kind = "outlet", or column.ends = "flow", whose lid is one'
             raise InputError(enters[0], None, "together with an outlet: what enters has to leave", remedy)

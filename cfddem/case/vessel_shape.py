@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, shown
@@ -80,14 +81,15 @@ class CaseVessel(Checked):
             raise InputError("line", shown(self.line), "of radii above 0 above the floor")
 
     def line_in(self, column: Any) -> Line:
-        """Heights and radii of the wall, from the floor at least to the lid [m]."""
+        """Heights and radii of the wall, from the floor to the lid [m]."""
         half, height = 0.5 * column.width, column.height
         line: Line = self.line
         if self.shape == "cylinder":
             line = ((0.0, self.radius or half),)
         elif self.shape == "cone":
             line = ((0.0, self.radius or 0.0), (self.length or 0.0, self.top_radius or half))
-        return line if line[-1][0] >= height else (*line, (height, line[-1][1]))
+        below = tuple(place for place in line if place[0] < height)
+        return (*below, (height, float(np.interp(height, *np.array(line).T))))
 
     def refuse(self, column: Any) -> None:
         """Raise InputError where the vessel does not lie in the column, or the column has walls of its own."""

@@ -64,7 +64,6 @@ class Changes:
         """The case of a file with its values replaced, after the user's laws are known."""
         from cfddem.case.gallery import overrides
         from cfddem.case.schema import Case
-        from cfddem.cli.cases import import_laws
 
         if self.laws:
             import_laws(self.laws)
@@ -115,8 +114,8 @@ def check(
     picture: Annotated[Path | None, Parameter(help="PNG file for a drawing of the case, seen along y")] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
-    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run, or written but
-    the picture.
+    """Check a case before it runs: numbers, time steps, cost, warnings and errors. Nothing is run, and only
+    the picture is written.
 
     Exit code: 0 without errors, 2 with errors.
 
@@ -131,6 +130,8 @@ def check(
     described = changes.case(find_case(case))
     result = checked(described, ranks, shape)
     if picture is not None:
+        if picture.suffix.lower() != ".png":
+            raise InputError("--picture", str(picture), "a PNG file", "let its name end in .png")
         require_folder(picture)
         from cfddem.plotting.case_drawing import case_drawing
         from cfddem.plotting.curves import save
@@ -301,7 +302,6 @@ def resume(
     Example: cfddem resume bed --until 0.03
     """
     from cfddem.backend.compile import use_threads
-    from cfddem.cli.cases import import_laws
     from cfddem.io.reading import newest_run, open_run
     from cfddem.run.progress import live_line
     from cfddem.run.resuming import case_to_continue

@@ -174,7 +174,10 @@ def _patches(axes: Axes, case: Case) -> None:
         middle = patch.centre[0] if patch.centre else 0.5 * width
         half = 0.5 * (patch.size[0] if patch.size else patch.diameter or width)
         z, colour = (0.0, height)[patch.side == "lid"], {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]
-        axes.plot([middle - half, middle + half], [z, z], color=colour, linewidth=4.0, solid_capstyle="butt")
+        inner = 0.5 * (patch.inner_diameter or 0.0)
+        for side in (-1.0, 1.0):
+            x = middle + side * inner, middle + side * half
+            axes.plot(x, [z, z], color=colour, linewidth=4.0, solid_capstyle="butt")
         words = f"{name} {patch.highest:.3g} m/s" if patch.kind == "inlet" else name
         lower = (-0.04 if patch.side == "floor" else 0.02) * height * (1.0 + number % 2)
         axes.text(middle, z + lower, words, color=colour, fontsize=9.5, ha="center", va="center", **LEGIBLE)

@@ -158,10 +158,12 @@ def mean_inlet_velocity(case: Case) -> float:
     """Mean superficial velocity over the floor including jet and inlets, highest in time [m/s]."""
     if (case.column.ends != "flow" and not case.patch) or case.around is NO_FLUID:
         return 0.0
-    inlet = case.bed.highest_inlet_velocity
-    of_floor = [each for each in case.patch.values() if each.kind == "inlet" and each.side == "floor"]
+    on_floor = [each for each in case.patch.values() if each.side == "floor"]
+    closed = case.column.ends != "flow" or any(each.kind != "inlet" and each.shape == "whole" for each in on_floor)
+    inlet = 0.0 if closed else case.bed.highest_inlet_velocity
+    of_floor = [each for each in on_floor if each.kind == "inlet"]
     if of_floor:
-        shares = [min(1.0, each.area / case.floor_area) for each in of_floor]
+        shares = [min(1.0, each.area / max(case.floor_area, 1e-300)) for each in of_floor]
         entering = sum(each.highest * share for each, share in zip(of_floor, shares))
         return entering + max(0.0, 1.0 - sum(shares)) * inlet
     return inlet + sum(share_of_jet(case, jet) * (jet.velocity - inlet) for jet in case.bed.jets)

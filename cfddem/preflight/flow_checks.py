@@ -129,7 +129,7 @@ def check_flow(case: Case, bed: BedEstimate) -> Iterator[Issue]:
             "warning", "column.ends", "periodic along gravity: particles and fluid accelerate without limit",
             "set laws.gravity = [0.0, 0.0, 0.0]",
         )  # fmt: skip
-    if not (case.bed.fixed or bed.inlet <= 0.0 or ends != "flow" or downward == 0.0):
+    if not (case.bed.fixed or bed.inlet <= 0.0 or (ends != "flow" and not case.patch) or downward == 0.0):
         yield from _check_inlet(case, bed)
     jet, in_a_box = case.bed.jet, not case.line and not vessel_of(case)
     if jet and not (in_a_box or jet.round or jet.depth):
@@ -184,6 +184,8 @@ def _check_viscosity(case: Case, bed: BedEstimate) -> Iterator[Issue]:
 def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
     """Check the inlet velocity against minimum fluidisation and terminal velocity."""
     inlet = case.bed.inlet_velocity
+    of_floor = (f"patch.{name}" for name, each in case.patch.items() if (each.kind, each.side) == ("inlet", "floor"))
+    key = next(of_floor, "bed.inlet_velocity")
     if case.laws.gravity[2] * (case.solid_density - case.required_fluid.density) > 0.0:
         names = {case.material_name_of(each) for each in case.species.values()}
         yield Issue(
@@ -194,7 +196,7 @@ def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
     elif bed.inlet > bed.terminal:
         yield Issue(
-            "error" if isinstance(inlet, float) else "warning", "bed.inlet_velocity",
+            "error" if isinstance(inlet, float) else "warning", key,
             f"{bed.inlet:.3g} m/s is above the terminal velocity {bed.terminal:.3g} m/s: the flow carries the "
             "particles to the lid",
             unit_of_velocity(case, bed)
@@ -202,7 +204,7 @@ def _check_inlet(case: Case, bed: BedEstimate) -> Iterator[Issue]:
         )  # fmt: skip
     elif bed.inlet < bed.onset and case.bed.start in ("poured", "expanded"):
         yield Issue(
-            "warning", "bed.inlet_velocity",
+            "warning", key,
             f"{bed.inlet:.3g} m/s is below minimum fluidisation, {bed.onset:.3g} m/s: the bed stays packed",
             "use more, or set bed.fixed = true, which runs much faster",
         )  # fmt: skip

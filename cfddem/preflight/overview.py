@@ -190,7 +190,7 @@ def _cut_cells(case: Case, group: str) -> Iterator[Row]:
         "smallest cut cell / cell",
         float(cut.min(initial=1.0)),
         "",
-        f"{half} are less than half open: particles see them with a neighbour",
+        f"{half} are less than half open, and merged",
     )
 
 

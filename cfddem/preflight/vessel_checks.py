@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -25,7 +25,8 @@ def check_vessel(case: Case) -> Iterator[Issue]:
     if not case.vessel:
         return
     narrow = 2.0 * min(radius for _, radius in case.line)
-    key = {"cylinder": "radius", "cone": "radius", "chain": "line"}[case.vessel.shape]
+    of_cone = "radius" if case.line[0][1] <= case.line[1][1] else "top_radius"
+    key = {"cylinder": "radius", "cone": of_cone, "chain": "line"}[case.vessel.shape]
     largest = case.bed.largest_diameter
     if 0.0 < narrow < largest:
         yield Issue(
@@ -41,12 +42,20 @@ def check_vessel(case: Case) -> Iterator[Issue]:
             "warning", f"vessel.{key}",
             f"{narrow / widest:.2g} cells across the vessel where it is narrowest, {narrow:.3g} m; its flow needs "
             f"at least {FEWEST_ACROSS:g}",
-            "use smaller cells, of at least 2 diameters, or a wider vessel",
+            "use smaller cells, but of at least 2 diameters, or a wider vessel",
         )  # fmt: skip
 
 
 def check_patches(case: Case) -> Iterator[Issue]:
     """Check that patches lie on the open part of floor or lid."""
+    of_lid = {name: each for name, each in case.patch.items() if each.side == "lid"}
+    leaves = case.column.ends == "flow" and _is_open(case, [*of_lid.values()])
+    if case.fastest_inflow > 0.0 and of_lid and not leaves and "outlet" not in {e.kind for e in case.patch.values()}:
+        yield Issue(
+            "error", f"patch.{next(iter(of_lid))}",
+            "the patches of the lid leave no part of it open: what enters has to leave",
+            'make them smaller, or give a patch of kind = "outlet"',
+        )  # fmt: skip
     for name, patch in case.patch.items():
         share = open_share_of(case, patch)
         if share == 0.0:
@@ -76,6 +85,17 @@ def open_share_of(case: Case, patch: CasePatch) -> float:
     inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
     inside &= case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0
     return float(np.count_nonzero(mine & inside)) / max(int(np.count_nonzero(mine)), 1)
+
+
+def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:
+    """Whether patches leave some of the lid free."""
+    width, depth, height = case.column.size
+    along = (np.arange(PLACES) + 0.5) / PLACES
+    x, y = (each.reshape(-1) for each in np.meshgrid(width * along, depth * along))
+    free = case.beyond_the_side(np.stack([x, y, np.full(x.size, height)], axis=-1)) <= 0.0
+    for each in patches:
+        free &= each.weight(x, y, (0.5 * width, 0.5 * depth)) == 0.0
+    return bool(free.any())
 
 
 def _radius(case: Case, patch: CasePatch) -> float:

@@ -128,7 +128,7 @@ class RunCost:
     particle_steps  in the run
     fluid_steps     in the run; 0 without a fluid
     particles       in the run
-    films           between particles, in the run
+    films           or bridges between particles, in the run
     """
 
     seconds: float

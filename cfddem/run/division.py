@@ -81,7 +81,8 @@ def cost_of(case: Case) -> RunCost:
     """What a case costs one process, and how often ranks would exchange."""
     bed = estimate_bed(case)
     cost = estimate_cost(case, bed, estimate_steps(case, bed))
-    return RunCost(cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count), case.has_films)
+    films = case.has_films or bool(case.liquid)
+    return RunCost(cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count), films)
 
 
 def most_ranks(case: Case, cost: RunCost) -> int:

@@ -12,7 +12,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.liquid import Liquid
 from cfddem.case.particle_properties import SPECIES, ParticleProperties, particle_properties
 from cfddem.case.schema import Case
-from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, start_box
+from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, start_box, vessel_of
 from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import clear_of_walls, loose_places
 from cfddem.particles.initial.packing import lattice, random_packing
@@ -113,7 +113,9 @@ def _suspended(count: int, largest: float, case: Case, walls: Sequence[Wall]) ->
     """Places spread evenly over the column: a random subset of a perturbed lattice (count, 3) [m]."""
     column, seed = case.column, case.bed.seed
     corner, size = case.bed.start_corner or (0.0, 0.0, 0.0), case.bed.start_size or column.size
-    volume = math.prod(case.bed.start_size) if case.bed.start_size else case.floor_area * column.height
+    vessel = vessel_of(case) if case.vessel and not case.vessel.is_upright else None
+    volume = case.floor_area * column.height if vessel is None else float(vessel.volumes[-1])
+    volume = math.prod(case.bed.start_size) if case.bed.start_size else volume
     pitch = min((volume / count) ** (1.0 / 3.0), *size)
     for _ in range(200):
         if pitch < 1.02 * largest:

@@ -40,35 +40,34 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
         if not share.any():
             remedy = "move it, or make it larger than a cell"
             raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
-    made, inlets = [*listed], {name: each for name, each in patches.items() if each.kind == "inlet"}
-    if inlets:
-        speeds = [(each.speed, covered[name]) for name, each in inlets.items()]
-        entering = np.sum([share for _, share in speeds], axis=0) > 0.0
-        made.append(Inlet(_velocity(case, speeds, _before(listed[0])), where=_at(case, entering)))
+    made, inlets = [*listed], [name for name, each in patches.items() if each.kind == "inlet"]
     for name, each in patches.items():
         if each.kind != "inlet":
             where = _at(case, covered[name] >= HALF * covered[name].max())
             made.append(Outlet(each.pressure, where=where) if each.kind == "outlet" else NoSlip(where=where))
+        elif name == inlets[-1]:  # all inlets at once: two may share a face
+            speeds = [(patches[one].speed, covered[one]) for one in inlets]
+            entering = np.sum([share for _, share in speeds], axis=0) > 0.0
+            made.append(Inlet(_velocity(case, speeds, _before(listed[0])), where=_at(case, entering)))
     return made
 
 
 def coverage(case: Case, patch: CasePatch) -> Array:
     """Velocity through the open part of each face of a side over that of the patch (ny, nx) [-]."""
-    grid, (width, depth, height) = grid_of(case), case.column.size
-    (nx, ny, nz), (hx, hy, _) = grid.cells, grid.spacing
-    within = (np.arange(PLACES) + 0.5) / PLACES
-    x = hx * (np.arange(nx)[:, None] + within).reshape(-1)
-    y = hy * (np.arange(ny)[:, None] + within).reshape(-1)
-    z = np.full((y.size, x.size), 0.0 if patch.side == "floor" else height)
-    places = np.stack([*np.broadcast_arrays(x, y[:, None], z)], axis=-1).reshape(-1, 3)
-    inside = (case.beyond_the_side(places) <= 0.0).reshape(z.shape) if case.vessel else np.ones(z.shape, bool)
-    inside &= np.kron(grid.open[0 if patch.side == "floor" else nz - 1], np.ones((PLACES, PLACES), bool)).astype(bool)
-
-    def per_face(values: Array) -> Array:
-        return np.asarray(values.reshape(ny, PLACES, nx, PLACES).sum(axis=(1, 3)))
-
-    weight = patch.weight(x, y[:, None], (0.5 * width, 0.5 * depth)) * inside
-    return per_face(weight) / np.maximum(per_face(inside.astype(float)), 1.0)
+    (width, depth, height), (nx, ny, nz) = case.column.size, grid_of(case).cells
+    z, solid = (0.0, 0) if patch.side == "floor" else (height, nz - 1)
+    x = (np.arange(nx * PLACES) + 0.5) * width / (nx * PLACES)
+    made = np.zeros((ny, nx))
+    for row, is_open in enumerate(grid_of(case).open[solid]):
+        y = (row * PLACES + np.arange(PLACES)[:, None] + 0.5) * depth / (ny * PLACES)
+        places = np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+        inside = np.repeat(is_open, PLACES) * np.ones(y.shape)
+        if case.vessel:
+            inside = inside * (case.beyond_the_side(places.reshape(-1, 3)) <= 0.0).reshape(inside.shape)
+        weight = patch.weight(x, y, (0.5 * width, 0.5 * depth)) * inside
+        sums = [values.reshape(PLACES, nx, PLACES).sum(axis=(0, 2)) for values in (weight, inside)]
+        made[row] = sums[0] / np.maximum(sums[1], 1.0)
+    return made
 
 
 def _before(condition: Condition) -> Callable[[float], float]:

@@ -126,7 +126,7 @@ def test_a_sphere_beside_a_corner_touches_the_wall_once():
     ("table", "line"),
     [
         ({"shape": "cylinder", "radius": 0.05}, [(0.0, 0.05), (0.24, 0.05)]),
-        ({"shape": "cone", "radius": 0.03, "top_radius": 0.05, "length": 0.3}, [(0.0, 0.03), (0.3, 0.05)]),
+        ({"shape": "cone", "radius": 0.03, "top_radius": 0.05, "length": 0.3}, [(0.0, 0.03), (0.24, 0.046)]),
         ({"shape": "chain", "line": [[0.0, 0.03], [0.1, 0.03], [0.2, 0.06]]},
          [(0.0, 0.03), (0.1, 0.03), (0.2, 0.06), (0.24, 0.06)]),
     ],
@@ -154,6 +154,15 @@ def test_particles_start_in_the_vessel():
     spheres = particles_of(case, materials_of(case), walls_of(case), laws_of(case))
     assert clear_of_walls(spheres.position, 2e-3 * (1.0 - 1e-6), walls_of(case)).all()
     assert (case.beyond_the_side(spheres.position, 2e-3) <= 1e-9).all()
+    for radius in (0.03, 0.0):
+        many = made(vessel__radius=radius, patch={}, bed__start="suspended", bed__count=12_000, bed__height=None)
+        assert particles_of(many, materials_of(many), walls_of(many), laws_of(many)).count == 12_000
+    assert made(
+        vessel__shape="chain",
+        vessel__radius=None,
+        vessel__length=None,
+        vessel__line=[[0.0, 0.03], [0.2, 0.06], [0.4, 0.1]],
+    ).line[-1] == pytest.approx((0.24, 0.068))
 
 
 def test_a_vessel_survives_text_and_commands(tmp_path: Path):
@@ -225,8 +234,33 @@ def test_the_flow_through_a_patch_is_its_velocity_times_its_area():
     )  # beside the middle
 
 
+def inflow(case: Case) -> float:
+    """Flow through the floor at 0.5 s [m3/s]."""
+    boundaries = Boundaries(grid_of(case), boundaries_of(case))
+    boundaries.set_inlets(0.5, np.ones(grid_of(case).padded_shape))
+    side = next(each for each in boundaries.sides if each.name == "z_low")
+    open_part = boundaries.cut.aperture[2][2, 2:-3, 2:-3]
+    return float((side.wall[2, 2:-3, 2:-3] * open_part).sum() * grid_of(case).face_area(2))
+
+
+def test_an_inlet_opens_the_wall_before_it_and_a_wall_closes_the_inlet_before_it():
+    plate = {"kind": "wall", "side": "floor", "shape": "ring", "diameter": 0.06, "inner_diameter": 0.0001}
+    nozzle = made().patch["nozzle"].model_dump(exclude_unset=True)
+    assert inflow(made(patch={"plate": {"kind": "wall"}, "nozzle": nozzle})) == pytest.approx(inflow(made()), rel=1e-12)
+    half = {"kind": "wall", "shape": "box", "centre": [0.04, 0.08], "size": [0.08, 0.16]}
+    assert inflow(made(**{"patch.half": half})) == pytest.approx(0.5 * inflow(made()), rel=1e-9)
+    with pytest.raises(InputError, match="inlet"):
+        inflow(made(patch={"nozzle": nozzle, "plate": plate}))
+
+
+def test_velocities_of_inlets_that_overlap_add_up():
+    floor = {"kind": "inlet", "velocity": 1.0}
+    alone, nozzle = inflow(made(patch={"floor": floor})), made().patch["nozzle"].model_dump(exclude_unset=True)
+    assert inflow(made(patch={"floor": floor, "nozzle": nozzle})) == pytest.approx(alone + inflow(made()), rel=1e-9)
+
+
 def test_a_lid_may_be_closed_but_for_its_outlets():
-    """Later patches replace earlier ones; two outlets of a closed lid are those that are open."""
+    """Two outlets of a closed lid are those that are open."""
     outlet = {"kind": "outlet", "side": "lid", "shape": "disc", "diameter": 0.03}
     case = made(**{
         "column.ends": "closed",
@@ -246,6 +280,11 @@ def test_a_lid_may_be_closed_but_for_its_outlets():
         ({"patch.nozzle.diameter": 0.08}, "patch.nozzle", "warning", "outside of the floor, and has no flow"),
         ({"vessel.radius": 0.015, "patch.nozzle.diameter": 0.02}, "vessel.radius", "warning", "3 cells across"),
         ({"vessel.radius": 0.0019, "patch": {}}, "vessel.radius", "warning", "less than a particle"),
+        ({"vessel.radius": 0.0}, "patch.nozzle", "error", "outside of the floor"),
+        ({"vessel": {"shape": "cone", "radius": 0.08, "top_radius": 0.01, "length": 0.2}},
+         "vessel.top_radius", "warning", "2 cells across"),
+        ({"patch.top": {"kind": "wall", "side": "lid", "shape": "disc", "diameter": 0.3}}, "patch.top", "error",
+         "leave no part of it open"),
     ],
 )  # fmt: skip
 def test_the_pre_run_check_sees_vessel_and_patches(given, key, severity, said):

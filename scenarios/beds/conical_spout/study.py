@@ -47,7 +47,7 @@ def olazar(case: Case) -> float:
 
     Re = 0.126 Ar^0.5 (D_b/D_o)^1.68 tan(gamma/2)^-0.57, with Re of the particle diameter and the velocity in the
     nozzle, the diameter D_b of the surface of the bed at rest, D_o of the nozzle, and the angle gamma of the cone. The
-    constants are quoted from memory.
+    constants were not compared with the paper.
     """
     (_, low), (length, high) = case.line[:2]
     fluid, diameter, nozzle = case.required_fluid, case.bed.diameter, case.patch["nozzle"].diameter or math.nan
