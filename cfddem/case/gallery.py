@@ -107,7 +107,15 @@ def full_key(key: str) -> str:
     tables = {
         name: sections[0].model_fields for name, field in Case.model_fields.items() if (sections := sections_of(field))
     }
-    for several in ("material", "pair", "wall", "feed", "outlet", "compare"):  # their keys need a name or number
+    for several in (
+        "material",
+        "pair",
+        "wall",
+        "patch",
+        "feed",
+        "outlet",
+        "compare",
+    ):  # their keys need a name or number
         tables.pop(several)
     found = [f"{name}.{key}" for name, words in tables.items() if key in words]
     if len(found) > 1:

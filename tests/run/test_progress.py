@@ -53,7 +53,7 @@ def test_the_log_gets_one_line_per_row_and_a_pipe_gets_none(tmp_path: Path, capf
             logging.getLogger("cfddem").warning("a checkpoint is damaged")
     rows = (tmp_path / "log.txt").read_text().splitlines()
     assert [row[21:28] for row in rows] == ["pouring", "0.25/2 ", "a check", "pouring", "0.5/2 s", "a check"]
-    assert capfd.readouterr().err == 2 * "a checkpoint is damaged\n"
+    assert capfd.readouterr().err == 2 * "cfddem: warning: a checkpoint is damaged\n"
     with pytest.raises(InputError, match=r"log = .*: must be a writable file"), live_line(tmp_path):
         pass
 

@@ -90,8 +90,9 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
         position, up = particles["position"], particles["velocity"][:, 2]
         near = np.abs(position[:, 1] - middle) < reach
         axis.scatter(
-            position[near, 0], position[near, 2], s=20.0, c=up[near], cmap="coolwarm", vmin=-0.6, vmax=0.6, linewidths=0
-        )
+            position[near, 0], position[near, 2], s=20.0, c=up[near], cmap="RdBu_r", vmin=-0.6, vmax=0.6,
+            linewidths=0.3, edgecolors=GREY,
+        )  # fmt: skip
         for side in (-1.0, 1.0):
             axis.plot(middle + side * radii, heights, color="#222222", lw=1.6)
         axis.set(xlim=(0.0, case.column.width), ylim=(0.0, 0.6 * case.column.height), aspect="equal")
@@ -105,7 +106,7 @@ def figure(run: RunData, case: Case, times: Sequence[float], path: Path) -> None
         run.history["time"], run.history["pressure_drop"] / 1e3, color=GREY, lw=1.0, label="pressure drop  [kPa]"
     )
     curve.set(ylim=(0.0, 2.4), xlabel="time  [s]")
-    legend(curve, loc="upper right", fontsize=8)
+    legend(curve, loc="upper right")
     save(drawn, path)
 
 
