@@ -90,8 +90,9 @@ def finer(fluid: FluidSolver, axis: int) -> Any:
     """A component of the velocity at any point."""
 
     def velocity(x: Array, y: Array, z: Array) -> Array:
-        points = np.stack([np.ravel(each) for each in np.broadcast_arrays(x, y, 0.5 * fluid.grid.spacing[2])], axis=-1)
-        return fluid.velocity_at(points)[:, axis].reshape(np.broadcast_shapes(*map(np.shape, (x, y, z))))
+        x, y, z = np.broadcast_arrays(x, y, z)
+        middle = np.full(x.size, 0.5 * fluid.grid.spacing[2])
+        return fluid.velocity_at(np.stack([x.ravel(), y.ravel(), middle], axis=-1))[:, axis].reshape(x.shape)
 
     return velocity
 
