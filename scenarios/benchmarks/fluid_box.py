@@ -17,6 +17,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.fluid.conditions import Inlet, Outlet
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
+from scenarios.benchmarks import kept_speeds
 from scenarios.benchmarks.memory import triad
 
 CELLS = {(32, 8, 128): 0.05, (64, 64, 64): 0.25}
@@ -88,8 +89,9 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "fluid step", f"{result['threads']} thread(s), triad {result['triad [GB/s]']:.1f} GB/s"
     for each in result["boxes"]:
         cells, step = each["cells"], each["step [s]"]
+        name = kept_speeds.fluid_box(cells, result["threads"])
         yield (
             " x ".join(str(count) for count in cells),
             f"{step:.4f} s, {1e9 * step / np.prod(cells):.0f} ns a cell, {each['pressure iterations']:.1f} pressure "
-            f"iterations, {each['share of the triad']:.2f} of the triad",
+            f"iterations, {each['share of the triad']:.2f} of the triad{kept_speeds.beside(name, 1.0 / step)}",
         )

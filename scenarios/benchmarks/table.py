@@ -1,13 +1,18 @@
-"""All benchmarks of the commands, as one table of plain values."""
+"""All benchmarks of the commands, as one table of plain values; run as a program, it keeps their speeds."""
 
 from __future__ import annotations
 
+import json
+import platform
 from collections.abc import Callable, Iterator
+from datetime import date
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from cfddem.io.files import write_whole
 from scenarios.beds.gas_bed import study as gas_bed
-from scenarios.benchmarks import dense_bed, fluid_box
+from scenarios.benchmarks import dense_bed, fluid_box, kept_speeds
 
 SIZES = (10_000, 100_000)
 """Particles of the dense beds."""
@@ -37,3 +42,26 @@ def rows(result: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """The results as lines of a table."""
     for name, (_, lines) in benchmarks().items():
         yield from lines(result[name])
+
+
+def keep() -> None:
+    """Measure this machine and write the file."""
+    results = bench()
+    document = {
+        "machine": _processor(),
+        "date": date.today().isoformat(),
+        "triad [GB/s]": next(iter(results.values()))["triad [GB/s]"],
+        "speeds": dict(kept_speeds.speeds(results)),
+    }
+    write_whole(kept_speeds.FILE, (json.dumps(document, indent=1) + "\n").encode())
+
+
+def _processor() -> str:
+    """Name of the processor where Linux tells it."""
+    listed = Path("/proc/cpuinfo")
+    lines = listed.read_text(encoding="utf-8").splitlines() if listed.exists() else []
+    return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+if __name__ == "__main__":
+    keep()
