@@ -41,14 +41,17 @@ def with_patches(case: Case, side: str, base: Condition | list[Condition]) -> Co
             remedy = "move it, or make it larger than a cell"
             raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
     made, inlets = [*listed], [name for name, each in patches.items() if each.kind == "inlet"]
+    around = np.ones(next(iter(covered.values())).shape)  # whether the side itself is open beside the inlets
     for name, each in patches.items():
         if each.kind != "inlet":
-            where = _at(case, covered[name] >= HALF * covered[name].max())
+            whole = covered[name] >= HALF * covered[name].max()
+            around[whole] = 0.0
+            where = _at(case, whole)
             made.append(Outlet(each.pressure, where=where) if each.kind == "outlet" else NoSlip(where=where))
         elif name == inlets[-1]:  # all inlets at once: two may share a face
             speeds = [(patches[one].speed, covered[one]) for one in inlets]
             entering = np.sum([share for _, share in speeds], axis=0) > 0.0
-            made.append(Inlet(_velocity(case, speeds, _before(listed[0])), where=_at(case, entering)))
+            made.append(Inlet(_velocity(case, speeds, _before(listed[0]), around), where=_at(case, entering)))
     return made
 
 
@@ -79,11 +82,11 @@ def _before(condition: Condition) -> Callable[[float], float]:
 
 
 def _velocity(
-    case: Case, speeds: Sequence[tuple[Callable[[float], float], Array]], flow: Callable[[float], float]
+    case: Case, speeds: Sequence[tuple[Callable[[float], float], Array]], flow: Callable[[float], float], around: Array
 ) -> Callable[[Array, Array, Array, float], Array]:
-    """Inward speed at faces: that of every patch by its share, and that of the floor by the rest."""
+    """Inward speed at faces: that of every patch by its share, and that of the floor by the rest if it is `around`."""
     spacing = grid_of(case).spacing
-    rest = np.maximum(1.0 - np.sum([share for _, share in speeds], axis=0), 0.0)
+    rest = around * np.maximum(1.0 - np.sum([share for _, share in speeds], axis=0), 0.0)
 
     def velocity(x: Array, y: Array, z: Array, time: float) -> Array:
         row, column = np.floor(y / spacing[1]).astype(int), np.floor(x / spacing[0]).astype(int)

@@ -247,6 +247,8 @@ def test_an_inlet_opens_the_wall_before_it_and_a_wall_closes_the_inlet_before_it
     plate = {"kind": "wall", "side": "floor", "shape": "ring", "diameter": 0.06, "inner_diameter": 0.0001}
     nozzle = made().patch["nozzle"].model_dump(exclude_unset=True)
     assert inflow(made(patch={"plate": {"kind": "wall"}, "nozzle": nozzle})) == pytest.approx(inflow(made()), rel=1e-12)
+    open_floor = made(patch={"plate": {"kind": "wall"}, "nozzle": nozzle}, bed__inlet_velocity=1.0)
+    assert inflow(open_floor) == pytest.approx(inflow(made()), rel=1e-12)
     half = {"kind": "wall", "shape": "box", "centre": [0.04, 0.08], "size": [0.08, 0.16]}
     assert inflow(made(**{"patch.half": half})) == pytest.approx(0.5 * inflow(made()), rel=1e-9)
     with pytest.raises(InputError, match="inlet"):
