@@ -25,6 +25,21 @@ POURED_SOLID_FRACTION = 0.58
 _FRACTION_TOLERANCE = 1e-6
 """The fractions of a mixture add up to 1 within this [-]."""
 
+InTime = float | tuple[tuple[float, float], ...]
+"""A velocity: a number, or [time, velocity] pairs [s], [m/s]."""
+
+
+def speeds_of(velocity: InTime) -> tuple[float, ...]:
+    """Every value of a velocity in time [m/s]."""
+    return (velocity,) if isinstance(velocity, float) else tuple(speed for _, speed in velocity)
+
+
+def check_times(name: str, velocity: InTime) -> None:
+    """Raise InputError for a velocity whose times do not increase, or that has none."""
+    times = [] if isinstance(velocity, float) else [time for time, _ in velocity]
+    if velocity == () or sorted(set(times)) != times:
+        raise InputError(name, None, "a number, or [time, velocity] pairs in increasing time")
+
 
 class Jet(Checked):
     """A faster inlet through part of the floor."""
@@ -150,7 +165,7 @@ class Bed(Species):
     initial_velocity: Point = Field((0.0, 0.0, 0.0), description="velocity of all particles at the start [m/s]")
     fixed: bool = Field(False, description="particles do not move: a packed bed")
     seed: int = Field(1, ge=0, description="random seed; the same seed gives the same bed")
-    inlet_velocity: float | tuple[tuple[float, float], ...] = Field(
+    inlet_velocity: InTime = Field(
         0.0, description="superficial velocity through the floor, upward: a number, or [time, velocity] pairs [m/s]"
     )
     jet: Jet | None = Field(None, description="faster inlet through part of the floor")
@@ -174,10 +189,7 @@ class Bed(Species):
                 raise InputError(name, None, "left out where start_corner and start_size are given", "give a count")
         if self.positions and self.start == "poured":
             object.__setattr__(self, "start", "placed")
-        if not isinstance(self.inlet_velocity, float):
-            times = [time for time, _ in self.inlet_velocity]
-            if not times or sorted(set(times)) != times:
-                raise InputError("inlet_velocity", None, "a number, or [time, velocity] pairs in increasing time")
+        check_times("inlet_velocity", self.inlet_velocity)
         if self.lowest_inlet_velocity < 0.0:
             raise InputError(
                 "inlet_velocity", self.lowest_inlet_velocity, "at least 0", "the fluid enters through the floor"
@@ -250,14 +262,12 @@ class Bed(Species):
     @property
     def lowest_inlet_velocity(self) -> float:
         """Lowest superficial velocity through the floor over time [m/s]."""
-        inlet = self.inlet_velocity
-        return inlet if isinstance(inlet, float) else min(speed for _, speed in inlet)
+        return min(speeds_of(self.inlet_velocity))
 
     @property
     def highest_inlet_velocity(self) -> float:
         """Highest superficial velocity through the floor over time, without the jet [m/s]."""
-        inlet = self.inlet_velocity
-        return inlet if isinstance(inlet, float) else max(speed for _, speed in inlet)
+        return max(speeds_of(self.inlet_velocity))
 
     @property
     def jets(self) -> tuple[Jet, ...]:

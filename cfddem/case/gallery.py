@@ -94,6 +94,10 @@ def read_value(text: str) -> Any:
         return text
 
 
+NAMED = ("material", "pair", "wall", "patch", "feed", "outlet", "compare")
+"""Tables whose keys need a name or a number."""
+
+
 def full_key(key: str) -> str:
     """The key with its table; the table may be left out if only one table has the key, [liquid] and [spray] aside.
 
@@ -107,15 +111,7 @@ def full_key(key: str) -> str:
     tables = {
         name: sections[0].model_fields for name, field in Case.model_fields.items() if (sections := sections_of(field))
     }
-    for several in (
-        "material",
-        "pair",
-        "wall",
-        "patch",
-        "feed",
-        "outlet",
-        "compare",
-    ):  # their keys need a name or number
+    for several in NAMED:
         tables.pop(several)
     found = [f"{name}.{key}" for name, words in tables.items() if key in words]
     if len(found) > 1:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, shown
-from cfddem.case.bed import NonNegative, Positive
+from cfddem.case.bed import NonNegative, Positive, check_times, speeds_of
 from cfddem.case.materials import Checked
 
 Array = NDArray[np.float64]
@@ -64,10 +64,8 @@ class CasePatch(Checked):
                 raise InputError(name, shown(getattr(self, name)), f'left out for kind = "{self.kind}"')
         if self.kind == "inlet" and self.velocity is None:
             raise InputError("velocity", None, "given for an inlet")
-        if isinstance(self.velocity, tuple):
-            times = [time for time, _ in self.velocity]
-            if not times or sorted(set(times)) != times:
-                raise InputError("velocity", None, "a number, or [time, velocity] pairs in increasing time")
+        if self.velocity is not None:
+            check_times("velocity", self.velocity)
         if self.inner_diameter and self.inner_diameter >= (self.diameter or 0.0):
             raise InputError("inner_diameter", self.inner_diameter, f"below the diameter, {self.diameter:g} m")
         if self.profile == "parabolic" and self.shape != "disc":
@@ -77,7 +75,7 @@ class CasePatch(Checked):
     @property
     def highest(self) -> float:
         """Highest superficial velocity of an inlet over time, its mean over the patch [m/s]."""
-        return max(speed for _, speed in self.velocity) if isinstance(self.velocity, tuple) else self.velocity or 0.0
+        return max(speeds_of(self.velocity or 0.0))
 
     @property
     def fastest(self) -> float:

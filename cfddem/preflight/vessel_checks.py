@@ -59,7 +59,8 @@ def check_patches(case: Case) -> Iterator[Issue]:
     for name, patch in case.patch.items():
         share = open_share_of(case, patch)
         if share == 0.0:
-            radius = f", a disc of {2.0 * _radius(case, patch):.3g} m" if case.line else ""
+            end = 0 if patch.side == "floor" else -1
+            radius = f", a disc of {2.0 * case.line[end][1]:.3g} m" if case.line else ""
             yield Issue(
                 "error", f"patch.{name}", f"it lies outside of the {patch.side} of the column{radius}",
                 "move its centre [x, y], in m from the corner of the column",
@@ -74,30 +75,30 @@ def check_patches(case: Case) -> Iterator[Issue]:
 
 def open_share_of(case: Case, patch: CasePatch) -> float:
     """Share of a patch that lies on its side of the vessel [-]; of a whole side that of the side."""
-    width, depth, height = case.column.size
+    width, depth, _ = case.column.size
     middle = patch.centre or (0.5 * width, 0.5 * depth)
     edges = patch.size or (2.0 * width, 2.0 * depth)
     reach = patch.diameter or float(max(edges))
     along = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
     x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + along, middle[1] + along))
     mine = patch.weight(x, y, middle) > 0.0
-    z = np.full(x.size, 0.0 if patch.side == "floor" else height)
-    inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
-    inside &= case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0
-    return float(np.count_nonzero(mine & inside)) / max(int(np.count_nonzero(mine)), 1)
+    return float(np.count_nonzero(mine & _inside(case, patch.side, x, y))) / max(int(np.count_nonzero(mine)), 1)
 
 
 def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:
     """Whether patches leave some of the lid free."""
-    width, depth, height = case.column.size
+    width, depth, _ = case.column.size
     along = (np.arange(PLACES) + 0.5) / PLACES
     x, y = (each.reshape(-1) for each in np.meshgrid(width * along, depth * along))
-    free = case.beyond_the_side(np.stack([x, y, np.full(x.size, height)], axis=-1)) <= 0.0
+    free = _inside(case, "lid", x, y)
     for each in patches:
         free &= each.weight(x, y, (0.5 * width, 0.5 * depth)) == 0.0
     return bool(free.any())
 
 
-def _radius(case: Case, patch: CasePatch) -> float:
-    """Radius of a round floor or lid [m]."""
-    return float(np.interp(0.0 if patch.side == "floor" else case.column.height, *np.array(case.line).T))
+def _inside(case: Case, side: str, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Which places of the plane of floor or lid lie within the column and its vessel."""
+    width, depth, height = case.column.size
+    z = np.full(x.size, 0.0 if side == "floor" else height)
+    inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
+    return np.asarray(inside & (case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0))

@@ -85,23 +85,26 @@ def _velocity(
     case: Case, speeds: Sequence[tuple[Callable[[float], float], Array]], flow: Callable[[float], float], around: Array
 ) -> Callable[[Array, Array, Array, float], Array]:
     """Inward speed at faces: that of every patch by its share, and that of the floor by the rest if it is `around`."""
-    spacing = grid_of(case).spacing
     rest = around * np.maximum(1.0 - np.sum([share for _, share in speeds], axis=0), 0.0)
 
     def velocity(x: Array, y: Array, z: Array, time: float) -> Array:
-        row, column = np.floor(y / spacing[1]).astype(int), np.floor(x / spacing[0]).astype(int)
-        entering: Any = sum(speed(time) * share[row, column] for speed, share in speeds)
-        return np.asarray(entering + flow(time) * rest[row, column])
+        face = _face(case, x, y)
+        entering: Any = sum(speed(time) * share[face] for speed, share in speeds)
+        return np.asarray(entering + flow(time) * rest[face])
 
     return velocity
 
 
 def _at(case: Case, chosen: np.ndarray) -> Region:
     """The faces of a side that are chosen (ny, nx)."""
-    spacing = grid_of(case).spacing
 
     def where(x: Array, y: Array, z: Array) -> np.ndarray:
-        row, column = np.floor(y / spacing[1]).astype(int), np.floor(x / spacing[0]).astype(int)
-        return np.asarray(chosen[row, column])
+        return np.asarray(chosen[_face(case, x, y)])
 
     return where
+
+
+def _face(case: Case, x: Array, y: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the faces of a side at some places."""
+    hx, hy, _ = grid_of(case).spacing
+    return np.floor(y / hy).astype(int), np.floor(x / hx).astype(int)
