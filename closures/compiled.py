@@ -111,22 +111,13 @@ def _allow_wide_vectors() -> None:
         _set_compiler("CPU_FEATURES", f"{features.flatten()},-prefer-256-bit")
 
 
-_OPTIONS: Any = {
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "forceinline": True,
-    "_nrt": False,
-}
-
-
 _EXPOSED: set[Callable[..., float]] = set()
 
 
 def expose(function: Callable[..., float]) -> None:
     """Let compiled loops call this plain function by its name."""
     _EXPOSED.add(function)
-    overload(function, strict=False, jit_options=_OPTIONS)(lambda *_, **__: function)
+    overload(function, strict=False, jit_options=INLINE)(lambda *_, **__: function)
 
 
 def is_exposed(function: Callable[..., Any]) -> bool:
@@ -138,6 +129,8 @@ _set_compiler("CACHE_DIR", str(cache_folder()))
 _allow_wide_vectors()
 
 from numba.extending import overload  # noqa: E402  the compiler reads its settings when it is loaded
+
+from closures.linked import INLINE  # noqa: E402
 
 for _laws in REGISTRY.values():
     for _law in _laws.values():

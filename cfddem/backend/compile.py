@@ -1,6 +1,6 @@
 """How a loop is compiled, cached and threaded.
 
-    serial         a loop; the machine code is kept between runs
+    serial         a loop; the machine code is kept between runs. Within another loop it is a part of that
     threaded       a loop over `prange` that runs on all threads; kept between runs. For one thread it is compiled
                    without them, in a third of the time
     either         a loop over `prange` for one thread, or for all where `law_set.specialise` compiles it so; kept
@@ -46,10 +46,12 @@ from numba.core import event
 from numba.core.cpu import CPUTargetOptions
 from numba.core.options import TargetOptions
 from numba.core.types import none as none_type
+from numba.core.types import unliteral
 from numba.extending import intrinsic, overload
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.backend.errors import InputError
+from closures.linked import INLINE, PART, Called
 
 __all__ = [
     "CHUNKS",
@@ -79,23 +81,39 @@ CHUNKS = 64
 """Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
 
 
-_INLINE: dict[str, Any] = {
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "forceinline": True,
-    "_nrt": False,
-}
-"""Helpers are never called from outside, always inlined, and count no references: they own no arrays."""
+_CALLED: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": Called}
+"""How loops are compiled that Python calls."""
 
 
 # the compiler has this flag, but no word for it among the options of `njit`
 CPUTargetOptions.noalias = TargetOptions.Mapping("noalias")  # type: ignore[attr-defined]
 
 
+class Serial:
+    """A loop as Python calls it. Within another loop it is a part of that.
+
+    function  the loop
+
+    called, within  as it is compiled for Python, and for other loops
+    """
+
+    def __init__(self, function: Any) -> None:
+        self.py_func, self.__name__ = function, function.__name__
+        self.called, self.within = kept_on_disk(njit(**_CALLED)(function)), _linked(function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What a loop calls by this name."""
+        return self.within._numba_type_
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the loop."""
+        return self.called(*arguments)
+
+
 def serial(function: Callable[..., Any]) -> Any:
     """Compile a serial loop; kept on disk."""
-    return _marked(kept_on_disk(njit(error_model="numpy")(function)), serial)
+    return _marked(Serial(function), serial)
 
 
 class Threaded:
@@ -108,8 +126,8 @@ class Threaded:
 
     def __init__(self, function: Any) -> None:
         self.py_func, self.__name__ = function, function.__name__
-        self.one = kept_on_disk(njit(error_model="numpy")(renamed(function, f"{function.__name__}_on_one_thread")))
-        self.all = kept_on_disk(njit(error_model="numpy", parallel=True)(function))
+        self.one = kept_on_disk(njit(**_CALLED)(renamed(function, f"{function.__name__}_on_one_thread")))
+        self.all = kept_on_disk(njit(**_CALLED, parallel=True)(function))
 
     @property
     def in_use(self) -> Any:
@@ -128,12 +146,21 @@ def threaded(function: Callable[..., Any]) -> Any:
 
 def either(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` for one thread; `law_set.specialise` can compile it for all threads."""
-    return _marked(kept_on_disk(njit(error_model="numpy")(function)), either)
+    return _marked(kept_on_disk(njit(**_CALLED)(function)), either)
+
+
+def _linked(function: Callable[..., Any], **options: Any) -> Any:
+    """A function for other loops, compiled once for all values of a number that they give it as a constant."""
+    compiled = njit(**PART, **options)(function)
+    if hasattr(compiled, "get_call_template"):  # compilation is switched on
+        found = compiled.get_call_template
+        compiled.get_call_template = lambda args, kws: found(tuple(map(unliteral, args)), kws)
+    return compiled
 
 
 def part(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` that is part of a larger one, with which it is kept; as `either` for threads."""
-    return _marked(njit(error_model="numpy")(function), part)
+    return _marked(_linked(function), part)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -162,29 +189,28 @@ def vector_part(function: Callable[..., Any]) -> Any:
 
     The compiler may then work on several rows at once, as it does by itself in loops for all threads.
     """
-    compiled = njit(error_model="numpy", noalias=True, forceinline=False)(function)  # type: ignore[call-overload]
-    return _marked(compiled, vector_part)
+    return _marked(_linked(function, noalias=True, forceinline=False), vector_part)
 
 
 def vector_inline(function: Callable[..., Any]) -> Any:
     """Compile a helper as `inline` does, where what it writes shares no memory with its other array arguments."""
-    compiled = njit(**_INLINE, noalias=True)(function)  # type: ignore[call-overload]
+    compiled = njit(**INLINE, noalias=True)(function)  # type: ignore[call-overload]
     return _marked(compiled, vector_inline)
 
 
 def threaded_part(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` that is part of a larger one and runs on all threads."""
-    return _marked(njit(error_model="numpy", parallel=True)(function), threaded_part)
+    return _marked(_linked(function, parallel=True), threaded_part)
 
 
 def inline(function: Callable[..., Any]) -> Any:
     """Compile a small helper into the loops that call it."""
-    return _marked(njit(**_INLINE)(function), inline)
+    return _marked(njit(**INLINE)(function), inline)
 
 
 def fused(function: Callable[..., Any]) -> Any:
     """Compile a small helper as `inline` does, where a product and a sum may be one instruction."""
-    return _marked(njit(**_INLINE, fastmath={"contract"})(function), fused)
+    return _marked(njit(**INLINE, fastmath={"contract"})(function), fused)
 
 
 def renamed(function: FunctionType, name: str, bound: Mapping[str, Any] | None = None) -> FunctionType:

@@ -170,10 +170,34 @@ def _fill(of: Struct, value: Any, address: Any, c: Any, failures: list[Any], rel
         if isinstance(member, Struct):
             _fill(member, item, inner, c, failures, releases)
             continue
-        native = c.unbox(member, item)
-        c.builder.store(native.value, inner)
-        failures.append(native.is_error)
-        if native.cleanup is not None:
-            releases.append(native.cleanup)
-        if c.context.enable_nrt:
-            releases.append(partial(c.context.nrt.decref, c.builder, member, native.value))
+        failures.append(c.builder.call(_once(c, member, "take", _take), [item, inner]))
+        if c.context.enable_nrt and c.context.data_model_manager[member].contains_nrt_meminfo():
+            releases.append(partial(c.builder.call, _once(c, member, "release", _release), [inner]))
+
+
+def _once(c: Any, member: types.Type, what: str, fill: Any) -> Any:
+    """A function of the module that treats all members of a type: what each did would be most of the code of a loop."""
+    kind = _content(c.context.data_model_manager, member).as_pointer()
+    item, flag = c.pyapi.pyobj, cgutils.bool_t
+    signature = ir.FunctionType(flag, [item, kind]) if fill is _take else ir.FunctionType(ir.VoidType(), [kind])
+    function = cgutils.get_or_insert_function(c.builder.module, signature, f".{what}.{member}")
+    if not function.blocks:
+        function.linkage = "internal"
+        function.attributes.add("noinline")
+        fill(c.context, ir.IRBuilder(function.append_basic_block()), member, *function.args)
+    return function
+
+
+def _take(context: Any, builder: Any, member: types.Type, item: Any, address: Any) -> None:
+    """Put what Python has at an address; returns whether it fails."""
+    api = context.get_python_api(builder)
+    native = api.to_native_value(member, item)
+    builder.store(native.value, address)
+    assert native.cleanup is None
+    builder.ret(native.is_error)
+
+
+def _release(context: Any, builder: Any, member: types.Type, address: Any) -> None:
+    """Count one reference less."""
+    context.nrt.decref(builder, member, builder.load(address))
+    builder.ret_void()

@@ -1,0 +1,83 @@
+"""Functions that are compiled into the loops that call them, and by themselves to nothing.
+
+The compiler makes each function ready to run, with machine code and an entry from Python, also one that only other
+compiled functions call. Most functions of a loop are such parts of it, so most machine code would never run. A
+`Linked` function stays in the language of the compiler until a loop that Python calls, a `Called` one, takes it over.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
+from numba.core.environment import lookup_environment
+
+
+class _WithoutAddresses:
+    """Stands for the machine code where there is none."""
+
+    @staticmethod
+    def set_env(name: str, environment: Any) -> None:
+        """What a function reads from Python has no address yet; it is set with that of the loop."""
+
+
+class _LinkedCode(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a function without machine code."""
+
+    @property
+    def codegen(self) -> Any:
+        """Where addresses are set."""
+        return _WithoutAddresses
+
+    def _optimize_final_module(self) -> None:
+        """The loop is optimised as a whole."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Address of a function: none."""
+        self._ensure_finalized()
+        return 0
+
+
+class _CalledCode(JITCodeLibrary):  # type: ignore[misc]
+    """Code of a loop that Python calls, with that of all functions in it."""
+
+    def _finalize_specific(self) -> None:
+        super()._finalize_specific()
+        for each in self._final_module.global_variables:
+            environment = lookup_environment(each.name)
+            if environment is not None:
+                self._codegen.set_env(each.name, environment)
+
+
+class Linked(Compiler):  # type: ignore[misc]
+    """Compiles a function for other compiled functions."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, *more: Any) -> None:
+        super().__init__(typing, target, _LinkedCode(target.codegen(), "linked"), *more)
+
+
+class Called(Compiler):  # type: ignore[misc]
+    """Compiles a loop that Python calls."""
+
+    def __init__(self, typing: Any, target: Any, library: Any, *more: Any) -> None:
+        code = _CalledCode(target.codegen(), "called")
+        code.enable_object_caching()
+        super().__init__(typing, target, code, *more)
+
+
+PART: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": Linked,
+}
+"""How functions are compiled that other compiled functions call."""
+
+INLINE: dict[str, Any] = {**PART, "forceinline": True, "_nrt": False}
+"""Helpers are always inlined, and count no references: they own no arrays."""

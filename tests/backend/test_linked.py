@@ -1,0 +1,108 @@
+"""Functions that are compiled only into the loops that call them."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cfddem.backend.compile import inline, part, prange, serial, threaded_part, use_threads
+
+pytestmark = pytest.mark.skipif(not hasattr(inline(lambda x: x), "signatures"), reason="compilation is switched off")
+
+
+@inline
+def raised(x, twice):  # type: ignore[no-untyped-def]
+    return 2.0 * x if twice else x
+
+
+@part
+def raise_all(values, by, twice):  # type: ignore[no-untyped-def]
+    for n in prange(len(values)):
+        values[n] = raised(values[n], twice) + by
+
+
+@threaded_part
+def raise_on_threads(values, by):  # type: ignore[no-untyped-def]
+    for n in prange(len(values)):
+        values[n] = raised(values[n], False) + by
+
+
+@serial
+def sum_of(values):  # type: ignore[no-untyped-def]
+    if values[0] > 1e9:
+        raise ValueError("too large", values[0])
+    return values.sum()
+
+
+@serial
+def walk(values):  # type: ignore[no-untyped-def]
+    raise_all(values, 1, True)
+    raise_all(values, 2, False)
+    return sum_of(values)
+
+
+@serial
+def walk_on_threads(values):  # type: ignore[no-untyped-def]
+    raise_on_threads(values, 1.0)
+    return sum_of(values)
+
+
+def test_a_part_is_compiled_once_for_all_constants_that_loops_give_it() -> None:
+    values = np.ones(5)
+    assert walk(values) == 25.0
+    assert len(raise_all.signatures) <= 1  # none where the loop was read from the disk
+
+
+def test_a_loop_that_other_loops_call_runs_by_itself_too() -> None:
+    assert sum_of(np.ones(5)) == walk(np.full(5, -1.0)) + 0.0 == 5.0
+
+
+def test_parts_have_no_machine_code() -> None:
+    one = part(raise_all.py_func)
+    one.compile("(float64[::1], int64, boolean)")
+    code = one.overloads[one.signatures[0]].library
+    assert code.get_pointer_to_function(next(code.get_defined_functions()).name) == 0
+
+
+@pytest.mark.parametrize("threads", [1, use_threads(None)])
+def test_parts_run_on_threads(threads: int) -> None:
+    before = use_threads(None)
+    use_threads(threads)
+    try:
+        assert walk_on_threads(np.ones(1000)) == 2000.0
+    finally:
+        use_threads(before)
+
+
+def test_errors_of_parts_keep_their_values(tmp_path: Path) -> None:
+    """Also in a loop that is read from the disk."""
+    (tmp_path / "steps.py").write_text(
+        textwrap.dedent("""
+            import numpy as np
+            from cfddem.backend.compile import part, serial
+
+            @part
+            def refuse(values):
+                if values[0] > 1.0:
+                    raise ValueError("too large", values[0])
+
+            @serial
+            def walk(values):
+                refuse(values)
+
+            try:
+                walk(np.full(3, 7.5))
+            except ValueError as error:
+                print(error.args, walk.called.stats.cache_hits.total())
+        """)
+    )
+    answers = [
+        subprocess.run([sys.executable, "steps.py"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    ]
+    assert answers == ["('too large', 7.5) 0\n", "('too large', 7.5) 1\n"]
