@@ -10,26 +10,24 @@ import numpy as np
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
 from cfddem.case.vessel_shape import CaseVessel
+from cfddem.case.vessel_surface import surface_in
 from cfddem.case.wall_geometry import solid_part, stamp
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
-from cfddem.fluid.surfaces import turned
 
 
 def grid_of(case: Case) -> Grid:
     """Cells of the column, cut by its vessel; cells outside a cylinder, and behind walls, are solid."""
     if case.vessel:
-        return _in_vessel(case.column, case.vessel)
+        return _in_vessel(case.column, case.vessel, stamp(case.vessel))
     walls = tuple(filter(case.closes_cells, case.wall))
     return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
 
 
 @lru_cache(maxsize=8)
-def _in_vessel(column: Column, vessel: CaseVessel) -> Grid:
-    centre = (0.5 * column.size[0], 0.5 * column.size[1], 0.0)
-    wall = turned(vessel.line_in(column), centre, spin=vessel.spin)
-    return within(Grid.of_size(column.size, column.cell), wall)
+def _in_vessel(column: Column, vessel: CaseVessel, _: tuple[int, int]) -> Grid:
+    return within(Grid.of_size(column.size, column.cell), surface_in(vessel, column))
 
 
 @lru_cache(maxsize=8)

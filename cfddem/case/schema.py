@@ -25,7 +25,7 @@ from cfddem.case.materials import Material, check_pairs, unknown_materials
 from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.vessel import vessel_of
-from cfddem.case.walls import walls_in
+from cfddem.case.walls import place_of, walls_in
 from closures.agitation import SHARES, TIMES, AgitationFactors, free_spheres
 from closures.kinds import BUILT_IN
 from closures.registry import Law, law_of, load_package_laws
@@ -277,7 +277,12 @@ class Case(CaseTables):
         folder  of the case file; other paths are relative to it
         errors  InputError for measured data outside of the folder, unless their whole path is given
         """
-        return self.model_copy(update={"wall": walls_in(self.wall, folder), "compare": data_in(self.compare, folder)})
+        is_run = (folder / "run.json").is_file()
+        vessel = self.vessel and self.vessel.with_file(
+            lambda file: place_of(file, folder, "vessel", "vessel.file", is_run)
+        )
+        data = data_in(self.compare, folder)
+        return self.model_copy(update={"wall": walls_in(self.wall, folder), "vessel": vessel, "compare": data})
 
     def with_(self, **changes: Any) -> Case:
         """A changed copy: `case.with_(**{"bed.inlet_velocity": 0.06})`, or whole tables by name."""

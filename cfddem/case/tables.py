@@ -17,6 +17,7 @@ from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import NO_FLUID, Checked, Fluid, Material, Materials, Pairs
 from cfddem.case.patches import CasePatch
 from cfddem.case.vessel_shape import CaseVessel, Line
+from cfddem.case.vessel_surface import floor_area, surface_in
 from cfddem.case.walls import CaseWall
 
 
@@ -188,13 +189,16 @@ class CaseTables(Checked):
     @property
     def floor_area(self) -> float:
         """Area of the floor, inside the vessel if there is one [m2]."""
-        return self.column.floor_area if not self.vessel else self.vessel.floor_area(self.column)
+        return self.column.floor_area if not self.vessel else floor_area(self.vessel, self.column)
 
     def beyond_the_side(self, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.float64]:
-        """How far places (N, 3) are outside of the round wall, across (N,); negative inside, or in a box [m].
+        """How far places (N, 3) are outside of the vessel or of a round column, across it if it is round (N,); negative
+        inside, or in a box without a vessel [m].
 
         margin  from the wall, across it [m]
         """
+        if self.vessel and not self.vessel.is_round:
+            return np.asarray(margin - surface_in(self.vessel, self.column).distance(*places.T))
         if not self.line:
             return np.full(len(places), -np.inf)
         heights, radii = np.array(self.line).T

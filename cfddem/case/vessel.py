@@ -14,6 +14,7 @@ from cfddem.backend.errors import InputError
 from cfddem.case.bed import Point
 from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import Line
+from cfddem.case.vessel_surface import start_box_in, surface_in
 from cfddem.case.wall_geometry import (
     Array,
     distance,
@@ -53,6 +54,8 @@ def start_box(case: CaseTables) -> tuple[Point, Point]:
     if case.bed.start_corner is not None and case.bed.start_size is not None:
         return case.bed.start_corner, case.bed.start_size
     width, depth, height = case.column.size
+    if case.vessel and not case.vessel.is_round:
+        return start_box_in(case.vessel, case.column, stamp(case.vessel))
     if not case.line:
         return (0.0, 0.0, 0.0), (width, depth, height)
     side = 2.0 * max(radius for _, radius in case.line) / math.sqrt(2.0)
@@ -204,10 +207,15 @@ def vessel_of(case: CaseTables) -> Vessel | None:
 
     An open cone or tube without a fluid has no side: particles may be on both.
     """
+    if case.vessel and not case.vessel.is_round:
+        surface_in(case.vessel, case.column)  # refuses a surface that is no vessel
     try:
         closing = tuple((wall, side) for wall in case.wall if (side := closed_side(case, wall)) is not None)
         if not closing and (not case.vessel or case.vessel.is_upright):
             return None
+        if case.vessel and not case.vessel.is_round:
+            sides: dict[str, Side] = {"surface": "outside", "plane": "behind"}
+            closing += tuple((wall, sides[wall.shape]) for wall in case.vessel.walls_in(case.column))
         vessel = _vessel(case.column, case.line, closing, tuple(stamp(wall) for wall, _ in closing))
     except (InputError, OSError, ValueError):  # reported by the checks of walls
         return None
@@ -255,11 +263,15 @@ def _vessel(
     return Vessel(edges, areas, above, points[: len(lowest), :2][lowest].T)
 
 
-def floor_places(column: Column, line: Line = ()) -> Array:
-    """x and y of evenly spread places over the floor of the box of a column, or within a round wall (2, m) [m]."""
-    width, depth, _ = column.size
-    places = np.stack(np.meshgrid(*_across(column))).reshape(2, -1)
-    return places[:, np.hypot(places[0] - 0.5 * width, places[1] - 0.5 * depth) < line[0][1]] if line else places
+def floor_places(case: CaseTables, within: bool = True) -> Array:
+    """x and y of evenly spread places over the floor of a column (2, m) [m].
+
+    within  its vessel, or its round wall, or else its whole box
+    """
+    places = np.stack(np.meshgrid(*_across(case.column))).reshape(2, -1)
+    if not within:
+        return places
+    return places[:, case.beyond_the_side(np.stack([*places, np.zeros(places.shape[1])], axis=-1)) < 0.0]
 
 
 def _across(column: Column) -> tuple[Array, Array]:

@@ -1,12 +1,14 @@
-"""The vessel of a case, as it is written: a round wall about an upright axis in the middle of the column.
+"""The vessel of a case, as it is written: a round wall about an upright axis in the middle of the column, an upright
+box, or a closed surface from a file.
 
-Particles meet it, and it cuts the cells of the fluid: both see the same line of heights and radii.
+Particles meet it, and it cuts the cells of the fluid: both see the same line of heights and radii, or the same
+triangles (`cfddem.case.vessel_surface`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -14,31 +16,40 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from cfddem.backend.errors import InputError, shown
-from cfddem.case.bed import NonNegative, Positive
+from cfddem.case.bed import NonNegative, Point, Positive
 from cfddem.case.materials import Checked
-from cfddem.case.walls import CaseWall
+from cfddem.case.walls import ORIGIN, CaseWall, require_surface_file
 
 Line = tuple[tuple[float, float], ...]
 """Heights and radii from the floor up [m]."""
 
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {
-    "cylinder": ("radius",),
-    "cone": ("radius", "top_radius", "length"),
-    "chain": ("line",),
+    "cylinder": ("radius", "spin"),
+    "cone": ("radius", "top_radius", "length", "spin"),
+    "chain": ("line", "spin"),
+    "box": ("size", "angle"),
+    "surface": ("file", "scale", "point"),
 }
 """Keys of each shape beside those of all vessels."""
 
-NEEDED: Mapping[str, tuple[str, ...]] = {"cylinder": (), "cone": ("radius", "length"), "chain": ("line",)}
+NEEDED: Mapping[str, tuple[str, ...]] = {
+    "cylinder": (),
+    "cone": ("radius", "length"),
+    "chain": ("line",),
+    "box": ("size",),
+    "surface": ("file",),
+}
 
 ROUND_OFF = 1e-9
 """Share of the width by which a vessel may reach out of the column [-]."""
 
 
 class CaseVessel(Checked):
-    """A round vessel about an upright axis in the middle of the column, whose smooth wall cuts the cells of a fluid."""
+    """A vessel in the column, round, a box or a closed surface, whose smooth wall cuts the cells of a fluid."""
 
-    shape: Literal["cylinder", "cone", "chain"] = Field(
-        description="a cylinder, a cone with a cylinder above it, or a chain of cones and cylinders"
+    shape: Literal["cylinder", "cone", "chain", "box", "surface"] = Field(
+        description="a cylinder, a cone with a cylinder above it, or a chain of cones and cylinders, about an upright "
+        "axis in the middle of the column; an upright box there; or a closed surface from a file"
     )
     radius: NonNegative | None = Field(
         None, description="radius of a cylinder, default half of column.width; of a cone at the floor [m]"
@@ -50,6 +61,13 @@ class CaseVessel(Checked):
     line: tuple[tuple[NonNegative, NonNegative], ...] = Field(
         (), description="[height, radius] points of a chain, from the floor up; a cylinder goes on above them [m]"
     )
+    size: tuple[Positive, Positive] | None = Field(None, description="edges of a box, from floor to lid [m]")
+    angle: float = Field(0.0, description="by which a box is turned about its upright axis [degree]")
+    file: str | None = Field(
+        None, description="STL, PLY or VTP file of a closed surface; its place is relative to the case file"
+    )
+    scale: Positive = Field(1.0, description="unit of length of the file [m]")
+    point: Point = Field(ORIGIN, description="where the origin of the file lies [m]")
     spin: float = Field(0.0, description="the wall turns about its axis, and drags fluid and particles [rad/s]")
 
     @model_validator(mode="after")
@@ -64,6 +82,7 @@ class CaseVessel(Checked):
                 raise InputError(name, None, f'given for shape = "{self.shape}"')
         if self.shape == "cylinder" and self.radius == 0.0:
             raise InputError("radius", self.radius, "above 0")
+        require_surface_file(self.file)
         if self.line:
             self._check_line()
         return self
@@ -81,7 +100,9 @@ class CaseVessel(Checked):
             raise InputError("line", shown(self.line), "of radii above 0 above the floor")
 
     def line_in(self, column: Any) -> Line:
-        """Heights and radii of the wall, from the floor to the lid [m]."""
+        """Heights and radii of a round wall, from the floor to the lid [m]; empty if it is not round."""
+        if not self.is_round:
+            return ()
         half, height = 0.5 * column.width, column.height
         line: Line = self.line
         if self.shape == "cylinder":
@@ -100,8 +121,15 @@ class CaseVessel(Checked):
             remedy = "fluid sticks to a vessel, which is inside the sides of the column"
             raise InputError(f"column.{name}", getattr(column, name), "left out where there is a vessel", remedy)
         if column.ends == "periodic" and not self.is_upright:
-            raise InputError("column.ends", "periodic", '"flow" or "closed" in a vessel that is no cylinder')
+            raise InputError("column.ends", "periodic", '"flow" or "closed" in a vessel that is not upright')
         width, depth, _ = column.size
+        if self.size:
+            reach = np.abs(self.plan_in(column)).max(axis=0) - 0.5 * np.array((width, depth))
+            if (reach > 0.5 * np.array((width, depth)) * (1.0 + ROUND_OFF)).any():
+                limit = f"within the column, {width:g} m by {depth:g} m"
+                raise InputError("vessel.size", shown(self.size), limit, "widen column.width and column.depth")
+        if not self.is_round:
+            return
         widest = max(radius for _, radius in self.line_in(column))
         if 2.0 * widest > min(width, depth) * (1.0 + ROUND_OFF):
             key = {"cylinder": "radius", "cone": "top_radius", "chain": "line"}[self.shape]
@@ -110,11 +138,35 @@ class CaseVessel(Checked):
 
     @property
     def is_upright(self) -> bool:
-        """Whether its radius is the same at every height."""
-        return self.shape == "cylinder" or len({radius for _, radius in self.line}) == 1
+        """Whether its cross-section is the same at every height."""
+        return self.shape in ("cylinder", "box") or len({radius for _, radius in self.line}) == 1
+
+    @property
+    def is_round(self) -> bool:
+        """Whether it is a line turned about its axis."""
+        return self.shape in ("cylinder", "cone", "chain")
+
+    def plan_in(self, column: Any) -> np.ndarray:
+        """x and y of the four corners of a box, counter-clockwise from above (4, 2) [m]."""
+        half, turn = 0.5 * np.array(self.size), math.radians(self.angle)
+        corners = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+        cosine, sine = math.cos(turn), math.sin(turn)
+        return 0.5 * np.array(column.size[:2]) + corners @ np.array([[cosine, sine], [-sine, cosine]])
+
+    def with_file(self, place: Callable[[str], str]) -> CaseVessel:
+        """The vessel with another place of its file, from the one that it has now."""
+        return self if self.file is None else self.model_copy(update={"file": place(self.file)})
 
     def walls_in(self, column: Any) -> tuple[CaseWall, ...]:
-        """The pieces of the wall between floor and lid as cones and cylinders, for pictures and distances."""
+        """The pieces of the wall between floor and lid, for pictures and distances."""
+        if self.shape == "surface":
+            return (CaseWall(shape="surface", file=self.file, scale=self.scale, point=self.point, solid="outside"),)
+        if self.shape == "box":
+            plan, middle = self.plan_in(column), 0.5 * np.array(column.size[:2])
+            sides = 0.5 * (plan + np.roll(plan, -1, axis=0))
+            return tuple(
+                CaseWall(shape="plane", point=(*at, 0.0), normal=(*(middle - at), 0.0)) for at in sides.tolist()
+            )
         x, y = 0.5 * column.size[0], 0.5 * column.size[1]
         made, height = [], column.height
         for (low, below), (high, above) in pairwise(self.line_in(column)):
@@ -127,7 +179,3 @@ class CaseVessel(Checked):
                 shape="cone", top_radius=max(above, ROUND_OFF * column.width), **place
             ))  # fmt: skip
         return tuple(made)
-
-    def floor_area(self, column: Any) -> float:
-        """Cross-section at the floor [m2]."""
-        return math.pi * self.line_in(column)[0][1] ** 2

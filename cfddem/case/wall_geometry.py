@@ -5,19 +5,20 @@ from __future__ import annotations
 import itertools
 import os
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.walls import CaseWall
-from cfddem.particles.walls.stl import read_stl
+from cfddem.particles.walls.stl import read_surface
 
 Array = NDArray[np.float64]
 
 
-def stamp(wall: CaseWall) -> tuple[int, int]:
-    """Time and size of the file of a surface, which tell whether it has changed; 0 without a file."""
+def stamp(wall: Any) -> tuple[int, int]:
+    """Time and size of the file of a wall or vessel, which tell whether it has changed; 0 without a file."""
     try:
         found = os.stat(wall.file or "")
     except (OSError, ValueError):
@@ -27,7 +28,7 @@ def stamp(wall: CaseWall) -> tuple[int, int]:
 
 @lru_cache(maxsize=8)
 def _triangles(file: str, scale: float, place: tuple[float, float, float], _: tuple[int, int]) -> Array:
-    return np.asarray(np.array(place) + scale * read_stl(file))
+    return np.asarray(np.array(place) + scale * read_surface(file))
 
 
 def triangles(wall: CaseWall) -> Array:

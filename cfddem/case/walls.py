@@ -30,6 +30,9 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
     "surface": ("file",),
 }
 
+FORMATS = (".stl", ".ply", ".vtp")
+"""Endings of surface files."""
+
 COPIES = "surfaces"
 """Folder inside a run folder with copies of the surface files of the case."""
 
@@ -60,7 +63,9 @@ class CaseWall(Checked):
     )
     caps: bool = Field(False, description="a cylinder has flat ends; without them particles touch it from both sides")
     outside: bool = Field(False, description="particles are outside of a cylinder that is closed or has no end")
-    file: str | None = Field(None, description="STL file of a surface; its place is relative to the case file")
+    file: str | None = Field(
+        None, description="STL, PLY or VTP file of a surface; its place is relative to the case file"
+    )
     scale: Positive = Field(1.0, description="unit of length of the file [m]")
     velocity: Point = Field(ORIGIN, description="velocity of the wall [m/s]")
     spin: Point = Field(ORIGIN, description="angular velocity of the wall [rad/s]")
@@ -108,8 +113,7 @@ class CaseWall(Checked):
                 raise InputError("caps", True, "false where no length is given")
             if self.outside and self.is_open:
                 raise InputError("outside", True, "false for an open cylinder", "particles touch it from both sides")
-        if self.file is not None and Path(self.file).suffix.lower() != ".stl":
-            raise InputError("file", self.file, "an STL file, *.stl")
+        require_surface_file(self.file)
         if self.solid in ("inside", "outside") and self.shape != "surface" and not self.is_open:
             raise InputError("solid", self.solid, "none, or left out", "the side without particles is solid")
 
@@ -195,9 +199,15 @@ def _parallel(one: Sequence[float] | np.ndarray, other: Sequence[float] | np.nda
 # ---------------------------------------------------------------- surface files
 
 
-def copy_of(folder: Path, number: int) -> Path:
-    """Copy of the surface of a wall in a run folder."""
-    return folder / COPIES / f"wall_{number}.stl"
+def require_surface_file(file: str | None) -> None:
+    """Raise InputError for a file whose ending is not that of a surface."""
+    if file is not None and Path(file).suffix.lower() not in FORMATS:
+        raise InputError("file", file, "a surface file, *.stl, *.ply or *.vtp")
+
+
+def copy_of(folder: Path, name: str, file: str) -> Path:
+    """Copy of a surface file in a run folder, by the name of its wall, "wall_0" or "vessel"."""
+    return folder / COPIES / f"{name}{Path(file).suffix.lower()}"
 
 
 def walls_in(walls: Sequence[CaseWall], folder: Path) -> tuple[CaseWall, ...]:
@@ -208,10 +218,18 @@ def walls_in(walls: Sequence[CaseWall], folder: Path) -> tuple[CaseWall, ...]:
     is_run = (folder / "run.json").is_file()
 
     def place(number: int, file: str) -> str:
-        copy = copy_of(folder, number)
-        return str(kept(folder, copy, f"wall.{number}.file", file)) if is_run else os.path.abspath(folder / file)
+        return place_of(file, folder, f"wall_{number}", f"wall.{number}.file", is_run)
 
     return with_surfaces(walls, place)
+
+
+def place_of(file: str, folder: Path, name: str, key: str, is_run: bool) -> str:
+    """The place of a surface file of a case: its copy in a run folder, or relative to the folder of the case.
+
+    name, key  of the copy, see `copy_of`, and of the file in the case
+    is_run     whether the folder is that of a run
+    """
+    return str(kept(folder, copy_of(folder, name, file), key, file)) if is_run else os.path.abspath(folder / file)
 
 
 def kept(folder: Path, copy: Path, key: str, file: str) -> Path:

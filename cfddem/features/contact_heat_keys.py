@@ -219,7 +219,7 @@ def wall_names(case: Any) -> list[str]:
     """Names of the walls, in the order of the particle solver."""
     column = case.column
     names = [] if column.ends == "periodic" else ["floor", "lid"]
-    if case.line:
+    if case.line or case.vessel:
         names.append("side")
     else:
         sides = {"x": column.sides, "y": column.front or column.sides}

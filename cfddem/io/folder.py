@@ -224,13 +224,12 @@ def _dependencies() -> dict[str, str]:
 
 
 def keep_files(case: Case, folder: Path) -> None:
-    """Copy the surface files of a case into a run folder, as `surfaces/wall_NUMBER.stl`, and its measured data.
+    """Copy the surface files of a case into a run folder, as `surfaces/NAME`, and its measured data.
 
     errors  InputError if a file cannot be read
     """
-    for number, wall in enumerate(case.wall):
-        if wall.file is not None:
-            _copy(f"wall.{number}.file", wall.file, copy_of(folder, number), "STL file")
+    for name, key, file in _surfaces(case):
+        _copy(key, file, copy_of(folder, name, file), "surface file")
     for name, data in case.compare.items():
         _copy(f"compare.{name}.file", data.file, compare.copy_of(folder, name), "CSV file")
 
@@ -241,15 +240,23 @@ def with_kept_files(case: Case, folder: Path) -> Case:
 
 
 def _at_copies(case: Case, folder: Path) -> Case:
-    walls = with_surfaces(case.wall, lambda number, _: copy_of(folder, number).as_posix())
+    walls = with_surfaces(case.wall, lambda number, file: copy_of(folder, f"wall_{number}", file).as_posix())
+    vessel = case.vessel and case.vessel.with_file(lambda file: copy_of(folder, "vessel", file).as_posix())
     data = compare.with_data(case.compare, lambda name, _: compare.copy_of(folder, name).as_posix())
-    return case.model_copy(update={"wall": walls, "compare": data})
+    return case.model_copy(update={"wall": walls, "vessel": vessel, "compare": data})
 
 
 def holds_surfaces_of(case: Case, folder: Path) -> bool:
-    """Whether the copies of STL files in a run folder are those that the case names now."""
-    files = {number: Path(wall.file) for number, wall in enumerate(case.wall) if wall.file is not None}
-    return all(copy_of(folder, number).read_bytes() == file.read_bytes() for number, file in files.items())
+    """Whether the copies of surface files in a run folder are those that the case names now."""
+    copies = [(copy_of(folder, name, file), Path(file)) for name, _, file in _surfaces(case)]
+    return all(copy.read_bytes() == file.read_bytes() for copy, file in copies)
+
+
+def _surfaces(case: Case) -> list[tuple[str, str, str]]:
+    """Name of the copy, key and place of each surface file of a case."""
+    named = [(f"wall_{n}", f"wall.{n}.file", wall.file) for n, wall in enumerate(case.wall)]
+    named += [("vessel", "vessel.file", case.vessel.file)] if case.vessel else []
+    return [(name, key, file) for name, key, file in named if file is not None]
 
 
 def text_with_kept_files(case: Case) -> str:

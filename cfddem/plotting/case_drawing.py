@@ -258,7 +258,8 @@ def _facts(case: Case) -> list[str]:
     width, depth, height = case.column.size
     box = f"width {width:.4g} m\ndepth {depth:.4g} m\nheight {height:.4g} m"
     if case.vessel:
-        box += f"\n{case.vessel.shape}, {2.0 * case.line[0][1]:.4g} m at the floor"
+        across = f"{2.0 * case.line[0][1]:.4g} m" if case.line else f"{case.floor_area:.3g} m2"
+        box += f"\n{case.vessel.shape}, {across} at the floor"
     lines = [f"cylinder\ndiameter {width:.4g} m\nheight {height:.4g} m" if case.column.shape == "cylinder" else box]
     lines.append(f"sides {case.column.sides.replace('_', ' ')}\nends {case.column.ends}")
     lines.append("")

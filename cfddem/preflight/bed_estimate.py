@@ -171,18 +171,16 @@ def mean_inlet_velocity(case: Case) -> float:
 
 def share_of_jet(case: Case, jet: Jet) -> float:
     """Share of the open floor through which the jet enters [-]."""
-    vessel, column = vessel_of(case), case.column
-    width, depth, _ = column.size
+    vessel = vessel_of(case)
+    width, depth, _ = case.column.size
     opening = 0.25 * math.pi * jet.width**2 if jet.round else min(jet.width, width) * min(jet.depth or depth, depth)
 
     def covered(places: Array) -> int:
         """Number of places (2, m) that the jet covers."""
         return int(np.count_nonzero(jet.covers(places[0] - 0.5 * width, places[1] - 0.5 * depth)))
 
-    is_open, area = (
-        (vessel.floor_places, vessel.floor) if vessel else (floor_places(column, case.line), case.floor_area)
-    )
-    every = covered(floor_places(column))
+    is_open, area = (vessel.floor_places, vessel.floor) if vessel else (floor_places(case), case.floor_area)
+    every = covered(floor_places(case, within=False))
     return min(1.0, opening * (covered(is_open) / every if every else 1.0) / area)
 
 

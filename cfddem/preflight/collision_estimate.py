@@ -113,7 +113,7 @@ def _has_walls(case: Case) -> bool:
     """Whether particles of a case can meet a wall."""
     column = case.column
     ends = {column.sides, column.front or column.sides, column.ends}
-    return ends != {"periodic"} or bool(case.line or case.wall)
+    return ends != {"periodic"} or bool(case.line or case.vessel or case.wall)
 
 
 def _film_gap(case: Case, values: tuple[float, float, float, float, float]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -24,9 +25,13 @@ def check_vessel(case: Case) -> Iterator[Issue]:
     """Check that particles fit through a vessel, and that cells resolve it."""
     if not case.vessel:
         return
-    narrow = 2.0 * min(radius for _, radius in case.line)
-    of_cone = "radius" if case.line[0][1] <= case.line[1][1] else "top_radius"
-    key = {"cylinder": "radius", "cone": of_cone, "chain": "line"}[case.vessel.shape]
+    if case.line:
+        narrow = 2.0 * min(radius for _, radius in case.line)
+        of_cone = "radius" if case.line[0][1] <= case.line[1][1] else "top_radius"
+    else:
+        narrow = min(case.vessel.size or (math.inf,))
+        of_cone = ""
+    key = {"cylinder": "radius", "cone": of_cone, "chain": "line", "box": "size", "surface": "file"}[case.vessel.shape]
     largest = case.bed.largest_diameter
     if 0.0 < narrow < largest:
         yield Issue(

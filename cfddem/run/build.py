@@ -17,6 +17,7 @@ from cfddem.case.materials import pair_overrides
 from cfddem.case.particle_properties import SPECIES
 from cfddem.case.schema import Case
 from cfddem.case.tables import Column
+from cfddem.case.vessel_surface import corners_in
 from cfddem.coupling.coupling import Coupling
 from cfddem.coupling.forces.added_mass import AddedMass
 from cfddem.coupling.forces.agitation import Agitation, FluctuatingForce, PseudoTurbulence
@@ -41,7 +42,7 @@ from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
-from cfddem.particles.walls.shapes import Cylinder, Plane, Turned, Wall
+from cfddem.particles.walls.shapes import Cylinder, Mesh, Plane, Turned, Wall
 from cfddem.run.division import cells_of, space_of
 from cfddem.run.initial_particles import particles_of, periodic_box, periodic_directions
 from cfddem.run.patches import with_patches
@@ -166,7 +167,9 @@ def walls_of(case: Case) -> list[Wall]:
         walls.append(Plane(point=(0.0, 0.0, height), normal=(0.0, 0.0, -1.0), material=solid))
     if case.vessel:
         spin, middle = (0.0, 0.0, case.vessel.spin), (0.5 * width, 0.5 * depth, 0.0)
-        if case.vessel.is_upright:
+        if not case.vessel.is_round:
+            walls.append(Mesh.of_corners(corners_in(case.vessel, case.column), material=solid))
+        elif case.vessel.is_upright:
             walls.append(Cylinder(point=middle, radius=case.line[0][1], spin=spin, material=solid))
         else:
             walls.append(Turned(line=case.line, point=middle, spin=spin, material=solid))

@@ -18,7 +18,7 @@ import numpy as np
 from cfddem.backend.errors import InputError
 from cfddem.particles.vectors import Vector
 from cfddem.particles.walls.nearest_point import PLANE, REVOLVED, SOLID_CYLINDER, TRIANGLE
-from cfddem.particles.walls.stl import read_stl, write_stl
+from cfddem.particles.walls.stl import read_surface, write_stl
 
 ROUNDING = 1e-9
 """Relative difference below which directions and positions are equal."""
@@ -330,20 +330,12 @@ class Mesh(Wall):
         place    of the file's origin [m]
         options  as of :class:`Wall`
         """
-        if Path(path).suffix.lower() == ".stl":
-            corners = (np.array(place) + scale * read_stl(path)).reshape(-1, 3)
-            return cls(vertices=corners, triangles=np.arange(len(corners)).reshape(-1, 3), **options)
-        import pyvista  # takes a second to import, and few runs need it
+        return cls.of_corners(np.array(place) + scale * read_surface(path), **options)
 
-        if not Path(path).is_file():
-            raise InputError("mesh", str(path), "a file that exists")
-        surface = pyvista.read(path)
-        if not isinstance(surface, pyvista.PolyData):
-            raise InputError("mesh", str(path), "a file of one surface")
-        surface = surface.triangulate()
-        corners = np.asarray(surface.faces).reshape(-1, 4)[:, 1:]
-        vertices = np.array(place) + scale * np.asarray(surface.points, float)
-        return cls(vertices=vertices, triangles=corners, **options)
+    @classmethod
+    def of_corners(cls, corners: np.ndarray, **options: Any) -> Mesh:
+        """A surface from the corners of its triangles (T, 3, 3) [m]; options as of :class:`Wall`."""
+        return cls(vertices=corners.reshape(-1, 3), triangles=np.arange(3 * len(corners)).reshape(-1, 3), **options)
 
     def to_stl(self, path: str | Path) -> None:
         """Write the surface as an STL file in metres, for a wall of a case."""

@@ -1,4 +1,4 @@
-"""Triangles of STL files, text or binary."""
+"""Triangles of surface files: STL, text or binary, and what pyvista reads, PLY and VTP."""
 
 from __future__ import annotations
 
@@ -14,6 +14,30 @@ HEADER, RECORD = 80, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)),
 """Bytes before the number of triangles of a binary file, and one triangle after it."""
 
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[ \t]*\r?$", re.MULTILINE | re.IGNORECASE)
+
+
+def read_surface(path: str | Path) -> np.ndarray:
+    """Corners of the triangles of a surface (T, 3, 3), in the unit of the file.
+
+    path    STL, or another format that pyvista reads: PLY, VTP
+    errors  InputError if the file is missing, or is not a whole file of one surface
+    """
+    if Path(path).suffix.lower() == ".stl":
+        return read_stl(path)
+    _content(Path(path))
+    import pyvista  # takes a second to import, and few runs need it
+
+    try:
+        surface = pyvista.read(path)
+    except Exception as failure:  # of many kinds, by the reader
+        raise InputError("file", os.fspath(path), "a readable surface", str(failure).partition("\n")[0]) from None
+    if not isinstance(surface, pyvista.PolyData) or surface.n_cells == 0:
+        raise InputError("file", os.fspath(path), "a file of one surface, with triangles")
+    surface = surface.triangulate()
+    corners = np.asarray(surface.points, float)[np.asarray(surface.faces).reshape(-1, 4)[:, 1:]]
+    if not np.isfinite(corners).all():
+        raise InputError("file", os.fspath(path), "a surface of finite corners")
+    return np.asarray(corners)
 
 
 def read_stl(path: str | Path) -> np.ndarray:
@@ -76,7 +100,7 @@ def _content(path: Path) -> bytes:
         return path.read_bytes()
     except (OSError, ValueError) as failure:
         reason = getattr(failure, "strerror", None) or str(failure)
-        raise InputError("file", os.fspath(path), "a readable STL file", reason) from None
+        raise InputError("file", os.fspath(path), "a readable surface file", reason) from None
 
 
 def _not_stl(path: str | Path, why: str) -> InputError:
