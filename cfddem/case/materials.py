@@ -68,18 +68,18 @@ class Material(Checked):
     density: float = Field(gt=0, description="density rho_p [kg/m3]")
     youngs_modulus: float = Field(gt=0, description="Young's modulus E of the real solid [Pa]")
     poisson: float = Field(gt=-1, le=0.5, description="Poisson's ratio nu [-]")
-    restitution: float = Field(1.0, gt=0, le=1, description="dry normal restitution e [-]")
-    friction: float = Field(0.0, ge=0, description="dry friction coefficient mu [-]")
-    rolling_friction: float = Field(0.0, ge=0, description="rolling friction mu_r: lever arm over R* [-]")
+    restitution: float = Field(default=1.0, gt=0, le=1, description="dry normal restitution e [-]")
+    friction: float = Field(default=0.0, ge=0, description="dry friction coefficient mu [-]")
+    rolling_friction: float = Field(default=0.0, ge=0, description="rolling friction mu_r: lever arm over R* [-]")
     friction_lubricated: float | None = Field(
-        None, ge=0, description="friction coefficient while a film separates the solids; default: friction [-]"
+        default=None, ge=0, description="friction coefficient while a film separates the solids; default: friction [-]"
     )
     surface_energy: float = Field(
-        0.0, ge=0, description="surface energy gamma, half the work of adhesion of two like solids [J/m2]"
+        default=0.0, ge=0, description="surface energy gamma, half the work of adhesion of two like solids [J/m2]"
     )
-    roughness: float = Field(0.0, ge=0, description="height of asperities sigma [m]")
+    roughness: float = Field(default=0.0, ge=0, description="height of asperities sigma [m]")
     contact_modulus: float | None = Field(
-        None, gt=0, description="Young's modulus used in contacts; default: youngs_modulus [Pa]"
+        default=None, gt=0, description="Young's modulus used in contacts; default: youngs_modulus [Pa]"
     )
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError, model_validator
 
@@ -48,6 +48,10 @@ class Case(CaseTables):
     >>> case.solid.density
     2540.0
     """
+
+    if TYPE_CHECKING:  # tables may be given as dictionaries, which type checkers would take for errors
+
+        def __init__(self, **tables: Any) -> None: ...
 
     @model_validator(mode="after")
     def _material_names_exist(self) -> Case:

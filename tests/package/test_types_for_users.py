@@ -45,14 +45,20 @@ def test_the_source_package_holds_what_its_first_page_links_to() -> None:
     assert f"version: {cfddem.__version__}\n" in (HOME / "CITATION.cff").read_text(encoding="utf-8")
 
 
-def test_mypy_accepts_a_script_of_a_user_and_finds_a_wrong_argument_in_it(tmp_path: Path) -> None:
+def test_mypy_accepts_scripts_of_users_and_finds_a_wrong_argument_in_one(tmp_path: Path) -> None:
+    """Also the scripts of the first page."""
     pytest.importorskip("mypy")
+    first_page = re.findall(r"```python\n(.*?)```", (HOME / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    names = [f"readme{number}.py" for number in range(len(first_page))]
+    for name, text in zip(names, first_page, strict=True):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert len(names) == 3 and "required_fluid" in first_page[2]
     (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
     wrong = SCRIPT.replace("10.0", '"ten"').replace("Simulation(case)", "Simulation(10.0)")
     (tmp_path / "wrong.py").write_text(wrong, encoding="utf-8")
     mypy = [sys.executable, "-P", "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache")]
     checked = subprocess.run(
-        [*mypy, "script.py", "wrong.py"],
+        [*mypy, "script.py", "wrong.py", *names],
         cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(HOME)}, capture_output=True, text=True,
     )  # fmt: skip
     said = [line for line in checked.stdout.splitlines() if ": error:" in line]
