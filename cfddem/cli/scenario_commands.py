@@ -6,7 +6,7 @@ import inspect
 import re
 from collections.abc import Callable, Mapping
 from types import UnionType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from cyclopts import Parameter
 
@@ -100,8 +100,9 @@ def descriptions(function: Callable[..., Any]) -> dict[str, str]:
 
 def _simple(annotation: Any) -> Any:
     """The part of an annotation that a command line can give; None where there is none."""
-    parts = annotation.__args__ if isinstance(annotation, UnionType) else (annotation,)
-    kept = [part for part in parts if part in SIMPLE]
+    parts = get_args(annotation) if get_origin(annotation) in (UnionType, Union) else (annotation,)
+    words = [str if get_origin(part) is Literal else part for part in parts]  # refused by name, as other values are
+    kept = [part for part in words if part in SIMPLE]
     if not kept:
         return None
     return kept[0] | None if type(None) in parts else kept[0]

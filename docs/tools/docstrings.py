@@ -6,8 +6,10 @@ Docstrings of this package hold equations after `.. math::`, one argument per li
 
 from __future__ import annotations
 
+import inspect
 import re
 from functools import cache
+from importlib import import_module
 from typing import Any
 
 import griffe
@@ -99,6 +101,9 @@ class Docstrings(griffe.Extension):
         """Called by griffe for every module, class, function and constant."""
         if obj.docstring is None:
             return
+        if isinstance(obj, griffe.Function) and any("takes(" in str(each.value) for each in obj.decorators):
+            function = getattr(import_module(obj.path.rpartition(".")[0]), obj.name)
+            obj.docstring.value = inspect.getdoc(function) or ""  # with the settings that it takes
         text = to_markdown(obj.docstring.value)
         entry = _laws().get(obj.path)
         obj.docstring.value = text if entry is None else text + "\n\n" + of_the_law(entry.reference, entry.ranges)

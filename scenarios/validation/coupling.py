@@ -20,7 +20,7 @@ from cfddem.run.simulation import Simulation
 from scenarios.beds.liquid_bed import study as liquid_bed
 from scenarios.beds.packed_bed import study as packed_bed
 from scenarios.beds.settling import study as settling
-from scenarios.validation import history_force
+from scenarios.references import history_force
 from scenarios.validation.table import Curves, Progress, Row, in_parts, numbers, reference, worst
 
 REYNOLDS = (0.01, 0.1, 1.0, 10.0, 100.0, 1000.0)

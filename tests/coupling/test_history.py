@@ -17,7 +17,7 @@ from cfddem.features.energy import EnergyLedger
 from cfddem.run.simulation import Simulation
 from closures import history as laws
 from scenarios.beds.settling import study as settling
-from scenarios.validation.history_force import (
+from scenarios.references.history_force import (
     Memory,
     Motion,
     around_impact,

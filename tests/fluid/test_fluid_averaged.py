@@ -9,7 +9,7 @@ from cfddem.fluid import budgets
 from cfddem.fluid.conditions import SIDES, Inlet, NoSlip, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
-from scenarios.validation.fluid import ALL_PERIODIC, fixed_bed
+from scenarios.references.flows import ALL_PERIODIC, fixed_bed
 
 ALL_WALLS = dict.fromkeys(SIDES, NoSlip())
 

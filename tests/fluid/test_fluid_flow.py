@@ -10,7 +10,7 @@ import pytest
 from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic, ramp
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.solver import FluidSolver
-from scenarios.validation.fluid import ALL_PERIODIC, cavity, duct, ghia, order, pipe, rms, sound, taylor_green
+from scenarios.references.flows import ALL_PERIODIC, cavity, duct, ghia, order, pipe, rms, sound, taylor_green
 
 
 def test_taylor_green_vortices_decay_to_second_order():

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from scenarios.validation.fluid import error, order, rms
+from scenarios.references.flows import error, order, rms
 
 
 @pytest.mark.parametrize("model", ["A", "B"])

@@ -87,7 +87,7 @@ def test_a_slow_bead_sticks() -> None:
     [
         ({"film": 3e-3}, r"film = 0.003: must be at most the radius of the bead"),
         ({"viscosity": 0.0, "gap_rule": "elastohydrodynamic"}, r"viscosity = 0.0: must be above 0 with gap_rule"),
-        ({"velocity": 0.0}, r"velocity = 0.0: must be above 0 .* never reaches the plate"),
+        ({"velocity": 0.0}, r"velocity = 0.0: must be above 0; velocity: of the bead towards the plate"),
         ({"velocity": -1.0}, "velocity"),
         ({"liquid": "watr"}, "did you mean 'water'"),
         ({"viscosity": -1.0}, "viscosity"),

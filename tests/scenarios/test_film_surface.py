@@ -139,7 +139,7 @@ def test_surface_tension_slows_the_rebound_of_a_small_bead() -> None:
     ("given", "field"),
     [
         ({"surface_tension": -1.0}, "surface_tension"),
-        ({"surface_tension": 0.07, "contact_angle": 200.0}, "contact_angle = 200.0: must be between 0 and 180 degrees"),
+        ({"surface_tension": 0.07, "contact_angle": 200.0}, "contact_angle = 200.0: must be at most 180"),
         ({"contact_angle": 30.0}, "contact_angle = 30.0: must be left out without surface_tension"),
         ({"method": "isph", "surface_tension": 0.07}, "surface_tension = 0.07: must be left out with method"),
     ],

@@ -12,25 +12,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from inspect import signature
 from time import process_time
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field, model_validator
 
-from cfddem.backend.errors import InputError, RunFailed, nearest
+from cfddem.backend.errors import InputError, RunFailed
 from cfddem.case.materials import Material
+from cfddem.case.settings import Settings, takes
 from closures.film_impact import film_added_mass
 from scenarios.collisions.film_impact.grid import Grid
 from scenarios.collisions.film_impact.liquid import overfilled
 from scenarios.collisions.film_impact.materials import GLASS, Liquid, liquid_named, touching_gap
 from scenarios.collisions.film_impact.pressure import EXCHANGES, Bead
 from scenarios.collisions.film_impact.result import ENERGIES, FilmImpact, Record
-from scenarios.collisions.film_impact.solver import GridImpact, Settings
+from scenarios.collisions.film_impact.solver import GridImpact
+from scenarios.collisions.film_impact.solver import Settings as Solver
 from scenarios.collisions.film_impact.surface import Tension
 from scenarios.references.isph.impact import SmoothedImpact
 
-METHODS = {"grid": 20, "isph": 5}
+CELLS = {"grid": 20, "isph": 5}
 """Method -> cells or layers of particles in the film, if not given."""
 
 MOST_CELLS = 10_000_000
@@ -43,96 +45,111 @@ BOUNCES = 10
 """So has one that touches the plate this often."""
 
 
-def impact(
-    diameter: float = 5.5e-3,
-    liquid: str | Liquid = "water",
-    film: float = 0.4e-3,
-    velocity: float = 0.5,
-    *,
-    method: str = "grid",
-    solid: Material = GLASS,
-    plate: Material = GLASS,
-    viscosity: float | None = None,
-    cells: int | None = None,
-    gap_rule: str = "fixed",
-    minimum_gap: float = 1e-6,
-    cavitation: float | None = None,
-    wetted_share: float | None = None,
-    wetted_missing: float = 0.5,
-    domain: float = 1.0,
-    flip: float = 0.97,
-    particles_per_side: int = 3,
-    courant: float = 0.5,
-    surface_tension: float = 0.0,
-    contact_angle: float = 0.0,
-    gravity: float = 9.81,
-    progress: Callable[[GridImpact | SmoothedImpact], None] | None = None,
-) -> FilmImpact:
-    """Let a bead fall through a liquid film onto a plate.
+class Fall(Settings):
+    """A bead that falls through a liquid film onto a plate."""
 
-    diameter            of the bead [m]
-    liquid              "water" or "m5", or a Liquid
-    film                depth of the film at rest [m]
-    velocity            of the bead towards the plate where it meets the film [m/s]
-    method              "grid": axisymmetric grid with liquid particles; "isph": smoothed particles in three dimensions,
-                        the method of the paper at its coarsest resolution, with an error of about 6 %
-    solid, plate        of the bead and of the plate; the dry restitution is the bead's
-    viscosity           replaces that of the liquid, dynamic [Pa s]
-    cells               in the depth of the film; 20 if not given, and 5 layers of particles with "isph"
-    gap_rule            gap at which the solids touch: "fixed", the "roughness" of the solids, or "elastohydrodynamic"
-    minimum_gap         of the rule "fixed" [m]
-    cavitation          lowest pressure of the liquid, below 0, such as -1e5; without it, it holds any suction [Pa]
-    wetted_share        guess of the wetted radius over sqrt(D (film - gap)) instead of the tracked one, for comparison
-    wetted_missing      share of its volume that the outermost wetted column may lack
-    domain              width of the domain, over the usual one; from about 0.8 on
-    flip                share of its own velocity that a liquid particle keeps
-    particles_per_side  of a cell, along radius and height
-    courant             cells that the liquid may cross in a step
-    surface_tension     of the liquid; 0 neglects it, as in the paper; water has 0.0728, M5 0.0192 [N/m]
-    contact_angle       static, of bead and plate, within the liquid; 0 wets them [deg]
-    gravity             towards the plate [m/s2]
-    progress            called after every step
-    returns             :class:`FilmImpact`
+    by_place: ClassVar[int] = 4
+
+    diameter: float = Field(5.5e-3, gt=0, description="of the bead [m]")
+    liquid: str | Liquid = Field("water", description='"water" or "m5", or a Liquid')
+    film: float = Field(0.4e-3, gt=0, description="depth of the film at rest [m]")
+    velocity: float = Field(0.5, gt=0, description="of the bead towards the plate where it meets the film [m/s]")
+    method: Literal["grid", "isph"] = Field(
+        "grid",
+        description='"grid": axisymmetric grid with liquid particles; "isph": smoothed particles in three dimensions, '
+        "the method of the paper at its coarsest resolution, with an error of about 6 %",
+    )
+    solid: Material = Field(GLASS, description="of the bead, with the dry restitution")
+    plate: Material = Field(GLASS, description="of the plate")
+    viscosity: float | None = Field(None, ge=0, description="replaces that of the liquid, dynamic [Pa s]")
+    cells: int | None = Field(
+        None, ge=4, le=100,
+        description='in the depth of the film; 20 if not given, and 5 layers of particles with "isph"',
+    )  # fmt: skip
+    gap_rule: Literal["fixed", "roughness", "elastohydrodynamic"] = Field(
+        "fixed",
+        description='gap at which the solids touch: "fixed", the "roughness" of the solids, or "elastohydrodynamic"',
+    )
+    minimum_gap: float = Field(1e-6, gt=0, description='of the rule "fixed" [m]')
+    cavitation: float | None = Field(
+        None, lt=0,
+        description="lowest pressure of the liquid relative to the air, such as -1e5; without it, it holds any suction "
+        "[Pa]",
+    )  # fmt: skip
+    wetted_share: float | None = Field(
+        None,
+        description="guess of the wetted radius over sqrt(D (film - gap)) instead of the tracked one, for comparison",
+    )
+    wetted_missing: float = Field(
+        0.5, ge=0, description="share of its volume that the outermost wetted column may lack"
+    )
+    domain: float = Field(1.0, gt=0, description="width of the domain, over the usual one; from about 0.8 on")
+    flip: float = Field(0.97, ge=0, le=1, description="share of its own velocity that a liquid particle keeps")
+    particles_per_side: int = Field(3, ge=1, le=6, description="of a cell, along radius and height")
+    courant: float = Field(0.5, gt=0, le=1, description="cells that the liquid may cross in a step")
+    surface_tension: float = Field(
+        0.0, ge=0, description="of the liquid; 0 neglects it, as in the paper; water has 0.0728, M5 0.0192 [N/m]"
+    )
+    contact_angle: float = Field(
+        0.0, ge=0, le=180, description="static, of bead and plate, within the liquid; 0 wets them [deg]"
+    )
+    gravity: float = Field(9.81, ge=0, description="towards the plate [m/s2]")
+    progress: Callable[[GridImpact | SmoothedImpact], None] | None = Field(None, description="called after every step")
+
+    @model_validator(mode="after")
+    def _go_together(self) -> Fall:
+        if self.method == "isph":
+            for name in OF_GRID:
+                if getattr(self, name) != type(self).model_fields[name].default:
+                    limit = 'left out with method = "isph"'
+                    raise InputError(name, getattr(self, name), limit, "it is an option of the grid")
+        if self.film > 0.5 * self.diameter:
+            raise InputError("film", self.film, f"at most the radius of the bead, {0.5 * self.diameter:g} m")
+        if self.surface_tension == 0.0 and self.contact_angle != 0.0:
+            remedy = "water has 0.0728 N/m"
+            raise InputError("contact_angle", self.contact_angle, "left out without surface_tension", remedy)
+        return self
+
+    def settings(self, liquid: Liquid, cells: int) -> Solver:
+        """Numbers of the method."""
+        rule = self.gap_rule, self.minimum_gap
+        gap = touching_gap(*rule, liquid.viscosity, self.velocity, self.diameter, (self.solid, self.plate))
+        if not gap < self.film / cells:
+            limit = f"below a cell, {self.film / cells:g} m"
+            raise InputError("minimum_gap", gap, limit, "the film is too thin for this gap")
+        angle = math.radians(self.contact_angle)
+        return Solver(
+            minimum_gap=gap, flip=self.flip, per_side=self.particles_per_side, missing=self.wetted_missing,
+            guessed=self.wetted_share, cavitation=self.cavitation, courant=self.courant,
+            tension=Tension(self.surface_tension, angle, angle) if self.surface_tension > 0.0 else None,
+        )  # fmt: skip
+
+
+OF_GRID = (
+    "cavitation", "wetted_share", "wetted_missing", "domain", "flip", "particles_per_side", "courant",
+    "surface_tension", "contact_angle",
+)  # fmt: skip
+"""What only the grid has."""
+
+
+@takes(Fall)
+def impact(given: Fall) -> FilmImpact:
+    """Let a bead fall through a liquid film onto a plate.
 
     >>> round(impact(liquid=Liquid(density=1e-3, viscosity=0.0), cells=5, gravity=0.0).restitution, 4)
     0.98
     """
-    poured = liquid_named(liquid, viscosity)
-    if method not in METHODS:
-        raise InputError("method", method, nearest(method, METHODS))
-    cells = METHODS[method] if cells is None else cells
-    if method == "isph":
-        _check_of_grid(cavitation=cavitation, wetted_share=wetted_share, wetted_missing=wetted_missing, domain=domain,
-                       flip=flip, particles_per_side=particles_per_side, courant=courant,
-                       surface_tension=surface_tension, contact_angle=contact_angle)  # fmt: skip
-    _check(diameter=diameter, film=film, velocity=velocity, gravity=gravity, domain=domain, flip=flip, courant=courant)
-    _check_film(film, diameter)
-    _check_whole(cells=cells, particles_per_side=particles_per_side)
-    gap = touching_gap(gap_rule, minimum_gap, poured.viscosity, velocity, diameter, (solid, plate))
-    if not gap < film / cells:
-        raise InputError("minimum_gap", gap, f"below a cell, {film / cells:g} m", "the film is too thin for this gap")
-    if cavitation is not None and not (math.isfinite(cavitation) and cavitation < 0.0):
-        raise InputError("cavitation", cavitation, "below 0 and finite", "it is a pressure relative to the air")
-    settings = Settings(minimum_gap=gap, flip=flip, per_side=particles_per_side, missing=wetted_missing,
-                        guessed=wetted_share, cavitation=cavitation, courant=courant,
-                        tension=_tension(surface_tension, contact_angle))  # fmt: skip
-    bead = Bead(0.5 * diameter, solid.density * math.pi / 6.0 * diameter**3, film, -velocity)
-    of_liquid = (poured.density, poured.viscosity, solid.restitution, gravity, settings)
-    if method == "isph":
-        return integrate(SmoothedImpact(bead, film, cells, *of_liquid), velocity, solid.density, progress)
-    run = GridImpact(grid_for(diameter, film, cells, domain), bead, film, *of_liquid)
-    return integrate(run, velocity, solid.density, progress)
-
-
-def _tension(sigma: float, angle: float) -> Tension | None:
-    """Surface tension and contact angle, if there is one."""
-    if not (math.isfinite(sigma) and sigma >= 0.0):
-        raise InputError("surface_tension", sigma, "at least 0 and finite")
-    if not 0.0 <= angle <= 180.0:
-        raise InputError("contact_angle", angle, "between 0 and 180 degrees")
-    if sigma == 0.0 and angle != 0.0:
-        raise InputError("contact_angle", angle, "left out without surface_tension", "water has 0.0728 N/m")
-    return Tension(sigma, math.radians(angle), math.radians(angle)) if sigma > 0.0 else None
+    liquid, cells = liquid_named(given.liquid, given.viscosity), given.cells or CELLS[given.method]
+    diameter, film, velocity, density = given.diameter, given.film, given.velocity, given.solid.density
+    bead = Bead(0.5 * diameter, density * math.pi / 6.0 * diameter**3, film, -velocity)
+    numbers = given.settings(liquid, cells)
+    of_liquid = (liquid.density, liquid.viscosity, given.solid.restitution, given.gravity, numbers)
+    run = (
+        SmoothedImpact(bead, film, cells, *of_liquid)
+        if given.method == "isph"
+        else GridImpact(grid_for(diameter, film, cells, given.domain), bead, film, *of_liquid)
+    )
+    return integrate(run, velocity, density, given.progress)
 
 
 def grid_for(diameter: float, film: float, cells: int, domain: float = 1.0) -> Grid:
@@ -251,41 +268,3 @@ def _warnings(run: GridImpact | SmoothedImpact) -> tuple[str, ...]:
             f"{some} in {EXCHANGES} trials; the pressure may be below {run.voids.floor:g} Pa. Use a smaller courant.",
         )
     return ()
-
-
-def _check(**given: float) -> None:
-    """Check the numbers of an impact."""
-    limits = {
-        "velocity": (
-            given["velocity"] > 0.0,
-            "above 0 and finite",
-            "a bead that does not fall never reaches the plate",
-        ),
-        "gravity": (given["gravity"] >= 0.0, "at least 0 and finite", ""),
-        "flip": (0.0 <= given["flip"] <= 1.0, "between 0 and 1", ""),
-        "courant": (0.0 < given["courant"] <= 1.0, "above 0 and at most 1", ""),
-    }
-    for name, value in given.items():
-        holds, limit, remedy = limits.get(name, (value > 0.0, "above 0 and finite", ""))
-        if not (holds and math.isfinite(value)):
-            raise InputError(name, value, limit, remedy)
-
-
-def _check_of_grid(**given: float | None) -> None:
-    """Refuse options of the grid for another method."""
-    for name, value in given.items():
-        if value != signature(impact).parameters[name].default:
-            raise InputError(name, value, 'left out with method = "isph"', "it is an option of the grid")
-
-
-def _check_film(film: float, diameter: float) -> None:
-    if film > 0.5 * diameter:
-        raise InputError("film", film, f"at most the radius of the bead, {0.5 * diameter:g} m")
-
-
-def _check_whole(**given: int) -> None:
-    """Check the counts: cells in the film, particles in a cell."""
-    for name, value in given.items():
-        least, most = {"cells": (4, 100)}.get(name, (1, 6))
-        if not (isinstance(value, int) and least <= value <= most):
-            raise InputError(name, value, f"a whole number from {least} to {most}")

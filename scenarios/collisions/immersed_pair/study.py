@@ -14,15 +14,17 @@ import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
-from cfddem.backend.errors import InputError, UnstableStep, nearest
+from cfddem.backend.errors import InputError, UnstableStep
 from cfddem.backend.html import table
 from cfddem.backend.json_text import summary_of
 from cfddem.backend.law_choice import called_by_name, chosen
 from cfddem.case.materials import Material
+from cfddem.case.settings import Settings, takes
 from cfddem.particles.collision_record import CollisionRecord
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
@@ -93,113 +95,109 @@ class Collision:
         return table(f"Collision: {self.outcome.replace('_', ' ')}", rows)
 
 
-def collide(
-    material: Material | tuple[Material, Material],
-    *,
-    diameter: float | tuple[float, float] = 12.7e-3,
-    velocity: float | None = None,
-    viscosity: float | None = None,
-    stokes: float | None = None,
-    angle: float = 0.0,
-    against: str = "sphere",
-    trajectory: str = "frozen",
-    spin: tuple[float, float] = (0.0, 0.0),
-    integrator: str = "drift",
-    friction_onset: str = "film",
-    spring: str = "total",
-    step_fraction: float | None = None,
-    surroundings: str | Sequence[str] = "none",
-    fluid_density: float = 1000.0,
-    gravity: float = 0.0,
-    until: float | None = None,
-    minimum_gap: Callable[..., float] | None = None,
-    lubrication: Callable[..., float] | None = None,
-    film_motions: str = "normal",
-) -> Collision:
-    r"""Let one body strike another at rest in a fluid, in the particle engine.
+class Impact(Settings):
+    """One body that strikes another at rest in a fluid."""
+
+    by_place: ClassVar[int] = 1
+
+    material: Any = Field(description="of both particles, or (striker, target); with a wall, (sphere, wall)")
+    diameter: float | tuple[float, float] = Field(12.7e-3, description="of both spheres, or (striker, target) [m]")
+    velocity: float | None = Field(None, gt=0, description="normal approach speed at the cut-off gap h_co = R* [m/s]")
+    viscosity: float | None = Field(None, ge=0, description="of the fluid; 0 for a dry collision [Pa s]")
+    stokes: float | None = Field(None, gt=0, description="of the normal approach [-]")
+    angle: float = Field(0.0, ge=0, lt=90, description="between velocity and line of centres at contact [deg]")
+    against: Literal["sphere", "wall"] = Field("sphere", description='"sphere" or "wall"')
+    trajectory: Literal["frozen", "full"] = Field(
+        "frozen",
+        description='"frozen" holds the line of centres; "full" starts at a gap of 2 R* aimed at the contact point',
+    )
+    spin: tuple[float, float] = Field(
+        (0.0, 0.0), description="of striker and target before, about the plane's normal [rad/s]"
+    )
+    integrator: str = Field(
+        "drift", description='"drift" (film as a potential difference) or "verlet" (film as a force)'
+    )
+    friction_onset: str = Field(
+        "film",
+        description='"film": at h_min, weighted by 1 - h/h_min; "overlap": at h = 0, as in the published figures',
+    )
+    spring: str = Field("total", description='"total" tangential displacement, or "rescaled" while loading')
+    step_fraction: float | None = Field(
+        None, gt=0, le=0.2,
+        description='of the Hertz time; 0.02, or 0.005 for an oblique impact with the sudden onset "overlap" [-]',
+    )  # fmt: skip
+    surroundings: str | Sequence[str] = Field(
+        "none",
+        description='beyond the film: "none", "all", or some of drag, added_mass, history, wall_drag, joined by commas',
+    )
+    fluid_density: float = Field(1000.0, ge=0, description="[kg/m3]")
+    gravity: float = Field(0.0, description="from striker to target; the weight is less buoyancy [m/s2]")
+    until: float | None = Field(
+        None, gt=0,
+        description="follow the pair for this time, also after it has left the film, or until it rests [s]",
+    )  # fmt: skip
+    minimum_gap: Callable[..., float] | None = Field(
+        None, description="a user-defined law for h_min, instead of the elastohydrodynamic one"
+    )
+    lubrication: Callable[..., float] | None = Field(
+        None, description="a user-defined law for the resistance of the film"
+    )
+    film_motions: str = Field(
+        "normal", description='that films resist: "normal"; "full" with sliding and rolling; "full_twist"'
+    )
+
+    @property
+    def step(self) -> float:
+        """Step in contact over the Hertz time [-]."""
+        oblique = self.angle > 0.0 or any(self.spin)
+        return self.step_fraction or (0.005 if oblique and self.friction_onset == "overlap" else 0.02)
+
+    def laws(self, viscosity: float) -> Laws:
+        """Contact and film in a fluid of a viscosity [Pa s]."""
+        return Laws(
+            film=viscosity > 0.0,
+            integrator=self.integrator,
+            friction_onset=self.friction_onset,
+            spring=self.spring,
+            minimum_gap=self.minimum_gap,
+            lubrication=self.lubrication,
+            film_motions=self.film_motions if viscosity > 0.0 else "normal",
+        )
+
+
+@takes(Impact)
+def collide(given: Impact) -> Collision:
+    """Let one body strike another at rest in a fluid, in the particle engine.
 
     Two of velocity, viscosity and stokes are given: St = m* v / (6 pi eta R*^2).
-
-    material        of both particles, or (striker, target); with a wall, (sphere, wall)
-    diameter        of both spheres, or (striker, target) [m]
-    velocity        normal approach speed at the cut-off gap h_co = R* [m/s]
-    viscosity       of the fluid; 0 for a dry collision [Pa s]
-    stokes          of the normal approach [-]
-    angle           between velocity and line of centres at contact, 0 <= angle < 90 [deg]
-    against         "sphere" or "wall"
-    trajectory      "frozen" holds the line of centres; "full" starts at a gap of 2 R* aimed at the contact point
-    spin            of striker and target before, about the plane's normal [rad/s]
-    integrator      "drift" (film as a potential difference) or "verlet" (film as a force)
-    friction_onset  "film": at h_min, weighted by 1 - h/h_min; "overlap": at h = 0, as in the published figures
-    spring          "total" tangential displacement, or "rescaled" while loading
-    step_fraction   of the Hertz time; 0.02, or 0.005 for an oblique impact with the sudden onset "overlap" [-]
-    surroundings    beyond the film: "none", "all", or some of drag, added_mass, history, wall_drag, joined by commas
-    fluid_density   [kg/m3]
-    gravity         from striker to target; the weight is less buoyancy [m/s2]
-    until           follow the pair for this time, also after it has left the film, or until it rests [s]
-    minimum_gap     a user-defined law for h_min, instead of the elastohydrodynamic one
-    lubrication     a user-defined law for the resistance of the film
-    film_motions    that films resist: "normal"; "full" with sliding and rolling; "full_twist"
-    returns         :class:`Collision`
 
     >>> wall = collide(MATERIALS["glass"], against="wall", velocity=0.2, stokes=50)
     >>> wall.mechanism, round(float(wall.restitution), 2)
     ('roughness', 0.53)
     """
-    bodies = Bodies(_both(material), _both(diameter), against)
-    velocity, viscosity = _speed_and_viscosity(bodies, velocity, viscosity, stokes)
-    _check("angle", angle, 0.0 <= angle < 90.0, "at least 0 and below 90 degrees")
-    oblique = angle > 0.0 or any(spin)
-    if step_fraction is None:
-        step_fraction = 0.005 if oblique and friction_onset == "overlap" else 0.02
-    _check("step_fraction", step_fraction, 0.0 < step_fraction <= 0.2, "above 0 and at most 0.2")
-    _check_motion(spin, fluid_density, gravity, until)
-    laws = Laws(
-        film=viscosity > 0.0,
-        integrator=integrator,
-        friction_onset=friction_onset,
-        spring=spring,
-        minimum_gap=minimum_gap,
-        lubrication=lubrication,
-        film_motions=film_motions if viscosity > 0.0 else "normal",
-    )
+    bodies = Bodies(_both(given.material), _both(given.diameter), given.against)
+    velocity, viscosity = _speed_and_viscosity(bodies, given.velocity, given.viscosity, given.stokes)
+    laws = given.laws(viscosity)
     laws.check()
-    full = _choice("trajectory", trajectory, {"frozen": False, "full": True})
+    full, density, gravity = given.trajectory == "full", given.fluid_density, given.gravity
     table = pair_table(bodies.materials)
-    setting = _setting(table[0, 1], bodies, velocity, viscosity, angle, step_fraction, laws)
-    caveats = _check_film_step(setting, laws, step_fraction)
-    simulation = stage(setting, table, bodies.materials, laws, full, spin)
-    fluid = fluid_around(simulation, chosen_forces(surroundings), fluid_density, viscosity, gravity, against == "wall")
-    history = integrate(simulation, setting, full, fluid, until)
+    setting = _setting(table[0, 1], bodies, velocity, viscosity, given.angle, given.step, laws)
+    caveats = _check_film_step(setting, laws, given.step)
+    simulation = stage(setting, table, bodies.materials, laws, full, given.spin)
+    forces = chosen_forces(given.surroundings)
+    fluid = fluid_around(simulation, forces, density, viscosity, gravity, given.against == "wall")
+    history = integrate(simulation, setting, full, fluid, given.until)
     found = _result(simulation, setting, table, history, laws, full, caveats)
-    return found if stokes is None or not laws.film else replace(found, stokes=float(stokes))  # without round-off
+    return found if given.stokes is None or not laws.film else replace(found, stokes=given.stokes)  # without round-off
 
 
 def _both(value: Any) -> tuple[Any, Any]:
     return value if isinstance(value, tuple) else (value, value)
 
 
-Chosen = TypeVar("Chosen")
-
-
-def _choice(name: str, value: str, choices: dict[str, Chosen]) -> Chosen:
-    if value not in choices:
-        raise InputError(name, value, nearest(str(value), choices))
-    return choices[value]
-
-
 def _check(name: str, value: Any, holds: bool, limit: str) -> None:
     if not holds:
         raise InputError(name, value, limit)
-
-
-def _check_motion(spin: Sequence[float], fluid_density: float, gravity: float, until: float | None) -> None:
-    for each in spin:
-        _check("spin", each, math.isfinite(each), "finite")
-    _check("fluid_density", fluid_density, 0.0 <= fluid_density < math.inf, "at least 0 and finite")
-    _check("gravity", gravity, math.isfinite(gravity), "finite")
-    if until is not None:
-        _check("until", until, until > 0.0, "above 0")
 
 
 class Bodies(NamedTuple):
@@ -218,7 +216,7 @@ class Bodies(NamedTuple):
         most = ROUGH * min(self.diameters)
         for each in self.materials:
             _check("roughness", each.roughness, each.roughness <= most, f"at most 5 % of a diameter, {most:.3g} m")
-        wall = _choice("against", self.against, {"sphere": False, "wall": True})
+        wall = self.against == "wall"
         mass = [m.density * math.pi / 6.0 * d**3 for m, d in zip(self.materials, self.diameters)]
         other = (math.inf, math.inf) if wall else (0.5 * self.diameters[1], mass[1])
         return contact.reduced(0.5 * self.diameters[0], other[0]), contact.reduced(mass[0], other[1])
@@ -232,11 +230,6 @@ def _speed_and_viscosity(
     names = [name for name, value in given.items() if value is not None]
     if len(names) != 2:
         raise InputError("velocity, viscosity, stokes", names, "two of the three", "the third follows from them")
-    for name in names:
-        value = given[name]
-        zero_allowed = name == "viscosity"
-        sound = math.isfinite(value) and (value >= 0.0 if zero_allowed else value > 0.0)  # type: ignore[arg-type, operator]
-        _check(name, value, sound, "finite and " + ("at least 0" if zero_allowed else "above 0"))  # type: ignore[arg-type]
     radius, mass = bodies.reduced()
     film_speed_per_viscosity = lubrication.film_strength(1.0, radius) / mass
     if velocity is None:
@@ -299,7 +292,7 @@ def _check_film_step(setting: Setting, laws: Laws, step_fraction: float) -> tupl
         f"the film is poorly resolved: step/film time = {step / film_time:.2g} (should be below 1), "
         f'largest overlap/minimum gap = {depth:.2g} (should be below 15); use integrator="drift"'
     )
-    warnings.warn(caveat, stacklevel=3)
+    warnings.warn(caveat, stacklevel=4)
     return (caveat,)
 
 

@@ -18,16 +18,18 @@ bridges are those of Davis (2023) with this gap added.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from joblib import Parallel, delayed
+from pydantic import Field, model_validator
 
-from cfddem.backend.errors import InputError, nearest
+from cfddem.backend.errors import InputError
 from cfddem.backend.launch import safe_workers
 from cfddem.case.materials import Material
+from cfddem.case.settings import Settings, takes
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeFilm, BridgeLaws, BridgePull
 from cfddem.particles.interactions.laws import Laws
@@ -50,8 +52,6 @@ force every rotating pair separates in the end, so the outcome depends on when t
 
 SLOWEST_BOUNCE = 1e-4
 """Contacts slower than this fraction of the impact stay pressed together; 1e-3 to 2e-6 agree to 8 digits."""
-
-SOLVERS = ("particles", "equations")
 
 MAP_TOLERANCE, PARALLEL_FROM = 1e-8, 200
 """Tolerance of the runs of a map, and number of runs from which it uses all cores."""
@@ -96,73 +96,90 @@ class Triplet:
         }
 
 
-def simulate_three_spheres(
-    stokes: float = 8.0,
-    theta12: float = 45.0,
-    theta23: float = 0.0,
-    *,
-    film_ratio: float = 0.01,
-    minimum_gap: float = 0.05,
-    capillary_number: float = math.inf,
-    friction: float = 0.0,
-    restitution: float = 1.0,
-    gap23: float = 1.0,
-    film23: float = 1.0,
-    film13: float = 1.0,
-    spheres: int = 3,
-    until: float = UNTIL,
-    slowest_bounce: float = SLOWEST_BOUNCE,
-    solver: str = "particles",
-    overlap: float = 0.002,
-    tolerance: float | None = None,
-) -> Triplet:
-    r"""Let sphere 1 strike sphere 2 of a resting pair 2-3; all spheres are equal and coated with a viscous film.
+class Collision(Settings):
+    """Sphere 1 strikes sphere 2 of a resting pair 2-3; all spheres are equal and coated with a viscous film.
 
     Gaps and films are scaled with the film of the first pair, delta_12; sphere 1 flies along x.
+    """
 
-    stokes            St_n = m* v_n0 / (6 pi eta R*^2), of the normal speed of impact [-]
-    theta12           angle of the line of centres 1-2 at impact to the velocity, -90 < theta12 < 90 [deg]
-    theta23           angle of the line of centres 2-3 to the velocity [deg]
-    film_ratio        h_a = delta_12 over the diameter of the spheres [-]
-    minimum_gap       h_m, gap at which solids touch, over delta_12 [-]
-    capillary_number  Ca = 3 eta R* v_n0 / (sigma delta_12); infinite for no capillary force [-]
-    friction          mu_f, of the solids [-]
-    restitution       e_dry, of the solids [-]
-    gap23             initial gap of the pair 2-3 over delta_12 [-]
-    film23            film of the pair 2-3 over delta_12 [-]
-    film13            film of the pair 1-3 over delta_12 [-]
-    spheres           3, or 2 for a collision without sphere 3
-    until             end, as the distance travelled at the speed of impact over the diameter [-]
-    slowest_bounce    hard contacts slower than this fraction of v_n0 stay pressed together [-]
-    solver            the "particles" engine with soft contacts, or "equations" in polar coordinates with hard ones
-    overlap           of soft contacts: deepest overlap of an impact without a film, over the minimum gap [-]
-    tolerance         of each step of the equations, relative; 1e-11 if not given [-]
-    returns           :class:`Triplet`
+    by_place: ClassVar[int] = 3
+
+    stokes: float = Field(8.0, ge=1e-5, description="St_n = m* v_n0 / (6 pi eta R*^2), of the normal impact speed [-]")
+    theta12: float = Field(
+        45.0, gt=-90, lt=90, description="angle of the line of centres 1-2 at impact to the velocity [deg]"
+    )
+    theta23: float = Field(0.0, ge=-180, le=180, description="angle of the line of centres 2-3 to the velocity [deg]")
+    film_ratio: float = Field(0.01, gt=0, le=0.5, description="h_a = delta_12 over the diameter of the spheres [-]")
+    minimum_gap: float = Field(0.05, gt=0, description="h_m, gap at which solids touch, over delta_12 [-]")
+    capillary_number: float = Field(
+        math.inf, ge=0.01, allow_inf_nan=True,
+        description="Ca = 3 eta R* v_n0 / (sigma delta_12); infinite for no capillary force [-]",
+    )  # fmt: skip
+    friction: float = Field(0.0, ge=0, description="mu_f, of the solids [-]")
+    restitution: float = Field(1.0, ge=0, le=1, description="e_dry, of the solids [-]")
+    gap23: float = Field(1.0, description="initial gap of the pair 2-3 over delta_12 [-]")
+    film23: float = Field(1.0, description="film of the pair 2-3 over delta_12 [-]")
+    film13: float = Field(1.0, description="film of the pair 1-3 over delta_12 [-]")
+    spheres: int = Field(3, ge=2, le=3, description="3, or 2 for a collision without sphere 3")
+    until: float = Field(
+        UNTIL, gt=0, description="end, as the distance travelled at the speed of impact over the diameter [-]"
+    )
+    slowest_bounce: float = Field(
+        SLOWEST_BOUNCE, gt=0, le=0.01,
+        description="hard contacts slower than this fraction of v_n0 stay pressed together [-]",
+    )  # fmt: skip
+    solver: Literal["particles", "equations"] = Field(
+        "particles",
+        description='the "particles" engine with soft contacts, or "equations" in polar coordinates with hard ones',
+    )
+    overlap: float = Field(
+        0.002, gt=0, le=1,
+        description="of soft contacts: deepest overlap of an impact without a film, over the minimum gap [-]",
+    )  # fmt: skip
+    tolerance: float | None = Field(
+        None, ge=1e-13, le=1e-3, description="of each step of the equations, relative; 1e-11 if not given [-]"
+    )
+
+    @model_validator(mode="after")
+    def _gaps_suit_films(self) -> Collision:
+        if not self.minimum_gap < min(1.0, self.film23, self.film13):
+            raise InputError("minimum_gap", self.minimum_gap, "below every film")
+        if not self.gap23 >= self.minimum_gap:
+            raise InputError("gap23", self.gap23, "at least minimum_gap")
+        return self
+
+
+@takes(Collision)
+def simulate_three_spheres(given: Collision) -> Triplet:
+    """Let sphere 1 strike sphere 2 of a resting pair 2-3; all spheres are equal and coated with a viscous film.
+
+    Gaps and films are scaled with the film of the first pair, delta_12; sphere 1 flies along x.
 
     >>> simulate_three_spheres(stokes=2, theta12=45).outcome          # sphere 1 separates after it has met sphere 3
     'PA1'
     >>> simulate_three_spheres(stokes=3.5, theta12=45, capillary_number=100).outcome
     'FA'
     """
-    _check(locals())
-    films = (1.0, film23, film13)
+    film_ratio, films, spheres = given.film_ratio, (1.0, given.film23, given.film13), given.spheres
     numbers = Numbers(
-        float(stokes), film_ratio, minimum_gap, 4.0 / capillary_number, friction, restitution, films, slowest_bounce
-    )
-    one = math.radians(theta12)
+        given.stokes, film_ratio, given.minimum_gap, 4.0 / given.capillary_number, given.friction, given.restitution,
+        films, given.slowest_bounce,
+    )  # fmt: skip
+    one = math.radians(given.theta12)
     state = np.zeros(STATE)
     state[:4] = 1.0, one, 1.0, math.tan(one) / (1.0 / film_ratio + 1.0)
-    state[4:6] = (gap23, math.radians(theta23)) if spheres == 3 else (1e3 / film_ratio, 0.5 * math.pi)  # out of reach
+    out_of_reach = (1e3 / film_ratio, 0.5 * math.pi)
+    state[4:6] = (given.gap23, math.radians(given.theta23)) if spheres == 3 else out_of_reach
     gap13 = view(state, film_ratio, 2).gap
-    if spheres == 3 and gap13 < minimum_gap:
-        raise InputError("theta23", theta23, "such that sphere 3 does not overlap sphere 1")
+    if spheres == 3 and gap13 < given.minimum_gap:
+        raise InputError("theta23", given.theta23, "such that sphere 3 does not overlap sphere 1")
     modes = np.array([JOINED, *(JOINED if gap <= film else APART for gap, film in zip((state[4], gap13), films[1:]))])
 
     diameters = math.cos(one) / film_ratio  # time v_n0 t / delta_12 over time v_10 t / diameter
-    if solver == "equations":
-        path = integrate(state, modes, numbers, until * diameters, tolerance)
+    if given.solver == "equations":
+        path = integrate(state, modes, numbers, given.until * diameters, given.tolerance)
     else:
-        path = integrate_in_engine(state, numbers, until * diameters, overlap)
+        path = integrate_in_engine(state, numbers, given.until * diameters, given.overlap)
     events = tuple(
         Event(kind, PAIRS[pair], time, time / diameters, speed)
         for kind, pair, time, speed in path.events
@@ -175,33 +192,6 @@ def simulate_three_spheres(
         events=events,
         history=_history(path, diameters, film_ratio),
     )
-
-
-def _check(given: Mapping[str, Any]) -> None:
-    """Check the arguments of :func:`simulate_three_spheres`."""
-    thinnest = min(1.0, given["film23"], given["film13"])
-    limits = {
-        "stokes": (lambda x: 1e-5 <= x < math.inf, "at least 1e-5 and finite"),
-        "theta12": (lambda x: -90.0 < x < 90.0, "between -90 and 90 degrees"),
-        "theta23": (lambda x: -180.0 <= x <= 180.0, "between -180 and 180 degrees"),
-        "film_ratio": (lambda x: 0.0 < x <= 0.5, "above 0 and at most 0.5"),
-        "minimum_gap": (lambda x: 0.0 < x < thinnest, "above 0 and below every film"),
-        "capillary_number": (lambda x: x >= 0.01, "at least 0.01; infinite for no capillary force"),
-        "friction": (lambda x: 0.0 <= x < math.inf, "at least 0 and finite"),
-        "restitution": (lambda x: 0.0 <= x <= 1.0, "between 0 and 1"),
-        "gap23": (lambda x: given["minimum_gap"] <= x < math.inf, "at least minimum_gap and finite"),
-        "film23": (math.isfinite, "finite"),
-        "film13": (math.isfinite, "finite"),
-        "spheres": (lambda x: x in (2, 3), "2 or 3"),
-        "until": (lambda x: 0.0 < x < math.inf, "above 0 and finite"),
-        "slowest_bounce": (lambda x: 0.0 < x <= 0.01, "above 0 and at most 0.01"),
-        "solver": (lambda x: x in SOLVERS, nearest(str(given["solver"]), SOLVERS)),
-        "overlap": (lambda x: 0.0 < x <= 1.0, "above 0 and at most 1"),
-        "tolerance": (lambda x: x is None or 1e-13 <= x <= 1e-3, "from 1e-13 to 1e-3"),
-    }
-    for name, (holds, limit) in limits.items():
-        if not holds(given[name]):
-            raise InputError(name, given[name], limit)
 
 
 def outcome_of(modes: np.ndarray) -> str:

@@ -12,17 +12,18 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
-from cfddem.backend.errors import InputError, RunFailed, nearest
+from cfddem.backend.errors import InputError, RunFailed
 from cfddem.backend.json_text import summary_of
 from cfddem.case.materials import Material
+from cfddem.case.settings import Settings, takes
 from cfddem.particles.interactions.bridge import coat
-from cfddem.particles.interactions.bridge_law import CUTS, TANGENTIALS, BridgeLaws
+from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.bridge_view import Bridges
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
@@ -34,9 +35,6 @@ from closures.contact import hertz_stiffness
 from closures.lubrication import film_strength
 from closures.minimum_gap import glass_transition
 from scenarios.references.wet_pair import Motion, Pair, integrate
-
-BRIDGES = ("deforming", "static")
-SOLVERS = ("particles", "equations")
 
 TRANSITION_PRESSURES = {
     ("static", "constant"): 4.9e6,
@@ -72,68 +70,119 @@ class WetPair:
         return summary_of(self)
 
 
-def collide_wet(
-    stokes: float = 2.0,
-    angle: float = 0.0,
-    bridge: str = "deforming",
-    cut: str = "zero",
-    *,
-    tangential: str = "davis",
-    friction: float = 0.0,
-    capillary: bool = False,
-    glass_transition_pressure: float | None = None,
-    film: float = 270e-6,
-    viscosity: float = 10.0,
-    radius: float = 12.7e-3,
-    density: float = 7960.0,
-    youngs_modulus: float = 2.0e11,
-    poisson: float = 0.35,
-    restitution: float = 0.9,
-    surface_tension: float = 0.0205,
-    duration: float = 1.0,
-    solver: str = "particles",
-) -> WetPair:
-    r"""Let one wet sphere strike an equal one at rest; the defaults are steel spheres in silicone oil.
+class WetImpact(Settings):
+    """A wet sphere that strikes an equal one at rest; the defaults are steel spheres in silicone oil."""
 
-    stokes                     St_n = m* v_n0 / (6 pi eta R*^2), of the normal speed of impact [-]
-    angle                      between velocity and line of centres at impact, 0 <= angle < 90 [deg]
-    bridge                     "deforming", which grows with the liquid squeezed out, or "static"
-    cut                        film below h_min: "zero", or "constant" as at h_min
-    tangential                 resistance of the film to sliding: "davis", "nase" or "none"
-    friction                   of the solids [-]
-    capillary                  whether the bridge attracts the spheres
-    glass_transition_pressure  sets h_min; the value fitted for this bridge and cut if not given [Pa]
-    film                       h_max, thickness of the liquid on both spheres together [m]
-    viscosity                  of the film [Pa s]
-    radius                     of the spheres [m]
-    density                    of the spheres [kg/m3]
-    youngs_modulus             of the spheres [Pa]
-    poisson                    Poisson's ratio of the spheres [-]
-    restitution                dry, of the solids [-]
-    surface_tension            of the film [N/m]
-    duration                   after which a pair that has not separated counts as stuck [s]
-    solver                     the "particles" engine, or "equations" in polar coordinates
-    returns                    :class:`WetPair`
+    by_place: ClassVar[int] = 4
+
+    stokes: float = Field(2.0, gt=0, description="St_n = m* v_n0 / (6 pi eta R*^2), of the normal speed of impact [-]")
+    angle: float = Field(0.0, ge=0, lt=90, description="between velocity and line of centres at impact [deg]")
+    bridge: Literal["deforming", "static"] = Field(
+        "deforming", description='"deforming", which grows with the liquid squeezed out, or "static"'
+    )
+    cut: Literal["zero", "constant"] = Field("zero", description='film below h_min: "zero", or "constant" as at h_min')
+    tangential: Literal["davis", "nase", "none"] = Field(
+        "davis", description='resistance of the film to sliding: "davis", "nase" or "none"'
+    )
+    friction: float = Field(0.0, ge=0, description="of the solids [-]")
+    capillary: bool = Field(False, description="whether the bridge attracts the spheres")
+    glass_transition_pressure: float | None = Field(
+        None, gt=0, description="sets h_min; the value fitted for this bridge and cut if not given [Pa]"
+    )
+    film: float = Field(270e-6, gt=0, description="h_max, thickness of the liquid on both spheres together [m]")
+    viscosity: float = Field(10.0, gt=0, description="of the film [Pa s]")
+    radius: float = Field(12.7e-3, ge=1e-9, description="of the spheres [m]")
+    density: float = Field(7960.0, gt=0, description="of the spheres [kg/m3]")
+    youngs_modulus: float = Field(2.0e11, gt=0, description="of the spheres [Pa]")
+    poisson: float = Field(0.35, gt=-1, le=0.5, description="Poisson's ratio of the spheres [-]")
+    restitution: float = Field(0.9, gt=0, le=1, description="dry, of the solids [-]")
+    surface_tension: float = Field(0.0205, ge=0, description="of the film [N/m]")
+    duration: float = Field(1.0, gt=0, description="after which a pair that has not separated counts as stuck [s]")
+    solver: Literal["particles", "equations"] = Field(
+        "particles", description='the "particles" engine, or "equations" in polar coordinates'
+    )
+
+    @property
+    def laws(self) -> BridgeLaws:
+        """The laws of the bridge."""
+        pressure = self.glass_transition_pressure
+        return BridgeLaws(
+            viscosity=self.viscosity,
+            surface_tension=self.surface_tension,
+            film=self.bridge,
+            cut=self.cut,
+            tangential=self.tangential,
+            pull="constant" if self.capillary else "none",
+            rupture="film",
+            transition_pressure=TRANSITION_PRESSURES[self.bridge, self.cut] if pressure is None else pressure,
+        )
+
+    @property
+    def solid(self) -> Material:
+        """The solid of the spheres."""
+        return Material(**{name: getattr(self, name) for name in OF_SOLID})
+
+    def pair(self) -> Pair:
+        """The constants of the pair."""
+        viscosity, radius, elastic = self.viscosity, self.radius, (self.youngs_modulus, self.poisson)
+        mass = self.density * 4.0 / 3.0 * math.pi * radius**3
+        speed = self.stokes * film_strength(viscosity, 0.5 * radius) / (0.5 * mass)
+        if not LEAST_SPEED <= speed <= FASTEST:
+            limit = f"that of an impact at {LEAST_SPEED:g} to {FASTEST:g} m/s; it gives {speed:.3g} m/s"
+            raise InputError("stokes", self.stokes, limit)
+        return Pair(
+            speed=speed,
+            film=self.film,
+            minimum_gap=glass_transition(viscosity, speed, self.laws.transition_pressure, 0.5 * radius, self.film),
+            radius=radius,
+            mass=mass,
+            modulus=contact.reduced_modulus(*elastic, *elastic),
+            shear_modulus=contact.reduced_shear_modulus(*elastic, *elastic),
+            damping_ratio=contact.damping_ratio(self.restitution),
+            friction=self.friction,
+            liquid=self.laws.numbers,
+        )
+
+    def warn(self, pair: Pair) -> tuple[str, ...]:
+        """Warn of a minimum gap as large as the film, of a pressure fitted to another liquid, and of a radius in mm."""
+        found = []
+        if pair.minimum_gap >= pair.film:
+            found.append(
+                f"at {pair.speed:.3g} m/s the whole film of {pair.film:.3g} m is above its glass transition pressure "
+                "and does not act; the fitted pressure does not hold at so high a Stokes number"
+            )
+        if self.glass_transition_pressure is None and self.viscosity < LEAST_VISCOSITY:
+            found.append(
+                f"glass_transition_pressure is that of silicone oil of 10 Pa s, but viscosity is {self.viscosity:g} "
+                "Pa s; give one for this liquid"
+            )
+        if self.radius >= LARGE_RADIUS:
+            found.append(f"radius is {self.radius:g} m; did you mean {1e-3 * self.radius:g} m?")
+        for each in found:
+            warnings.warn(each, stacklevel=4)
+        return tuple(found)
+
+
+OF_SOLID = ("density", "youngs_modulus", "poisson", "restitution", "friction")
+
+
+@takes(WetImpact)
+def collide_wet(given: WetImpact) -> WetPair:
+    """Let one wet sphere strike an equal one at rest; the defaults are steel spheres in silicone oil.
 
     >>> slow = collide_wet(stokes=0.5, angle=60.0)
     >>> slow.outcome, round(slow.spin, 2), round(slow.turned)
     ('stick_rotate_separate', 5.42, 47)
     """
-    given = dict(locals())
-    _check(given)
-    laws = _laws(given)
-    pair = _pair(given, laws)
-    solid = Material(
-        density=density, youngs_modulus=youngs_modulus, poisson=poisson, restitution=restitution, friction=friction
-    )
+    pair, laws = given.pair(), given.laws
 
     def collision(at: float) -> Motion:
-        if solver == "equations":
-            return integrate(pair, laws, at, duration)
-        return integrate_in_engine(pair, laws, solid, at, duration)
+        if given.solver == "equations":
+            return integrate(pair, laws, at, given.duration)
+        return integrate_in_engine(pair, laws, given.solid, at, given.duration)
 
-    motion = collision(angle)
-    bounces = motion.separated and (angle == 0.0 or collision(0.0).separated)
+    motion = collision(given.angle)
+    bounces = motion.separated and (given.angle == 0.0 or collision(0.0).separated)
     return WetPair(
         outcome="bounce" if bounces else "stick_rotate_separate" if motion.separated else "stick",
         restitution=-float(motion.approach[-1]) / pair.speed if motion.separated else 0.0,
@@ -143,87 +192,8 @@ def collide_wet(
         velocity=pair.speed,
         turned=math.degrees(float(motion.angle[-1])),
         history=_history(motion),
-        warnings=_warn(pair, given),
+        warnings=given.warn(pair),
     )
-
-
-def _check(given: Mapping[str, Any]) -> None:
-    """Check the arguments of :func:`collide_wet`."""
-    for name, known in (("bridge", BRIDGES), ("cut", CUTS), ("tangential", TANGENTIALS), ("solver", SOLVERS)):
-        if given[name] not in known:
-            raise InputError(name, given[name], nearest(str(given[name]), known))
-    limits = {
-        "angle": (lambda x: 0.0 <= x < 90.0, "at least 0 and below 90 degrees"),
-        "restitution": (lambda x: 0.0 < x <= 1.0, "above 0 and at most 1"),
-        "poisson": (lambda x: -1.0 < x <= 0.5, "above -1 and at most 0.5"),
-    }
-    limits["radius"] = (lambda x: 1e-9 <= x < math.inf, "at least 1e-9 m and finite")
-    for name in ("stokes", "film", "viscosity", "density", "duration", "youngs_modulus"):
-        limits[name] = (lambda x: 0.0 < x < math.inf, "above 0 and finite")
-    for name in ("friction", "surface_tension"):
-        limits[name] = (lambda x: 0.0 <= x < math.inf, "at least 0 and finite")
-    limits["glass_transition_pressure"] = (lambda x: x is None or 0.0 < x < math.inf, "above 0 and finite")
-    for name, (holds, limit) in limits.items():
-        if not holds(given[name]):
-            raise InputError(name, given[name], limit)
-
-
-def _laws(given: Mapping[str, Any]) -> BridgeLaws:
-    """The laws of the bridge, from the arguments of :func:`collide_wet`."""
-    pressure = given["glass_transition_pressure"]
-    return BridgeLaws(
-        viscosity=given["viscosity"],
-        surface_tension=given["surface_tension"],
-        film=given["bridge"],
-        cut=given["cut"],
-        tangential=given["tangential"],
-        pull="constant" if given["capillary"] else "none",
-        rupture="film",
-        transition_pressure=TRANSITION_PRESSURES[given["bridge"], given["cut"]] if pressure is None else pressure,
-    )
-
-
-def _pair(given: Mapping[str, Any], laws: BridgeLaws) -> Pair:
-    """The constants of a pair, from the arguments of :func:`collide_wet`."""
-    viscosity, radius, film = given["viscosity"], given["radius"], given["film"]
-    elastic = (given["youngs_modulus"], given["poisson"])
-    mass = given["density"] * 4.0 / 3.0 * math.pi * radius**3
-    speed = given["stokes"] * film_strength(viscosity, 0.5 * radius) / (0.5 * mass)
-    if not LEAST_SPEED <= speed <= FASTEST:
-        limit = f"that of an impact at {LEAST_SPEED:g} to {FASTEST:g} m/s; it gives {speed:.3g} m/s"
-        raise InputError("stokes", given["stokes"], limit)
-    return Pair(
-        speed=speed,
-        film=film,
-        minimum_gap=glass_transition(viscosity, speed, laws.transition_pressure, 0.5 * radius, film),
-        radius=radius,
-        mass=mass,
-        modulus=contact.reduced_modulus(*elastic, *elastic),
-        shear_modulus=contact.reduced_shear_modulus(*elastic, *elastic),
-        damping_ratio=contact.damping_ratio(given["restitution"]),
-        friction=given["friction"],
-        liquid=laws.numbers,
-    )
-
-
-def _warn(pair: Pair, given: Mapping[str, Any]) -> tuple[str, ...]:
-    """Warn of a minimum gap as large as the film, of a pressure fitted to another liquid, and of a radius in mm."""
-    found = []
-    if pair.minimum_gap >= pair.film:
-        found.append(
-            f"at {pair.speed:.3g} m/s the whole film of {pair.film:.3g} m is above its glass transition pressure and "
-            "does not act; the fitted pressure does not hold at so high a Stokes number"
-        )
-    if given["glass_transition_pressure"] is None and given["viscosity"] < LEAST_VISCOSITY:
-        found.append(
-            f"glass_transition_pressure is that of silicone oil of 10 Pa s, but viscosity is {given['viscosity']:g} "
-            "Pa s; give one for this liquid"
-        )
-    if given["radius"] >= LARGE_RADIUS:
-        found.append(f"radius is {given['radius']:g} m; did you mean {1e-3 * given['radius']:g} m?")
-    for each in found:
-        warnings.warn(each, stacklevel=3)
-    return tuple(found)
 
 
 def _history(motion: Motion) -> dict[str, np.ndarray]:

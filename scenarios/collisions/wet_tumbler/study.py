@@ -17,11 +17,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
+from pydantic import Field
 
-from cfddem.backend.errors import InputError
 from cfddem.case.materials import Material
+from cfddem.case.settings import Settings, takes
 from cfddem.particles.initial.packing import random_packing
 from cfddem.particles.interactions.bridge import coat
 from cfddem.particles.interactions.bridge_law import BridgeLaws
@@ -73,50 +75,43 @@ class Tumbling:
         return float(values[len(values) // 2 :].mean())
 
 
-def tumble(
-    capillary_number: float = 0.03,
-    count: int = 5000,
-    *,
-    until: float = 0.25,
-    shear_rate: float = 100.0,
-    diameter: float = 1e-3,
-    film: float = 25e-6,
-    film_spread: float = 0.5,
-    viscosity: float = 5e-3,
-    contact_angle: float = 15.0,
-    solid_fraction: float = 0.1,
-    drag_time: float = 5e-3,
-    seed: int = 1,
-    samples: int = 50,
-    progress: Progress | None = None,
-) -> Tumbling:
+class Stirring(Settings):
+    """Wet spheres that are stirred in a periodic box."""
+
+    by_place: ClassVar[int] = 2
+
+    capillary_number: float = Field(0.03, gt=0, description="Ca [-]")
+    count: int = Field(5000, gt=0, description="number of spheres")
+    until: float = Field(0.25, gt=0, description="length of the run [s]")
+    shear_rate: float = Field(100.0, ge=0, description="G, largest shear rate of the flow; 0 for no flow [1/s]")
+    diameter: float = Field(1e-3, gt=0, description="d [m]")
+    film: float = Field(25e-6, gt=0, description="mean thickness of the films at the start [m]")
+    film_spread: float = Field(
+        0.5, ge=0, lt=1, description="largest deviation from it, drawn evenly for each sphere, relative [-]"
+    )
+    viscosity: float = Field(5e-3, gt=0, description="eta, of the liquid [Pa s]")
+    contact_angle: float = Field(15.0, ge=0, le=90, description="of the liquid on the spheres [deg]")
+    solid_fraction: float = Field(0.1, gt=0, lt=0.64, description="of the box [-]")
+    drag_time: float = Field(5e-3, gt=0, description="relaxation time of a sphere towards the flow [s]")
+    seed: int = Field(1, ge=0, description="same seed, same run")
+    samples: int = Field(50, gt=0, description="times at which agglomerates are counted")
+    progress: Progress | None = Field(None, description="called with the completed fraction of the run")
+
+
+@takes(Stirring)
+def tumble(given: Stirring) -> Tumbling:
     r"""Stir wet spheres in a periodic box.
 
     The flow is u = U (sin kz, sin kx, sin ky) with one wave in the box and k U the shear rate G. The surface tension
     follows from the capillary number, :math:`Ca = \eta G d/\sigma`, so that viscous films are the same at each.
-
-    capillary_number  Ca [-]
-    count             number of spheres
-    until             length of the run [s]
-    shear_rate        G, largest shear rate of the flow; 0 for no flow [1/s]
-    diameter          d [m]
-    film              mean thickness of the films at the start [m]
-    film_spread       largest deviation from it, drawn evenly for each sphere, relative [-]
-    viscosity         eta, of the liquid [Pa s]
-    contact_angle     [deg]
-    solid_fraction    of the box [-]
-    drag_time         relaxation time of a sphere towards the flow [s]
-    seed              same seed, same run
-    samples           times at which agglomerates are counted
-    progress          called with the completed fraction of the run
-    returns           :class:`Tumbling`
     """
-    _check(film_spread, capillary_number=capillary_number, count=count, until=until, film=film)
-    surface_tension = viscosity * max(shear_rate, 1.0) * diameter / capillary_number
-    thickness = film * (1.0 + film_spread * np.random.default_rng(seed).uniform(-1.0, 1.0, count))
-    liquid = BridgeLaws(viscosity, surface_tension, math.radians(contact_angle))
-    run, bridges = _spheres(diameter, thickness, film, liquid, solid_fraction, seed)
-    flow = Flow(run, shear_rate, drag_time)
+    film, viscosity, shear_rate, diameter = given.film, given.viscosity, given.shear_rate, given.diameter
+    samples, until, progress = given.samples, given.until, given.progress
+    surface_tension = viscosity * max(shear_rate, 1.0) * diameter / given.capillary_number
+    thickness = film * (1.0 + given.film_spread * np.random.default_rng(given.seed).uniform(-1.0, 1.0, given.count))
+    liquid = BridgeLaws(viscosity, surface_tension, math.radians(given.contact_angle))
+    run, bridges = _spheres(diameter, thickness, film, liquid, given.solid_fraction, given.seed)
+    flow = Flow(run, shear_rate, given.drag_time)
     run.particles.velocity[:] = flow.speed
     run.refresh()
     start, all_liquid = _momentum(run), bridges.liquid
@@ -133,7 +128,7 @@ def tumble(
     drift = np.abs(_momentum(run) - start - flow.impulse).max() / carried
     mean, weighed, largest, per_sphere = np.array(counted).T
     return Tumbling(
-        capillary_number=capillary_number,
+        capillary_number=given.capillary_number,
         surface_tension=surface_tension,
         time=np.arange(samples + 1) * rounds * SUBSTEPS * step,
         mean_size=mean,
@@ -148,14 +143,6 @@ def tumble(
         agglomerates=bridges.agglomerates,
         run=run,
     )
-
-
-def _check(film_spread: float, **positive: float) -> None:
-    for name, value in positive.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise InputError(name, value, "above 0 and finite")
-    if not 0.0 <= film_spread < 1.0:
-        raise InputError("film_spread", film_spread, "at least 0 and below 1")
 
 
 class Flow:

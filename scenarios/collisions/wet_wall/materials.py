@@ -62,9 +62,7 @@ FRICTION = {None: 0.195, "tween": 0.160, "glycerol_35": 0.140}
 def half_filling(particle: Any, liquid: Any, film: float, given: float | None) -> float:
     """The half-filling angle that is given, or was measured for this case."""
     if given is not None:
-        if not 0.0 < given <= 90.0:
-            raise InputError("half_filling_angle", given, "above 0 and at most 90 degrees")
-        return float(given)
+        return given
     if isinstance(particle, str) and isinstance(liquid, str):
         measured = HALF_FILLING_ANGLES.get(particle, {}).get(liquid, {})
         for thickness, angle in measured.items():
@@ -83,8 +81,6 @@ def half_filling(particle: Any, liquid: Any, film: float, given: float | None) -
 def sliding_friction(particle: Any, liquid: Any, given: float | None) -> float:
     """The friction that is given, or was fitted for this case."""
     if given is not None:
-        if not (math.isfinite(given) and given >= 0.0):
-            raise InputError("friction", given, "at least 0 and finite")
         return given
     if particle == "alumina_1.74" and (liquid is None or isinstance(liquid, str)) and liquid in FRICTION:
         return FRICTION[liquid]

@@ -14,13 +14,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.json_text import summary_of
 from cfddem.case.materials import Material
+from cfddem.case.settings import Settings, takes
 from cfddem.particles.material_pairs import pair_table
 from closures import capillary, contact, timescales
 from scenarios.collisions.wet_wall.engine import integrate as integrate_in_engine
@@ -68,49 +70,100 @@ class Impact:
         return summary_of(self)
 
 
-def impact(
-    particle: str | Ball = "glass_1.74",
-    liquid: str | Liquid | None = "water",
-    film: float = 100e-6,
-    velocity: float = 1.0,
-    *,
-    angle: float = 0.0,
-    spin: float = 0.0,
-    half_filling_angle: float | None = None,
-    friction: float | None = None,
-    wall: Material = GLASS,
-    capillary_phases: str = "always",
-    length_from: str = "surface",
-    film_signs: str = "goldman",
-    spring: str | None = None,
-    smallest_arc: float | None = None,
-    smallest_gap: float = 0.5e-6,
-    gravity: float = 9.81,
-    tolerance: float = 1e-10,
-    solver: str = "particles",
-) -> Impact:
-    """Let a sphere strike a wall that carries a liquid layer, from above.
+class WetImpact(Settings):
+    """A sphere that strikes a wall under a liquid layer, from above."""
 
-    particle            "glass_0.91", "glass_1.74" or "alumina_1.74", or a Ball
-    liquid              "water", "tween", "glycerol_35" or "glycerol_51", or a Liquid; None for a dry wall
-    film                thickness of the layer; 0 for a dry wall [m]
-    velocity            normal speed where the sphere meets the layer [m/s]
-    angle               between velocity and normal there, 0 <= angle < 90; tan(angle) = tangential/normal [deg]
-    spin                before; positive if it moves the lowest point in the direction of the sphere [rad/s]
-    half_filling_angle  of the bridge; that of table 5 of the source where it lists the case [deg]
-    friction            of the contact; that of table 3 of the source where it lists the case [-]
-    wall                solid of the wall
-    capillary_phases    "always" where there is liquid, on "rebound" only, or on the "bridge" only
-    length_from         where the length of the bridge counts from: the "surface" of the layer, or the "wall"
-    film_signs          of the coupling of sliding and spin in the film: "goldman" (1967), or as "printed"
-    spring              of the contact along the wall while it slides: "cut" to Coulomb's limit, as the engine does, or
-                        "kept" as the whole displacement, as printed; if not given, what the solver does
-    smallest_arc        floor of r_m for layers in which the toroid is singular; such layers are refused without [m]
-    smallest_gap        below it the film's resistance no longer grows [m]
-    gravity             towards the wall [m/s2]
-    tolerance           of the equations, relative
-    solver              the "particles" engine, which cuts the spring and pulls always, or "equations" phase by phase
-    returns             :class:`Impact`
+    by_place: ClassVar[int] = 4
+
+    particle: str | Ball = Field("glass_1.74", description='"glass_0.91", "glass_1.74" or "alumina_1.74", or a Ball')
+    liquid: str | Liquid | None = Field(
+        "water", description='"water", "tween", "glycerol_35" or "glycerol_51", or a Liquid; None for a dry wall'
+    )
+    film: float = Field(100e-6, ge=0, description="thickness of the layer; 0 for a dry wall [m]")
+    velocity: float = Field(
+        1.0, gt=0, le=FASTEST, description="normal speed where the sphere meets the layer, at most 1000 m/s [m/s]"
+    )
+    angle: float = Field(
+        0.0, ge=0, lt=90, description="between velocity and normal there; tan(angle) = tangential/normal [deg]"
+    )
+    spin: float = Field(
+        0.0, ge=-1e6, le=1e6,
+        description="before; positive if it moves the lowest point in the direction of the sphere [rad/s]",
+    )  # fmt: skip
+    half_filling_angle: float | None = Field(
+        None, gt=0, le=90,
+        description="of the bridge; that of table 5 of the source where it lists the case [deg]",
+    )  # fmt: skip
+    friction: float | None = Field(
+        None, ge=0, description="of the contact; that of table 3 of the source where it lists the case [-]"
+    )
+    wall: Material = Field(GLASS, description="solid of the wall")
+    capillary_phases: Literal["always", "rebound", "bridge"] = Field(
+        "always", description='"always" where there is liquid, on "rebound" only, or on the "bridge" only'
+    )
+    length_from: Literal["surface", "wall"] = Field(
+        "surface", description='where the length of the bridge counts from: the "surface" of the layer, or the "wall"'
+    )
+    film_signs: Literal["goldman", "printed"] = Field(
+        "goldman", description='of the coupling of sliding and spin in the film: "goldman" (1967), or as "printed"'
+    )
+    spring: Literal["cut", "kept"] | None = Field(
+        None,
+        description='of the contact along the wall while it slides: "cut" to Coulomb\'s limit, as the engine does, or '
+        '"kept" as the whole displacement, as printed; if not given, what the solver does',
+    )
+    smallest_arc: float | None = Field(
+        None, gt=0,
+        description="floor of r_m for layers in which the toroid is singular; such layers are refused without [m]",
+    )  # fmt: skip
+    smallest_gap: float = Field(0.5e-6, gt=0, description="below it the film's resistance no longer grows [m]")
+    gravity: float = Field(9.81, ge=0, le=1e4, description="towards the wall [m/s2]")
+    tolerance: float = Field(1e-10, ge=1e-13, le=1e-3, description="of the equations, relative")
+    solver: Literal["particles", "equations"] = Field(
+        "particles",
+        description='the "particles" engine, which cuts the spring and pulls always, or "equations" phase by phase',
+    )
+
+    @property
+    def wetted(self) -> bool:
+        """Whether there is liquid on the wall."""
+        return self.film > 0.0 and self.liquid is not None
+
+    def wet(self, ball: Ball, filled: float | None, friction: float) -> Wet:
+        """The constants of the impact."""
+        fluid = _named("liquid", self.liquid, LIQUIDS) if self.wetted else None
+        radius, row = 0.5 * ball.diameter, pair_table([ball.material, self.wall])[0, 1]
+        mass, stiffness = (
+            ball.material.density * 4.0 / 3.0 * math.pi * radius**3,
+            contact.hertz_stiffness(float(row["contact_modulus"]), radius),
+        )
+        cut = (self.spring or ("cut" if self.solver == "particles" else "kept")) == "cut"
+        return Wet(
+            radius=radius,
+            mass=mass,
+            gravity=self.gravity,
+            stiffness=stiffness,
+            damping_ratio=float(row["damping_ratio"]),
+            shear_modulus=float(row["shear_modulus"]),
+            friction=friction,
+            film=self.film if self.wetted else 0.0,
+            viscosity=fluid.viscosity if fluid else 0.0,
+            liquid_density=fluid.density if fluid else 0.0,
+            surface_tension=fluid.surface_tension if fluid else 0.0,
+            contact_angle=math.radians(fluid.contact_angle) if fluid else 0.0,
+            half_filling_angle=math.radians(filled) if filled else 0.0,
+            smallest_gap=self.smallest_gap,
+            smallest_arc=self.smallest_arc or 0.0,
+            pulled_in=PULLED_IN[self.capillary_phases],
+            length_from=self.film if self.length_from == "surface" else 0.0,
+            printed_signs=self.film_signs == "printed",
+            cutting_time=CUTTING * timescales.hertz_time(mass, stiffness, self.velocity) if cut else 0.0,
+        )
+
+
+@takes(WetImpact)
+def impact(given: WetImpact) -> Impact:
+    """Let a sphere strike a wall that carries a liquid layer, from above.
 
     Raises InputError where the contact line of the bridge lies within the layer while the solids touch.
 
@@ -118,31 +171,22 @@ def impact(
     >>> round(sliding.restitution_tangential, 3), round(1 - 0.195 * 1.76 / math.tan(math.radians(60)), 3)
     (0.802, 0.802)
     """
-    ball = _named("particle", particle, BALLS)
-    wetted = film > 0.0 and liquid is not None
-    fluid = _named("liquid", liquid, LIQUIDS) if wetted else None
-    _check(film=film, velocity=velocity, angle=angle, spin=spin, gravity=gravity, tolerance=tolerance)
-    oblique = angle != 0.0 or spin != 0.0
-    rubs = sliding_friction(particle, liquid if wetted else None, friction) if oblique or friction is not None else None
-    filled = half_filling(particle, liquid, film, half_filling_angle) if wetted else None
-    along = velocity * math.tan(math.radians(angle))
-    wet = _wet(ball, wall, fluid, film if wetted else 0.0, filled, rubs or 0.0, gravity)._replace(
-        smallest_gap=_above_zero("smallest_gap", smallest_gap),
-        smallest_arc=0.0 if smallest_arc is None else _above_zero("smallest_arc", smallest_arc),
-        pulled_in=_named("capillary_phases", capillary_phases, PULLED_IN),
-        length_from=_named("length_from", length_from, {"surface": film, "wall": 0.0}),
-        printed_signs=_named("film_signs", film_signs, {"goldman": False, "printed": True}),
-    )
-    if wetted and smallest_arc is None and capillary_phases != "bridge":
+    ball, velocity, spin = _named("particle", given.particle, BALLS), given.velocity, given.spin
+    if given.wetted:
+        _named("liquid", given.liquid, LIQUIDS)
+    liquid = given.liquid if given.wetted else None
+    oblique = given.angle != 0.0 or spin != 0.0
+    rubs = sliding_friction(given.particle, liquid, given.friction) if oblique or given.friction is not None else None
+    filled = half_filling(given.particle, liquid, given.film, given.half_filling_angle) if given.wetted else None
+    along = velocity * math.tan(math.radians(given.angle))
+    wet = given.wet(ball, filled, rubs or 0.0)
+    if given.wetted and given.smallest_arc is None and given.capillary_phases != "bridge":
         _refuse_the_singular(wet)
-    in_engine = _named("solver", solver, {"particles": True, "equations": False})
-    if _named("spring", spring or ("cut" if in_engine else "kept"), {"cut": True, "kept": False}):
-        wet = wet._replace(cutting_time=CUTTING * timescales.hertz_time(wet.mass, wet.stiffness, velocity))
-    if in_engine:
+    if given.solver == "particles":
         _refuse_other_readings(wet, oblique)
-        path = integrate_in_engine(wet, (ball.material, wall), velocity, along, spin)
+        path = integrate_in_engine(wet, (ball.material, given.wall), velocity, along, spin)
     else:
-        path = integrate(wet, velocity, along, spin, tolerance)
+        path = integrate(wet, velocity, along, spin, given.tolerance)
     return replace(_result(path, wet, velocity, along, spin, filled, rubs), warnings=_nearly_singular(wet))
 
 
@@ -170,40 +214,6 @@ def sticking_velocity(
         middle = 0.5 * (low + high)
         low, high = (middle, high) if sticks(middle) else (low, middle)
     return high
-
-
-def _wet(
-    ball: Ball,
-    wall: Material,
-    fluid: Liquid | None,
-    film: float,
-    half_filling_angle: float | None,
-    friction: float,
-    gravity: float,
-) -> Wet:
-    """The constants of an impact."""
-    radius, row = 0.5 * ball.diameter, pair_table([ball.material, wall])[0, 1]
-    return Wet(
-        radius=radius,
-        mass=ball.material.density * 4.0 / 3.0 * math.pi * radius**3,
-        gravity=gravity,
-        stiffness=contact.hertz_stiffness(float(row["contact_modulus"]), radius),
-        damping_ratio=float(row["damping_ratio"]),
-        shear_modulus=float(row["shear_modulus"]),
-        friction=friction,
-        film=film,
-        viscosity=fluid.viscosity if fluid else 0.0,
-        liquid_density=fluid.density if fluid else 0.0,
-        surface_tension=fluid.surface_tension if fluid else 0.0,
-        contact_angle=math.radians(fluid.contact_angle) if fluid else 0.0,
-        half_filling_angle=math.radians(half_filling_angle) if half_filling_angle else 0.0,
-        smallest_gap=0.0,
-        smallest_arc=0.0,
-        pulled_in=(),
-        length_from=film,
-        printed_signs=False,
-        cutting_time=0.0,
-    )
 
 
 def _refuse_other_readings(wet: Wet, oblique: bool) -> None:
@@ -271,28 +281,6 @@ def _result(
         time=path.time,
         history=dict(zip(COLUMNS, path.state)) | {"phase": path.phase},
     )
-
-
-def _check(**given: float) -> None:
-    """Check the numbers of an impact."""
-    limits = {
-        "film": (given["film"] >= 0.0, "at least 0 and finite"),
-        "velocity": (0.0 < given["velocity"] <= FASTEST, f"above 0 and at most {FASTEST:g} m/s"),
-        "angle": (0.0 <= given["angle"] < 90.0, "at least 0 and below 90 degrees"),
-        "tolerance": (1e-13 <= given["tolerance"] <= 1e-3, "between 1e-13 and 1e-3"),
-        "spin": (abs(given["spin"]) <= 1e6, "between -1e6 and 1e6 rad/s"),
-        "gravity": (0.0 <= given["gravity"] <= 1e4, "between 0 and 1e4 m/s2"),
-    }
-    for name, value in given.items():
-        holds, limit = limits.get(name, (True, "finite"))
-        if not (holds and math.isfinite(value)):
-            raise InputError(name, value, limit)
-
-
-def _above_zero(name: str, value: float) -> float:
-    if not (math.isfinite(value) and value > 0.0):
-        raise InputError(name, value, "above 0 and finite")
-    return value
 
 
 def _named(name: str, value: Any, known: dict[str, Any]) -> Any:
