@@ -225,13 +225,12 @@ class FilterKernel:
 
     def map_particles(self, position: Array, radius: Array) -> ParticleCellMap:
         """Map of particles at positions (N, 3) [m] with radii (N,) [m]."""
-        if self.owners.division is not self.reach.division:  # space has been cut anew
-            self._take_reach()
+        stencil = self.stencil(position, radius)
         slabs = max(self.reach.shape[0] // SLAB, 1)
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
         loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
-        number, stencil, places = int(self.communicator.sum([len(position)])), self.stencil(position, radius), []
+        number, places = int(self.communicator.sum([len(position)])), []
         for kind in range(len(self.stages) if self.unequal else 0):
             own = self.kinds(radius)[order] == kind
             places.append((order[own], np.append(0, np.cumsum(own))[start]))
@@ -252,6 +251,8 @@ class FilterKernel:
 
     def stencil(self, position: Array, radius: Array) -> Stencil:
         """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
+        if self.owners.division is not self.reach.division:  # space has been cut anew
+            self._take_reach()
         shape = len(position), len(self._offsets)
         stencil = Stencil(np.empty(shape, np.uint32), np.empty((*shape, 3)))
         self.reach.refuse_beyond(position, radius if len(self._offsets) > 1 else None)

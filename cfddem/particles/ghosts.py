@@ -69,11 +69,12 @@ class Whole:
         """Which of the places (N, 3) [m] belong to this rank (N,) bool."""
         return np.ones(len(position), bool)
 
-    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
+    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None, cut: bool = False) -> np.ndarray:
         """Drop all ghosts, give particles to the ranks that own their places, and take those that come.
 
         old_row  (N,) int32, row in the old list of each particle of this rank, without ghosts; -1 for new ones
         edges    the old list; None if there is none
+        cut      cut space anew if the work has become unequal
         returns  the rows in the old list of the particles as they are now; -1 for those that were not in it
         """
         return old_row
@@ -120,10 +121,10 @@ class Divided(Whole):
         """See `Whole.owns`."""
         return self.division.owner(position) == self.communicator.rank
 
-    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
+    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None, cut: bool = False) -> np.ndarray:
         """See `Whole.migrate`."""
         particles.drop_ghosts()
-        if self.balance and edges is not None:
+        if self.balance and cut:
             self._cut_anew(particles, _work(old_row, edges))
         owner = self.division.owner(particles.position)
         leave = np.flatnonzero(owner != self.communicator.rank)

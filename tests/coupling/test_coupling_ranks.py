@@ -12,6 +12,7 @@ from cluster import needs_mpi, on_mpi
 from example_case import MIXTURE
 from golden.beds import BEADS, SEEDS
 from in_process_ranks import on_ranks
+from test_case_walls import TETRAHEDRON, write_binary_stl
 
 from cfddem.backend import portions
 from cfddem.backend.brick_shapes import Shape, place_of
@@ -77,7 +78,8 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
     assert simulation.fluid is not None
     for _ in range(steps):
         simulation.step()
-    names = ("position", "velocity", "spin", "applied", "drag_impulse")
+    names = ["position", "velocity", "spin", "applied", "drag_impulse"]
+    names += ["liquid"] if "liquid" in simulation.particles.fields else []
     order = np.argsort(simulation.whole("id"))
     particles = {name: simulation.whole(name)[order] for name in names}
     particles["temperature"] = np.zeros(0)
@@ -171,13 +173,52 @@ MANY = {
     ),
 }  # fmt: skip
 
+WET_AND_FED = """
+[liquid]
+viscosity = 5e-3
+surface_tension = 0.02
+liquid_fraction = 0.01
+wall_share = 0.5
+wall_thickness = 1e-6
+[[feed]]
+corner = [0.002, 0.002, 0.060]
+size = [0.010, 0.010, 0.006]
+rate = 4000.0
+velocity = [0.0, 0.0, -0.5]
+[[wall]]
+shape = "surface"
+solid = "none"
+file = "FILE"
+velocity = [0.0, 0.0, -0.1]
+spin = [0.0, 0.0, 20.0]
+"""
+"""Liquid on particles and walls, particles that enter, and a mesh that sinks and turns."""
+
+
+@pytest.fixture(autouse=True)
+def _wet_and_fed(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Write the mesh, once."""
+    if WET not in MANY:
+        corners = 0.004 * TETRAHEDRON + (0.005, 0.006, 0.030)
+        file = write_binary_stl(tmp_path_factory.mktemp("mesh") / "part.stl", corners)
+        MANY[WET] = case_of(
+            SEEDS + WET_AND_FED.replace("FILE", str(file)), column__height=0.072, bed__count=700,
+            bed__initial_velocity=[0.1, 0.05, -0.3],
+        )  # fmt: skip
+
+
+WET = "wet gas, fed and stirred"
+
 MANY_SHAPES = ((1, 2, 1), (1, 1, 3), (2, 2, 1), (2, 1, 3), (2, 2, 2), (1, 2, 4), (1, 1, 8))
 """2, 3, 4, 6 and 8 ranks, eight of them in three ways."""
 
 
+MANY_STEPS = 500
+
+
 def many_steps(name: str, communicator: Communicator = SERIAL) -> dict[str, Array]:
     """500 fluid steps at the default tolerance of the pressure."""
-    return advanced(Simulation(MANY[name], communicator=communicator), 500)
+    return advanced(Simulation(MANY[name], communicator=communicator), MANY_STEPS)
 
 
 many_steps_alone = cache(many_steps)
@@ -186,7 +227,7 @@ many_steps_alone = cache(many_steps)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", MANY_SHAPES, ids=lambda shape: "x".join(map(str, shape)))
-@pytest.mark.parametrize("name", MANY)
+@pytest.mark.parametrize("name", [*MANY, WET])
 def test_any_number_of_ranks_has_the_bits_of_one(name: str, shape: Shape) -> None:
     """500 fluid steps in one process and on 2, 3, 4, 6 and 8 ranks."""
 
