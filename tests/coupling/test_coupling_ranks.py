@@ -29,7 +29,7 @@ from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.multigrid import PressureEquation
 from cfddem.io import checkpoint
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.ghosts import Divided
+from cfddem.particles.ghosts import Divided, Whole
 from cfddem.particles.state import Particles
 from cfddem.run import history
 from cfddem.run.resuming import LARGE
@@ -296,6 +296,30 @@ def test_fields_travel_between_the_division_of_cells_and_that_of_particles(
         assert np.array_equal(collected, block.part(communicator.sum(expected, axis=())))
 
     on_ranks(ranks, program)
+
+
+@pytest.mark.parametrize("periodic", [(False, False, False), (True, True, False)])
+def test_values_between_centres_have_the_bits_of_one_process(periodic: tuple[bool, bool, bool]) -> None:
+    """A viscosity that grows with height, and one that differs from cell to cell, at places up to the walls."""
+    grid, draw, shape = Grid((12, 10, 14), (0.01,) * 3), np.random.default_rng(2), (2, 2, 2)
+    places = draw.uniform(0.0, 1.0, (2000, 3)) ** 2 * grid.size
+    division, layered = Bricks.balanced(shape, places), np.broadcast_to(grid.centres()[2], grid.shape)
+    uneven = draw.uniform(1.0, 2.0, grid.shape)
+
+    def program(communicator: Communicator) -> list[Array]:
+        cells, owners, mine = grid, Whole(), np.arange(2000)
+        if communicator.size > 1:
+            cells = Block(grid, divide(grid, 8, shape=shape), communicator)
+            owners, mine = Divided(division, communicator), np.flatnonzero(division.owner(places) == communicator.rank)
+        kernel = FilterKernel(cells, periodic, communicator=communicator, owners=owners)
+        found = [kernel.between_centres(cells.part(each), places[mine]) for each in (layered, uneven)]
+        order = np.argsort(communicator.joined(mine))
+        return [communicator.joined(each)[order] for each in found]
+
+    alone = program(SERIAL)
+    inside = np.clip(places[:, 2], 0.005, 0.135)
+    assert alone[0] == pytest.approx(inside, rel=1e-12)
+    assert all(np.array_equal(*pair) for found in on_ranks(8, program) for pair in zip(found, alone))
 
 
 def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
