@@ -85,6 +85,19 @@ def rows_by_rank(values: np.ndarray, communicator: Communicator) -> np.ndarray |
     return Portions((int(ends[-1]), *values.shape[1:]), values.dtype, parts)
 
 
+def slices(count: int, width: int = 1, largest: int = 0) -> Iterator[slice]:
+    """Rows from the first to the last of so many, in portions.
+
+    width    numbers in a row
+    largest  numbers in a portion; `LARGEST` if 0
+
+    >>> list(slices(5, width=2, largest=4))
+    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
+    """
+    step = max((largest or LARGEST) // width, 1)
+    return (slice(first, min(first + step, count)) for first in range(0, count, step))
+
+
 def take_part(values: Any) -> None:
     """Give rank 0 what it asks for where it goes through these values, nested mappings of `Portions` and others."""
     if isinstance(values, Mapping):

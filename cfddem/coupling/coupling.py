@@ -129,8 +129,8 @@ class Coupling:
         """
         if self.momentum.last_step == 0.0:
             particles.reset(*self._stored)  # particles may have been moved since the fields were declared
-        particles.viscosity[:] = self.fluid.viscosity_at(particles.position)
         cell_map = self.kernel.map_particles(self._mapped_position(particles, step), particles.radius)
+        particles.viscosity[:] = self.kernel.between_centres(self.fluid.viscosity, particles.position)
         terms = self._terms(particles, cell_map, step)
         self.forces.act(terms)
         terms.implicit = self.momentum.prepare(particles, cell_map, terms.resistance, step, terms.unseen)

@@ -15,9 +15,9 @@ Particles of unequal sizes have kernels of unequal widths: each deposits and gat
 size, so that small particles among large ones exchange with their own surroundings. Deposit and gather of each size
 are adjoint, and so are those of all together.
 
-Where several ranks share the grid, each deposits its own particles, on its cells and on ghosts of those around
-(:class:`cfddem.coupling.reach.Reach`). Ghosts are then added to the cells that they stand for; a gather fills them
-before. Deposit and gather stay adjoint.
+Where several ranks share the grid, each deposits its own particles on the cells around them
+(:class:`cfddem.coupling.reach.Reach`), which are then added to those of their owners; a gather takes them from there.
+Deposit and gather stay adjoint.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
 from cfddem.coupling.merged_cells import merged_cells
 from cfddem.coupling.reach import Reach
-from cfddem.fluid.grid import Array, Grid
+from cfddem.fluid.grid import AT_CENTRES, HIGH, LOW, Array, Grid, sample
 from cfddem.fluid.halo import Halo
+from cfddem.particles.ghosts import Whole
 from cfddem.particles.state import sphere_volume
 
 MAPPINGS = ("linear", "centroid", "divided")
@@ -89,6 +90,7 @@ class FilterKernel:
     twice         whether this is that of a deposit and a gather together, both with the mapping
     parts         into how many the cells of the fluid are divided along x, y, z
     communicator  of the run
+    owners        which rank owns which particles; as the cells if None
     """
 
     def __init__(
@@ -102,6 +104,7 @@ class FilterKernel:
         twice: bool = False,
         parts: Sequence[int] = (1, 1, 1),
         communicator: Communicator = SERIAL,
+        owners: Whole | None = None,
     ) -> None:
         if mapping not in MAPPINGS:
             raise InputError("laws.mapping", mapping, nearest(mapping, MAPPINGS))
@@ -113,14 +116,10 @@ class FilterKernel:
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))
         self._merged = merged_cells(grid, self.periodic)
-        self.reach = Reach(self._merged.grid, periodic, parts)
-        self._axes = self.reach.axes()
+        self.owners, self._parts = owners or Whole(), parts
+        self._take_reach()
         self.halo = Halo(grid.cells, periodic, 1, 1, grid.borders(periodic))
         self._buffers: dict[int, Array] = {}
-        _, ny, nx = self.reach.shape
-        corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
-        self._corners = np.array(corners, np.uint32)
-        self._homes = self.reach.homes()
         self._gates = self._merged.gates(self.halo)
         self.sizes = tuple(sizes)
         radii = np.array([radius for radius, _ in self.sizes])
@@ -128,6 +127,14 @@ class FilterKernel:
         self.widths = np.array([width for _, width in self.sizes] or [self.smoothing])
         self.stages = [self._diffusion(width) for width in self.widths]
         self.sweeps, self.strength = self._diffusion(self.smoothing)
+
+    def _take_reach(self) -> None:
+        """Find the cells that particles reach by the present division of space."""
+        self.reach = Reach(self._merged.grid, self.periodic, self._parts, self.owners.division)
+        self._axes, self._homes = self.reach.axes(), self.reach.homes()
+        _, ny, nx = self.reach.shape
+        corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
+        self._corners = np.array(corners, np.uint32)
 
     def _diffusion(self, width: float) -> tuple[int, Array]:
         """Number of sweeps, and strength of each along x, y, z, that widen the mapping to a standard deviation."""
@@ -218,11 +225,12 @@ class FilterKernel:
 
     def map_particles(self, position: Array, radius: Array) -> ParticleCellMap:
         """Map of particles at positions (N, 3) [m] with radii (N,) [m]."""
+        stencil = self.stencil(position, radius)
         slabs = max(self.reach.shape[0] // SLAB, 1)
         order, start = np.empty(len(position), np.int64), np.zeros(slabs + 1, np.int64)
         low = self._axes.origin[2] + self._axes.first[2] * self.grid.spacing[2]
         loops.sort_into_slabs(position, low, self._axes.inverse[2], SLAB, order, start)
-        number, stencil, places = int(self.communicator.sum([len(position)])), self.stencil(position, radius), []
+        number, places = int(self.communicator.sum([len(position)])), []
         for kind in range(len(self.stages) if self.unequal else 0):
             own = self.kinds(radius)[order] == kind
             places.append((order[own], np.append(0, np.cumsum(own))[start]))
@@ -243,6 +251,8 @@ class FilterKernel:
 
     def stencil(self, position: Array, radius: Array) -> Stencil:
         """Cells and weights of particles at positions (N, 3) [m] with radii (N,) [m]."""
+        if self.owners.division is not self.reach.division:  # space has been cut anew
+            self._take_reach()
         shape = len(position), len(self._offsets)
         stencil = Stencil(np.empty(shape, np.uint32), np.empty((*shape, 3)))
         self.reach.refuse_beyond(position, radius if len(self._offsets) > 1 else None)
@@ -293,6 +303,19 @@ class FilterKernel:
         values = np.empty((len(now.first), len(fields)))
         loops.gather_over_steps(*earlier, *last, *now, self._corners, self._layered(fields), values)
         return values
+
+    def between_centres(self, field: Array, position: Array) -> Array:
+        """Values of a field (nz, ny, nx) at the places (N, 3) [m] of particles, tri-linear between centres (N,)."""
+        least, most = self.communicator.smallest(field), self.communicator.largest(field)
+        if least == most:
+            return np.full(len(position), most)  # free of the rounding of an interpolation
+        around = self.reach.spread(field[None])[0]
+        for axis in range(3):
+            widths = [(LOW, HIGH) if axis == 2 - d else (0, 0) for d in range(3)]
+            around = np.pad(around, widths, "wrap" if self.reach.wraps[axis] else "edge")
+        values, (origin, inverse, _, first, _) = np.empty((len(position), 1)), self._axes
+        sample(around[None], AT_CENTRES, np.ascontiguousarray(position), origin, first, inverse, values)
+        return np.asarray(values[:, 0])
 
     def _layered(self, fields: Array) -> Array:
         """Fields (m, nz, ny, nx) in the cells and the layer around them (n, m)."""

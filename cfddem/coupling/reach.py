@@ -1,12 +1,18 @@
-"""Cells that the particles of a rank reach: its own cells, and ghosts of the cells of its neighbours.
+"""Cells that the particles of a rank reach, and the table of the ranks that own them.
 
-In a run of one process these are the cells of the grid.
+Ranks divide particles and cells in two ways. The particles of a rank deposit on the cells of its brick and on some
+layers around it: its *box*. Where boxes and blocks of cells overlap, what is deposited travels from the one to the
+other. Both divisions are known to every rank, so that the table is made without a message, anew after each cut.
+
+In a run of one process the box is the grid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +20,22 @@ from scipy.ndimage import distance_transform_edt
 
 from cfddem.backend.errors import RunFailed
 from cfddem.coupling.kernel_loops import Axes
-from cfddem.fluid.block import THINNEST
+from cfddem.fluid.block import THINNEST, Block
 from cfddem.fluid.grid import Array, Grid
+from cfddem.particles.bricks import Bricks
 
 LAYERS = THINNEST
-"""Layers of ghosts beyond a border. A particle may lie half a cell less beyond its rank's cells: it moves until the
-next neighbour list, and is mapped where it was two fluid steps ago, or where it will be after the next one."""
+"""Layers of cells around a brick. A particle may lie half a cell less beyond it: it moves until the next neighbour
+list, and is mapped where it was two fluid steps ago, or where it will be after the next one."""
+
+NEARLY = 1e-6
+"""Part of a cell by which a plane between two ranks may miss the border of cells on which it lies."""
+
+Region = tuple[slice, ...]
+"""Some cells of fields (m, nz, ny, nx)."""
+
+Overlaps = dict[int, list[Region]]
+"""By rank, the regions that it shares."""
 
 
 class Homes(NamedTuple):
@@ -40,17 +56,45 @@ class Reach:
     grid      cells of the rank
     periodic  whether x, y, z are periodic
     parts     into how many the cells of the fluid are divided along x, y, z
+    division  of the particles among the ranks; that of the cells if None
 
-    Attributes: `shape` (nz, ny, nx), ghosts included.
+    Attributes: `shape` of the box (nz, ny, nx); `wraps`, whether it begins again at its end along x, y, z.
     """
 
-    def __init__(self, grid: Grid, periodic: Sequence[bool] | np.ndarray, parts: Sequence[int] = (1, 1, 1)) -> None:
-        self.grid, self.periodic, self.borders = grid, np.array(periodic, bool), grid.borders(periodic)
-        self._ghosts = np.zeros(3, np.int64)
-        for each in self.borders:
-            self._ghosts[each.axis] = LAYERS * parts[each.axis]
-        nx, ny, nz = (int(n) for n in np.array(grid.cells) + 2 * self._ghosts)
-        self.shape = (nz, ny, nx)
+    def __init__(
+        self,
+        grid: Grid,
+        periodic: Sequence[bool] | np.ndarray,
+        parts: Sequence[int] = (1, 1, 1),
+        division: Bricks | None = None,
+    ) -> None:
+        self.grid, self.periodic, self.division = grid, np.array(periodic, bool), division
+        counts = np.array(grid.whole.cells)
+        self._bare = self._box = np.array([[0, 0, 0], counts])  # cells of the brick, and those of the box, from and to
+        self._layers = np.zeros(3, np.int64)
+        if isinstance(grid, Block):
+            bricks = division or Bricks(grid.division.planes(grid.whole))
+            self._layers = LAYERS * np.array(parts) * (np.array(bricks.shape) > 1)
+            self._share(grid, bricks)
+        nx, ny, nz = (self._box[1] - self._box[0]).tolist()
+        self.shape, self.wraps = (nz, ny, nx), self.periodic & (self._layers == 0)
+
+    def _share(self, block: Block, bricks: Bricks) -> None:
+        """Find the box of this rank, and its overlaps with the cells of others, and those of their boxes with its."""
+        whole, rank, counts = block.whole, block.communicator.rank, np.array(block.whole.cells)
+        low, high = (bricks.ends - np.array(whole.origin)) / np.array(whole.spacing)
+        low, high = np.floor(low + NEARLY), np.ceil(high - NEARLY)
+        bare = np.clip([low, np.maximum(low, high)], 0, counts).astype(np.int64)
+        boxes = bare + np.array([-self._layers, self._layers])[:, None]
+        boxes = np.where(self.periodic, boxes, np.clip(boxes, 0, counts))
+        self._bare, self._box = bare[:, rank], boxes[:, rank]
+        ends = [[np.array(each)[n : len(each) - 1 + n] for each in block.division.starts] for n in (0, 1)]
+        cells = np.array([np.stack(np.meshgrid(*each, indexing="ij"), -1).reshape(-1, 3) for each in ends])
+        around = [range(-n, n + 1) for n in np.where(self.periodic, -(-self._layers // counts), 0).tolist()]
+        shifts = [np.array(each) * counts for each in itertools.product(*around)]
+        self._communicator = block.communicator
+        self._in_box = _overlaps(self._box, cells, shifts)
+        self._in_cells = _overlaps(cells[:, rank], boxes, [-each for each in shifts])  # in the same order
 
     def homes(self) -> Homes:
         """Homes of the cells and of the layer around them."""
@@ -64,13 +108,11 @@ class Reach:
         """Cell that receives the deposit on each of the cells and of a layer around them; flat indices."""
         whole, counts = self.grid.whole, self.grid.whole.cells
         lines = []
-        for first, n, ghosts, count, repeats in zip(
-            self.grid.first, self.grid.cells, self._ghosts, counts, self.periodic
-        ):
-            cells = np.arange(first - ghosts - 1, first + n + ghosts + 1)
+        for first, last, count, repeats, wraps in zip(*self._box, counts, self.periodic, self.wraps):
+            cells = np.arange(first - 1, last + 1)
             if not repeats:
                 cells = np.clip(cells, 0, count - 1)
-            elif not ghosts:
+            elif wraps:
                 cells %= count
             lines.append(cells)
         homes = np.array(np.meshgrid(*lines[::-1], indexing="ij"))
@@ -78,37 +120,35 @@ class Reach:
             nearest_open = distance_transform_edt(whole.solid, sampling=whole.spacing[::-1], return_indices=True)[1]
             at = tuple(homes % np.array(counts[::-1])[:, None, None, None])
             homes += nearest_open[:, *at] - np.array(at)
-        begin = (np.array(self.grid.first) - self._ghosts)[::-1, None, None, None]
+        begin = self._box[0][::-1, None, None, None]
         # a particle cannot reach a home so deep in the solid that it lies outside
         inside = np.clip(homes - begin, 0, np.array(self.shape)[:, None, None, None] - 1)
         return np.ravel_multi_index(tuple(inside), self.shape).ravel()
 
     def axes(self) -> Axes:
         """These cells along x, y, z."""
-        whole, period = self.grid.whole, np.zeros(3, np.int64)
-        for each in self.borders:
-            period[each.axis] = whole.cells[each.axis] * self.periodic[each.axis]
-        first = np.array(self.grid.first, np.int64) - self._ghosts
-        cells = np.array(self.shape[::-1], np.int64)
-        return Axes(np.array(whole.origin), 1.0 / np.array(whole.spacing), cells, first, period)
+        whole, cells = self.grid.whole, np.array(self.shape[::-1], np.int64)
+        period = np.array(whole.cells, np.int64) * (self.periodic & ~self.wraps)
+        return Axes(np.array(whole.origin), 1.0 / np.array(whole.spacing), cells, self._box[0].copy(), period)
 
     def refuse_beyond(self, position: Array, radius: Array | None = None) -> None:
-        """Raise `RunFailed` for a particle beyond the ghosts.
+        """Raise `RunFailed` for a particle beyond the box.
 
         position  (N, 3) [m]
         radius    of particles that reach beyond their centres (N,) [m]
         """
-        for each in self.borders:
-            axis, grid = each.axis, self.grid
-            begin, h, place = grid.origin[axis], grid.spacing[axis], position[:, axis]
-            end, around = begin + grid.cells[axis] * h, 0.0 if radius is None else radius
+        whole, around = self.grid.whole, 0.0 if radius is None else radius
+        for axis in np.flatnonzero(self._layers).tolist():
+            h, count, place, farthest = whole.spacing[axis], whole.cells[axis], position[:, axis], 0.0
+            begin, end = whole.origin[axis] + h * self._bare[:, axis]
             if self.periodic[axis]:
-                length = grid.whole.size[axis]
+                length = whole.size[axis]
                 place = place - length * np.rint((place - 0.5 * (begin + end)) / length)
-            below = 0.0 if each.below is None else np.max(begin - place + around, initial=0.0)  # local: own particles
-            above = 0.0 if each.above is None else np.max(place - end + around, initial=0.0)  # local: own particles
-            farthest = max(float(below), float(above))
-            layers = int(self._ghosts[axis])
+            if self.periodic[axis] or self._bare[0, axis] > 0:
+                farthest = float(np.max(begin - place + around, initial=0.0))  # local: own particles
+            if self.periodic[axis] or self._bare[1, axis] < count:
+                farthest = max(farthest, float(np.max(place - end + around, initial=0.0)))  # local: own particles
+            layers = int(self._layers[axis])
             if not farthest <= (layers - 0.5) * h:
                 raise RunFailed(
                     f"a particle reaches {farthest / h:.3g} cells beyond the cells of its rank, must be at most "
@@ -118,24 +158,59 @@ class Reach:
     def collected(self, fields: NDArray[np.int64]) -> NDArray[np.int64]:
         """Fields (m, nz, ny, nx) of the rank's cells: what was deposited on them, also by other ranks.
 
-        fields  int64, on the cells of this rank and its ghosts; ghosts are added to the cells that they stand for
+        fields  int64, in the box of this rank
         """
-        for each in self.borders:
-            each.add(fields, int(self._ghosts[each.axis]))
-        return fields if not self.borders else np.ascontiguousarray(self._inner(fields))
-
-    def spread(self, fields: Array) -> Array:
-        """Fields (m, nz, ny, nx) of the rank's cells, with ghosts; the adjoint of `collected`."""
-        if not self.borders:
+        if not isinstance(self.grid, Block):
             return fields
-        made = np.zeros((len(fields), *self.shape))
-        self._inner(made)[:] = fields
-        for each in self.borders:
-            layers = int(self._ghosts[each.axis])
-            each.fill(made, layers, layers)
+        made = np.zeros((len(fields), *self.grid.shape), np.int64)
+        for region, values in self._given(fields, self._in_box, self._in_cells):
+            made[region] += values
         return made
 
-    def _inner(self, fields: NDArray[Any]) -> NDArray[Any]:
-        """View of fields without ghosts."""
-        x, y, z = (slice(int(ghosts), int(ghosts) + n) for ghosts, n in zip(self._ghosts, self.grid.cells))
-        return fields[:, z, y, x]
+    def spread(self, fields: Array) -> Array:
+        """Fields (m, nz, ny, nx) of the rank's cells, in its box; the adjoint of `collected`."""
+        if not isinstance(self.grid, Block):
+            return fields
+        made = np.empty((len(fields), *self.shape))
+        for region, values in self._given(fields, self._in_cells, self._in_box):
+            made[region] = values
+        return made
+
+    def _given(self, fields: np.ndarray, sent: Overlaps, got: Overlaps) -> Iterator[tuple[Region, np.ndarray]]:
+        """Give other ranks what they wait for; returns what they give, region by region."""
+        mine, width = self._communicator.rank, len(fields)
+        outgoing = {
+            rank: np.concatenate([fields[each].reshape(-1) for each in regions]) for rank, regions in sent.items()
+        }
+        sizes = {rank: [[_length(each) for each in region[1:]] for region in regions] for rank, regions in got.items()}
+        incoming = {
+            rank: np.empty(width * sum(map(math.prod, each)), fields.dtype)
+            for rank, each in sizes.items() if rank != mine
+        }  # fmt: skip
+        self._communicator.swap({rank: each for rank, each in outgoing.items() if rank != mine}, incoming)
+        for rank, regions in got.items():
+            values, end = incoming[rank] if rank != mine else outgoing[rank], 0
+            for region, size in zip(regions, sizes[rank]):
+                begin, end = end, end + width * math.prod(size)
+                yield region, values[begin:end].reshape(width, *size)
+
+
+def _overlaps(box: np.ndarray, others: np.ndarray, shifts: Iterable[np.ndarray]) -> Overlaps:
+    """Regions of a box that the boxes of ranks overlap, all of which repeat.
+
+    box     its first and last corner (2, 3); cells
+    others  those of each rank (2, ranks, 3)
+    shifts  where the others lie, too (3,); cells
+    """
+    found: Overlaps = {}
+    for shift in shifts:
+        begin = np.maximum(box[0], others[0] + shift) - box[0]
+        end = np.minimum(box[1], others[1] + shift) - box[0]
+        for rank in np.flatnonzero((begin < end).all(axis=1)).tolist():  # local: three axes
+            x, y, z = (slice(*each) for each in zip(begin[rank].tolist(), end[rank].tolist()))
+            found.setdefault(rank, []).append((slice(None), z, y, x))
+    return found
+
+
+def _length(cells: slice) -> int:
+    return int(cells.stop - cells.start)

@@ -120,4 +120,4 @@ class CellFields:
             shape = (*self.owned(name).shape[:-3], *(n + faces for n in self.grid.whole.shape))
             if np.shape(stored[name]) != shape:
                 raise InputError(f"checkpoint.{name}", np.shape(stored[name]), f"of shape {shape}, as on this grid")
-            self.owned(name)[:] = self.grid.part(np.asarray(stored[name]), faces)
+            self.owned(name)[:] = self.grid.part(stored[name], faces)

@@ -31,7 +31,7 @@ from cfddem.fluid.boundaries import Boundaries
 from cfddem.fluid.checks import checked_field, checked_viscosity, checked_voidage, refuse_trapped_inflow
 from cfddem.fluid.conditions import Condition
 from cfddem.fluid.fields import FLUID_FIELDS, CellFields
-from cfddem.fluid.grid import AT_CENTRES, AT_FACES, Array, Grid, on_faces, sample
+from cfddem.fluid.grid import AT_FACES, Array, Grid, on_faces, sample
 from cfddem.fluid.momentum import FlowRates, drag_seen, in_cells, predict, transport
 from cfddem.fluid.near_walls import near_walls
 from cfddem.fluid.pressure.projection import Projection
@@ -490,20 +490,9 @@ class FluidSolver:
 
     def velocity_at(self, points: Array) -> Array:
         """Velocity at points (N, 3) [m], tri-linear between faces: (N, 3) [m/s]."""
-        return self._at(self.fields.velocity, AT_FACES, points)
-
-    def viscosity_at(self, points: Array) -> Array:
-        """mu at points (N, 3) [m], tri-linear between centres: (N,) [Pa s]."""
-        viscosity = self.fields.viscosity
-        least, most = self.communicator.smallest(viscosity), self.communicator.largest(viscosity)
-        if least == most:
-            return np.full(len(points), most)  # free of the rounding of an interpolation
-        return self._at(viscosity[None], AT_CENTRES, points)[:, 0]
-
-    def _at(self, fields: Array, place: Array, points: Array) -> Array:
         points = np.ascontiguousarray(points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError("points", points.shape, "of shape (N, 3)")
-        values, origin = np.empty((len(points), len(fields))), np.array(self.grid.whole.origin)
-        sample(fields, place, points, origin, np.array(self.grid.first), self.inverse_spacing, values)
+        values, origin = np.empty((len(points), 3)), np.array(self.grid.whole.origin)
+        sample(self.fields.velocity, AT_FACES, points, origin, np.array(self.grid.first), self.inverse_spacing, values)
         return values

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -66,10 +66,32 @@ def exists(folder: Path) -> bool:
     return bool(_files(Path(folder) / "checkpoint"))
 
 
-def newest(folder: Path) -> dict[str, Any]:
+class Stored:
+    """An array of a checkpoint that is read where it is indexed.
+
+    path   of the checkpoint
+    array  in the open file
+    """
+
+    def __init__(self, path: Path, array: Any) -> None:
+        self.path, self.name, self.shape, self.dtype = path, array.name, array.shape, array.dtype
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    def __getitem__(self, rows: Any) -> np.ndarray:
+        with opened(self.path) as data:
+            return data.read(data.file[self.name], rows)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[()], dtype)
+
+
+def newest(folder: Path, later: Sequence[str] = ()) -> dict[str, Any]:
     """The newest undamaged state of a run. Damaged checkpoints are skipped with a warning.
 
     folder   of the run
+    later    entries, with / between levels, whose arrays are `Stored`: read where they are indexed
     returns  the state given to `write`, bit for bit
     errors   InputError if there is none, or one of another format; RunFailed if all are damaged
     """
@@ -82,7 +104,7 @@ def newest(folder: Path) -> dict[str, Any]:
         if fault is None:
             _require_format(path)
             with opened(path, "delete it; the previous one is used then") as data:
-                return _get(data.file, data)
+                return _get(data.file, data, tuple(f"/{each}/" for each in later))
         _log.warning("%s: %s; using the previous checkpoint", path, fault)
     raise RunFailed(f"{home}: all checkpoints are damaged ({len(found)}); delete the folder and run the case again")
 
@@ -147,14 +169,17 @@ def _put(group: Any, values: Mapping[str, Any], where: str) -> None:
                 raise InputError(here, type(value).__name__, "an array, number, text, flag, list or dict") from None
 
 
-def _get(group: Any, data: ArrayFile) -> dict[str, Any]:
+def _get(group: Any, data: ArrayFile, later: tuple[str, ...]) -> dict[str, Any]:
     import h5py
 
     values: dict[str, Any] = {}
     for name, each in group.items():
         if isinstance(each, h5py.Group):
-            values[name] = _get(each, data)
+            values[name] = _get(each, data, later)
+            continue
+        data.require_own(each)
+        if each.shape and later and f"{each.name}/".startswith(later):
+            values[name] = Stored(Path(each.file.filename), each)
         else:
-            data.require_own(each)
             values[name] = json.loads(each[()]) if "json" in each.attrs else each[()]
     return values

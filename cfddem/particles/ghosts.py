@@ -20,6 +20,7 @@ from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import serial
 from cfddem.backend.errors import InputError
 from cfddem.backend.law_set import specialise
+from cfddem.backend.portions import slices
 from cfddem.data.fields import Phase
 from cfddem.particles.bricks import Bricks
 from cfddem.particles.integrate import find_bridge_changes, finish_step, move, start_step, start_steps
@@ -45,23 +46,35 @@ from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
 from cfddem.particles.system import System
 
-IMBALANCE = 1.1
-"""Largest number of particles of a rank over the mean, or over what the last move has left; where it is exceeded the
-planes are moved."""
+IMBALANCE = 1.2
+"""Largest work of a rank over the mean, or over what the last cut has left; where it is exceeded space is cut anew."""
+
+ALONE = 2
+"""Work for a particle over that for a pair of its list."""
 
 
 class Whole:
-    """The particles of a run in one process: it owns all of them."""
+    """The particles of a run in one process: it owns all of them.
+
+    division  of space among the ranks, a new one after each cut; None in one process
+    """
+
+    division: Bricks | None = None
 
     def own(self, particles: Particles) -> Particles:
         """Those of the particles that belong to this rank."""
         return particles
 
-    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
+    def owns(self, position: np.ndarray) -> np.ndarray:
+        """Which of the places (N, 3) [m] belong to this rank (N,) bool."""
+        return np.ones(len(position), bool)
+
+    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None, cut: bool = False) -> np.ndarray:
         """Drop all ghosts, give particles to the ranks that own their places, and take those that come.
 
         old_row  (N,) int32, row in the old list of each particle of this rank, without ghosts; -1 for new ones
         edges    the old list; None if there is none
+        cut      cut space anew if the work has become unequal
         returns  the rows in the old list of the particles as they are now; -1 for those that were not in it
         """
         return old_row
@@ -82,8 +95,10 @@ class Divided(Whole):
 
     division      of space
     communicator  between the ranks
-    balance       move the planes when particles become unequally many
+    balance       cut space anew when the work becomes unequal
     """
+
+    division: Bricks
 
     def __init__(self, division: Bricks, communicator: Communicator, balance: bool = False) -> None:
         if math.prod(division.shape) != communicator.size:
@@ -95,18 +110,22 @@ class Divided(Whole):
         self._order = np.zeros(0, np.int64)  # rows in the order of these ids
         self._arrived: list[dict[str, np.ndarray]] = []
         self._particles: Any = None
-        self._uneven = 1.0  # most particles of a rank over the mean, after the planes were moved
+        self._uneven = 1.0  # most work of a rank over the mean, after the last cut
         self._near: list[int] | None = None  # ranks to which particles go between lists; all ranks if None
 
     def own(self, particles: Particles) -> Particles:
         """See `Whole.own`."""
-        return particles.copy(self.division.owner(particles.position) == self.communicator.rank)
+        return particles.copy(self.owns(particles.position))
 
-    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
+    def owns(self, position: np.ndarray) -> np.ndarray:
+        """See `Whole.owns`."""
+        return self.division.owner(position) == self.communicator.rank
+
+    def migrate(self, particles: Particles, old_row: np.ndarray, edges: Edges | None, cut: bool = False) -> np.ndarray:
         """See `Whole.migrate`."""
         particles.drop_ghosts()
-        if self.balance:
-            self._move_planes(particles)
+        if self.balance and cut:
+            self._cut_anew(particles, _work(old_row, edges))
         owner = self.division.owner(particles.position)
         leave = np.flatnonzero(owner != self.communicator.rank)
 
@@ -175,14 +194,18 @@ class Divided(Whole):
                 begin, end = end, end + ghosts.size
                 ghosts[...] = buffer[begin:end].reshape(ghosts.shape)
 
-    def _move_planes(self, particles: Particles) -> None:
-        """Divide space anew if a rank has many more particles than the mean."""
-        most, total = self.communicator.largest([particles.count]), self.communicator.sum([particles.count])
-        ranks = self.communicator.size
+    def _cut_anew(self, particles: Particles, work: np.ndarray) -> None:
+        """Divide space anew if a rank has much more work than the mean.
+
+        work  of each particle of this rank (n,)
+        """
+        mine, ranks = work.sum(), self.communicator.size  # local: compared below
+        most, total = self.communicator.largest([mine]), self.communicator.sum([mine])
         if most > IMBALANCE * self._uneven * total / ranks:
-            self.division = Bricks.balanced(self.division.shape, particles.position, self.communicator)
-            counts = np.bincount(self.division.owner(particles.position), minlength=ranks)  # local: summed below
-            self._uneven = max(max(self.communicator.sum(counts, axis=())) * ranks / total, 1.0)
+            self.division = Bricks.balanced(self.division.shape, particles.position, self.communicator, work)
+            shares = np.zeros(ranks, np.int64)
+            np.add.at(shares, self.division.owner(particles.position), work)
+            self._uneven = max(max(self.communicator.sum(shares, axis=())) * ranks / total, 1.0)
 
     def _known(self, ids: np.ndarray) -> np.ndarray:
         """Row that each id had in the last list; -1 if it was not in it (k,) int32."""
@@ -191,6 +214,38 @@ class Divided(Whole):
     def _listed(self, particles: Particles) -> None:
         """Take note of the rows of a list."""
         self._particles, self._ids, self._order = particles, particles.id.copy(), np.argsort(particles.id)
+
+
+def _work(old_row: np.ndarray, edges: Edges | None) -> np.ndarray:
+    """Work for each particle by the pairs of its last list, in whole numbers; arguments as of `Whole.migrate`."""
+    work = np.full(len(old_row), ALONE, np.int64)
+    if edges is not None and len(edges.start) > 1:
+        work += np.where(old_row >= 0, np.diff(edges.start)[old_row], 0)
+    return work
+
+
+def handed_out(particles: Particles, division: Bricks, communicator: Communicator) -> Particles:
+    """The particles of this rank, where each rank has some of all to begin with, in any way.
+
+    They travel in portions, so that no rank needs room for more than what it has and what it gets.
+
+    particles     that this rank has, each of which no other rank has
+    division      of space among the ranks
+    communicator  between them
+    """
+    parts = list(slices(particles.count, sum(math.prod(each.shape[1:]) for each in particles.arrays.values())))
+    mine = particles.copy(slice(0))
+    for n in range(communicator.largest([len(parts)])):
+        some = particles.copy(parts[n] if n < len(parts) else slice(0))
+        owner = division.owner(some.position)
+        parcels = {
+            rank: packed(some.copy(np.flatnonzero(owner == rank)).arrays)
+            for rank in np.unique(owner).tolist() if rank != communicator.rank
+        }  # fmt: skip
+        mine.append(some.copy(np.flatnonzero(owner == communicator.rank)))
+        for parcel in communicator.exchange(parcels).values():
+            mine.append(mine.rows_from(unpacked(parcel, mine.arrays)[0]))
+    return mine
 
 
 def packed(*tables: Mapping[str, np.ndarray]) -> np.ndarray:

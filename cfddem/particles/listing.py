@@ -40,7 +40,7 @@ class NeighbourLists:
     box           (3,) length of the periodic box; infinite along open axes [m]
     communicator  of the run
     division      of space among the ranks; None in one process
-    balance       move its planes when particles become unequally many
+    balance       cut it anew when the work becomes unequal
     skin          of all lists; tuned during the run if None [m]
     sort_every    sort the particles by position at every this many lists, if they are many
 
@@ -114,10 +114,10 @@ class NeighbourLists:
         reach_ratio  reach of films and bridges over the reduced radius [-]
         old_row      (N,) int32, row of each particle in the old list; -1 for new particles
         old          the list whose memory is carried over, None if there is none
-        steps        made by the run so far; None for a list out of turn: nothing is sorted, the skin stays
+        steps        made by the run so far; None for a list out of turn: nothing is sorted or cut, the skin stays
         """
         wrap(particles.position, self.box)
-        old_row = self.ghosts.migrate(particles, old_row, old)
+        old_row = self.ghosts.migrate(particles, old_row, old, cut=steps is not None)
         largest = self.communicator.largest(particles.radius, default=0.0)
         if steps is not None:
             old_row = old_row[self._sort(particles)]

@@ -6,6 +6,7 @@ ranks makes the same list again, with the same bits in the next steps.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,7 +14,8 @@ import numpy as np
 
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError
-from cfddem.backend.portions import Portions, rows_by_id, rows_by_rank
+from cfddem.backend.portions import Portions, rows_by_id, rows_by_rank, slices
+from cfddem.particles.ghosts import joined_rows
 from cfddem.particles.listing import NeighbourLists
 from cfddem.particles.pair_graph import Edges
 from cfddem.particles.state import Particles, rows_of
@@ -60,7 +62,8 @@ def restored_list(
 ) -> tuple[Particles, Edges, np.ndarray]:
     """The particles of this rank, their pairs, and the positions at which the list was made.
 
-    state             of a solver, of one rank or of several; the same on all ranks
+    state             of a solver, of one rank or of several; the same on all ranks. That of several may hold arrays
+                      that are read where they are indexed
     particles, edges  with the fields of the run
     walls             as they were when the list was made
     reach_ratio       as of `NeighbourLists.renewed`
@@ -80,20 +83,40 @@ def _listed_again(
     state: Mapping[str, Any], particles: Particles, lists: NeighbourLists, walls: Walls, reach_ratio: float
 ) -> tuple[Particles, Edges, np.ndarray]:
     """See `restored_list`, for a `named_state()`."""
-    particles.restore(dict(state["particles"]) | {"position": state["origin"]})
+    mine = _own_rows(state, lists)
+    now, ids = mine["position"], mine["id"]  # in ascending order
+    particles.restore(
+        {name: values for name, values in mine.items() if name != "origin"} | {"position": mine["origin"]}
+    )
     particles = lists.own(particles)
     lists.count(particles)
     edges = lists.renewed(particles, walls, reach_ratio, np.full(particles.count, -1, np.int32), None)
-    origin, ids = particles.position.copy(), np.asarray(state["particles"]["id"])
-    particles.position[:] = np.asarray(state["particles"]["position"])[np.searchsorted(ids, particles.id)]
-    for names, values in ((state["bodies"], state["pairs"]), (state["touch_bodies"], {"touch": state["touch"]})):
-        _give(edges, particles, np.asarray(names).reshape(-1, 2), values)
+    origin, own = particles.position.copy(), slice(particles.owned)
+    particles.position[own] = now[np.searchsorted(ids, particles.id[own])]
+    lists.ghosts.refresh("motion")
+    order = np.argsort(particles.id)
+    for names, values in (("bodies", state["pairs"]), ("touch_bodies", {"touch": state["touch"]})):
+        for part in slices(len(state[names]), 16):
+            bodies = np.asarray(state[names][part]).reshape(-1, 2)
+            _give(edges, particles, order, bodies, {name: np.asarray(each[part]) for name, each in values.items()})
     return particles, edges, origin
 
 
-def _give(edges: Edges, particles: Particles, bodies: np.ndarray, values: Mapping[str, np.ndarray]) -> None:
-    """Give the pairs of this rank their values, by the names of their bodies."""
-    rows = rows_of(bodies.reshape(-1), particles.id, np.argsort(particles.id)).reshape(-1, 2)
+def _own_rows(state: Mapping[str, Any], lists: NeighbourLists) -> dict[str, np.ndarray]:
+    """Fields of the particles of this rank, with "origin", of a `named_state()` that is read in portions."""
+    fields = {**state["particles"], "origin": state["origin"]}
+    found = []
+    for part in slices(len(state["origin"]), sum(math.prod(each.shape[1:]) for each in fields.values())):
+        mine = lists.ghosts.owns(np.asarray(state["origin"][part]))
+        found.append({name: np.asarray(values[part])[mine] for name, values in fields.items()})
+    return joined_rows(found)
+
+
+def _give(
+    edges: Edges, particles: Particles, order: np.ndarray, bodies: np.ndarray, values: Mapping[str, np.ndarray]
+) -> None:
+    """Give the pairs of this rank their values, by the names of their bodies; `order` sorts the particles by id."""
+    rows = rows_of(bodies.reshape(-1), particles.id, order).reshape(-1, 2)
     found = edges.between(rows, bodies)
     owned = ((rows >= 0) & (rows < particles.owned)).any(axis=1)  # local: two bodies
     if (owned & (found < 0)).any():  # local: each rank checks its own pairs

@@ -67,8 +67,8 @@ class ParticleSolver:
     check_steps  refuse time steps above the stability limit
     after    an earlier run over the same particles and walls, whose pair memory is taken over
     communicator  path to sums, extremes and decisions over all ranks
-    division  of space among the ranks; needed if there are several. All ranks pass all particles
-    balance   move its planes when particles become unequally many
+    division  of space among the ranks; needed if there are several. All ranks pass all particles, or each its own
+    balance   cut it anew when the work becomes unequal
     """
 
     system: System

@@ -95,6 +95,7 @@ class CostEstimate:
     cells_dominate: bool  # cells take more memory than particles
     particle_steps: float
     fluid_steps: float
+    cell_seconds: float  # part of the seconds for the cells of the fluid
 
 
 def estimate_cost(case: Case, bed: BedEstimate, steps: StepEstimate) -> CostEstimate:
@@ -102,8 +103,9 @@ def estimate_cost(case: Case, bed: BedEstimate, steps: StepEstimate) -> CostEsti
     cells, count = math.prod(steps.cells or (0, 0, 0)), bed.count + fed_count(case)
     particle_steps = case.run.until / min(steps.particle, steps.fluid)
     fluid_steps = case.run.until / steps.fluid
-    seconds = particle_steps * count / PARTICLE_STEPS_PER_SECOND
-    seconds += fluid_steps * (cells / CELL_STEPS_PER_SECOND + count / EXCHANGES_PER_SECOND * bool(cells))
+    cell_seconds = fluid_steps * cells / CELL_STEPS_PER_SECOND
+    seconds = particle_steps * count / PARTICLE_STEPS_PER_SECOND + cell_seconds
+    seconds += fluid_steps * count / EXCHANGES_PER_SECOND * bool(cells)
     snapshots = 1.0 + case.run.until / (case.run.every or case.run.until / 50.0)
     return CostEstimate(
         seconds,
@@ -113,6 +115,7 @@ def estimate_cost(case: Case, bed: BedEstimate, steps: StepEstimate) -> CostEsti
         BYTES_PER_CELL * cells > BYTES_PER_PARTICLE * count,
         particle_steps,
         fluid_steps * bool(cells),
+        cell_seconds,
     )
 
 

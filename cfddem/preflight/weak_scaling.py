@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from cfddem.backend.brick_shapes import Shape, shapes
+from cfddem.preflight.step_estimate import BYTES_AT_LEAST, BYTES_PER_PARTICLE
 
 RANDOM_PACKING = 0.6
 """Solid fraction of a bed, for its length in diameters."""
-
-BYTES_PER_PARTICLE = 3000.0
-"""Memory for a particle with its pairs [byte]."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +128,9 @@ class RunCost:
     fluid_steps     in the run; 0 without a fluid
     particles       in the run
     films           or bridges between particles, in the run
+    cell_seconds    part of the seconds for the cells of the fluid [s]
+    memory          of one process [byte]
+    snapshot        size of one [byte]
     """
 
     seconds: float
@@ -136,34 +138,82 @@ class RunCost:
     fluid_steps: float
     particles: float
     films: bool = False
+    cell_seconds: float = 0.0
+    memory: float = 0.0
+    snapshot: float = 0.0
 
 
-def efficiency(cost: RunCost, shape: Shape, busiest: float, machine: Machine | None = None) -> float:
-    """Speed-up of a run over the number of its ranks.
+class Shares(NamedTuple):
+    """Shares of the busiest rank, ghosts included, over the mean without them.
 
-    .. math:: t_p = \\frac{w}{p} t_1 + N_s (m (k l + c) + g b / B + s (r \\log_2 p + c))
+    shape      ranks along x, y, z
+    particles  and their ghosts
+    cells      and the layer around them; 1 without a fluid
+    """
+
+    shape: Shape
+    particles: float
+    cells: float = 1.0
+
+
+def time_of_a_rank(cost: RunCost, shares: Shares, machine: Machine | None = None) -> dict[str, float]:
+    """Time of the busiest rank in a run, by what it is spent on [s].
+
+    .. math:: t_p = \\frac{w_p t_P + w_c t_C}{p} + N_s (m (k l + c) + g b / B + s (r \\log_2 p + c))
               + N_f (h a (2 l + c) + s_f (r \\log_2 p + c))
 
-    with N_s particle steps of m exchanges with k neighbours and s sums, N_f fluid steps of h exchanges along each of a
-    divided axes and s_f sums, and the time c of a rank for each of these.
+    with the times t_P and t_C of one process for particles and cells, N_s particle steps of m exchanges with k
+    neighbours and s sums, N_f fluid steps of h exchanges along each of a divided axes and s_f sums, and the time c of a
+    rank for each of these.
 
     cost     of one process
-    shape    ranks along x, y, z
-    busiest  work of the busiest rank over the mean w, ghosts included
+    shares   w_p and w_c of the busiest rank
     machine  l, B, r and b; see `Machine`
+    returns  the share of the work, and what is added to it, which is 0 in one process
+    """
+    given, ranks = machine or Machine(), math.prod(shares.shape)
+    work, cells = cost.seconds / ranks, cost.cell_seconds / ranks
+    beside = math.prod(min(n, 3) for n in shares.shape) - 1
+    reduction, many = given.reduction * math.log2(ranks) + CALL, float(ranks > 1)
+    exchanges, sums = WITH_FILMS if cost.films else DRY
+    ghosts = (shares.particles - 1.0) * cost.particles / ranks
+    messages = exchanges * (beside * given.latency + CALL) + ghosts * given.message / given.bandwidth
+    divided = sum(n > 1 for n in shares.shape)
+    return {
+        "work": work,
+        "uneven particles, and ghosts": (shares.particles - 1.0) * (work - cells),
+        "uneven cells, and ghosts": (shares.cells - 1.0) * cells,
+        "messages of particles": many * cost.particle_steps * messages,
+        "sums in particle steps": many * cost.particle_steps * sums * reduction,
+        "messages of cells": cost.fluid_steps * HALOS * divided * (2.0 * given.latency + CALL),
+        "sums in fluid steps": many * cost.fluid_steps * SUMS * reduction,
+    }
+
+
+def efficiency(cost: RunCost, shares: Shares, machine: Machine | None = None) -> float:
+    """Speed-up of a run over the number of its ranks, by `time_of_a_rank`; arguments as there.
 
     >>> dry = RunCost(seconds=1000.0, particle_steps=1e5, fluid_steps=0, particles=1e5)
-    >>> round(efficiency(dry, (1, 2, 1), 1.05), 2), round(efficiency(dry, (4, 4, 4), 1.3), 2)
+    >>> round(efficiency(dry, Shares((1, 2, 1), 1.05)), 2), round(efficiency(dry, Shares((4, 4, 4), 1.3)), 2)
     (0.93, 0.36)
     """
-    given, ranks = machine or Machine(), math.prod(shape)
-    if ranks == 1:
-        return 1.0
-    beside, reduction = math.prod(min(n, 3) for n in shape) - 1, given.reduction * math.log2(ranks) + CALL
-    exchanges, sums = WITH_FILMS if cost.films else DRY
-    ghosts = (busiest - 1.0) * cost.particles / ranks
-    step = exchanges * (beside * given.latency + CALL) + ghosts * given.message / given.bandwidth + sums * reduction
-    divided = sum(n > 1 for n in shape)
-    flow = HALOS * divided * (2.0 * given.latency + CALL) + SUMS * reduction
-    total = busiest * cost.seconds / ranks + cost.particle_steps * step + cost.fluid_steps * flow
-    return cost.seconds / (ranks * total)
+    spent = time_of_a_rank(cost, shares, machine)
+    return spent["work"] / sum(spent.values())  # local: known to every rank
+
+
+PACKED, WRITTEN = 450.0, 4.4e7
+"""Memory of rank 0 for a particle while all of them are made [byte]; what rank 0 writes of a snapshot [byte/s]."""
+
+
+def memory_of_a_rank(cost: RunCost, shares: Shares) -> tuple[float, float]:
+    """Memory of the busiest rank, and that of rank 0 while it makes all particles at the start [byte].
+
+    The busiest rank has most of both particles and cells, at worst.
+    """
+    arrays = (cost.memory - BYTES_AT_LEAST) / math.prod(shares.shape)
+    return BYTES_AT_LEAST + max(shares[1:]) * arrays, BYTES_AT_LEAST + PACKED * cost.particles
+
+
+def seconds_of_a_snapshot(cost: RunCost) -> float:
+    """Time in which rank 0 writes a snapshot, while the others wait [s]; how many ranks there are does not matter."""
+    return cost.snapshot / WRITTEN

@@ -36,10 +36,12 @@ from cfddem.fluid.conditions import Condition, FreeSlip, Inlet, NoSlip, Outlet, 
 from cfddem.fluid.grid import Region
 from cfddem.fluid.solver import FluidSolver
 from cfddem.model.feature import FluidForce
+from cfddem.particles.ghosts import Whole, handed_out
 from cfddem.particles.interactions.bond import BondLaw
 from cfddem.particles.interactions.bridge_law import BridgeLaws
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.material_pairs import pair_table
+from cfddem.particles.neighbours import wrap
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.shapes import Cylinder, Mesh, Plane, Turned, Wall
@@ -66,7 +68,7 @@ def parts_of(
     """Build the parts of a run.
 
     progress      receives a line of text on what is being done
-    particles     of an earlier part of the run; made from the case if None
+    particles     of an earlier part of the run, of which each rank has some; made from the case if None
     communicator  path to sums, extremes and decisions over all ranks
     """
     table, walls, laws = materials_of(case), walls_of(case), laws_of(case)
@@ -74,10 +76,14 @@ def parts_of(
     if spheres is None:
         if case.bed.start == "poured":
             progress(f"pouring {case.particle_count} particles")
-        spheres = communicator.by_first(lambda: particles_of(case, table, walls, laws))
+        spheres = _made(case, table, walls, laws, communicator)
     if case.bed.species:
         spheres.declare(SPECIES)
     dry, cells = not case.has_fluid, cells_of(case, spheres.position, communicator)
+    division = space_of(case, spheres.position, communicator, cells)
+    if division is not None:
+        wrap(spheres.position, np.array([math.inf if each is None else each for each in periodic_box(case)]))
+        spheres = handed_out(spheres, division, communicator)
     solver = ParticleSolver(
         spheres,
         table,
@@ -89,24 +95,41 @@ def parts_of(
         record=case.run.record_collisions,
         energies=case.run.energy_budget,
         communicator=communicator,
-        division=space_of(case, spheres.position, communicator, cells),
-        balance=dry,
+        division=division,
+        balance=True,
     )
     if dry:
         return Parts(solver, None)
-    _, coupling = flow_of(case, solver.particles, communicator, cells)
+    _, coupling = flow_of(case, solver.particles, communicator, cells, solver.lists.ghosts)
     if coupling.sets_inertia:
         solver.refresh()  # the forces of films depend on the inertia
     return Parts(solver, coupling)
 
 
+def _made(case: Case, table: np.ndarray, walls: list[Wall], laws: Laws, communicator: Communicator) -> Particles:
+    """The particles of a case at the start, all of them on rank 0."""
+    made = list[Particles]()
+
+    def no_rows() -> Particles:
+        made.append(particles_of(case, table, walls, laws))
+        return made[0].copy(slice(0))
+
+    fields = communicator.by_first(no_rows)
+    return made[0] if made else fields
+
+
 def flow_of(
-    case: Case, spheres: Particles, communicator: Communicator = SERIAL, cells: Division | None = None
+    case: Case,
+    spheres: Particles,
+    communicator: Communicator = SERIAL,
+    cells: Division | None = None,
+    owners: Whole | None = None,
 ) -> tuple[FluidSolver, Coupling]:
     """The fluid of a case around its particles, and their coupling.
 
     spheres  particles of this rank
     cells    division of the cells among the ranks; None in one process
+    owners   which rank owns which particles; as the cells if None
     """
     grid = grid_of(case)
     if cells is not None:
@@ -128,6 +151,7 @@ def flow_of(
         smoothing=case.laws.kernel_width * case.bed.largest_diameter,
         sizes=kernels_of(case),
         communicator=communicator,
+        owners=owners,
     )
     beside = wall_drag_of(case.laws.wall_drag, walls_of(case), laws_of(case))
     forces = forces_of(case, fluid, kernel, beside)

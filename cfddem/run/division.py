@@ -12,10 +12,10 @@ from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
 from cfddem.case.schema import Case
 from cfddem.fluid.block import Division, divide
-from cfddem.particles.bricks import Bricks
+from cfddem.particles.bricks import ENOUGH, Bricks
 from cfddem.preflight.bed_estimate import estimate_bed
 from cfddem.preflight.step_estimate import estimate_cost, estimate_steps
-from cfddem.preflight.weak_scaling import RunCost, efficiency
+from cfddem.preflight.weak_scaling import RunCost, Shares, efficiency
 
 GHOSTS = 1.1
 """About how far from a brick its ghosts lie, in diameters."""
@@ -23,8 +23,12 @@ GHOSTS = 1.1
 WORTHWHILE = 0.7
 """Efficiency from which more ranks are recommended."""
 
-SAMPLE = 20_000
-"""Places that stand for the bed where no particles have been made yet."""
+SAMPLE = (20_000, 100, ENOUGH)
+"""Places that stand for the bed where no particles have been made yet: at least, for each rank, and at most."""
+
+SPREAD = np.array([0.8191725134, 0.6710436067, 0.5497004779])
+"""Steps from place to place over the width, depth and height, 1/g, 1/g^2 and 1/g^3 with g^4 = g + 1, which fill a box
+evenly."""
 
 
 def require_parallel(case: Case, ranks: int, shape: Shape | None = None) -> None:
@@ -44,37 +48,46 @@ def require_parallel(case: Case, ranks: int, shape: Shape | None = None) -> None
 def cells_of(case: Case, position: np.ndarray, communicator: Communicator) -> Division | None:
     """Division of the cells among ranks; None without a fluid, or in one process.
 
-    position  of all particles at the start (N, 3) [m]
+    position  of the particles that this rank has at the start (N, 3) [m]
     """
     if communicator.size == 1 or not case.fluid:
         return None
-    return divide(grid_of(case), communicator.size, _expected(case, position), communicator.shape)
+    places = _some(position, communicator)
+    return divide(grid_of(case), communicator.size, _expected(case, places), communicator.shape)
 
 
 def space_of(case: Case, position: np.ndarray, communicator: Communicator, cells: Division | None) -> Bricks | None:
     """Space divided among ranks: as the cells, else by the particles; None in one process.
 
-    position  of all particles at the start (N, 3) [m]
+    position  of the particles that this rank has at the start (N, 3) [m]
     """
     if communicator.size == 1:
         return None
     if cells is not None:
         return Bricks(cells.planes(grid_of(case)))
-    shape = communicator.shape or _dry(case, _expected(case, position), communicator.size).shape
-    return Bricks.balanced(shape, position)
+    places = _some(position, communicator)
+    shape = communicator.shape or _dry(case, _expected(case, places), communicator.size).shape
+    return Bricks.balanced(shape, position, communicator)
 
 
-def expected_division(case: Case, ranks: int, shape: Shape | None = None) -> tuple[Shape, float]:
-    """Ranks along x, y, z for a case, and work of the busiest rank over the mean, before particles are made.
+def _some(position: np.ndarray, communicator: Communicator) -> np.ndarray:
+    """Places of at most about `ENOUGH` of the particles of all ranks (n, 3) [m]."""
+    return communicator.joined(position[:: max(communicator.sum([len(position)]) // ENOUGH, 1)])
+
+
+def expected_shares(case: Case, ranks: int, shape: Shape | None = None) -> Shares:
+    """Ranks along x, y, z for a case, and shares of the busiest rank, before particles are made.
 
     shape  as given by the user; that with the least work if None
     """
-    places = _expected(case, np.array(case.bed.positions, float) if case.bed.start == "placed" else _sample(case))
-    if case.fluid:
-        cells = divide(grid_of(case), ranks, places, shape)
-        return cells.shape, cells.work(grid_of(case), places)
+    placed = case.bed.start == "placed"
+    places = _expected(case, np.array(case.bed.positions, float) if placed else _sample(case, ranks))
+    grid, reach, most = grid_of(case) if case.fluid else None, GHOSTS * case.bed.largest_diameter, 1.0
+    if grid is not None:
+        cells = divide(grid, ranks, places, shape)
+        shape, most = cells.shape, cells.work(grid, places[:0])
     bricks = Bricks.balanced(shape, places) if shape else _dry(case, places, ranks)
-    return bricks.shape, bricks.work(places, GHOSTS * case.bed.largest_diameter)
+    return Shares(bricks.shape, bricks.work(places, reach), most)
 
 
 def cost_of(case: Case) -> RunCost:
@@ -82,7 +95,10 @@ def cost_of(case: Case) -> RunCost:
     bed = estimate_bed(case)
     cost = estimate_cost(case, bed, estimate_steps(case, bed))
     films = case.has_films or bool(case.liquid)
-    return RunCost(cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count), films)
+    return RunCost(
+        cost.seconds, cost.particle_steps, cost.fluid_steps, float(case.particle_count), films, cost.cell_seconds,
+        cost.memory, cost.disk / cost.snapshots,
+    )  # fmt: skip
 
 
 def most_ranks(case: Case, cost: RunCost) -> int:
@@ -90,10 +106,10 @@ def most_ranks(case: Case, cost: RunCost) -> int:
     most = 1
     for ranks in sorted(n * 2**k for k in range(1, 20) for n in (1, 1.5) if n * 2**k <= case.particle_count):
         try:
-            shape, work = expected_division(case, int(ranks))
+            shares = expected_shares(case, int(ranks))
         except InputError:  # too few layers of cells
             break
-        if efficiency(cost, shape, work) < WORTHWHILE:
+        if efficiency(cost, shares) < WORTHWHILE:
             break
         most = int(ranks)
     return most
@@ -112,7 +128,8 @@ def _expected(case: Case, position: np.ndarray) -> np.ndarray:
     return position * (1.0, 1.0, height / top)
 
 
-def _sample(case: Case) -> np.ndarray:
-    """Places spread over the column (n, 3) [m]."""
-    places = np.random.default_rng(0).uniform(0.0, case.column.size, (SAMPLE, 3))
+def _sample(case: Case, ranks: int) -> np.ndarray:
+    """Places spread evenly over the column (n, 3) [m]."""
+    least, each, most = SAMPLE
+    places = np.arange(min(max(least, each * ranks), most))[:, None] * SPREAD % 1.0 * case.column.size
     return places[case.beyond_the_side(places) <= 0.0]

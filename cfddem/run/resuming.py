@@ -25,6 +25,12 @@ from cfddem.run import history
 from cfddem.run.simulation import Simulation
 from closures.registry import GROUP, REGISTRY, load_package_laws
 
+LARGE = (
+    *(f"simulation/particles/{name}" for name in ("particles", "origin", "pairs", "bodies", "touch", "touch_bodies")),
+    "simulation/fluid",
+)  # fmt: skip
+"""Entries of a checkpoint that grow with particles and cells; several ranks read them in portions."""
+
 
 def require_forward(until: float | None, state: Mapping[str, Any] | None) -> None:
     """Refuse an end [s] before the time of a checkpoint."""

@@ -39,6 +39,7 @@ from cfddem.particles.guard import guard
 from cfddem.run import history
 from cfddem.run.progress import Status
 from cfddem.run.resuming import (
+    LARGE,
     branch_state,
     case_to_continue,
     record_of,
@@ -181,7 +182,8 @@ class Run:
         """
         folder = Path(folder)
         given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
-        state = checkpoint.newest(folder) if checkpoint.exists(folder) else None
+        later = LARGE if communicator.size > 1 else ()
+        state = checkpoint.newest(folder, later) if checkpoint.exists(folder) else None
         before = read_about(folder)
         if state is None and ORIGIN in before["provenance"]:
             remedy = f"begin it again in another folder: cfddem run --from {before['provenance'][ORIGIN]['folder']}"

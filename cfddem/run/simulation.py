@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
@@ -65,7 +65,7 @@ class Simulation:
         communicator: Communicator = SERIAL,
     ) -> None:
         keep_freed_memory()
-        particles = None if state is None else particles_in(state["particles"]["particles"])
+        particles = None if state is None else particles_in(_share(state["particles"]["particles"], communicator))
         parts = parts_of(case, progress, particles, communicator)
         settings = StepSettings(case.reference_speed, case.run.particle_step, case.run.fluid_step, case.fastest_inflow)
         self._begin(case, parts, settings, fields, callbacks, features, state)
@@ -331,3 +331,10 @@ class Simulation:
     def is_acted_on(self) -> bool:
         """Whether a user's function may put energy in."""
         return bool(self.callbacks or self._own) or "external" in self.forces.lines
+
+
+def _share(fields: Mapping[str, Any], communicator: Communicator) -> dict[str, np.ndarray]:
+    """As many rows of some fields for each rank, one rank after the other."""
+    rows = len(next(iter(fields.values())))
+    first, last = (rows * n // communicator.size for n in (communicator.rank, communicator.rank + 1))
+    return {name: np.asarray(values[first:last]) for name, values in fields.items()}

@@ -1,6 +1,6 @@
 """The model of `cfddem check --ranks N` against runs: shares of work, exchanges, and the time of a rank.
 
-    python tests/benchmarks/bench_scaling_model.py [fluid steps]
+    python tests/benchmarks/bench_scaling_model.py [beads or seeds] [fluid steps]
 
 The ranks are threads of one process, one at a time. Times are processor times of the slowest rank, without messages
 and sums: they test how the work is shared, on any machine, also one with fewer cores than ranks.
@@ -20,17 +20,23 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import in_process_ranks
 import rooms  # noqa: F401
-from golden.beds import BEADS
+from golden.beds import BEADS, SEEDS
 from in_process_ranks import Rank, on_ranks
 
 from cfddem.backend.communicator import Communicator
 from cfddem.backend.compile import use_threads
 from cfddem.case.schema import Case
-from cfddem.run.division import expected_division
+from cfddem.preflight.weak_scaling import Machine, RunCost, Shares, time_of_a_rank
+from cfddem.run.division import cost_of, expected_shares
 from cfddem.run.simulation import Simulation
 
-RANKS = (1, 2, 4, 8)
-CASE = Case.from_text(BEADS, "beads", {"column.width": 0.06, "column.height": 0.18, "bed.count": 20_000})
+CASES = {
+    "beads": (BEADS, {"column.width": 0.06, "column.height": 0.18, "bed.count": 20_000}, (1, 2, 4, 8)),
+    "seeds": (SEEDS, {"column.width": 0.036, "column.height": 0.072, "bed.count": 10_000}, (1, 2, 3, 6, 8)),
+}
+"""Text, changes and ranks of the runs: with beads the constants of the model were found, with seeds it is checked."""
+
+WITHOUT_NETWORK = Machine(latency=0.0, bandwidth=1e300, reduction=0.0)
 
 
 class Counted(Rank):
@@ -51,10 +57,10 @@ class Counted(Rank):
         return found
 
 
-def measured(communicator: Communicator, steps: int) -> tuple[float, ...]:
+def measured(communicator: Communicator, case: Case, steps: int) -> tuple[float, ...]:
     """Processor time of some fluid steps [s]; particle steps, exchanges and reductions in them."""
     use_threads(1)
-    simulation = Simulation(CASE, communicator=communicator)
+    simulation = Simulation(case, communicator=communicator)
     for _ in range(3):
         simulation.step()
     solver: Any = simulation.particle_solver
@@ -66,22 +72,27 @@ def measured(communicator: Communicator, steps: int) -> tuple[float, ...]:
     return tuple(found.tolist())
 
 
-def main(steps: int) -> None:
-    """One line for each number of ranks."""
+def main(name: str, steps: int) -> None:
+    """One line for each number of ranks; times of the model are those of one process here, shared."""
     setattr(in_process_ranks, "Rank", Counted)  # noqa: B010
-    print("ranks  bricks    time of the slowest   work, model  measured   exchanges, reductions a fluid step")
-    one = 0.0
-    for ranks in RANKS:
-        shape, work = ((1, 1, 1), 1.0) if ranks == 1 else expected_division(CASE, ranks)
-        found = np.array(on_ranks(ranks, lambda communicator: measured(communicator, steps)))
-        slowest = float(found[:, 0].max())
+    text, changes, numbers = CASES[name]
+    case = Case.from_text(text, name, changes)
+    print("ranks  bricks    time of the slowest, ms   model, ms   exchanges, sums a fluid step")
+    one, cells = 0.0, cost_of(case).cell_seconds / cost_of(case).seconds
+    for ranks in numbers:
+        shares = Shares((1, 1, 1), 1.0) if ranks == 1 else expected_shares(case, ranks)
+        found = np.array(on_ranks(ranks, lambda communicator: measured(communicator, case, steps)))
+        slowest, particle_steps = 1e3 * float(found[:, 0].max()) / steps, found[0, 1] / steps
         one = one or slowest
+        films = case.has_films or bool(case.liquid)
+        cost = RunCost(1e-3 * one, particle_steps, 1.0, case.particle_count, films, 1e-3 * one * cells)
+        modelled = 1e3 * sum(time_of_a_rank(cost, shares, WITHOUT_NETWORK).values())
         print(
-            f"{ranks:5}  {'x'.join(map(str, shape))}  {1e3 * slowest / steps:12.0f} ms {work:15.2f} "
-            f"{slowest * ranks / one:10.2f} {found[0, 2] / steps:10.0f} {found[0, 3] / steps:10.0f}"
-            f"   with {found[0, 1] / steps:.0f} particle steps"
+            f"{ranks:5}  {'x'.join(map(str, shares.shape))} {slowest:24.0f} {modelled:11.0f} "
+            f"{found[0, 2] / steps:10.0f}, {found[0, 3] / steps:.0f}   with {particle_steps:.0f} particle steps, "
+            f"shares {shares.particles:.2f} and {shares.cells:.2f}"
         )
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 5)
+    main(sys.argv[1] if len(sys.argv) > 1 else "beads", int(sys.argv[2]) if len(sys.argv) > 2 else 5)

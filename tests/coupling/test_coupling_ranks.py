@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from cluster import needs_mpi, on_mpi
 from example_case import MIXTURE
 from golden.beds import BEADS, SEEDS
 from in_process_ranks import on_ranks
+from test_case_walls import TETRAHEDRON, write_binary_stl
 
+from cfddem.backend import portions
 from cfddem.backend.brick_shapes import Shape, place_of
 from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import RunFailed
@@ -24,8 +27,12 @@ from cfddem.fluid.block import Block, Division, divide, region_of
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.multigrid import PressureEquation
+from cfddem.io import checkpoint
 from cfddem.particles.bricks import Bricks
+from cfddem.particles.ghosts import Divided, Whole
+from cfddem.particles.state import Particles
 from cfddem.run import history
+from cfddem.run.resuming import LARGE
 from cfddem.run.simulation import Simulation
 
 TIGHT = 1e-11
@@ -71,7 +78,8 @@ def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
     assert simulation.fluid is not None
     for _ in range(steps):
         simulation.step()
-    names = ("position", "velocity", "spin", "applied", "drag_impulse")
+    names = ["position", "velocity", "spin", "applied", "drag_impulse"]
+    names += ["liquid"] if "liquid" in simulation.particles.fields else []
     order = np.argsort(simulation.whole("id"))
     particles = {name: simulation.whole(name)[order] for name in names}
     particles["temperature"] = np.zeros(0)
@@ -111,6 +119,13 @@ def differing(found: dict[str, Array], expected: dict[str, Array]) -> list[str]:
     return [name for name in expected if not np.array_equal(found[name], expected[name], equal_nan=True)]
 
 
+def assert_same_bits(found: dict[str, Array], alone: dict[str, Array]) -> None:
+    """All arrays have the bits of one process; energies, which each rank counts in turn, but their last digits."""
+    exact = {each: values for each, values in alone.items() if each != "energy"}
+    assert not differing(found, exact)
+    assert found["energy"] == pytest.approx(alone["energy"], rel=1e-12)
+
+
 @pytest.mark.parametrize("shape", [(1, 2, 1), (2, 2, 1), (1, 2, 2)])
 @pytest.mark.parametrize("name", BEDS)
 def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int, int, int]) -> None:
@@ -125,7 +140,7 @@ def test_a_divided_bed_has_the_bits_of_the_whole_one(name: str, shape: tuple[int
 
     alone = advanced(begun(BEDS[name]), steps)
     for found, moved in on_ranks(ranks, program):
-        assert not differing(found, alone)
+        assert_same_bits(found, alone)
         assert np.abs(found["imbalance"]).max() < 1e-10
         assert len(moved) > 20 or "periodic" not in name
 
@@ -158,13 +173,52 @@ MANY = {
     ),
 }  # fmt: skip
 
+WET_AND_FED = """
+[liquid]
+viscosity = 5e-3
+surface_tension = 0.02
+liquid_fraction = 0.01
+wall_share = 0.5
+wall_thickness = 1e-6
+[[feed]]
+corner = [0.002, 0.002, 0.060]
+size = [0.010, 0.010, 0.006]
+rate = 4000.0
+velocity = [0.0, 0.0, -0.5]
+[[wall]]
+shape = "surface"
+solid = "none"
+file = "FILE"
+velocity = [0.0, 0.0, -0.1]
+spin = [0.0, 0.0, 20.0]
+"""
+"""Liquid on particles and walls, particles that enter, and a mesh that sinks and turns."""
+
+
+@pytest.fixture(autouse=True)
+def _wet_and_fed(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Write the mesh, once."""
+    if WET not in MANY:
+        corners = 0.004 * TETRAHEDRON + (0.005, 0.006, 0.030)
+        file = write_binary_stl(tmp_path_factory.mktemp("mesh") / "part.stl", corners)
+        MANY[WET] = case_of(
+            SEEDS + WET_AND_FED.replace("FILE", str(file)), column__height=0.072, bed__count=700,
+            bed__initial_velocity=[0.1, 0.05, -0.3],
+        )  # fmt: skip
+
+
+WET = "wet gas, fed and stirred"
+
 MANY_SHAPES = ((1, 2, 1), (1, 1, 3), (2, 2, 1), (2, 1, 3), (2, 2, 2), (1, 2, 4), (1, 1, 8))
 """2, 3, 4, 6 and 8 ranks, eight of them in three ways."""
 
 
+MANY_STEPS = 500
+
+
 def many_steps(name: str, communicator: Communicator = SERIAL) -> dict[str, Array]:
     """500 fluid steps at the default tolerance of the pressure."""
-    return advanced(Simulation(MANY[name], communicator=communicator), 500)
+    return advanced(Simulation(MANY[name], communicator=communicator), MANY_STEPS)
 
 
 many_steps_alone = cache(many_steps)
@@ -173,7 +227,7 @@ many_steps_alone = cache(many_steps)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", MANY_SHAPES, ids=lambda shape: "x".join(map(str, shape)))
-@pytest.mark.parametrize("name", MANY)
+@pytest.mark.parametrize("name", [*MANY, WET])
 def test_any_number_of_ranks_has_the_bits_of_one(name: str, shape: Shape) -> None:
     """500 fluid steps in one process and on 2, 3, 4, 6 and 8 ranks."""
 
@@ -184,23 +238,109 @@ def test_any_number_of_ranks_has_the_bits_of_one(name: str, shape: Shape) -> Non
     alone = many_steps_alone(name)
     assert np.abs(alone["drag_impulse"]).max() > 0.0
     assert "hot" not in name or np.ptp(alone["temperature"]) > 10.0
-    exact = {each: values for each, values in alone.items() if each != "energy"}  # counted by each rank in turn
     for found in on_ranks(int(np.prod(shape)), program):
-        assert not differing(found, exact)
-        assert found["energy"] == pytest.approx(alone["energy"], rel=1e-12)
+        assert_same_bits(found, alone)
+
+
+def test_bricks_follow_a_bed_that_leaves_one_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All particles go to one side: space is cut anew, work is equal after each cut, and bits are those of one process.
+
+    The division of the cells stays: what particles deposit travels to other ranks.
+    """
+    shape, cuts, plain = (2, 2, 1), dict[int, list[float]](), Divided._cut_anew
+    case = case_of(
+        BEADS, column__cell=0.004, laws__added_mass=0.5, laws__agitation="pseudo_turbulence", run__energy_budget=True,
+        bed__initial_velocity=[0.8, 0.5, -0.1], **ALL_FORCES
+    )  # fmt: skip
+
+    def cut(self: Divided, particles: Particles, work: Array) -> None:
+        before = self.division
+        plain(self, particles, work)
+        if self.division is not before:
+            shares = np.bincount(self.division.owner(particles.position), weights=work, minlength=4)
+            shares = self.communicator.sum(shares, axis=())
+            cuts.setdefault(self.communicator.rank, []).append(shares.max() / shares.mean())
+
+    monkeypatch.setattr(Divided, "_cut_anew", cut)
+
+    def program(communicator: Communicator) -> dict[str, Array]:
+        communicator.shape = shape
+        return advanced(begun(case, communicator), 25)
+
+    alone = advanced(begun(case), 25)
+    for found in on_ranks(4, program):
+        assert_same_bits(found, alone)
+        assert np.abs(found["imbalance"]).max() < 1e-10
+    assert len(cuts) == 4 and all(len(each) > 1 and max(each) < 1.1 for each in cuts.values())
+
+
+@pytest.mark.parametrize("periodic", [(False, False, False), (True, True, True), (True, False, True)])
+@pytest.mark.parametrize("shape", [(2, 2, 2), (1, 3, 2), (4, 1, 1)])
+def test_fields_travel_between_the_division_of_cells_and_that_of_particles(
+    shape: tuple[int, int, int], periodic: tuple[bool, bool, bool]
+) -> None:
+    """Every cell of a box has the value of its owner; every owner gets what all boxes hold, over periodic borders."""
+    grid, draw, ranks = Grid((12, 10, 14), (0.01,) * 3), np.random.default_rng(1), int(np.prod(shape))
+    places = draw.uniform(0.0, 1.0, (3000, 3)) ** 2 * grid.size
+    division, whole = Bricks.balanced(shape, places), draw.normal(size=(2, *grid.shape))
+
+    def program(communicator: Communicator) -> None:
+        block = Block(grid, divide(grid, ranks, shape=shape), communicator)
+        reach = Reach(block, periodic, division=division)
+        first, lengths = reach.axes().first, reach.shape
+        at = np.ix_(range(2), *((first[2 - d] + np.arange(lengths[d])) % grid.shape[d] for d in range(3)))
+        assert np.array_equal(reach.spread(block.part(whole)), whole[at])
+        held, expected = draw.integers(0, 100, (2, *lengths)), np.zeros(whole.shape, np.int64)
+        np.add.at(expected, at, held)
+        collected = reach.collected(held)
+        assert np.array_equal(collected, block.part(communicator.sum(expected, axis=())))
+
+    on_ranks(ranks, program)
+
+
+@pytest.mark.parametrize("periodic", [(False, False, False), (True, True, False)])
+def test_values_between_centres_have_the_bits_of_one_process(periodic: tuple[bool, bool, bool]) -> None:
+    """A viscosity that grows with height, and one that differs from cell to cell, at places up to the walls."""
+    grid, draw, shape = Grid((12, 10, 14), (0.01,) * 3), np.random.default_rng(2), (2, 2, 2)
+    places = draw.uniform(0.0, 1.0, (2000, 3)) ** 2 * grid.size
+    division, layered = Bricks.balanced(shape, places), np.broadcast_to(grid.centres()[2], grid.shape)
+    uneven = draw.uniform(1.0, 2.0, grid.shape)
+
+    def program(communicator: Communicator) -> list[Array]:
+        cells, owners, mine = grid, Whole(), np.arange(2000)
+        if communicator.size > 1:
+            cells = Block(grid, divide(grid, 8, shape=shape), communicator)
+            owners, mine = Divided(division, communicator), np.flatnonzero(division.owner(places) == communicator.rank)
+        kernel = FilterKernel(cells, periodic, communicator=communicator, owners=owners)
+        found = [kernel.between_centres(cells.part(each), places[mine]) for each in (layered, uneven)]
+        order = np.argsort(communicator.joined(mine))
+        return [communicator.joined(each)[order] for each in found]
+
+    alone = program(SERIAL)
+    inside = np.clip(places[:, 2], 0.005, 0.135)
+    assert alone[0] == pytest.approx(inside, rel=1e-12)
+    assert all(np.array_equal(*pair) for found in on_ranks(8, program) for pair in zip(found, alone))
 
 
 def test_volume_is_lost_where_ghosts_are_not_added(monkeypatch: pytest.MonkeyPatch) -> None:
     """The volume that one rank deposits on cells of another belongs to the bed."""
-    monkeypatch.setattr(Reach, "collected", lambda self, fields: np.ascontiguousarray(self._inner(fields)))
+
+    def own(self: Reach, fields: Array) -> Array:
+        rank, made = self._communicator.rank, np.zeros((len(fields), *self.grid.shape), np.int64)
+        made[self._in_cells[rank][0]] = fields[self._in_box[rank][0]]
+        return made
+
+    monkeypatch.setattr(Reach, "collected", own)
     case = BEDS["all forces"]
     imbalance = on_ranks(2, lambda communicator: advanced(begun(case, communicator), 0)["imbalance"])[0]
     assert abs(imbalance[2]) > 1e-3
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(ranks: int) -> None:
-    """Two steps on four ranks and two on fewer, against four steps in one process."""
+def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(
+    ranks: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two steps on four ranks and two on fewer, against four steps in one process; ranks read it in portions."""
     case = case_of(BEADS, column__cell=0.002, bed__initial_velocity=[0.3, 0.1, 0.2])
     alone = advanced(begun(case), 4)
 
@@ -209,12 +349,23 @@ def test_a_checkpoint_of_a_bed_goes_on_with_another_number_of_ranks(ranks: int) 
         advanced(simulation, 2)
         return collected(simulation.checkpoint(), communicator)
 
-    state = on_ranks(4, half)[0]
+    checkpoint.write(tmp_path, {"simulation": on_ranks(4, half)[0]})
+    monkeypatch.setattr(portions, "LARGEST", 2000)
+    rows, read = list[int](), checkpoint.Stored.__getitem__
+
+    def noted(self: checkpoint.Stored, index: Any) -> Array:
+        if "/particles/particles/" in self.name:
+            rows.append(len(read(self, index)))
+        return read(self, index)
+
+    monkeypatch.setattr(checkpoint.Stored, "__getitem__", noted)
 
     def rest(communicator: Communicator) -> dict[str, Array]:
+        state = checkpoint.newest(tmp_path, LARGE if ranks > 1 else ())["simulation"]
         return advanced(begun(case, communicator, state), 2)
 
     assert not differing(on_ranks(ranks, rest)[0], alone)
+    assert max(rows, default=0) == (200 if ranks > 1 else 0)  # of 400 particles
 
 
 # ---------------------------------------------------------------- under MPI
@@ -231,20 +382,25 @@ def test_ranks_under_mpi_are_one_process(shape: tuple[int, int, int]) -> None:
         assert imbalance.max() < 1e-10
 
 
-LARGE = {
-    "liquid": (BEADS, {"column__width": 0.06, "column__height": 0.18}),
-    "gas": (SEEDS, {"column__width": 0.036, "column__height": 0.072, "laws__self_disturbance_correction": True}),
-}
-"""Beds of 10 000 particles."""
+BEDS_OF_10_000 = {
+    "liquid": (BEADS, {"bed__count": 10_000, "column__width": 0.06, "column__height": 0.18}),
+    "gas": (
+        SEEDS,
+        {
+            "bed__count": 10_000, "column__width": 0.036, "column__height": 0.072,
+            "laws__self_disturbance_correction": True,
+        },
+    ),
+}  # fmt: skip
+"""Texts and changes of beds of 10 000 particles."""
 
 
 @needs_mpi
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("name", BEDS_OF_10_000)
 def test_a_large_bed_under_mpi_has_the_bits_of_one_process(name: str) -> None:
     """0.05 s on two and four ranks; volume and momentum to 1e-10."""
-    text, changes = LARGE[name]
-    given = text, changes | {"bed__count": 10_000}, 0.05
+    given = *BEDS_OF_10_000[name], 0.05
     _, _, alone = bed_over_time(SERIAL, *given)
     for ranks in (2, 4):
         for _, imbalance, found in on_mpi(ranks, "test_coupling_ranks:bed_over_time", *given, timeout=3000.0):

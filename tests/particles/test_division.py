@@ -9,21 +9,35 @@ from test_ghosts import STEP, assert_same_bits, finished, joined, settings, stat
 
 from cfddem.backend.communicator import Communicator
 from cfddem.particles.bricks import Bricks
-from cfddem.particles.ghosts import IMBALANCE
 
 OPEN = np.full(3, np.inf)
 
 
-@pytest.mark.parametrize("ranks", [2, 3, 7])
-def test_balanced_slabs_hold_equally_many_particles(ranks: int) -> None:
-    """Of a cloud that is much denser on one side; each rank knows a part of it."""
-    places = np.random.default_rng(1).uniform(0.0, 1.0, (30_000, 3)) ** 3
-    whole = Bricks.balanced((1, ranks, 1), places)
-    counts = np.bincount(whole.owner(places), minlength=ranks)
-    assert counts.sum() == 30_000 and counts.max() < IMBALANCE * counts.mean()
-    assert np.all(np.diff(whole.planes[1]) > 0.0)
-    parts = on_ranks(3, lambda rank: Bricks.balanced((1, ranks, 1), places[rank.rank :: 3], rank))
-    assert all(each.planes == whole.planes for each in parts)
+@pytest.mark.parametrize("shape", [(1, 2, 1), (1, 7, 1), (3, 2, 2), (4, 4, 4)])
+def test_balanced_bricks_have_equal_work(shape: tuple[int, int, int]) -> None:
+    """Of a heap in one corner, whose parts differ along every axis; each rank knows a part of it."""
+    draw, ranks = np.random.default_rng(1), int(np.prod(shape))
+    places = draw.uniform(0.0, 1.0, (30_000, 3)) ** 2
+    places = places[places.sum(axis=1) < 1.0]
+    work = draw.integers(1, 20, len(places))
+    whole = Bricks.balanced(shape, places, work=work)
+    shares = np.bincount(whole.owner(places), weights=work, minlength=ranks)
+    assert shares.sum() == work.sum() and shares.max() < 1.05 * shares.mean()
+    assert all(np.all(np.diff(each, axis=-1) > 0.0) for each in whole.planes)
+    parts = on_ranks(3, lambda rank: Bricks.balanced(shape, places[rank.rank :: 3], rank, work[rank.rank :: 3]))
+    assert all(np.array_equal(*planes) for each in parts for planes in zip(each.planes, whole.planes))
+
+
+def test_a_brick_owns_what_lies_between_its_ends() -> None:
+    """Planes differ from layer to layer and from column to column; near bricks are those whose ends are near."""
+    places = np.random.default_rng(4).uniform(0.0, 1.0, (4000, 3)) ** 2
+    bricks = Bricks.balanced((3, 2, 4), places)
+    low, high = bricks.ends
+    inside = ((places[:, None] >= low) & (places[:, None] < high)).all(axis=2)
+    assert (inside.sum(axis=1) == 1).all() and np.array_equal(inside.argmax(axis=1), bricks.owner(places))
+    for rank in range(24):
+        apart = np.maximum(low - high[rank], low[rank] - high).max(axis=1)
+        assert bricks.near(rank, 0.05, OPEN) == [n for n in range(24) if n != rank and apart[n] < 0.05]
 
 
 def test_near_slabs_are_those_within_reach() -> None:
