@@ -216,6 +216,13 @@ def _particles(run: RunData) -> Iterator[KeyResult]:
     if "removed_count" in history:
         said.append(f"{since('removed_count'):.0f} removed, {since('removed_mass'):.3g} kg")
     yield KeyResult("particles", f"{count[-1]:.0f}", math.nan, "1", "; ".join(said), None)
+    if "residence_time" in history and math.isfinite(history["residence_time"][-1]):
+        few, half, most = (float(history[f"residence_time_{share}"][-1]) for share in (10, 50, 90))
+        spread = (
+            f"deviation {history['residence_time_deviation'][-1]:.3g} s; 10, 50 and 90 % of those that left stayed "
+        )
+        spread += f"at most {few:.3g}, {half:.3g} and {most:.3g} s"
+        yield KeyResult("residence time", float(history["residence_time"][-1]), math.nan, "s", spread, None)
 
 
 # ---------------------------------------------------------------- regime

@@ -7,8 +7,7 @@ from functools import lru_cache, reduce
 
 import numpy as np
 
-from cfddem.case.schema import Case
-from cfddem.case.tables import Column
+from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import CaseVessel
 from cfddem.case.vessel_surface import surface_in
 from cfddem.case.wall_geometry import solid_part, stamp
@@ -17,7 +16,7 @@ from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
 
 
-def grid_of(case: Case) -> Grid:
+def grid_of(case: CaseTables) -> Grid:
     """Cells of the column, cut by its vessel; cells outside a cylinder, and behind walls, are solid."""
     if case.vessel:
         return _in_vessel(case.column, case.vessel, stamp(case.vessel))
@@ -40,7 +39,7 @@ def _grid(column: Column, walls: tuple[CaseWall, ...], _: tuple[tuple[int, int],
     return Grid.of_size(column.size, column.cell, solid=lambda x, y, z: _any(each(x, y, z) for each in closing))
 
 
-def open_floor(case: Case) -> Region | None:
+def open_floor(case: CaseTables) -> Region | None:
     """Part of the floor below open cells; None if all of them are open."""
     grid = grid_of(case)
     if grid.solid is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,9 @@ NEEDED: Mapping[str, tuple[str, ...]] = {
     "whole": (), "disc": ("diameter",), "ring": ("diameter", "inner_diameter"), "box": ("size",),
 }  # fmt: skip
 
-OF_INLETS: Mapping[str, str] = {"velocity": "inlet", "profile": "inlet", "pressure": "outlet"}
+OF_INLETS: Mapping[str, str] = {
+    "velocity": "inlet", "mass_flow": "inlet", "profile": "inlet", "pressure": "outlet",
+}  # fmt: skip
 """Keys of one kind of patch -> the kind."""
 
 
@@ -45,6 +47,9 @@ class CasePatch(Checked):
     size: tuple[Positive, Positive] | None = Field(None, description="edges of a box along x and y [m]")
     velocity: NonNegative | tuple[tuple[float, NonNegative], ...] | None = Field(
         None, description="superficial velocity of an inlet, into the column: a number, or [time, velocity] pairs [m/s]"
+    )
+    mass_flow: NonNegative | tuple[tuple[float, NonNegative], ...] | None = Field(
+        None, description="mass flow of an inlet in place of velocity, by fluid.density: a number, or pairs [kg/s]"
     )
     profile: Literal["uniform", "parabolic"] = Field(
         "uniform", description="over a disc: the same velocity, or twice the mean in the middle and 0 at the edge"
@@ -62,15 +67,33 @@ class CasePatch(Checked):
         for name, kind in OF_INLETS.items():
             if kind != self.kind and getattr(self, name) != type(self).model_fields[name].default:
                 raise InputError(name, shown(getattr(self, name)), f'left out for kind = "{self.kind}"')
-        if self.kind == "inlet" and self.velocity is None:
-            raise InputError("velocity", None, "given for an inlet")
-        if self.velocity is not None:
-            check_times("velocity", self.velocity)
+        given = [name for name in ("velocity", "mass_flow") if getattr(self, name) is not None]
+        if self.kind == "inlet" and not given:
+            raise InputError("velocity", None, "given for an inlet", "or mass_flow, in kg/s")
+        if len(given) > 1:
+            raise InputError(
+                "mass_flow", shown(self.mass_flow), "left out where there is a velocity", "give one of them"
+            )
+        for name in given:
+            check_times(name, getattr(self, name))
         if self.inner_diameter and self.inner_diameter >= (self.diameter or 0.0):
             raise InputError("inner_diameter", self.inner_diameter, f"below the diameter, {self.diameter:g} m")
         if self.profile == "parabolic" and self.shape != "disc":
             raise InputError("profile", self.profile, f'uniform for shape = "{self.shape}"', "a disc may be parabolic")
         return self
+
+    def by_velocity(self, density: float, side: float) -> CasePatch:
+        """The same patch with the velocity of its mass flow.
+
+        density  of the fluid that enters [kg/m3]
+        side     area of the side on which it is [m2]
+        """
+        if self.mass_flow is None or density == 0.0:
+            return self
+        through = density * min(self.area, side)
+        flow = self.mass_flow
+        speed = tuple((t, each / through) for t, each in flow) if isinstance(flow, tuple) else flow / through
+        return self.model_copy(update={"velocity": speed})
 
     @property
     def highest(self) -> float:
@@ -109,3 +132,15 @@ class CasePatch(Checked):
         if self.size is not None:
             return math.prod(self.size)
         return 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2) if self.diameter else math.inf
+
+
+def refuse_no_inlets(case: Any, key: str, names: Mapping[str, float]) -> None:
+    """Raise InputError for a name that is no inlet patch of a case.
+
+    key  of the table with these names
+    """
+    inlets = [name for name, each in case.patch.items() if each.kind == "inlet"]
+    for name in names:
+        if name not in inlets:
+            limit = "one of the inlets " + ", ".join(inlets) if inlets else "left out without inlets by [patch.NAME]"
+            raise InputError(f"{key}.{name}", None, limit)

@@ -77,11 +77,9 @@ class Case(CaseTables):
             self.vessel.refuse(self.column)
         if self.has_smooth_walls:
             closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
-            scalars = [name for name in ("heat", "vapour") if getattr(self, name, None) is not None]
-            if closing or scalars:
+            if closing:
                 remedy = 'take column.shape = "cylinder", whose wall has steps of cells, instead of the vessel'
-                limit = "left out in a vessel with a fluid" if scalars else '"none" in a vessel with a fluid'
-                raise InputError([*scalars, *closing][0], None, limit, remedy)
+                raise InputError(closing[0], None, '"none" in a vessel with a fluid', remedy)
         return self
 
     @model_validator(mode="after")

@@ -95,6 +95,9 @@ class CaseRun(Checked):
     energy_budget: bool = Field(
         False, description="record the energy budget, force by force; takes up to 50 % more time"
     )
+    wall_forces: bool = Field(
+        False, description="record force and torque of particles and fluid on every wall; without, on those that move"
+    )
     record_collisions: bool = Field(
         False, description="record every collision of two particles, from first to last contact"
     )
@@ -176,7 +179,17 @@ class CaseTables(Checked):
     @property
     def fastest_inflow(self) -> float:
         """Highest superficial velocity over time through the floor, the jet or an inlet [m/s]."""
-        return max([self.bed.fastest_inflow, *(each.fastest for each in self.patch.values())])
+        return max([self.bed.fastest_inflow, *(each.fastest for each in self.patches.values())])
+
+    @property
+    def patches(self) -> dict[str, CasePatch]:
+        """The patches by name, with the velocities of those that have a mass flow."""
+        density = self.around.density
+        return {name: each.by_velocity(density, self.area_of(each.side)) for name, each in self.patch.items()}
+
+    def area_of(self, side: str) -> float:
+        """Area of the floor or the lid [m2]."""
+        return self.floor_area if side == "floor" or not self.line else math.pi * self.line[-1][1] ** 2
 
     @property
     def line(self) -> Line:

@@ -11,15 +11,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from cfddem.backend.errors import InputError
+from cfddem.fluid.cell_groups import large_cells
 from cfddem.fluid.cut_cells import cut_cells_of_box
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.halo import Halo
-
-LEAST = 0.5
-"""Share of a cell that must be open for a group of its own [-]."""
 
 
 class SingleCells:
@@ -59,13 +56,8 @@ class MergedCells(SingleCells):
             raise InputError("ranks", None, "1 for particles within smooth walls", "take one process, or solid cells")
         self._cut = cut_cells_of_box(grid, tuple(bool(each) for each in periodic))
         open_share = self._cut.own_volume() * grid.open
-        small = open_share < LEAST
-        if small.all():
-            remedy = "take smaller cells"
-            raise InputError("walls", None, "such that some cells are at least half open for particles", remedy)
+        small, self._home = large_cells(grid, open_share)
         super().__init__(replace(grid, solid=small, walls=None))
-        nearest = distance_transform_edt(small, sampling=grid.spacing[::-1], return_indices=True)[1]
-        self._home = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()
         total = np.bincount(self._home, weights=open_share.ravel(), minlength=self._home.size)
         self._open, self._total = open_share.ravel(), total[self._home]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,12 @@ LANDED = Field(
 )
 """Declared on the particles of a run with feeds."""
 
+ENTERED = Field(
+    "entered", "s", role="memory", initial=math.nan,
+    meaning="time at which a particle entered; NaN of those that were there before the first feed",
+)  # fmt: skip
+"""Declared on the particles of a run with outlets; without feeds, those of the start count from 0."""
+
 
 class Feeds(CaseFeature):
     """Feeds and outlets of a case. A particle that enters replaces fluid of its own volume, or leaves room for it."""
@@ -46,14 +53,20 @@ class Feeds(CaseFeature):
 
     @classmethod
     def fields_of(cls, case: Case) -> tuple[Field, ...]:
-        """What the particles of a case with feeds remember."""
-        return (LANDED,) if case.feed else ()
+        """What the particles of a case with feeds or outlets remember."""
+        entered = ENTERED if case.feed else replace(ENTERED, initial=0.0)
+        return ((LANDED,) if case.feed else ()) + ((entered,) if case.outlet else ())
 
     @classmethod
     def measures(cls, case: Case) -> tuple[Measured, ...]:
         """Numbers of particles that have entered and left."""
         of_feeds = Measured("1", "recorded", fed_count), Measured("1", "recorded", waiting_count)
-        of_outlets = Measured("1", "recorded", removed_count), Measured("kg", "recorded", removed_mass)
+        of_times = (residence_time, residence_time_deviation, residence_time_10, residence_time_50, residence_time_90)
+        of_outlets = (
+            Measured("1", "recorded", removed_count),
+            Measured("kg", "recorded", removed_mass),
+            *(Measured("s", "recorded", each) for each in of_times),
+        )
         return (of_feeds if case.feed else ()) + (of_outlets if case.outlet else ())
 
     def after(self, simulation: Any) -> None:
@@ -67,6 +80,9 @@ class Feeds(CaseFeature):
             _note_landings(solver)
         for feed in self.feeds:
             feed(solver)
+        if self.outlets and self.feeds:
+            entered = solver.particles[ENTERED.name]
+            entered[np.isinf(entered)] = solver.time
         for number, outlet in enumerate(self.outlets):
             owned = solver.particles.without_ghosts()
             if solver.communicator.all(outlet.takes(owned.position)):
@@ -85,6 +101,11 @@ class Feeds(CaseFeature):
     def waiting(self) -> int:
         """Number of particles that are due, and found no free place so far."""
         return sum(len(each.waiting) for each in self.feeds)
+
+    @property
+    def residence_times(self) -> np.ndarray:
+        """How long each particle that has left was there, where this is known (n,) [s]."""
+        return np.concatenate([np.zeros(0), *(each.times for each in self.outlets)])
 
     @property
     def removed(self) -> tuple[int, float]:
@@ -126,6 +147,38 @@ def removed_mass(simulation: Any) -> float:
     return simulation.feature(Feeds).removed[1]
 
 
+def residence_time(simulation: Any) -> float:
+    """Mean residence time of the particles that outlets have removed so far; with feeds, of fed ones."""
+    times = simulation.feature(Feeds).residence_times
+    return float(times.mean()) if len(times) else math.nan  # local: every rank has all times
+
+
+def residence_time_deviation(simulation: Any) -> float:
+    """Standard deviation of these residence times."""
+    times = simulation.feature(Feeds).residence_times
+    return float(times.std()) if len(times) else math.nan  # local: every rank has all times
+
+
+def residence_time_10(simulation: Any) -> float:
+    """Residence time that a tenth of these particles have not reached."""
+    return _quantile(simulation, 0.1)
+
+
+def residence_time_50(simulation: Any) -> float:
+    """Residence time that half of these particles have not reached."""
+    return _quantile(simulation, 0.5)
+
+
+def residence_time_90(simulation: Any) -> float:
+    """Residence time that nine tenths of these particles have not reached."""
+    return _quantile(simulation, 0.9)
+
+
+def _quantile(simulation: Any, share: float) -> float:
+    times = simulation.feature(Feeds).residence_times
+    return float(np.quantile(times, share)) if len(times) else math.nan
+
+
 def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
     """A feed of a case."""
     species = fed_species(case, given)
@@ -143,7 +196,7 @@ def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
         seed=(case.bed.seed, number, _FED),
         begin=given.begin,
         end=math.inf if given.end is None else given.end,
-        finish=_fresh(None if given.species is None else names.index(given.species)),
+        finish=_fresh(None if given.species is None else names.index(given.species), bool(case.outlet)),
     )
 
 
@@ -156,11 +209,13 @@ def _sizes(species: Species) -> Callable[[int, np.random.Generator], np.ndarray]
     return draw
 
 
-def _fresh(species: int | None) -> Callable[[Particles], None]:
-    """Declares the species of new particles, and that they have not landed."""
+def _fresh(species: int | None, timed: bool) -> Callable[[Particles], None]:
+    """Declares the species of new particles, that they have not landed, and where it counts that they enter now."""
 
     def declare(fresh: Particles) -> None:
         fresh.declare(LANDED, np.zeros(fresh.count, np.int8))
+        if timed:
+            fresh.declare(ENTERED, np.full(fresh.count, math.inf))
         if species is not None:
             fresh.declare(SPECIES, np.full(fresh.count, species, np.int32))
 

@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from cfddem.backend.portions import Portions
+from cfddem.case.patch_faces import brought_in
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw, Transfer, memory_of
 from cfddem.data.fields import Field
@@ -71,7 +73,8 @@ class HeatExchange(CaseFeature):
                 OF_FLUID.name, OF_FLUID.unit, OF_FLUID.meaning, keys.fluid_temperature, of_volume, keys.conductivity,
                 keys.effective_conductivity,
             )  # fmt: skip
-            self.cells = Scalar(fluid, kind, keys.sides_of(case))
+            inflow = brought_in(case, keys.gas_temperature, keys.patch_temperature)
+            self.cells = Scalar(fluid, kind, replace(keys.sides_of(case), inflow=inflow))
             self.transfer = Transfer(kernel, "temperature", RECEIVED, lambda particles: self._capacity)
             if keys.buoyancy != "none":
                 fluid.body_forces.append(lambda: self.buoyancy(fluid))

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
 from cfddem.case.feature_table import FeatureTable
+from cfddem.case.patches import refuse_no_inlets
 from cfddem.fluid.scalar_conditions import SOLID, ExchangeWall, FluxWall, HeldWall, ScalarSides, Wall
 from closures.heat_transfer import ranz_marshall
 
@@ -28,6 +29,7 @@ Temperature = Annotated[float, AfterValidator(_above_absolute_zero)]
 
 CELL_KEYS = (
     "inlet_temperature", "outlet_temperature", "wall_temperature", "wall_coefficient", "wall_flux", "expansion",
+    "patch_temperature",
 )  # fmt: skip
 """Keys that need a temperature in every cell."""
 
@@ -67,13 +69,16 @@ class Heat(FeatureTable):
     inlet_temperature: Temperature | None = Field(
         None, description="temperature of the fluid that enters; default: fluid_temperature [K]"
     )
+    patch_temperature: dict[str, Temperature] = Field(
+        {}, description="temperature of the fluid that enters through an inlet, by the name of its [patch.NAME] [K]"
+    )
     outlet_temperature: Temperature | None = Field(
         None, description="temperature of fluid that flows back through the outlet; default: that of the cell [K]"
     )
     wall_temperature: dict[str, Temperature] = Field(
         {},
-        description="temperature of walls of the column for the fluid, by x_low to z_high, or sides for all around; "
-        "walls without a key are insulated [K]",
+        description="temperature of walls of the column for the fluid, by x_low to z_high, or sides for all around, as "
+        "the wall of a vessel; walls without a key are insulated [K]",
     )
     wall_coefficient: dict[str, Positive] = Field(
         {},
@@ -163,6 +168,7 @@ class Heat(FeatureTable):
         if self.fluid_total_capacity:
             remedy = "leave it out; the fluid in the cells has its density"
             raise InputError("heat.fluid_total_capacity", self.fluid_total_capacity, "left out with cells", remedy)
+        refuse_no_inlets(case, "heat.patch_temperature", self.patch_temperature)
         walls = self.names_of_walls(case)
         for key in ("wall_temperature", "wall_coefficient", "wall_flux"):
             for name in getattr(self, key):
@@ -194,6 +200,8 @@ class Heat(FeatureTable):
         kinds = [column.sides, column.sides, column.front or column.sides, column.front or column.sides]
         around = [name for name, kind in zip(("x_low", "x_high", "y_low", "y_high"), kinds) if kind != "periodic"]
         ends = {"flow": ["z_low"], "closed": ["z_low", "z_high"], "periodic": []}[column.ends]
+        if case.vessel:
+            return [AROUND, *ends]
         return [*([AROUND] if around else []), *around, *ends, SOLID]
 
     def sides_of(self, case: Any) -> ScalarSides:
@@ -204,7 +212,7 @@ class Heat(FeatureTable):
             named = [name]
             if name == AROUND:
                 named = [each for each in self.names_of_walls(case) if each[0] in "xy"]
-                named += [SOLID] if case.column.shape == "cylinder" else []
+                named += [SOLID] if case.column.shape == "cylinder" or case.vessel else []
             for each in named:
                 area = round_wall if each[0] in "xys" else 1.0
                 if name in self.wall_flux:
@@ -243,7 +251,8 @@ class Heat(FeatureTable):
 
     def issues(self, case: Any) -> Iterator[tuple[Literal["note", "warning", "error"], str, str, str]]:
         """Warn where the density differs too much for the approximation of Boussinesq."""
-        others = (self.gas_temperature, self.particle_temperature, *self.wall_temperature.values())
+        of_others = (*self.wall_temperature.values(), *self.patch_temperature.values())
+        others = (self.gas_temperature, self.particle_temperature, *of_others)
         largest = max(abs(each - self.fluid_temperature) for each in others)
         if self.buoyancy != "none" and self.expansion_coefficient * largest > BOUSSINESQ:
             share = 100.0 * self.expansion_coefficient * largest

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cfddem.backend.portions import Portions
+from cfddem.case.patch_faces import brought_in
 from cfddem.case.schema import Case
 from cfddem.coupling.transfer import ExchangeLaw
 from cfddem.features.case_feature import CaseFeature, Measured
@@ -44,7 +45,8 @@ class Vapour(CaseFeature):
             OF_FLUID.name, OF_FLUID.unit, OF_FLUID.meaning, keys.fluid_fraction, fluid.density, self.conductivity,
             keys.effective_diffusivity,
         )  # fmt: skip
-        self.cells = Scalar(fluid, kind, ScalarSides(keys.inflow, keys.outlet_fraction))
+        inflow = brought_in(case, keys.inflow, keys.patch_fraction)
+        self.cells = Scalar(fluid, kind, ScalarSides(inflow, keys.outlet_fraction))
         self.received, self.scale, self._made = 0.0, 0.0, False
 
     @classmethod

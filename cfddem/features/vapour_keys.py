@@ -9,6 +9,7 @@ from pydantic import Field
 from cfddem.backend.errors import InputError
 from cfddem.case.bed import Positive
 from cfddem.case.feature_table import FeatureTable
+from cfddem.case.patches import refuse_no_inlets
 from cfddem.features.heat_keys import Heat, given_or
 
 Fraction = Annotated[float, Field(ge=0, lt=1)]
@@ -23,6 +24,9 @@ class VapourTable(FeatureTable):
     fluid_fraction: Fraction = Field(0.0, description="mass fraction of the vapour in the fluid at the start [-]")
     inlet_fraction: Fraction | None = Field(
         None, description="mass fraction in the fluid that enters; default: fluid_fraction [-]"
+    )
+    patch_fraction: dict[str, Fraction] = Field(
+        {}, description="mass fraction in the fluid that enters through an inlet, by the name of its [patch.NAME] [-]"
     )
     outlet_fraction: Fraction | None = Field(
         None, description="mass fraction in fluid that flows back through the outlet; default: that of the cell [-]"
@@ -46,3 +50,4 @@ class VapourTable(FeatureTable):
         if not heat.in_cells(case):
             remedy = 'set heat.fluid = "cells", with a law of drag'
             raise InputError("vapour", None, "left out where the fluid has one temperature", remedy)
+        refuse_no_inlets(case, "vapour.patch_fraction", self.patch_fraction)

@@ -181,9 +181,14 @@ def _triangle(a: Array, b: Array, c: Array) -> tuple[Array, Array, Array, Array]
 
 
 def volumes(surface: Surface, spacing: Sequence[float], *centres: Array) -> Array:
-    """Share of cells that is open, around centres x, y, z of one shape [m].
+    """Share of cells that is open, around centres x, y, z of one shape [m]."""
+    return contents(surface, spacing, *centres)[0]
 
-    The mean of several sections, along the axis that the wall is most parallel to.
+
+def contents(surface: Surface, spacing: Sequence[float], *centres: Array) -> tuple[Array, Array]:
+    """Share of cells that is open, around centres x, y, z of one shape [m], and its mean distance from the wall [m].
+
+    Means of several sections, along the axis that the wall is most parallel to.
     """
     x, y, z = centres
     step = 1e-3 * min(spacing)
@@ -192,14 +197,16 @@ def volumes(surface: Surface, spacing: Sequence[float], *centres: Array) -> Arra
                - surface.distance(x - step * (d == 0), y - step * (d == 1), z - step * (d == 2)))
         for d in range(3)
     ])  # fmt: skip
-    along, total = np.argmin(slope, axis=0), np.zeros(x.shape)
+    along, total, distance = np.argmin(slope, axis=0), np.zeros(x.shape), np.zeros(x.shape)
     for d in range(3):
         here = along == d
         for part in range(PARTS):
             points = [each[here] for each in centres]
             points[d] = points[d] + spacing[d] * ((part + 0.5) / PARTS - 0.5)
-            total[here] += section(surface, points, d, spacing).share / PARTS
-    return np.where(total > 1.0 - 1e-12, 1.0, total)
+            cut = section(surface, points, d, spacing)
+            total[here] += cut.share / PARTS
+            distance[here] += cut.share * cut.distance / PARTS
+    return np.where(total > 1.0 - 1e-12, 1.0, total), distance / np.maximum(total, 1e-300)
 
 
 # ---------------------------------------------------------------- the geometry that a solver uses

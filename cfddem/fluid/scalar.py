@@ -25,24 +25,29 @@ from typing import Any, Literal
 
 import numpy as np
 
-from cfddem.backend.errors import InputError, RunFailed
+from cfddem.backend.errors import RunFailed
+from cfddem.fluid.cell_groups import cell_groups
 from cfddem.fluid.fields import CellField, CellFields
 from cfddem.fluid.grid import Array
-from cfddem.fluid.scalar_conditions import ScalarSides
+from cfddem.fluid.scalar_conditions import SOLID, ScalarSides
 from cfddem.fluid.scalar_loops import (
     Carried,
     add_flows,
+    carry,
     cell_flows,
     cell_rates,
     diffusivities,
+    finish,
     followed_voidage,
-    move,
+    least_stored,
+    leave,
     relax,
     sort_flows,
     take_exchange,
     volume_fluxes,
 )
 from cfddem.fluid.scalar_sides import SideFaces
+from cfddem.fluid.scalar_walls import scalar_walls
 from cfddem.fluid.solver import FluidSolver
 
 FOLLOW = 0.05
@@ -77,7 +82,8 @@ class ScalarFlow:
     """The flow that carries all scalars of a fluid, found once in a step.
 
     flux     eps u through every face, with the correction that lets the stored voidage follow that of the fluid [m/s]
-    gate     1 between two open cells, 0 at solid cells and sides
+    gate     1 between two open cells, 0 at solid cells and sides; aperture: times the open share of the face
+    groups   of cells with one value, beside smooth walls
     growth   net outflow of every cell, outflow: twice what leaves it [1/s]
     lost     stored voidage less that of the fluid [-]
     least    of the stored voidage of every cell in the step (nz, ny, nx) [-]
@@ -88,10 +94,11 @@ class ScalarFlow:
         cells = [CellField(each, "", "") for each in ("growth", "outflow", "lost")]
         self.fields = CellFields(fluid.grid, [*cells, *(CellField(each, "", "", "faces") for each in ("flux", "gate"))])
         self.least = np.ones(fluid.grid.shape)
-        self.growth = self.fields.owned("growth")
+        self.growth, self.groups = self.fields.owned("growth"), cell_groups(fluid)
         is_open = fluid.boundaries.halo.padded(fluid.grid.open, outside=0.0)
         for d in range(3):
             self.fields.gate[d] = is_open * np.roll(is_open, 1, axis=2 - d)
+        self.aperture = self.fields.gate * fluid.boundaries.cut.aperture if fluid.grid.walls else self.fields.gate
 
     def follow(self, name: str, stored: Array) -> None:
         """Follow the step that the fluid has made, unless another scalar has let it.
@@ -107,9 +114,11 @@ class ScalarFlow:
         fluid.boundaries.halo.fill(fields.lost)
         strength = FOLLOW / (step * inverse)
         volume_fluxes(of_fluid.velocity, of_fluid.mean_voidage, fields.lost, fields.gate, strength, fields.flux)
-        cell_flows(
-            fields.flux, stored, fluid.open_cells, inverse, step, fields.growth, fields.outflow, self.least
-        )  # fmt: skip
+        self.groups.shut(fields.flux)
+        cell_flows(fields.flux, inverse, fields.growth, fields.outflow)
+        self.groups.gather(fields.growth)
+        self.groups.gather(fields.outflow)
+        least_stored(stored, fields.growth, fluid.open_cells, step, self.least)
         if fluid.communicator.smallest(self.least) <= 0.0:
             raise RunFailed(
                 f"{name} of the fluid: a cell loses all of its fluid in the step of {step:.3g} s to "
@@ -133,9 +142,6 @@ class Scalar:
 
     def __init__(self, fluid: FluidSolver, kind: ScalarKind, sides: ScalarSides) -> None:
         self.fluid, self.kind, self.grid = fluid, kind, fluid.grid
-        if self.grid.walls:
-            remedy = "take Grid.with_solid instead of smooth walls"
-            raise InputError("walls", None, "solid cells where the fluid has a temperature or a vapour", remedy)
         others = [each for each in fluid.followers if isinstance(each, Scalar)]
         self.flow: ScalarFlow = others[0].flow if others else ScalarFlow(fluid)
         roles: Mapping[str, Any] = {"value": "state", "stored": "state"}
@@ -147,10 +153,12 @@ class Scalar:
         )
         self._through = np.zeros((2, 3, *self.grid.padded_shape))
         self._faces = SideFaces.of(fluid.boundaries, sides, kind.capacity)
+        self._walls = scalar_walls(fluid, self.flow.groups, sides.walls.get(SOLID), kind.capacity)
+        self._spread = self.flow.groups.spread + self._walls.spread
         self._cells = {name: self.fields.owned(name) for name in ("stored", "target", "missed")}  # never exchanged
         self._rate = np.zeros(self.grid.shape)
         self._wall_rate = self._rate_of_walls()
-        self.fields.owned("stored")[:] = fluid.voidage
+        self.fields.owned("stored")[:] = self.flow.groups.averaged(fluid.voidage)
         self.sums = dict.fromkeys(("inflow", "outflow", "walls", "displaced"), 0.0)
         self.leaving, self.parts = kind.start, 1
         fluid.followers.append(self)
@@ -165,13 +173,13 @@ class Scalar:
     @property
     def mean(self) -> float:
         """Mean value of the fluid."""
-        total, weight = self.fluid.communicator.sum, self.fields.owned("stored") * self.fluid.open_cells
+        total, weight = self.fluid.communicator.sum, self.fields.owned("stored") * self.flow.groups.volume
         return float(total(weight * self.value) / total(weight))
 
     @property
     def content(self) -> float:
         """What the fluid holds above `kind.start`: its sum of the value times capacity [J] or [kg]."""
-        held = self.fields.owned("stored") * self.fluid.open_cells * (self.value - self.kind.start)
+        held = self.fields.owned("stored") * self.flow.groups.volume * (self.value - self.kind.start)
         return float(self._amount * self.fluid.communicator.sum(held))
 
     @property
@@ -180,9 +188,9 @@ class Scalar:
 
     def displaced(self, change: Array) -> None:
         """Let fluid enter or leave cells with its value, where particles leave or enter: change of voidage."""
-        stored = self.fields.owned("stored")
+        stored, change = self.fields.owned("stored"), self.flow.groups.averaged(change)
         stored += change
-        held = change * self.fluid.open_cells * (self.value - self.kind.start)
+        held = change * self.flow.groups.volume * (self.value - self.kind.start)
         self.sums["displaced"] += float(self._amount * self.fluid.communicator.sum(held))
 
     # ------------------------------------------------------------ one step
@@ -202,7 +210,7 @@ class Scalar:
             take_exchange(
                 coefficient, product, fields.value, self.kind.capacity, fields.coefficient, fields.target, fields.missed
             )
-        flows = np.zeros(len(self._faces.places))
+        flows, self._of_walls = np.zeros(len(self._faces.places)), 0.0
         for _ in range(parts):
             if exchanging:
                 self._relax(0.5 * step / parts)
@@ -219,8 +227,8 @@ class Scalar:
         molecular = self.kind.conductivity / self.kind.capacity
         diffusivities(fluid.fields.mean_voidage, molecular, self.kind.spread == "none", fields.diffusivity)
         cell_rates(
-            flow.fields.outflow, fields.diffusivity, self._wall_rate, flow.least, fluid.open_cells,
-            fluid.inverse_spacing, self._rate,
+            flow.fields.outflow, fields.diffusivity, self._spread, self._wall_rate, flow.least, fluid.open_cells,
+            self._rate,
         )  # fmt: skip
         self.parts = max(1, math.ceil(step * fluid.communicator.largest(self._rate) * (1.0 - 1e-9)))
         return self.parts
@@ -234,17 +242,25 @@ class Scalar:
         """Advection, diffusion and the flux of walls over a step [s]."""
         fields, of_flow = self.fields, self.flow.fields
         carried_by = Carried(
-            fields.stored, of_flow.growth, of_flow.flux, fields.diffusivity, of_flow.gate,
+            fields.stored, of_flow.growth, of_flow.flux, fields.diffusivity, self.flow.aperture,
             self._faces.places, self._faces.rules, self._through, self.fluid.inverse_spacing,
         )  # fmt: skip
+        groups, solid = self.flow.groups, self.grid.solid
         for stage in (0, 1):
             value = fields.next if stage else fields.value
             self.fluid.boundaries.halo.fill(value)
-            move(value, fields.value, carried_by, stage, step, float(self.kind.unlimited), fields.next)
-            if self.grid.solid is not None:
-                self.grid.inner(fields.next)[self.grid.solid] = self.kind.start
+            carry(value, carried_by, stage, float(self.kind.unlimited))
+            self._walls.correct(value, carried_by, stage)
+            leave(carried_by, stage, fields.next)
+            self._walls.give(stage, step, fields.next)
+            groups.gather(fields.next)
+            finish(fields.value, carried_by, step, fields.next)
+            if solid is not None:
+                self.grid.inner(fields.next)[solid] = self.kind.start
+            groups.copy(fields.next)
         fields.swap("value", "next")
         self._cells["stored"][:] -= step * self.flow.growth
+        self._of_walls += self._walls.given
         return carried_by
 
     def _count(self, carried_by: Carried, flows: Array) -> None:
@@ -255,7 +271,7 @@ class Scalar:
         left *= -self.fluid.last_step
         self.sums["inflow"] += inflow
         self.sums["outflow"] -= outflow
-        self.sums["walls"] += walls
+        self.sums["walls"] += walls + self.kind.capacity * self._of_walls
         if left > 0.0:
             self.leaving = self.kind.start - outflow / (left * self.kind.capacity)
 
@@ -264,7 +280,8 @@ class Scalar:
         rate, faces = np.zeros(self.grid.padded_shape), self._faces
         coefficient = np.where(faces.rules[:, 5] > 0.0, 0.0, faces.rules[:, 1]) * faces.rules[:, 4]
         np.add.at(rate.reshape(-1), faces.places[:, 2], coefficient * self.fluid.inverse_spacing[faces.places[:, 0]])
-        return np.array(self.grid.inner(rate))
+        self.flow.groups.gather(rate)
+        return np.asarray(self.grid.inner(rate) + self._walls.rate)
 
     # ------------------------------------------------------------ checkpoint
 

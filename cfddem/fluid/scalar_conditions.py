@@ -6,11 +6,16 @@ with a coefficient. Periodic sides need no condition.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
 SOLID = "solid"
-"""Name of the wall around solid cells, beside the names of the six sides."""
+"""Name of smooth walls, or of the wall around solid cells, beside the names of the six sides."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +57,12 @@ Wall = HeldWall | FluxWall | ExchangeWall
 class ScalarSides:
     """Conditions of a scalar on all sides.
 
-    inflow    value that inlets bring
+    inflow    value that inlets bring: a number, or a function of the name of a side and places x, y, z on it
     backflow  value that flows back through outlets; that of the cell if None
-    walls     by the name of a side, or "solid" for the walls around solid cells; insulated where there is none
+    walls     by the name of a side, or "solid" for smooth walls or those around solid cells; others
+              are insulated
     """
 
-    inflow: float
+    inflow: float | Callable[[str, Array, Array, Array], Array]
     backflow: float | None = None
     walls: Mapping[str, Wall] = field(default_factory=dict)

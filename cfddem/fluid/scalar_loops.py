@@ -49,13 +49,12 @@ def volume_fluxes(velocity, voidage, lost, gate, strength, flux):
 
 
 @threaded
-def cell_flows(flux, stored, is_open, inverse, step, growth, outflow, least):
-    """Net outflow of every cell to `growth`, twice what leaves it to `outflow` [1/s], and the least of its stored
-    voidage in the step to `least` (nz, ny, nx) [-].
+def cell_flows(flux, inverse, growth, outflow):
+    """Net outflow of every cell to `growth`, and twice what leaves it to `outflow` [1/s].
 
     A limited value on a face lies between the cells on both sides, so that what leaves a cell counts twice.
     """
-    shape, steps = stored.shape, strides(stored.shape)
+    shape, steps = growth.shape, strides(growth.shape)
     flat_growth, flat_outflow, flux = growth.reshape(-1), outflow.reshape(-1), flux.reshape(3, -1)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
@@ -67,6 +66,13 @@ def cell_flows(flux, stored, is_open, inverse, step, growth, outflow, least):
             for i in range(n):
                 grows[i] += (high[i] - low[i]) * inverse[d]
                 out[i] += 2.0 * (max(high[i], 0.0) + max(-low[i], 0.0)) * inverse[d]
+
+
+@threaded
+def least_stored(stored, growth, is_open, step, least):
+    """The least of the stored voidage of every cell in the step [s], to `least` (nz, ny, nx) [-]; its net outflow
+    `growth` becomes 0 in solid cells.
+    """
     for k in prange(is_open.shape[0]):
         for j in range(is_open.shape[1]):
             for i in range(is_open.shape[2]):
@@ -76,14 +82,16 @@ def cell_flows(flux, stored, is_open, inverse, step, growth, outflow, least):
 
 
 @threaded
-def cell_rates(outflow, diffusivity, of_walls, least, is_open, inverse, rate):
-    """Rate at which the value of every cell can change: a step below its inverse is bounded (nz, ny, nx) [1/s]."""
-    spread = 4.0 * (inverse[0] ** 2 + inverse[1] ** 2 + inverse[2] ** 2)
+def cell_rates(outflow, diffusivity, spread, of_walls, least, is_open, rate):
+    """Rate at which the value of every cell can change: a step below its inverse is bounded (nz, ny, nx) [1/s].
+
+    spread  by a diffusivity of 1 m2/s [1/m2]
+    """
     for k in prange(is_open.shape[0]):
         for j in range(is_open.shape[1]):
             for i in range(is_open.shape[2]):
                 at = k + LOW, j + LOW, i + LOW
-                fastest = outflow[at] + spread * diffusivity[at] + of_walls[k, j, i]
+                fastest = outflow[at] + spread[k, j, i] * diffusivity[at] + of_walls[k, j, i]
                 rate[k, j, i] = fastest * is_open[k, j, i] / least[k, j, i]
 
 
@@ -108,37 +116,42 @@ class Carried(NamedTuple):
     growth: np.ndarray  # net outflow [1/s]
     flux: np.ndarray  # of the fluid (3, ...) [m/s]
     diffusivity: np.ndarray  # [m2/s]
-    gate: np.ndarray  # (3, ...) 1 between two open cells
+    aperture: np.ndarray  # (3, ...) share of a face that is open, between two open cells
     places: np.ndarray
     rules: np.ndarray
     through: np.ndarray
     inverse: np.ndarray  # of the spacing along x, y, z [1/m]
 
 
-@threaded
-def move(value, old, carried_by, stage, step, unlimited, new):
-    """One of Heun's two stages, 0 and 1: what flow and diffusion carry through every face, sides of the box included,
-    and the balance of every cell.
+@inline
+def entering(coefficient, outside, given, in_series, own, half):
+    """What enters a cell through a wall, per area.
 
-    value  of the stage
-    old    before the step [s]
-    new    after the step
+    coefficient, outside, given, in_series  see `Carried`
+    own   value of the cell
+    half  coefficient between the wall and the value of the cell [m/s]
     """
-    shape, steps, second = value.shape, strides(value.shape), 0.5 * stage
-    stored, growth, flux, diffusivity, gate, places, rules, both, inverse = carried_by
-    value, old, new = value.reshape(-1), old.reshape(-1), new.reshape(-1)
-    stored, growth, diffusivity = stored.reshape(-1), growth.reshape(-1), diffusivity.reshape(-1)
-    flux, gate, both = flux.reshape(3, -1), gate.reshape(3, -1), both.reshape(2, 3, -1)
-    through = both[stage]
+    if in_series != 0.0:
+        coefficient = half if math.isinf(coefficient) else coefficient * half / (coefficient + half)
+    return coefficient * (outside - own) + given
+
+
+@threaded
+def carry(value, carried_by, stage, unlimited):
+    """What flow and diffusion carry through every face, sides of the box included, in a stage of `finish`."""
+    shape, steps = value.shape, strides(value.shape)
+    _, _, flux, diffusivity, aperture, places, rules, both, inverse = carried_by
+    value, diffusivity = value.reshape(-1), diffusivity.reshape(-1)
+    flux, aperture, through = flux.reshape(3, -1), aperture.reshape(3, -1), both[stage].reshape(3, -1)
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
         for d in range(3):
             far_low, low = line(value, at - 2 * steps[d], n), line(value, at - steps[d], n)
             high, far_high = line(value, at, n), line(value, at + steps[d], n)
             d_low, d_high = line(diffusivity, at - steps[d], n), line(diffusivity, at, n)
-            f, is_open, out = line(flux[d], at, n), line(gate[d], at, n), line(through[d], at, n)
+            f, share, out = line(flux[d], at, n), line(aperture[d], at, n), line(through[d], at, n)
             for i in range(n):
-                spread = 0.5 * is_open[i] * (d_low[i] + d_high[i]) * inverse[d]
+                spread = 0.5 * share[i] * (d_low[i] + d_high[i]) * inverse[d]
                 moved = carried(f[i], far_low[i], low[i], high[i], far_high[i], unlimited)
                 out[i] = moved - spread * (high[i] - low[i])
     for n in range(len(places)):
@@ -146,25 +159,43 @@ def move(value, old, carried_by, stage, step, unlimited, new):
         brought, coefficient, outside, given, share, in_series = rules[n]
         own, through_side = value[cell], flux[axis, face]
         enters = through_side * inward > 0.0 and not math.isnan(brought)
-        if in_series != 0.0:
-            half = 2.0 * diffusivity[cell] * inverse[axis]
-            coefficient = half if math.isinf(coefficient) else coefficient * half / (coefficient + half)
         through[axis, face] = through_side * (brought if enters else own)
-        if coefficient != 0.0 or given != 0.0:
-            through[axis, face] += inward * share * (coefficient * (outside - own) + given)
+        half = 2.0 * diffusivity[cell] * inverse[axis]
+        through[axis, face] += inward * share * entering(coefficient, outside, given, in_series, own, half)
+
+
+@threaded
+def leave(carried_by, stage, left):
+    """What leaves every cell through its faces, per time, in a stage: the mean of both in the second one (padded)."""
+    shape, steps, second = left.shape, strides(left.shape), 0.5 * stage
+    left, both, inverse = left.reshape(-1), carried_by.through.reshape(2, 3, -1), carried_by.inverse
     for k in prange(LOW, shape[0] - LOW):
         at, n = inside(k, shape, 0)
-        was, e, grows, out = line(old, at, n), line(stored, at, n), line(growth, at, n), line(new, at, n)
+        out = line(left, at, n)
         for i in range(n):
-            out[i] = e[i] * was[i]
+            out[i] = 0.0
         for d in range(3):
             a_low, a_high = line(both[0, d], at, n), line(both[0, d], at + steps[d], n)
             b_low, b_high = line(both[1, d], at, n), line(both[1, d], at + steps[d], n)
             for i in range(n):
-                left = (1.0 - second) * (a_high[i] - a_low[i]) + second * (b_high[i] - b_low[i])
-                out[i] -= step * inverse[d] * left
+                leaving = (1.0 - second) * (a_high[i] - a_low[i]) + second * (b_high[i] - b_low[i])
+                out[i] += inverse[d] * leaving
+
+
+@threaded
+def finish(old, carried_by, step, new):
+    """The balance of every cell in one of Heun's two stages.
+
+    old  before the step [s]
+    new  what leaves the cell, then its value after the step
+    """
+    shape, stored, growth = old.shape, carried_by.stored.reshape(-1), carried_by.growth.reshape(-1)
+    old, new = old.reshape(-1), new.reshape(-1)
+    for k in prange(LOW, shape[0] - LOW):
+        at, n = inside(k, shape, 0)
+        was, e, grows, out = line(old, at, n), line(stored, at, n), line(growth, at, n), line(new, at, n)
         for i in range(n):
-            out[i] /= e[i] - step * grows[i]
+            out[i] = (e[i] * was[i] - step * out[i]) / (e[i] - step * grows[i])
 
 
 @serial

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.fluid.boundaries import Boundaries
-from cfddem.fluid.grid import LOW, Array
+from cfddem.fluid.boundaries import Boundaries, Side
+from cfddem.fluid.grid import LOW, Array, Grid
 from cfddem.fluid.scalar_conditions import SOLID, FluxWall, HeldWall, ScalarSides, Wall
 
 
@@ -43,12 +43,14 @@ class SideFaces(NamedTuple):
             cells = np.moveaxis(flat, 2 - side.axis, 0)[layer][LOW : LOW + own.shape[0], LOW : LOW + own.shape[1]]
             inlet, outlet = np.isin(side.owner, side.inlets), side.outlet[LOW:, LOW:][: own.shape[0], : own.shape[1]]
             rule = np.zeros((*own.shape, 6))
-            rule[:] = _rule(sides.walls.get(side.name, FluxWall()), capacity)
-            rule[inlet] = sides.inflow, 0.0, 0.0, 0.0, 1.0, 0.0
+            rule[:] = rule_of(sides.walls.get(side.name, FluxWall()), capacity)
+            rule[..., 4] *= _open_share(boundaries, side)
+            rule[inlet] = 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
+            rule[inlet, 0] = _brought(grid, side, inlet, sides)
             rule[outlet] = math.nan if sides.backflow is None else sides.backflow, 0.0, 0.0, 0.0, 1.0, 0.0
             add(side.axis, side.high, cells[own], rule[own], ~(inlet | outlet)[own])
-        if sides.walls.get(SOLID) is not None and grid.whole.solid is not None:
-            rule = _rule(sides.walls[SOLID], capacity)
+        if sides.walls.get(SOLID) is not None and grid.whole.solid is not None and not grid.walls:
+            rule = rule_of(sides.walls[SOLID], capacity)
             for axis in range(3):
                 for high in (False, True):
                     beside = np.roll(solid, -1 if high else 1, axis=2 - axis)
@@ -59,8 +61,25 @@ class SideFaces(NamedTuple):
         return cls(every, np.concatenate(rules), areas[every[:, 0]], np.concatenate(wall))
 
 
-def _rule(wall: Wall, capacity: float) -> np.ndarray:
-    """Numbers of a wall, see `SideFaces.rules`."""
+def _brought(grid: Grid, side: Side, inlet: np.ndarray, sides: ScalarSides) -> Any:
+    """Value that inlets bring through the faces of a side that have one."""
+    if not callable(sides.inflow):
+        return sides.inflow
+    at = np.broadcast_arrays(*grid.faces(side.axis))
+    return sides.inflow(side.name, *(side.layer(each, -1 if side.high else 0)[inlet] for each in at))
+
+
+def _open_share(boundaries: Boundaries, side: Side) -> Any:
+    """Share of the faces of a side that smooth walls leave open, over its plane without ghosts."""
+    grid, cut = boundaries.grid, boundaries.cut
+    if not grid.walls:
+        return 1.0
+    faces: Any = grid.inner_faces(cut.of_faces(side.axis), side.axis)  # type: ignore[arg-type]
+    return side.layer(faces, -1 if side.high else 0)
+
+
+def rule_of(wall: Wall, capacity: float) -> np.ndarray:
+    """Numbers of a wall, see `cfddem.fluid.scalar_loops.Carried`."""
     if isinstance(wall, HeldWall):
         return np.array([math.nan, math.inf, wall.value, 0.0, wall.area, 1.0])
     if isinstance(wall, FluxWall):

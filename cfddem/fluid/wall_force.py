@@ -1,4 +1,4 @@
-"""The force of a fluid on its smooth walls."""
+"""The force of a fluid on its smooth walls, and on the walls that are sides of its box."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from cfddem.fluid.boundaries import Side
 from cfddem.fluid.cut_cells import CutCells
-from cfddem.fluid.grid import Array
+from cfddem.fluid.grid import HIGH, LOW, Array
 from cfddem.fluid.solver import FluidSolver
 
 AROUND = 2.5
@@ -16,6 +17,55 @@ AROUND = 2.5
 
 AT_ONCE = 4_000
 """Places that are fitted together, to save memory."""
+
+SMOOTH = "smooth"
+"""Name of all smooth walls together, beside the names of sides."""
+
+
+def loads_on_walls(fluid: FluidSolver, centre: Any) -> dict[str, tuple[Array, Array]]:
+    """Force and torque of the fluid on every side that is a wall at least in part, and on all smooth walls.
+
+    The pressure is p', without the hydrostatic one.
+
+    centre   about which the torques are (3,) [m]
+    returns  name of a side, or `SMOOTH` -> force (3,) [N], torque (3,) [N m]
+    """
+    made = {side.name: [_on_side(fluid, side)] for side in fluid.boundaries.sides}
+    if fluid.grid.walls:
+        made[SMOOTH] = [force_on_walls(fluid), pressure_on_walls(fluid)]
+    found = {}
+    for name in (*(side.name for side in fluid.boundaries.box.sides), *([SMOOTH] if fluid.grid.walls else [])):
+        rows = np.zeros((0, 6))
+        for place, force in made.get(name, []):
+            rows = np.concatenate([rows, np.concatenate([force, np.cross(place - centre, force)], axis=1)])
+        total = np.array(fluid.communicator.sum(rows, axis=0))
+        found[name] = total[:3], total[3:]
+    return found
+
+
+def _on_side(fluid: FluidSolver, side: Side) -> tuple[Array, Array]:
+    """Pressure and shear stress on the faces of a side that are walls: places (n, 3) [m], and forces (n, 3) [N]."""
+    grid, d, end = fluid.grid, side.axis, -1 if side.high else 0
+
+    def plane(values: Any) -> Any:
+        return values[..., LOW:-HIGH, LOW:-HIGH]
+
+    apertures = np.broadcast_to(fluid.boundaries.cut.of_faces(d), grid.padded_shape)
+    share = plane(side.layer(apertures, side.face(grid))) * side.layer(grid.open, end)
+    here = (share > 0.0) & ~np.isin(side.owner, side.inlets) & ~plane(side.outlet)
+    area, half = grid.face_area(d) * share[here], 0.5 * grid.spacing[d]
+    place = np.stack([side.layer(each, end)[here] for each in np.broadcast_arrays(*grid.faces(d))], axis=-1)
+    slope = side.layer(fluid.cell_pressure_gradient(), end)[d][here]
+    pressure = side.layer(fluid.pressure, end)[here] - side.inward * half * slope
+    fluid.rates()  # brings the effective viscosity up to date
+    viscosity = side.layer(grid.inner(fluid.fields.effective_viscosity), end)[here]
+    sticks = plane(side.mirror)[here] < 0.0
+    velocity = np.moveaxis(fluid.velocity, -1, 0)
+    force = np.zeros((len(area), 3))
+    for e in range(3):
+        slip = side.layer(velocity[e], end)[here] - plane(side.wall)[e][here]
+        force[:, e] = -side.inward * pressure * area if e == d else sticks * viscosity * slip / half * area
+    return place, force
 
 
 def force_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
@@ -31,7 +81,7 @@ def force_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
     cut, grid = fluid.boundaries.cut, fluid.grid
     if not isinstance(cut, CutCells):
         return np.zeros((0, 3)), np.zeros((0, 3))
-    wetted = np.linalg.norm(_area(cut), axis=0)
+    wetted = np.linalg.norm(wall_area(cut), axis=0)
     here = np.flatnonzero(wetted)
     place = _places(cut, here)
     fluid.rates()  # brings the effective viscosity up to date
@@ -47,7 +97,7 @@ def pressure_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
     cut, grid = fluid.boundaries.cut, fluid.grid
     if not isinstance(cut, CutCells):
         return np.zeros((0, 3)), np.zeros((0, 3))
-    area = _area(cut).reshape(3, -1)
+    area = wall_area(cut).reshape(3, -1)
     here = np.flatnonzero(area.any(axis=0))
     place = _places(cut, here)
     centre = np.stack([np.ravel(each)[here] for each in np.broadcast_arrays(*grid.centres())], axis=-1)
@@ -56,7 +106,7 @@ def pressure_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
     return place, -pressure[:, None] * area[:, here].T
 
 
-def _area(cut: CutCells) -> Array:
+def wall_area(cut: CutCells) -> Array:
     """Area of the wall in every cell, a vector into the fluid (3, nz, ny, nx) [m2]."""
     grid = cut.grid
     area = [np.diff(grid.inner_faces(cut.aperture[d], d), axis=2 - d) * grid.face_area(d) for d in range(3)]

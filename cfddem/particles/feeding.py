@@ -135,13 +135,15 @@ class Feed:
 class ParticleOutlet:
     """Removes and counts particles outside a region, or inside it.
 
+    Particles with a field `entered`, the time at which they did [s], have a residence time where this is a number.
+
     low, high  opposite corners of the region; infinite in directions without an outlet [m]
     inside     remove the particles inside
     """
 
     def __init__(self, low: Vector = _NOWHERE_BELOW, high: Vector = _NOWHERE_ABOVE, *, inside: bool = False) -> None:
         self.low, self.high, self.inside = np.array(low, float), np.array(high, float), inside
-        self.left, self.mass = 0, 0.0
+        self.left, self.mass, self.times = 0, 0.0, np.zeros(0)
 
     def takes(self, position: np.ndarray) -> np.ndarray:
         """Which positions (N, 3) [m] are removed (N,) bool."""
@@ -153,15 +155,18 @@ class ParticleOutlet:
         left = run.communicator.sum(gone.count)
         self.left += left
         self.mass += run.communicator.sum(gone.mass)
+        if left and "entered" in gone:
+            stayed = run.time - run.communicator.joined(gone.entered)
+            self.times = np.append(self.times, np.sort(stayed[np.isfinite(stayed)]))
         return left
 
     def checkpoint(self) -> dict[str, Any]:
         """What has left so far."""
-        return {"left": self.left, "mass": self.mass}
+        return {"left": self.left, "mass": self.mass, "times": self.times.copy()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()` of the same outlet."""
-        self.left, self.mass = int(state["left"]), float(state["mass"])
+        self.left, self.mass, self.times = int(state["left"]), float(state["mass"]), np.array(state["times"], float)
 
 
 def apart_from_walls(place: np.ndarray, radius: np.ndarray, walls: Walls) -> np.ndarray:

@@ -170,7 +170,7 @@ def _inflow(axes: Axes, case: Case) -> None:
 def _patches(axes: Axes, case: Case) -> None:
     """Patches of floor and lid as thick lines with their names: blue where fluid enters, red where it leaves."""
     width, _, height = case.column.size
-    for number, (name, patch) in enumerate(case.patch.items()):
+    for number, (name, patch) in enumerate(case.patches.items()):
         middle = patch.centre[0] if patch.centre else 0.5 * width
         half = 0.5 * (patch.size[0] if patch.size else patch.diameter or width)
         z, colour = (0.0, height)[patch.side == "lid"], {"inlet": BLUE, "outlet": RED, "wall": GREY}[patch.kind]

@@ -158,7 +158,7 @@ def mean_inlet_velocity(case: Case) -> float:
     """Mean superficial velocity over the floor including jet and inlets, highest in time [m/s]."""
     if (case.column.ends != "flow" and not case.patch) or case.around is NO_FLUID:
         return 0.0
-    on_floor = [each for each in case.patch.values() if each.side == "floor"]
+    on_floor = [each for each in case.patches.values() if each.side == "floor"]
     closed = case.column.ends != "flow" or any(each.kind != "inlet" and each.shape == "whole" for each in on_floor)
     inlet = 0.0 if closed else case.bed.highest_inlet_velocity
     of_floor = [each for each in on_floor if each.kind == "inlet"]

@@ -33,6 +33,7 @@ from cfddem.preflight.bed_waves import is_liquid_bed
 from cfddem.run import bed_measures
 from cfddem.run.bed_measures import BED, bed_solids, cells_of, open_area, open_volume
 from cfddem.run.simulation import Simulation
+from cfddem.run.wall_loads import wall_load_columns, wall_loads
 
 Function = Callable[[Simulation], float]
 """A measure: a number for the present state of a simulation."""
@@ -315,7 +316,7 @@ def mean_heights(simulation: Simulation) -> dict[str, float]:
 _declare("mean_heights", Measure(_mean_height_columns, mean_heights))
 
 
-_declare("wall_loads", Measure(bed_measures.wall_load_columns, bed_measures.wall_loads))
+_declare("wall_loads", Measure(wall_load_columns, wall_loads))
 
 
 # ---------------------------------------------------------------- conservation

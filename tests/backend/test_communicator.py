@@ -44,6 +44,8 @@ LOCAL_FILES = {
     "run/initial_particles.py": "every rank makes all particles before the run starts",
     "fluid/viscosity.py": "every rank knows the solid cells of the whole box",
     "fluid/cut_cells.py": "every rank knows the smooth walls of the whole box",
+    "fluid/cell_groups.py": "for one process alone",
+    "fluid/scalar_walls.py": "for one process alone",
     "fluid/near_walls.py": "along axes and neighbours of one cell",
     "fluid/surfaces.py": "every rank knows the smooth walls of the whole box",
     "fluid/wall_force.py": "along the axes of one cell",

@@ -14,6 +14,7 @@ from command_line import call
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
+from cfddem.case.patch_faces import coverage
 from cfddem.case.schema import Case
 from cfddem.case.vessel import start_box, vessel_of
 from cfddem.fluid.boundaries import Boundaries
@@ -27,7 +28,6 @@ from cfddem.preflight.summary import preflight
 from cfddem.run.build import boundaries_of, laws_of, materials_of, walls_of
 from cfddem.run.division import require_parallel
 from cfddem.run.initial_particles import particles_of
-from cfddem.run.patches import coverage
 
 TEXT = """
 [fluid]
@@ -67,11 +67,6 @@ until = 0.5
 reference_speed = 2.5
 particle_step = 1e-5
 """
-
-HEAT = {
-    "particle_temperature": 400.0, "fluid_temperature": 300.0, "conductivity": 0.026, "fluid_heat_capacity": 1000.0,
-    "heat_capacity": {"glass": 800.0},
-}  # fmt: skip
 
 CONE = [(0.0, 0.03), (0.1733, 0.08), (0.24, 0.08)]
 CHAINS = {
@@ -186,7 +181,6 @@ def test_a_vessel_survives_text_and_commands(tmp_path: Path):
         ({"column.sides": "free_slip"}, "column.sides.*left out where there is a vessel"),
         ({"column.walls": "smooth"}, "column.walls"),
         ({"vessel.fill_level": 0.5}, "without a free surface"),
-        ({"heat": HEAT}, "heat: must be left out in a vessel with a fluid"),
         ({"wall": [{"shape": "cylinder", "radius": 0.002, "point": [0.08, 0.08, 0.02], "length": 0.01, "caps": True}]},
          r"wall\.0\.solid.*vessel"),
         ({"patch.nozzle.side": "flor"}, "patch.nozzle.side = 'flor': must be one of floor, lid"),
@@ -241,6 +235,24 @@ def inflow(case: Case) -> float:
     side = next(each for each in boundaries.sides if each.name == "z_low")
     open_part = boundaries.cut.aperture[2][2, 2:-3, 2:-3]
     return float((side.wall[2, 2:-3, 2:-3] * open_part).sum() * grid_of(case).face_area(2))
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        {"shape": "disc", "diameter": 0.033}, {"shape": "whole"},
+        {"shape": "disc", "diameter": 0.05, "centre": [0.07, 0.08]},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_mass_flow_enters_exactly_also_where_no_face_follows_the_edge(patch):
+    flow = {"kind": "inlet", "mass_flow": [[0.0, 0.0], [1.0, 0.012]]}
+    case = made(patch={"nozzle": flow | patch})
+    assert inflow(case) == pytest.approx(0.006 / 1.2, rel=1e-9)
+    area = 0.25 * math.pi * patch.get("diameter", 0.06) ** 2
+    assert case.fastest_inflow == pytest.approx(0.012 / 1.2 / area, rel=1e-9)
+    with pytest.raises(InputError, match=r"mass_flow.*left out where there is a velocity"):
+        made(patch={"nozzle": flow | patch | {"velocity": 1.0}})
 
 
 def test_an_inlet_opens_the_wall_before_it_and_a_wall_closes_the_inlet_before_it():

@@ -18,7 +18,7 @@ from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Box, Cone, Cylinder, Mesh, Plane, Wall
-from cfddem.run.bed_measures import wall_load_columns, wall_loads
+from cfddem.run.wall_loads import wall_load_columns, wall_loads
 from closures import contact
 
 RADIUS, GRAVITY = 1e-3, 9.81

@@ -1,0 +1,183 @@
+r"""What a scalar does at smooth walls: the flux of the wall of every cut cell, and gradients beside it.
+
+A group of cut cells has one value T, at the mean distance :math:`\delta` of its fluid from the wall. The wall conducts
+over this distance, and so it is known how the value changes along its normal, by G. The difference of two groups over
+the spacing h is not yet the gradient between them, because their fluid is not in the middle of the cells. With the
+distance c of the middle of a cell,
+
+.. math:: \partial_e T = \frac{T_2 - T_1}{h} + G\,\frac{(c_2 - c_1) - (\delta_2 - \delta_1)}{h}
+
+which is exact for a value that changes with the distance alone. It is kept between 0 and twice the first part, so that
+no value leaves those around.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cfddem.backend.compile import prange, serial, threaded
+from cfddem.fluid.cell_groups import CutGroups
+from cfddem.fluid.cut_cells import CutCells, contents
+from cfddem.fluid.grid import Array
+from cfddem.fluid.scalar_conditions import FluxWall, Wall
+from cfddem.fluid.scalar_loops import Carried, entering
+from cfddem.fluid.scalar_sides import rule_of
+from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.wall_force import wall_area
+
+LEAST_RISE = 1e-9
+"""Correction of a gradient that is left out, over the gradient along the normal [-]."""
+
+
+class InsulatedWalls:
+    """Smooth walls through which nothing passes, or none at all.
+
+    spread  as :class:`cfddem.fluid.cell_groups.SingleCells`, by walls alone
+    rate    of each cell by coefficients of walls, beyond conduction (nz, ny, nx) [1/s]
+    given   what the walls have given in the step [the value times m3]
+    """
+
+    spread: Any = 0.0
+    rate: Any = 0.0
+    given = 0.0
+
+    def correct(self, value: Array, carried_by: Carried, stage: int) -> None:
+        """Correct gradients beside the walls, and find what these give, in a stage."""
+
+    def give(self, stage: int, step: float, left: Array) -> None:
+        """Take what walls give in a stage from what leaves every cell (padded); counts it over a whole step [s]."""
+
+
+class ScalarWalls(InsulatedWalls):
+    """Smooth walls that give something to a scalar.
+
+    fluid     with smooth walls
+    groups    of its cells
+    wall      what they do
+    capacity  of the fluid per volume
+    """
+
+    def __init__(self, fluid: FluidSolver, groups: CutGroups, wall: Wall, capacity: float) -> None:
+        cut, grid = fluid.boundaries.cut, fluid.grid
+        assert isinstance(cut, CutCells)
+        share, distance, centre = _distances(cut, groups)
+        amount = np.linalg.norm(wall_area(cut), axis=0) / grid.cell_volume
+        beside = groups.averaged(amount) > 0.0  # in any cell of the group
+        here = np.flatnonzero(beside & (share > 0.0))
+        flat = grid.inner(np.arange(cut.volume.size).reshape(grid.padded_shape)).ravel()
+        self.at, self.amount, self.distance = flat[here], amount.ravel()[here], distance.ravel()[here]
+        self.rule, self._volume = rule_of(wall, capacity), grid.cell_volume
+        self._entered = np.zeros((2, here.size))
+        self._slope = np.zeros(cut.volume.size)
+        self.faces = [_faces(fluid, d, beside, distance, centre) for d in range(3)]
+        coefficient, in_series = self.rule[1], self.rule[5]
+        per_group = groups.averaged(amount / np.maximum(share, 1e-300) * (share > 0.0))
+        if in_series:
+            self.spread = np.where(beside, 2.0 * per_group / np.where(beside, distance, 1.0), 0.0)
+        else:
+            self.rate = coefficient * per_group
+
+    def correct(self, value: Array, carried_by: Carried, stage: int) -> None:
+        """See `InsulatedWalls.correct`."""
+        diffusivity = carried_by.diffusivity
+        through_walls(
+            value, diffusivity, (self.at, self.amount, self.distance), self.rule, self._entered[stage], self._slope
+        )
+        for d, faces in enumerate(self.faces):
+            through = carried_by.through[stage, d]
+            correct_gradients(value, self._slope, diffusivity, faces, carried_by.inverse[d], through)
+
+    def give(self, stage: int, step: float, left: Array) -> None:
+        """See `InsulatedWalls.give`."""
+        mean = self._entered.mean(axis=0) if stage else self._entered[0]
+        left.reshape(-1)[self.at] -= mean
+        if stage:
+            self.given = step * float(mean.sum()) * self._volume
+
+
+def scalar_walls(fluid: FluidSolver, groups: Any, wall: Wall | None, capacity: float) -> InsulatedWalls:
+    """What a scalar does at the smooth walls of a fluid."""
+    if not fluid.grid.walls or wall is None or wall == FluxWall():
+        return InsulatedWalls()
+    return ScalarWalls(fluid, groups, wall, capacity)
+
+
+class WallFaces(NamedTuple):
+    """Faces of one direction beside walls.
+
+    at        flat index of the face and of the cell above it; `step` below is the other cell
+    share     of the face that is open [-]
+    rise      of the distance, what is missing between the fluid of both cells, over the spacing [-]
+    of_low, of_high  parts of both cells in the gradient along the normal [-]
+    """
+
+    at: np.ndarray
+    step: int
+    share: Array
+    rise: Array
+    of_low: Array
+    of_high: Array
+
+
+def _distances(cut: CutCells, groups: CutGroups) -> tuple[Array, Array, Array]:
+    """Open share of every cell, mean distance of the fluid of its group, and distance of its middle [m]."""
+    grid = cut.grid
+    points = list(np.broadcast_arrays(*grid.centres()))
+    centre = np.array(cut.surface.distance(*points))
+    _, own = contents(cut.surface, grid.spacing, *points)
+    return groups.volume, groups.averaged(np.where(groups.volume == 1.0, centre, own)), centre
+
+
+def _faces(fluid: FluidSolver, d: int, beside: Any, distance: Array, centre: Array) -> WallFaces:
+    """The faces normal to d whose gradients are corrected."""
+    cut, halo, inverse = fluid.boundaries.cut, fluid.boundaries.halo, fluid.inverse_spacing[d]
+    assert isinstance(cut, CutCells)
+    away, middle = halo.padded(distance), halo.padded(centre)
+    trust = halo.padded(np.where(beside, distance, 0.0))
+    rise = (middle - np.roll(middle, 1, axis=2 - d)) - (away - np.roll(away, 1, axis=2 - d))
+    low = np.roll(trust, 1, axis=2 - d)
+    own = np.zeros(cut.volume.shape, bool)
+    cut.grid.inner_faces(own, d)[:] = True
+    is_open = halo.padded(cut.grid.open, outside=0.0)
+    own &= (is_open * np.roll(is_open, 1, axis=2 - d) > 0.0) & (trust + low > 0.0)
+    own &= (cut.aperture[d] > 0.0) & (np.abs(rise) * inverse > LEAST_RISE)
+    at, step = np.flatnonzero(own), (1, cut.volume.shape[2], cut.volume.shape[1] * cut.volume.shape[2])[d]
+    both = (trust + low).ravel()[at]
+    return WallFaces(
+        at, step, cut.aperture[d].ravel()[at], rise.ravel()[at] * inverse, low.ravel()[at] / both,
+        trust.ravel()[at] / both,
+    )  # fmt: skip
+
+
+@serial
+def through_walls(value, diffusivity, walls, rule, entered, slope):
+    """What walls give to cells per time and volume of a whole cell, and the gradient along the normal.
+
+    walls    flat indices of cells, areas over the volume of a cell [1/m], distances of the fluid [m]
+    rule     see `cfddem.fluid.scalar_loops.Carried`
+    slope    flat, padded
+    """
+    at, amount, distance = walls
+    value, diffusivity = value.reshape(-1), diffusivity.reshape(-1)
+    for n in range(len(at)):
+        cell = at[n]
+        half = diffusivity[cell] / distance[n]
+        flux = rule[4] * entering(rule[1], rule[2], rule[3], rule[5], value[cell], half)
+        entered[n] = amount[n] * flux
+        slope[cell] = -flux / diffusivity[cell] if diffusivity[cell] > 0.0 else 0.0
+
+
+@threaded
+def correct_gradients(value, slope, diffusivity, faces, inverse, through):
+    """Correct what diffusion carries through faces beside walls, along one direction."""
+    value, diffusivity, through = value.reshape(-1), diffusivity.reshape(-1), through.reshape(-1)
+    for n in prange(len(faces.at)):
+        high = faces.at[n]
+        low = high - faces.step
+        first = (value[high] - value[low]) * inverse
+        right = first + (faces.of_low[n] * slope[low] + faces.of_high[n] * slope[high]) * faces.rise[n]
+        right = min(max(right, 0.0), 2.0 * first) if first > 0.0 else max(min(right, 0.0), 2.0 * first)
+        spread = 0.5 * faces.share[n] * (diffusivity[low] + diffusivity[high])
+        through[high] -= spread * (right - first)

@@ -1,0 +1,136 @@
+"""Measures of walls: force and torque of the particles and of the fluid, and power of walls that move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from cfddem.case.schema import Case
+from cfddem.case.walls import CaseWall
+from cfddem.features.contact_heat_keys import wall_names
+from cfddem.fluid.grid import Array
+from cfddem.fluid.wall_force import SMOOTH, loads_on_walls
+from cfddem.io.quantities import Quantity
+from cfddem.particles.walls.nearest_point import DISTANCE, NORMAL, TOUCH
+from cfddem.run.simulation import Simulation
+
+AXES = "xyz"
+
+IMPULSES = ("film_push", "impulse", "shear_impulse", "bridge_impulse")
+"""Fields of pairs whose first three values are an impulse of the last step on the particle [N s]."""
+
+COUPLES = ("shear_couples", "shear_impulse")
+"""Fields of pairs whose last three values are an angular impulse of the last step on the wall [N m s]."""
+
+SIDES = {"floor": "z_low", "lid": "z_high"}
+"""Names of walls of a case -> those of the sides of the grid, where they differ."""
+
+
+class Loaded(NamedTuple):
+    """A wall whose loads are recorded.
+
+    number    among the walls of the particle solver
+    name      of its columns
+    words     what it is
+    wall      table of the case; None for a wall of the column
+    spin      of the vessel or of the wall [rad/s]
+    of_fluid  its name for the fluid; empty where this has no force on it
+    """
+
+    number: int
+    name: str
+    words: str
+    wall: CaseWall | None
+    spin: tuple[float, float, float]
+    of_fluid: str
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is a moving wall of the case."""
+        return self.wall is not None and self.wall.moves
+
+
+def loaded_walls(case: Case) -> Iterator[Loaded]:
+    """The walls whose loads are recorded: those that move, or all of them with `run.wall_forces`."""
+    names = wall_names(case)
+    first = len(names) - len(case.wall)
+    for number, name in enumerate(names):
+        wall = case.wall[number - first] if number >= first else None
+        spin = (0.0, 0.0, case.vessel.spin) if case.vessel and name == "side" else (0.0, 0.0, 0.0)
+        of_fluid = SIDES.get(name, name) if case.has_fluid and wall is None else ""
+        if name == "side":
+            of_fluid = SMOOTH if case.has_smooth_walls else ""
+        made = Loaded(
+            number, f"wall_{name}" if wall else name, f"wall {name}" if wall else f"the wall {name}", wall,
+            wall.spin if wall else spin, of_fluid,
+        )  # fmt: skip
+        if made.moves or case.run.wall_forces:
+            yield made
+
+
+def wall_load_columns(case: Case) -> dict[str, Quantity]:
+    """Columns of the history, for every wall whose loads are recorded."""
+    found: dict[str, Quantity] = {}
+    for each in loaded_walls(case):
+        sources = [("", "particles")] + [("fluid_", "fluid, its hydrostatic pressure left out,")] * bool(each.of_fluid)
+        about = "its spin axis" if any(each.spin) else "the upright axis of the column"
+        for of, source in sources:
+            name, words = f"{each.name}_{of}", f"of the {source} on {each.words}"
+            found |= {f"{name}force_{axis}": Quantity("N", f"force {words} along {axis}", "measure") for axis in AXES}
+            if any(each.spin) or case.run.wall_forces:
+                found[f"{name}torque"] = Quantity("N m", f"torque {words} about {about}", "measure")
+        if each.moves:
+            meaning = f"power that the motion of {each.words} gives to the particles"
+            found[f"{each.name}_power"] = Quantity("W", meaning, "measure")
+    return found
+
+
+def wall_loads(simulation: Simulation) -> dict[str, float]:
+    """Values of the columns, from contacts, films and bridges; a film or bridge has its last impulse over the step."""
+    case, walls, found = simulation.case, simulation.particle_solver.walls, dict[str, float]()
+    force, torque = (np.array(simulation.communicator.sum(each, axis=())) for each in _loads(simulation))
+    axis = np.array((0.5 * case.column.size[0], 0.5 * case.column.size[1], 0.0))
+    recorded = list(loaded_walls(case))
+    of_fluid = loads_on_walls(simulation.required_fluid, axis) if any(each.of_fluid for each in recorded) else {}
+    for each in recorded:
+        m = each.number
+        pushed, turned, about = force[m], torque[m], (0.0, 0.0, 1.0)
+        if any(each.spin):
+            about = each.spin
+        else:  # about the axis of the column
+            turned = turned + np.cross((walls.centre + walls.shift)[m] - axis, pushed)
+        loads = {"": (pushed, turned)} | ({"fluid_": of_fluid[each.of_fluid]} if each.of_fluid else {})
+        for of, (push, turn) in loads.items():
+            found |= {f"{each.name}_{of}force_{x}": float(value) for x, value in zip(AXES, push)}
+            if any(each.spin) or case.run.wall_forces:
+                found[f"{each.name}_{of}torque"] = float(turn @ np.array(about)) / math.hypot(*about)
+        if each.moves:
+            found[f"{each.name}_power"] = -float(pushed @ walls.velocity[m] + torque[m] @ walls.spin[m])
+    return found
+
+
+def _loads(simulation: Simulation) -> tuple[Array, Array]:
+    """Force on each wall, and torque about the centre of its spin, from the particles of this rank (walls, 3)."""
+    solver = simulation.particle_solver
+    edges, walls, particles = solver.edges, solver.walls, solver.particles
+    force, torque = np.zeros((2, len(walls.sweep), 3))
+    at_walls = slice(edges.between_particles, None)
+    owner, own = walls.wall[edges.second[at_walls]], edges.first[at_walls]
+    touch = edges.touch.reshape(-1, TOUCH)
+    place = particles.position[own] - touch[:, DISTANCE, None] * touch[:, NORMAL : NORMAL + 3]
+    arm = place - (walls.centre + walls.shift)[owner]
+    rate = 1.0 / solver.last_step if solver.last_step > 0.0 else 0.0
+    for name, factor in {"force": 1.0, "bridge_force": 1.0, **dict.fromkeys(IMPULSES, rate)}.items():
+        if name in edges:
+            pushed = -factor * edges[name][at_walls, :3]
+            np.add.at(force, owner, pushed)
+            np.add.at(torque, owner, np.cross(arm, pushed))
+    for name in COUPLES:
+        if name in edges:
+            np.add.at(torque, owner, rate * edges[name][at_walls, -3:])
+    if "moment" in edges:  # of rolling resistance
+        np.subtract.at(torque, owner, edges["moment"][at_walls])
+    return force, torque

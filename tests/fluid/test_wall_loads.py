@@ -1,0 +1,137 @@
+"""Force and torque of fluid and particles on walls, against balances of momentum, and weights."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import jn_zeros
+
+from cfddem.case.schema import Case
+from cfddem.fluid.conditions import FreeSlip, Inlet, NoSlip, Outlet, Periodic
+from cfddem.fluid.cut_cells import within
+from cfddem.fluid.grid import Grid
+from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.surfaces import cylinder, turned
+from cfddem.fluid.wall_force import SMOOTH, loads_on_walls
+from cfddem.run.history import all_columns, row
+from cfddem.run.simulation import Simulation
+
+
+def test_a_sliding_lid_drags_the_floor_by_mu_u_over_h() -> None:
+    sides = {"x_low": Periodic(), "x_high": Periodic(), "y_low": FreeSlip(), "y_high": FreeSlip()}
+    fluid = FluidSolver(
+        Grid((4, 1, 8), (0.01,) * 3), sides | {"z_high": NoSlip((0.2, 0.0, 0.0))}, density=1.0, viscosity=0.1
+    )
+    fluid.run_until(0.5, largest=1e-3)
+    loads, exact = loads_on_walls(fluid, np.zeros(3)), 0.1 * 0.2 / 0.08 * 4e-4
+    assert loads["z_low"][0][0] == pytest.approx(exact, rel=1e-6)
+    assert loads["z_high"][0][0] == pytest.approx(-exact, rel=1e-6)
+    assert loads["z_high"][1][1] == pytest.approx(-0.08 * exact, rel=1e-6)  # about y
+    assert loads["y_low"][0][1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_walls_of_a_channel_carry_what_the_pressure_drives() -> None:
+    """The momentum balance of steady flow, to the end of its start-up."""
+    fluid = FluidSolver(
+        Grid((2, 12, 10), (0.01,) * 3), {"x_low": Periodic(3.0), "x_high": Periodic(3.0)}, density=1.0, viscosity=0.5
+    )
+    fluid.run_until(0.5, largest=1e-3)
+    loads = loads_on_walls(fluid, np.zeros(3))
+    carried = sum(loads[name][0][0] for name in ("y_low", "y_high", "z_low", "z_high"))
+    assert carried == pytest.approx(3.0 * 0.02 * 0.12 * 0.1, rel=1e-5)
+
+
+def test_the_torque_of_a_vessel_that_spins_its_fluid_up_is_the_exact_one() -> None:
+    """4 pi mu w R^2 h times the sum of exp(-x^2 nu t/R^2) over the zeros x of J1, from rest at t = 0."""
+    n, spin, viscosity = 14, 2.0, 0.1
+    h, across = 1.0 / n, n + 2
+    centre = np.array(((0.5 * across + 0.3) * h, (0.5 * across + 0.1) * h, 0.0))
+    grid = within(Grid((across, across, 1), (h,) * 3), cylinder(centre, 0.5, spin=spin))
+    fluid = FluidSolver(grid, {"z_low": FreeSlip(), "z_high": FreeSlip()}, density=1.0, viscosity=viscosity)
+    for time in (0.1, 0.2):
+        fluid.run_until(time, largest=0.002)
+        force, torque = loads_on_walls(fluid, centre)[SMOOTH]
+        sums = float(np.exp(-(jn_zeros(1, 20) ** 2) * viscosity * time / 0.25).sum())
+        exact = -4.0 * math.pi * viscosity * spin * 0.25 * h * sums
+        print(f"t = {time} s: torque {torque[2] / exact:.4f} of the exact one")
+        assert torque[2] == pytest.approx(exact, rel=0.05)  # the layer at the wall is two cells thick
+        pressed = 0.5 * (spin * 0.5) ** 2 * 1.0 * h  # by the pressure on one half of the wall, at the end
+        assert np.abs(force).max() < 0.05 * pressed
+
+
+def test_pressure_and_stress_on_a_cone_balance_what_flows_through_it() -> None:
+    """Along the axis: pressure and momentum at the inlet, those at the outlet, and the force of the walls."""
+    density, h = 1.0, 0.05
+    grid = within(Grid((14, 14, 20), (h,) * 3), turned([(0.0, 0.15), (0.7, 0.32), (1.0, 0.32)], (0.36, 0.34, 0.0)))
+    fluid = FluidSolver(grid, {"z_low": Inlet(1.0), "z_high": Outlet()}, density=density, viscosity=0.05)
+    fluid.run_until(4.0, largest=0.02)
+    area = h * h
+    inflow, outflow = (fluid.volume_flux(2)[each] * area for each in (0, -1))
+    speeds = [fluid.face_velocity(2)[each] for each in (0, -1)]
+    open_floor = grid.inner_faces(fluid.boundaries.cut.of_faces(2), 2)[0] * area
+    at_floor = fluid.pressure[0] - 0.5 * h * fluid.cell_pressure_gradient()[2][0]
+    pushed = float((at_floor * open_floor).sum()) + density * float((inflow * speeds[0]).sum())
+    left = density * float((outflow * speeds[1]).sum())
+    loads = loads_on_walls(fluid, np.zeros(3))
+    on_walls = loads[SMOOTH][0][2]
+    print(f"into the cone {pushed:.5g} N, out {left:.5g} N, on the walls {on_walls:.5g} N")
+    assert abs(on_walls) > 0.2 * abs(pushed)
+    assert pushed - left == pytest.approx(on_walls, abs=0.03 * (abs(pushed) + abs(on_walls)))
+
+
+# ---------------------------------------------------------------- cases
+
+BED = """
+column = { width = 0.03, height = 0.04, cell = 0.005, ends = "closed" }
+bed = { diameter = 2.0e-3, positions = [[0.015, 0.015, 0.002]] }
+run = { until = 0.4, particle_step = 1e-5, fluid_step = 1e-3, wall_forces = true }
+laws = { lubrication = "none" }
+
+[material.glass]
+density = 2500.0
+youngs_modulus = 6.0e10
+contact_modulus = 1.0e6
+poisson = 0.25
+restitution = 0.2
+friction = 0.5
+"""
+
+
+@pytest.mark.parametrize(
+    "vessel",
+    [{"shape": "cylinder", "radius": 0.0046}, {"shape": "cone", "radius": 0.0046, "length": 0.02, "top_radius": 0.015}],
+    ids=lambda vessel: str(vessel["shape"]),
+)
+def test_floor_and_wall_carry_the_weight_of_a_bed_at_rest(vessel: dict[str, Any]) -> None:
+    """36 spheres fall from a lattice beside the axis, and come to rest."""
+    x, y, z = np.meshgrid([0.0128, 0.015, 0.0172], [0.0128, 0.015, 0.0172], 1.3e-3 + 2.2e-3 * np.arange(4))
+    lattice = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    places = (lattice + np.random.default_rng(4).uniform(-1e-4, 1e-4, lattice.shape)).tolist()
+    rolling = {"laws.rolling_resistance": "constant_torque", "material.glass.rolling_friction": 0.02}
+    simulation = Simulation(Case.from_text(BED, "c.toml", {"vessel": vessel, "bed.positions": places} | rolling))
+    while simulation.time < 0.4:
+        simulation.step()
+    found, weight = row(simulation), 9.81 * float(simulation.particles.mass.sum())
+    carried = -(found["floor_force_z"] + found["side_force_z"] + found["lid_force_z"])
+    print(f"{found['particle_count']:g} particles: walls carry {carried / weight:.5f} of their weight")
+    assert carried == pytest.approx(weight, rel=1e-3)
+    assert found["lid_force_z"] == 0.0 and found["floor_force_z"] < 0.0
+    if vessel["shape"] == "cone":
+        assert found["side_force_z"] < -0.1 * weight
+    sideways = [found["floor_force_x"] + found["side_force_x"], found["floor_force_y"] + found["side_force_y"]]
+    assert np.abs(sideways).max() < 1e-3 * weight
+    assert abs(found["floor_torque"] + found["side_torque"]) < 1e-3 * weight * 0.01
+
+
+def test_columns_of_walls_are_there_by_choice_and_have_the_names_of_walls() -> None:
+    case = Case.from_text(BED, "c.toml", {"vessel.shape": "cylinder", "fluid": {"density": 1.2, "viscosity": 1.8e-5}})
+    names = [name for name in all_columns(case) if "torque" in name]
+    assert names == [f"{wall}_{of}torque" for wall in ("floor", "lid", "side") for of in ("", "fluid_")]
+    assert not [name for name in all_columns(Case.from_text(BED, "c.toml", {"run.wall_forces": False}))
+                if "floor_force" in name]  # fmt: skip
+    box = Case.from_text(BED, "c.toml")
+    assert "x_low_force_x" in all_columns(box) and "x_low_fluid_force_x" not in all_columns(box)
+    assert math.isclose(case.vessel.spin if case.vessel else 1.0, 0.0)
