@@ -60,7 +60,7 @@ class Case(CaseTables):
 
     @model_validator(mode="after")
     def _a_random_packing_fills_a_box(self) -> Case:
-        if self.bed.start in AT_RANDOM and self.line:
+        if self.bed.start in AT_RANDOM and (self.line or self.vessel):
             where = "a vessel" if self.vessel else "a cylinder"
             raise InputError(
                 "bed.start", self.bed.start, f'"poured" or "suspended" in {where}', "a packing fills a box"
@@ -73,10 +73,14 @@ class Case(CaseTables):
             self.vessel.refuse(self.column)
         if self.has_smooth_walls:
             closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
+            closing += ["column.shape"] if self.column.shape == "cylinder" else []
             scalars = [name for name in ("heat", "vapour") if getattr(self, name, None) is not None]
             if closing or scalars:
                 remedy = 'take column.shape = "cylinder", whose wall has steps of cells, instead of the vessel'
-                limit = "left out in a vessel with a fluid" if scalars else '"none" in a vessel with a fluid'
+                where = "in a vessel with a fluid" if self.vessel else "beside thin walls"
+                limit = f"left out {where}" if scalars else f'"none" or "thin" {where}'
+                if not scalars and closing[0] == "column.shape":
+                    limit, remedy = f"a box {where}", 'take [vessel] with shape = "cylinder"'
                 raise InputError([*scalars, *closing][0], None, limit, remedy)
         return self
 

@@ -167,7 +167,7 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
         yield Row(group, f"feed {number}: particles per second", feed_rate(case, feed), "1/s", note)
     for number, mask in closed_cells(case).items():
         yield Row(group, f"wall {number}: solid cells", int(mask.sum()), "", f"of {mask.size}; stepped for the fluid")
-    if case.has_smooth_walls and math.prod(cell_counts(case.column.size, case.column.cell)) <= MOST_CUT:
+    if case.has_fluid and case.vessel and math.prod(cell_counts(case.column.size, case.column.cell)) <= MOST_CUT:
         yield from _cut_cells(case, group)
     if (vessel := vessel_of(case)) is not None:
         yield Row(group, "cross-section at the floor", vessel.floor, "m2", "that walls leave open")
