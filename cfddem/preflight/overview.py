@@ -19,7 +19,7 @@ from cfddem.preflight.bed_estimate import BedEstimate, bed_drag, bubbles, net_do
 from cfddem.preflight.collision_estimate import CollisionEstimate
 from cfddem.preflight.issue import WIDTH
 from cfddem.preflight.step_estimate import CostEstimate, StepEstimate
-from cfddem.preflight.wall_checks import closed_cells, largest_rate
+from cfddem.preflight.wall_checks import area_by_cells, closed_cells, largest_rate
 from cfddem.preflight.wet_estimate import WetEstimate
 from closures import timescales
 from closures.bed import ergun_gradient
@@ -160,6 +160,9 @@ def _equipment(case: Case, bed: BedEstimate) -> Iterator[Row]:
     for number, wall in enumerate(case.wall):
         if wall.shape == "surface":
             yield Row(group, f"wall {number}: triangles", *_surface(wall))
+        if wall in case.thin_walls and wall.is_open and wall.axis[:2] == (0.0, 0.0):
+            note = "over the true one, half way up: the fluid sees steps; choose a radius that has it near 1"
+            yield Row(group, f"wall {number}: area by its cells", area_by_cells(case, wall), "", note)
         if wall.moves and math.isfinite(wall.fastest):
             yield Row(group, f"wall {number}: largest speed", wall.fastest, "m/s", wall.shape)
     for number, feed in enumerate(case.feed):

@@ -117,6 +117,16 @@ def cells_across(case: Case, wall: CaseWall) -> float:
     return 2.0 * min(own, wall.top_radius or own) / widest
 
 
+def area_by_cells(case: Case, wall: CaseWall) -> float:
+    """Area of the cells whose centres an upright thin wall holds half way up, over its own [-]."""
+    counts, own = cell_counts(case.column.size, case.column.cell), wall.radius or 0.0
+    radius = 0.5 * (own + (wall.top_radius or own))
+    x, y = ((np.arange(n) + 0.5) * length / n for n, length in zip(counts[:2], case.column.size))
+    inside = np.hypot(x[None, :] - wall.point[0], y[:, None] - wall.point[1]) < radius
+    cells = float(np.count_nonzero(inside)) * case.column.size[0] * case.column.size[1] / (counts[0] * counts[1])
+    return cells / (math.pi * radius**2)
+
+
 def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
     """Check that a surface can be read, and is not needlessly fine."""
     try:

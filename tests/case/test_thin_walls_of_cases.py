@@ -89,6 +89,13 @@ def test_thin_walls_that_cannot_be_are_refused_in_a_line(walls, given, said):
     assert len(str(refusal.value)) < 400
 
 
+def test_the_check_says_how_large_a_tube_is_for_the_fluid():
+    """24 of the cells are within a radius of 2.75 cells, 16 within 2.5 cells."""
+    for radius, cells in ((0.0275, 24), (0.025, 16)):
+        (row,) = [each for each in preflight(made({**TUBE, "radius": radius})).rows if "by its cells" in each.name]
+        assert row.value == pytest.approx(cells * 1e-4 / (np.pi * radius**2))
+
+
 def test_a_narrow_tube_is_warned_of_and_several_processes_are_refused():
     found = [each for each in preflight(made({**TUBE, "radius": 0.015})).issues if each.key == "wall.0.radius"]
     assert [each.severity for each in found] == ["warning"] and "3 cells across the opening" in found[0].reason
