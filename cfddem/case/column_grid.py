@@ -4,29 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache, reduce
+from typing import Any
 
 import numpy as np
 
 from cfddem.case.tables import CaseTables, Column
 from cfddem.case.vessel_shape import CaseVessel
 from cfddem.case.vessel_surface import surface_in
-from cfddem.case.wall_geometry import solid_part, stamp
+from cfddem.case.wall_geometry import solid_part, stamp, triangles
 from cfddem.case.walls import CaseWall
 from cfddem.fluid.cut_cells import within
 from cfddem.fluid.grid import Array, Grid, Region, outside_cylinder
+from cfddem.fluid.thin_walls import divided, thin_wall
 
 
 def grid_of(case: CaseTables) -> Grid:
     """Cells of the column, cut by its vessel; cells outside a cylinder, and behind walls, are solid."""
-    if case.vessel:
-        return _in_vessel(case.column, case.vessel, stamp(case.vessel))
+    if case.has_smooth_walls:
+        thin = case.thin_walls
+        stamps = tuple(stamp(each) for each in (case.vessel, *thin) if each)
+        return _in_vessel(case.column, case.vessel, thin, stamps)
     walls = tuple(filter(case.closes_cells, case.wall))
     return _grid(case.column, walls, tuple(stamp(wall) for wall in walls))
 
 
 @lru_cache(maxsize=8)
-def _in_vessel(column: Column, vessel: CaseVessel, _: tuple[int, int]) -> Grid:
-    return within(Grid.of_size(column.size, column.cell), surface_in(vessel, column))
+def _in_vessel(
+    column: Column, vessel: CaseVessel | None, thin: tuple[CaseWall, ...], _: tuple[tuple[int, int], ...]
+) -> Grid:
+    surface: Any = surface_in(vessel, column) if vessel else None
+    if thin:
+        surface = divided(thin_wall(*(triangles(wall) for wall in thin)), surface)
+    return within(Grid.of_size(column.size, column.cell), surface)
 
 
 @lru_cache(maxsize=8)

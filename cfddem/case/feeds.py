@@ -47,8 +47,10 @@ def _wrong_walls(case: CaseTables) -> Iterator[InputError]:
                 yield InputError(f"{key}.solid", wall.solid, "left out in a case without a fluid")
             continue
         if wall.is_open and wall.solid is None:
-            remedy = "fluid on both sides of an open wall: give the side whose cells are solid"
-            yield InputError(f"{key}.solid", None, "given in a case with a fluid: inside, outside or none", remedy)
+            remedy = "thin keeps the fluid on both sides; else give the side whose cells are solid"
+            yield InputError(
+                f"{key}.solid", None, "given in a case with a fluid: thin, inside, outside or none", remedy
+            )
         if wall.leaves_its_place and wall.solid != "none":
             remedy = "the cells of the fluid do not move; a wall may move along itself"
             yield InputError(f"{key}.solid", wall.solid, "none for a wall that leaves its place in a fluid", remedy)

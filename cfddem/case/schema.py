@@ -64,7 +64,7 @@ class Case(CaseTables):
 
     @model_validator(mode="after")
     def _a_random_packing_fills_a_box(self) -> Case:
-        if self.bed.start in AT_RANDOM and self.line:
+        if self.bed.start in AT_RANDOM and (self.line or self.vessel):
             where = "a vessel" if self.vessel else "a cylinder"
             raise InputError(
                 "bed.start", self.bed.start, f'"poured" or "suspended" in {where}', "a packing fills a box"
@@ -75,11 +75,19 @@ class Case(CaseTables):
     def _the_vessel_goes_with_the_rest(self) -> Case:
         if self.vessel:
             self.vessel.refuse(self.column)
-        if self.has_smooth_walls:
-            closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
-            if closing:
-                remedy = 'take column.shape = "cylinder", whose wall has steps of cells, instead of the vessel'
-                raise InputError(closing[0], None, '"none" in a vessel with a fluid', remedy)
+        if not self.has_smooth_walls:
+            return self
+        for name in ("heat", "vapour"):
+            if self.thin_walls and getattr(self, name, None) is not None:
+                remedy = 'give thin walls solid = "none", so that they are for particles only'
+                raise InputError(name, None, "left out beside thin walls", remedy)
+        where = "in a vessel with a fluid" if self.vessel else "beside thin walls"
+        if self.column.shape == "cylinder":
+            raise InputError("column.shape", None, f"a box {where}", 'take [vessel] with shape = "cylinder"')
+        closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
+        if closing:
+            remedy = 'or take column.shape = "cylinder", whose wall has steps of cells, and neither vessel nor thin walls'
+            raise InputError(closing[0], None, f'"none" or "thin" {where}', remedy)
         return self
 
     @model_validator(mode="after")

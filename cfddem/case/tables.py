@@ -173,8 +173,13 @@ class CaseTables(Checked):
 
     @property
     def has_smooth_walls(self) -> bool:
-        """Whether a smooth wall cuts cells of the fluid."""
-        return self.has_fluid and bool(self.vessel)
+        """Whether a smooth wall cuts cells of the fluid, or a thin one lies between them."""
+        return self.has_fluid and (bool(self.vessel) or bool(self.thin_walls))
+
+    @property
+    def thin_walls(self) -> tuple[CaseWall, ...]:
+        """Walls with the fluid on both sides, which does not pass through them."""
+        return tuple(wall for wall in self.wall if wall.is_thin) if self.has_fluid else ()
 
     @property
     def fastest_inflow(self) -> float:
@@ -223,4 +228,4 @@ class CaseTables(Checked):
 
     def closes_cells(self, wall: CaseWall) -> bool:
         """Whether a wall closes cells to the fluid."""
-        return self.has_fluid and wall.solid != "none"
+        return self.has_fluid and wall.solid != "none" and not wall.is_thin

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from functools import lru_cache
 from typing import Any
@@ -15,6 +16,9 @@ from cfddem.case.walls import CaseWall
 from cfddem.particles.walls.stl import read_surface
 
 Array = NDArray[np.float64]
+
+SIDES = 96
+"""Sides of an open cylinder or cone as a thin wall of the fluid."""
 
 
 def stamp(wall: Any) -> tuple[int, int]:
@@ -32,11 +36,29 @@ def _triangles(file: str, scale: float, place: tuple[float, float, float], _: tu
 
 
 def triangles(wall: CaseWall) -> Array:
-    """Corners of the triangles of a surface (T, 3, 3) [m].
+    """Corners of the triangles of a surface or plate, or of an open cylinder or cone with many sides (T, 3, 3) [m].
 
     errors  InputError if the file cannot be read
     """
-    return _triangles(wall.file or "", wall.scale, wall.point, stamp(wall))
+    if wall.edges:
+        first, second = np.array(wall.edges)
+        quad = np.array(wall.point) + np.array([0.0 * first, first, first + second, second])
+        return quad[[[0, 1, 2], [0, 2, 3]]]
+    return _around(wall) if wall.is_open else _triangles(wall.file or "", wall.scale, wall.point, stamp(wall))
+
+
+def _around(wall: CaseWall) -> Array:
+    """Triangles of an open cylinder or cone (T, 3, 3) [m]."""
+    axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
+    one = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    one /= np.linalg.norm(one)
+    angle = np.linspace(0.0, 2.0 * math.pi, SIDES, endpoint=False)[:, None]
+    circle = np.cos(angle) * one + np.sin(angle) * np.cross(axis, one)
+    own = wall.radius or 0.0
+    low = np.array(wall.point) + own * circle
+    high = np.array(wall.point) + (wall.length or 0.0) * axis + (wall.top_radius or own) * circle
+    after = [np.roll(each, -1, axis=0) for each in (low, high)]
+    return np.concatenate([np.stack([low, after[0], after[1]], 1), np.stack([low, after[1], high], 1)])
 
 
 def is_closed(corners: Array) -> bool:
@@ -63,7 +85,7 @@ def encloses(wall: CaseWall) -> bool:
 
 def extent(wall: CaseWall) -> Array | None:
     """Lower and upper corner of a box around a wall at the start (2, 3) [m]; None if the wall has no end."""
-    if wall.shape == "surface":
+    if wall.shape in ("surface", "plate"):
         corners = triangles(wall).reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
     if wall.length is None:
@@ -81,9 +103,9 @@ def extent(wall: CaseWall) -> Array | None:
 def distance(wall: CaseWall, points: Array) -> Array:
     """Distance of points (N, 3) [m] from a plane, cylinder or cone at the start (N,) [m].
 
-    Negative behind a wall with one side. NaN for a surface from a file.
+    Negative behind a wall with one side. NaN for a surface from a file and for a plate.
     """
-    if wall.shape == "surface":
+    if wall.shape in ("surface", "plate"):
         return np.full(len(points), np.nan)
     if wall.shape == "plane":
         normal = np.array(wall.normal) / np.linalg.norm(wall.normal)
@@ -105,7 +127,7 @@ def distance(wall: CaseWall, points: Array) -> Array:
 
 def solid_part(wall: CaseWall, points: Array) -> NDArray[np.bool_]:
     """Which points (N, 3) [m] a wall closes to the fluid (N,)."""
-    if wall.solid == "none":
+    if wall.solid == "none" or wall.is_thin:
         return np.zeros(len(points), bool)
     if wall.shape == "surface":
         inside = inside_surface(triangles(wall), points)

@@ -1,4 +1,5 @@
-"""Walls of a case beside those of the column: planes, cylinders, cones and surfaces from files, at rest or moving."""
+"""Walls of a case beside those of the column: planes, plates, cylinders, cones and surfaces from files, at rest or
+moving."""
 
 from __future__ import annotations
 
@@ -17,6 +18,7 @@ from cfddem.case.materials import Checked
 
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {
     "plane": ("normal",),
+    "plate": ("edges",),
     "cylinder": ("axis", "radius", "length", "caps", "outside"),
     "cone": ("axis", "radius", "top_radius", "length"),
     "surface": ("file", "scale"),
@@ -25,6 +27,7 @@ OWN_KEYS: Mapping[str, tuple[str, ...]] = {
 
 NEEDED: Mapping[str, tuple[str, ...]] = {
     "plane": (),
+    "plate": ("edges",),
     "cylinder": ("radius",),
     "cone": ("top_radius", "length"),
     "surface": ("file",),
@@ -43,14 +46,17 @@ ORIGIN = (0.0, 0.0, 0.0)
 
 
 class CaseWall(Checked):
-    """A wall inside the column: a plane, a cylinder, a cone, or a surface from a file; at rest or moving."""
+    """A wall inside the column: a plane, a plate, a cylinder, a cone, or a surface from a file; at rest or moving."""
 
-    shape: Literal["plane", "cylinder", "cone", "surface"] = Field(description="shape of the wall")
+    shape: Literal["plane", "plate", "cylinder", "cone", "surface"] = Field(description="shape of the wall")
     material: str | None = Field(None, description="material of the wall; default: that of the column")
     point: Point = Field(
         ORIGIN,
-        description="a point of a plane, centre of the lower end of a cylinder or cone, or where the origin of a "
-        "surface file lies [m]",
+        description="a point of a plane, a corner of a plate, centre of the lower end of a cylinder or cone, or where "
+        "the origin of a surface file lies [m]",
+    )
+    edges: tuple[Point, Point] | None = Field(
+        None, description="two edges of a plate from its corner; particles touch it from both sides [m]"
     )
     normal: Point = Field((0.0, 0.0, 1.0), description="normal of a plane, to the side of the particles")
     axis: Point = Field((0.0, 0.0, 1.0), description="axis of a cylinder or cone, from its lower end")
@@ -78,10 +84,10 @@ class CaseWall(Checked):
     frequency: NonNegative = Field(0.0, description="frequency of the oscillation [Hz]")
     begin: NonNegative = Field(0.0, description="time at which the motion begins [s]")
     end: Positive | None = Field(None, description="time at which the motion ends; default: the end of the run [s]")
-    solid: Literal["inside", "outside", "none"] | None = Field(
+    solid: Literal["inside", "outside", "thin", "none"] | None = Field(
         None,
-        description="in a fluid: side of the wall whose cells are solid; none: the fluid passes through. Default: the "
-        "side without particles, or the inside of a surface",
+        description="in a fluid: side of the wall whose cells are solid; thin: none, but no fluid passes through the "
+        "wall; none: it does. Default: the side without particles, the inside of a surface, or thin for a plate",
     )
 
     @model_validator(mode="after")
@@ -114,7 +120,14 @@ class CaseWall(Checked):
             if self.outside and self.is_open:
                 raise InputError("outside", True, "false for an open cylinder", "particles touch it from both sides")
         require_surface_file(self.file)
-        if self.solid in ("inside", "outside") and self.shape != "surface" and not self.is_open:
+        if self.edges and not _norm(np.cross(*np.array(self.edges))) > IN_PLACE * _norm(self.edges[0]) * _norm(
+            self.edges[1]
+        ):
+            raise InputError("edges", shown(self.edges), "two edges in different directions, in m")
+        if self.shape == "plate" and self.solid in ("inside", "outside"):
+            raise InputError("solid", self.solid, "thin, none, or left out", "a plate has no inside")
+        sided = self.shape not in ("surface", "plate") and not self.is_open
+        if self.solid in ("inside", "outside", "thin") and sided:
             raise InputError("solid", self.solid, "none, or left out", "the side without particles is solid")
 
     def _check_motion(self) -> None:
@@ -141,6 +154,11 @@ class CaseWall(Checked):
         return self.shape == "cone" or (self.shape == "cylinder" and self.length is not None and not self.caps)
 
     @property
+    def is_thin(self) -> bool:
+        """Whether a fluid is on both sides of the wall, and does not pass through it."""
+        return self.solid == "thin" or (self.shape == "plate" and self.solid is None)
+
+    @property
     def moves(self) -> bool:
         """Whether the surface has a velocity at some time."""
         return any(self.velocity) or any(self.spin) or any(self.amplitude)
@@ -163,7 +181,7 @@ class CaseWall(Checked):
             return not abs(float(drift @ np.array(self.normal))) <= IN_PLACE * _norm(drift) * _norm(self.normal)
         if self.shape == "cylinder" and self.length is None:
             return not _parallel(drift, self.axis)
-        if self.shape == "surface":
+        if self.shape in ("surface", "plate"):
             return self.moves
         return bool(drift.any()) or not self._spins_in_place
 

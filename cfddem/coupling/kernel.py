@@ -34,6 +34,7 @@ from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
 from cfddem.coupling.merged_cells import merged_cells
 from cfddem.coupling.reach import Reach
+from cfddem.coupling.two_sides import sides_of
 from cfddem.fluid.grid import AT_CENTRES, HIGH, LOW, Array, Grid, sample
 from cfddem.fluid.halo import Halo
 from cfddem.particles.ghosts import Whole
@@ -131,7 +132,9 @@ class FilterKernel:
     def _take_reach(self) -> None:
         """Find the cells that particles reach by the present division of space."""
         self.reach = Reach(self._merged.grid, self.periodic, self._parts, self.owners.division)
-        self._axes, self._homes = self.reach.axes(), self.reach.homes()
+        self._axes = self.reach.axes()
+        self._sides = sides_of(self.grid, self._merged.grid, self.reach.homes(), self._axes)
+        self._homes = self._sides.homes
         _, ny, nx = self.reach.shape
         corners = [(c * (ny + 2) + b) * (nx + 2) + a for c in (0, 1) for b in (0, 1) for a in (0, 1)]
         self._corners = np.array(corners, np.uint32)
@@ -257,6 +260,7 @@ class FilterKernel:
         stencil = Stencil(np.empty(shape, np.uint32), np.empty((*shape, 3)))
         self.reach.refuse_beyond(position, radius if len(self._offsets) > 1 else None)
         loops.stencils(position, radius, self._offsets, self._linear, self._axes, *stencil)
+        self._sides.choose(position, stencil.first)
         return stencil
 
     def deposit(

@@ -9,6 +9,7 @@ import numpy as np
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
+from cfddem.case.wall_geometry import triangles
 from cfddem.case.walls import CaseWall
 from cfddem.features.case_feature import CaseFeature
 from cfddem.particles.walls.motion import Motion, WallMotions
@@ -66,6 +67,8 @@ def wall_of(given: CaseWall, material: int, key: str) -> Wall:
     try:
         if given.shape == "plane":
             return Plane(point=given.point, normal=given.normal, **common)
+        if given.shape == "plate":
+            return Mesh.of_corners(triangles(given), **common)
         if given.shape == "cylinder":
             return Cylinder(
                 point=given.point, axis=given.axis, radius=given.radius or 0.0, length=given.length, caps=given.caps,

@@ -24,6 +24,7 @@ from cfddem.backend.errors import InputError
 from cfddem.fluid.grid import HIGH, LOW, Array, Grid
 from cfddem.fluid.halo import Halo
 from cfddem.fluid.surfaces import Surface
+from cfddem.fluid.thin_walls import parted
 
 SMALLEST_VOLUME = 1e-6
 """Share of a cell below which it is solid [-]."""
@@ -268,6 +269,7 @@ class CutCells(WholeCells):
     shift     (3, ...) that distance less the one of the centre of the face [m]
     depth     (3, ...) mean square of the distance over its mean [m]
     sliding   (3, ...) mean velocity of the nearest wall over the open part, the component normal to the face [m/s]
+    thin      (3, ...) share of a face that thin walls close besides
     beyond    (3, ...) velocity of closed faces, which is that of the wall near by [m/s]
     swerve    (3, ...) that velocity less the one at the centre of the face [m/s]
     """
@@ -278,7 +280,10 @@ class CutCells(WholeCells):
         shape = grid.padded_shape
         is_open = halo.padded(grid.open)
         self.volume = volumes(surface, h, *self.points((0.5, 0.5, 0.5))) * is_open
-        self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve = np.zeros((6, 3, *shape))
+        self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve, self.thin = np.zeros(
+            (7, 3, *shape)
+        )
+        centres = self.points((0.5, 0.5, 0.5))
         for d in range(3):
             offset = [0.5, 0.5, 0.5]
             offset[d] = 0.0
@@ -286,17 +291,20 @@ class CutCells(WholeCells):
             cut, centre = section(surface, points, d, h), surface.distance(*points)
             share = cut.share * is_open * np.roll(is_open, 1, axis=2 - d)
             some, whole = share > SMALLEST_APERTURE, share == 1.0
-            self.aperture[d] = np.where(some, share, 0.0)
+            closed = parted(surface, centres, h, d)
+            self.thin[d] = np.where(some & closed, share, 0.0)
+            self.aperture[d] = np.where(some & ~closed, share, 0.0)
             self.distance[d] = np.where(some, np.where(whole, centre, cut.distance), 0.0)
             self.shift[d] = np.where(whole, 0.0, self.distance[d] - centre)
             self.depth[d] = np.where(some, cut.square / np.where(some, self.distance[d], 1.0), 0.0)
-            at_centre = surface.velocity(*points)[d]
-            self.sliding[d] = np.where(some & ~whole, cut.sliding, at_centre)
+            at_centre = np.where(closed, 0.0, surface.velocity(*points)[d])
+            self.sliding[d] = np.where(some & ~whole & ~closed, cut.sliding, at_centre)
             self.swerve[d] = self.sliding[d] - at_centre
         near = self.distance - self.shift > -REACH * float(np.linalg.norm(h))
         self.beyond = np.where(near, self.sliding, 0.0)
         halo.fill(self.volume, extend=False)
-        for field in (self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve, self.beyond):
+        fields = self.aperture, self.distance, self.shift, self.depth, self.sliding, self.swerve, self.thin, self.beyond
+        for field in fields:
             halo.fill_faces(field)
         self.shares = self.aperture, self.volume
         touched = (grid.inner(self.volume) < 1.0) & grid.open

@@ -141,14 +141,14 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
     spacing, shape = cut.grid.spacing, cut.volume.shape
     steps = (1, shape[2], shape[1] * shape[2])
     inverse = 1.0 / np.array(spacing)
-    sections = [_sections(cut, d, e) for e in range(3)]
+    sections, edges = [_sections(cut, d, e) for e in range(3)], [_closed_edges(cut, d, e) for e in range(3)]
     aperture = cut.aperture[d]
     share = cut.momentum_share(d)
     near, missing = (aperture < 1.0) | (share < 1.0), np.zeros((3, *shape))
     for e in range(3):
         for side in range(2):
             near |= np.roll(aperture, 1 - 2 * side, 2 - e) < 1.0
-            near |= sections[e][side].share < 1.0
+            near |= (sections[e][side].share < 1.0) | (edges[e][side] > 0.0)
         missing[e] = (sections[e][0].share - sections[e][1].share) * inverse[e]
     own = np.zeros(shape, bool)
     cut.grid.inner_faces(own, d)[:] = True
@@ -162,7 +162,10 @@ def _faces_of(cut: CutCells, d: int, solved: Any, profiles: Profiles, outlets: S
         for side in range(2):
             high, cross = at + side * steps[e], sections[e][side]
             area = cross.share.ravel()[at] * inverse[e] / open_share
+            closed = edges[e][side].ravel()[at]
             made, of_walls = _gradient(profiles, high - steps[e], high, cross.distance.ravel()[at], inverse[e])
+            made, of_walls = (1.0 - closed) * made, (1.0 - closed) * of_walls
+            made[1 - side] += (2.0 - 4.0 * side) * inverse[e] * closed  # it sticks to a thin wall half a cell away
             weight[e, 4 * side : 4 * side + 4], constant[e, side] = area * made, area * of_walls
             stiff += weight[e, 1] if side == 0 else -weight[e, 4]
         further[e] = profiles.next[at - steps[e]] - place, profiles.next[at + steps[e]] - place
@@ -233,6 +236,15 @@ def _sections(cut: CutCells, d: int, e: int) -> list[Any]:
     return [moved, made] if e == d else [made, moved]
 
 
+def _closed_edges(cut: CutCells, d: int, e: int) -> list[Array]:
+    """Share of the momentum faces below and above the momentum cells of component d along e that thin walls close."""
+    if e == d:
+        return [np.zeros(cut.volume.shape)] * 2
+    closed = (cut.thin[e] > 0.0).astype(float)
+    low = 0.5 * (closed + np.roll(closed, 1, 2 - d))
+    return [low, np.roll(low, -1, 2 - e)]
+
+
 class Profiles(NamedTuple):
     """How the velocity of every face of a component varies away from the wall; flat arrays."""
 
@@ -255,11 +267,14 @@ def _profiles(cut: CutCells, d: int) -> Profiles:
     upward = np.take_along_axis(rise, steepest[None], axis=0)[0] > 0.0
     shape = cut.volume.shape
     step = np.array((1, shape[2], shape[1] * shape[2]))[steepest]
+    edges = np.stack([_closed_edges(cut, d, e) for e in range(3)])
+    low, high = (np.take_along_axis(edges[:, side], steepest[None], axis=0)[0] for side in range(2))
+    whole = (np.where(upward, high, low) == 0.0).ravel()  # no thin wall lies before the next face
     farther = np.clip(np.arange(distance.size) + np.where(upward, step, -step).ravel(), 0, distance.size - 1)
     near_d, far_d = distance.ravel(), distance.ravel()[farther]
     near_e, far_e = depth.ravel(), depth.ravel()[farther]
-    is_open = near_d > 0.0
-    known = is_open & (far_d > 0.0) & (far_e - near_e > LEAST_RISE * np.array(spacing)[steepest].ravel())
+    is_open = (cut.aperture[d] > 0.0).ravel()
+    known = is_open & is_open[farther] & whole & (far_e - near_e > LEAST_RISE * np.array(spacing)[steepest].ravel())
     k = np.where(known, 1.0 / np.where(known, far_e - near_e, 1.0), 0.0)
     own = np.where(is_open, 1.0 / np.where(is_open, near_d, 1.0), 0.0)
     other = np.where(known, 1.0 / np.where(known, far_d, 1.0), 0.0)

@@ -43,9 +43,9 @@ class ClosedSurface:
     """
 
     def __init__(self, corners: Array, names: NDArray[np.int64]) -> None:
-        order, self.tree = _sorted_into_boxes(corners)
+        order, self.tree = sorted_into_boxes(corners)
         self.corners, self.names = np.ascontiguousarray(corners[order]), names[order]
-        self._normals = _normals(self.corners, self.names)
+        self._normals = normals_of(self.corners, self.names)
 
     def distance(self, x: Array, y: Array, z: Array) -> Array:
         """See :meth:`cfddem.fluid.surfaces.Surface.distance`."""
@@ -73,7 +73,7 @@ def closed_surface(corners: Array, key: str = "surface", name: str | None = None
     from cfddem.fluid.triangles_loops import first_crossing
 
     corners = with_area(np.asarray(corners, float))
-    names, edges, count = _edges(corners)
+    names, edges, count = edges_of(corners)
     of_hole = edges[count[:, 0] != count[:, 1]]
     alone = np.unique(np.concatenate([of_hole, of_hole[:, ::-1]]), axis=0) if len(of_hole) else of_hole
     if len(alone):
@@ -157,7 +157,7 @@ def through_ends(corners: Array, height: float, reach: float) -> Array:
     return corners
 
 
-def _edges(corners: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def edges_of(corners: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Numbers of the corners (T, 3); edges (E, 2), the lower number first; and how many triangles have each edge in
     this direction and in the other (E, 2)."""
     names = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
@@ -181,7 +181,7 @@ def _parts(names: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [np.flatnonzero(part[names[:, 0]] == each) for each in range(number)]
 
 
-def _normals(corners: Array, names: NDArray[np.int64]) -> Array:
+def normals_of(corners: Array, names: NDArray[np.int64]) -> Array:
     """Normals of triangles, of their edges and of their corners (T, 7, 3), see `triangles_loops.signed_distances`."""
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     own /= np.linalg.norm(own, axis=1, keepdims=True)
@@ -199,7 +199,7 @@ def _normals(corners: Array, names: NDArray[np.int64]) -> Array:
     return np.concatenate([own[:, None], on_edge[which].reshape(-1, 3, 3), at_corner[names]], axis=1)
 
 
-def _sorted_into_boxes(corners: Array) -> tuple[NDArray[np.int64], Tree]:
+def sorted_into_boxes(corners: Array) -> tuple[NDArray[np.int64], Tree]:
     """An order of the triangles in which those of every box stand together, and the tree of these boxes."""
     count, middle, order = len(corners), corners.mean(axis=1), np.arange(len(corners))
     depth = max(0, int(np.log2(max(count / OF_LEAF, 1.0))))

@@ -119,11 +119,10 @@ def first_crossing(corners, names, tree):
 
     names  (T, 3) numbers of the corners
     """
-    low, high = np.empty(3), np.empty(3)
     for a in range(len(corners)):
-        for d in range(3):
-            low[d] = min(corners[a, 0, d], corners[a, 1, d], corners[a, 2, d])
-            high[d] = max(corners[a, 0, d], corners[a, 1, d], corners[a, 2, d])
+        x, y, z = corners[a, :, 0], corners[a, :, 1], corners[a, :, 2]
+        low = (min(x[0], x[1], x[2]), min(y[0], y[1], y[2]), min(z[0], z[1], z[2]))
+        high = (max(x[0], x[1], x[2]), max(y[0], y[1], y[2]), max(z[0], z[1], z[2]))
         node = 0
         while node < len(tree.skip):
             if _apart(tree.box, node, low, high):
@@ -158,19 +157,55 @@ def _touch(names, a, b):
 
 @inline
 def _passes(corners, a, edge, b):
-    """Whether an edge of triangle a passes through triangle b: it has the same sense about all edges of b."""
+    """Whether an edge of triangle a passes through triangle b, not only along its edge."""
     after = (edge + 1) % 3
     px, py, pz = corners[a, edge, 0], corners[a, edge, 1], corners[a, edge, 2]
     qx, qy, qz = corners[a, after, 0] - px, corners[a, after, 1] - py, corners[a, after, 2] - pz
+    least, along = _through((px, py, pz), (qx, qy, qz), corners, b)
+    return least > 0.0 and 0.0 < along < 1.0
+
+
+@inline
+def _through(begin, way, corners, b):
+    """Where a straight line passes through triangle b: the least of its senses about the edges, negative outside, and
+    the share of its way. Neighbours of one edge find the same number for it: no line slips between them."""
+    (px, py, pz), (qx, qy, qz) = begin, way
     ax, ay, az = corners[b, 0, 0] - px, corners[b, 0, 1] - py, corners[b, 0, 2] - pz
     bx, by, bz = corners[b, 1, 0] - px, corners[b, 1, 1] - py, corners[b, 1, 2] - pz
     cx, cy, cz = corners[b, 2, 0] - px, corners[b, 2, 1] - py, corners[b, 2, 2] - pz
     u = qx * (cy * bz - cz * by) + qy * (cz * bx - cx * bz) + qz * (cx * by - cy * bx)
     v = qx * (ay * cz - az * cy) + qy * (az * cx - ax * cz) + qz * (ax * cy - ay * cx)
     w = qx * (by * az - bz * ay) + qy * (bz * ax - bx * az) + qz * (bx * ay - by * ax)
-    if not ((u > 0.0 and v > 0.0 and w > 0.0) or (u < 0.0 and v < 0.0 and w < 0.0)):
-        return False
     total = u + v + w
+    if total == 0.0:  # along the plane of the triangle
+        return -1.0, 0.0
+    least = min(u, v, w) if total > 0.0 else -max(u, v, w)
     hx, hy, hz = (u * ax + v * bx + w * cx), (u * ay + v * by + w * cy), (u * az + v * bz + w * cz)
-    along = (hx * qx + hy * qy + hz * qz) / (total * (qx * qx + qy * qy + qz * qz))
-    return 0.0 < along < 1.0
+    return least, (hx * qx + hy * qy + hz * qz) / (total * (qx * qx + qy * qy + qz * qz))
+
+
+@threaded
+def crossings(begin, end, corners, tree, found):
+    """Write whether the straight lines between places (N, 3) pass through any triangle, its edges included."""
+    for n in prange(len(begin)):
+        found[n] = _is_crossed(begin, end, n, corners, tree)
+
+
+@inline
+def _is_crossed(begin, end, n, corners, tree):
+    """Whether one line passes through any triangle."""
+    px, py, pz = begin[n, 0], begin[n, 1], begin[n, 2]
+    qx, qy, qz = end[n, 0], end[n, 1], end[n, 2]
+    low = (min(px, qx), min(py, qy), min(pz, qz))
+    high = (max(px, qx), max(py, qy), max(pz, qz))
+    node = 0
+    while node < len(tree.skip):
+        if _apart(tree.box, node, low, high):
+            node = tree.skip[node]
+            continue
+        for b in range(tree.first[node], tree.last[node]):
+            least, along = _through((px, py, pz), (qx - px, qy - py, qz - pz), corners, b)
+            if least >= 0.0 and 0.0 <= along <= 1.0:
+                return True
+        node += 1
+    return False

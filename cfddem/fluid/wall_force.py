@@ -109,7 +109,8 @@ def pressure_on_walls(fluid: FluidSolver) -> tuple[Array, Array]:
 def wall_area(cut: CutCells) -> Array:
     """Area of the wall in every cell, a vector into the fluid (3, nz, ny, nx) [m2]."""
     grid = cut.grid
-    area = [np.diff(grid.inner_faces(cut.aperture[d], d), axis=2 - d) * grid.face_area(d) for d in range(3)]
+    whole = cut.aperture + cut.thin  # thin walls have no part in it
+    area = [np.diff(grid.inner_faces(whole[d], d), axis=2 - d) * grid.face_area(d) for d in range(3)]
     return np.array(area) * grid.open
 
 

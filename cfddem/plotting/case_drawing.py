@@ -210,7 +210,7 @@ OUTLINE: dict[str, Any] = {"color": "#222222", "linewidth": 1.6}
 
 def _wall(axes: Axes, wall: CaseWall, width: float, height: float) -> None:
     """The outline of a wall as seen along y."""
-    if wall.shape == "surface":
+    if wall.shape in ("surface", "plate"):
         _surface(axes, wall)
     elif wall.shape == "plane":
         (nx, _, nz), (px, _, pz) = wall.normal, wall.point

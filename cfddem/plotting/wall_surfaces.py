@@ -79,7 +79,7 @@ def _surface(wall: CaseWall, bounds: np.ndarray) -> Any:
 
     point, middle = np.array(wall.point), bounds.mean(axis=1)
     far = 2.0 * float(np.linalg.norm(bounds[:, 1] - bounds[:, 0])) + float(np.linalg.norm(middle - point))
-    if wall.shape == "surface":
+    if wall.shape in ("surface", "plate"):
         corners = triangles(wall)
         return _polygons(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)).clean()
     if wall.shape == "plane":
@@ -125,7 +125,7 @@ def _moved(mesh: Any, wall: CaseWall, time: float) -> Any:
     if any(wall.spin):
         axis = np.array(wall.axis) / np.linalg.norm(wall.axis)
         middle = np.array(wall.point) + 0.5 * (wall.length or 0.0) * axis
-        if wall.shape == "surface":
+        if wall.shape in ("surface", "plate"):
             middle = 0.5 * (mesh.points.min(axis=0) + mesh.points.max(axis=0))
         turned = math.degrees(math.hypot(*wall.spin) * motion.active(time))
         mesh = mesh.rotate_vector(wall.spin, turned, point=middle if wall.centre is None else wall.centre)

@@ -146,8 +146,8 @@ def check_wall_drag(case: Case) -> Iterator[Issue]:
     if not case.has_fluid:
         yield Issue("warning", "laws.wall_drag", "unused, because the case has no fluid", "leave it out")
     for number, wall in enumerate(case.wall):
-        if wall.shape == "surface" or wall.moves:
-            what = "is a surface file" if wall.shape == "surface" else "moves"
+        if wall.shape in ("surface", "plate") or wall.moves:
+            what = f"is a {wall.shape}" if wall.shape in ("surface", "plate") else "moves"
             yield Issue("error", "laws.wall_drag", f"wall.{number} {what}", 'set laws.wall_drag = "none"')
     column = case.column
     pairs = column.ends, column.sides, column.sides if column.front is None else column.front

@@ -37,6 +37,9 @@ FINE = 0.05
 LOOSE = 0.3
 """Solid fraction that random insertion reaches in a box [-]."""
 
+FEWEST_ACROSS = 4.0
+"""Cells across a thin tube, below which its flow has no profile [-]."""
+
 MOST_CELLS = 5_000_000
 """Cells above which the pre-run check does not look for those that walls close."""
 
@@ -88,7 +91,13 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "warning", "run.reference_speed", f"the speed of {key}, a surface file that spins, is not part of it",
             "set it to the speed of the tip, if that is the fastest",
         )  # fmt: skip
-    if wall.moves and case.closes_cells(wall):
+    if wall in case.thin_walls and wall.is_open and (across := cells_across(case, wall)) < FEWEST_ACROSS:
+        reason = f"{across:.2g} cells across the opening; its flow needs at least {FEWEST_ACROSS:g}"
+        end = narrow if wall.top_radius else "radius"
+        yield Issue(
+            "warning", f"{key}.{end}", reason, "use smaller cells, but of at least 2 diameters, or a wider wall"
+        )
+    if wall.moves and (case.closes_cells(wall) or wall in case.thin_walls):
         yield Issue(
             "warning", f"{key}.velocity" if any(wall.velocity) else f"{key}.spin",
             "the fluid does not feel the motion of a wall: at its cells the velocity is 0",
@@ -99,6 +108,23 @@ def _check_wall(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
             "error", key, f"a {wall.shape} is not the same all along the periodic sides of the column",
             'set column.sides or column.front to "no_slip"; only planes and endless cylinders along them repeat',
         )  # fmt: skip
+
+
+def cells_across(case: Case, wall: CaseWall) -> float:
+    """Cells across the narrowest part of an open wall."""
+    cell, own = case.column.cell, wall.radius or 0.0
+    widest = max(cell) if isinstance(cell, tuple) else cell
+    return 2.0 * min(own, wall.top_radius or own) / widest
+
+
+def area_by_cells(case: Case, wall: CaseWall) -> float:
+    """Area of the cells whose centres an upright thin wall holds half way up, over its own [-]."""
+    counts, own = cell_counts(case.column.size, case.column.cell), wall.radius or 0.0
+    radius = 0.5 * (own + (wall.top_radius or own))
+    x, y = ((np.arange(n) + 0.5) * length / n for n, length in zip(counts[:2], case.column.size))
+    inside = np.hypot(x[None, :] - wall.point[0], y[:, None] - wall.point[1]) < radius
+    cells = float(np.count_nonzero(inside)) * case.column.size[0] * case.column.size[1] / (counts[0] * counts[1])
+    return cells / (math.pi * radius**2)
 
 
 def _check_surface(case: Case, wall: CaseWall, key: str) -> Iterator[Issue]:
