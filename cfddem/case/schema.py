@@ -86,7 +86,7 @@ class Case(CaseTables):
             raise InputError("column.shape", None, f"a box {where}", 'take [vessel] with shape = "cylinder"')
         closing = [f"wall.{n}.solid" for n, wall in enumerate(self.wall) if self.closes_cells(wall)]
         if closing:
-            remedy = 'or take column.shape = "cylinder", whose wall has steps of cells, and neither vessel nor thin walls'
+            remedy = 'or take column.shape = "cylinder", a wall with steps of cells, without vessel and thin walls'
             raise InputError(closing[0], None, f'"none" or "thin" {where}', remedy)
         return self
 
