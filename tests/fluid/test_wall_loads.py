@@ -49,7 +49,7 @@ def test_the_torque_of_a_vessel_that_spins_its_fluid_up_is_the_exact_one() -> No
     n, spin, viscosity = 14, 2.0, 0.1
     h, across = 1.0 / n, n + 2
     centre = np.array(((0.5 * across + 0.3) * h, (0.5 * across + 0.1) * h, 0.0))
-    grid = within(Grid((across, across, 1), (h,) * 3), cylinder(centre, 0.5, spin=spin))
+    grid = within(Grid((across, across, 1), (h,) * 3), cylinder(centre.tolist(), 0.5, spin=spin))
     fluid = FluidSolver(grid, {"z_low": FreeSlip(), "z_high": FreeSlip()}, density=1.0, viscosity=viscosity)
     for time in (0.1, 0.2):
         fluid.run_until(time, largest=0.002)
@@ -71,7 +71,7 @@ def test_pressure_and_stress_on_a_cone_balance_what_flows_through_it() -> None:
     area = h * h
     inflow, outflow = (fluid.volume_flux(2)[each] * area for each in (0, -1))
     speeds = [fluid.face_velocity(2)[each] for each in (0, -1)]
-    open_floor = grid.inner_faces(fluid.boundaries.cut.of_faces(2), 2)[0] * area
+    open_floor = grid.inner_faces(np.asarray(fluid.boundaries.cut.of_faces(2)), 2)[0] * area
     at_floor = fluid.pressure[0] - 0.5 * h * fluid.cell_pressure_gradient()[2][0]
     pushed = float((at_floor * open_floor).sum()) + density * float((inflow * speeds[0]).sum())
     left = density * float((outflow * speeds[1]).sum())
