@@ -147,9 +147,9 @@ def flows(n: int, inner: float, shift: float) -> tuple[float, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, 0.27])
 def test_flow_in_a_draft_tube_and_around_it_is_met_within_the_steps_of_its_wall(shift):
-    """16 cells across the pipe, 8 across the tube."""
+    """16 cells across the pipe, 8 across the tube: 1.10 and 1.00 in the middle, 0.95 and 1.07 shifted."""
     in_tube, around = flows(16, 0.25, shift)
-    assert in_tube == pytest.approx(1.0, abs=0.2) and around == pytest.approx(1.0, abs=0.2)
+    assert in_tube == pytest.approx(1.0, abs=0.12) and around == pytest.approx(1.0, abs=0.08)
 
 
 # ---------------------------------------------------------------- particles beside a plate
