@@ -50,7 +50,7 @@ IMBALANCE = 1.2
 """Largest work of a rank over the mean, or over what the last cut has left; where it is exceeded space is cut anew."""
 
 ALONE = 2
-"""Work for a particle over that for a pair of its list."""
+"""Work for a particle over that for a pair of its list, by the bytes that a step moves for each: 296 and 177 (dry)."""
 
 
 class Whole:
