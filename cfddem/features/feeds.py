@@ -32,6 +32,17 @@ class Feeds(CaseFeature):
     """Feeds and outlets of a case. A particle that enters replaces fluid of its own volume, or leaves room for it."""
 
     name = "feeds and outlets"
+    measures = (
+        Measured("fed_count", "1", "recorded", "number of particles that feeds have inserted so far",
+                 lambda feeds, _: feeds.fed, lambda case: case.feed),
+        Measured("waiting_count", "1", "recorded",
+                 "number of particles that are due, and wait for a free place in the box of a feed",
+                 lambda feeds, _: feeds.waiting, lambda case: case.feed),
+        Measured("removed_count", "1", "recorded", "number of particles that outlets have removed so far",
+                 lambda feeds, _: feeds.removed[0], lambda case: case.outlet),
+        Measured("removed_mass", "kg", "recorded", "mass of the particles that outlets have removed so far",
+                 lambda feeds, _: feeds.removed[1], lambda case: case.outlet),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.feeds = [_feed(case, each, number) for number, each in enumerate(case.feed)]
@@ -48,13 +59,6 @@ class Feeds(CaseFeature):
     def fields_of(cls, case: Case) -> tuple[Field, ...]:
         """What the particles of a case with feeds remember."""
         return (LANDED,) if case.feed else ()
-
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """Numbers of particles that have entered and left."""
-        of_feeds = Measured("1", "recorded", fed_count), Measured("1", "recorded", waiting_count)
-        of_outlets = Measured("1", "recorded", removed_count), Measured("kg", "recorded", removed_mass)
-        return (of_feeds if case.feed else ()) + (of_outlets if case.outlet else ())
 
     def after(self, simulation: Any) -> None:
         """Insert the particles that are due, and remove those that have left."""
@@ -104,26 +108,6 @@ class Feeds(CaseFeature):
         """All feeds and outlets by name."""
         yield from ((f"feed_{number}", each) for number, each in enumerate(self.feeds))
         yield from ((f"outlet_{number}", each) for number, each in enumerate(self.outlets))
-
-
-def fed_count(simulation: Any) -> float:
-    """Number of particles that feeds have inserted so far."""
-    return simulation.feature(Feeds).fed
-
-
-def waiting_count(simulation: Any) -> float:
-    """Number of particles that are due, and wait for a free place in the box of a feed."""
-    return simulation.feature(Feeds).waiting
-
-
-def removed_count(simulation: Any) -> float:
-    """Number of particles that outlets have removed so far."""
-    return simulation.feature(Feeds).removed[0]
-
-
-def removed_mass(simulation: Any) -> float:
-    """Mass of the particles that outlets have removed so far."""
-    return simulation.feature(Feeds).removed[1]
 
 
 def _feed(case: Case, given: CaseFeed, number: int) -> Feed:
