@@ -58,7 +58,7 @@ def test_added_mass_beside_a_wall_keeps_the_energy() -> None:
     """Without drag, (m + C m_f) v^2 is constant while the sphere approaches the wall."""
     radius = 0.5 * DIAMETER
     run, wall = sphere(-0.1, 6.0 * radius), Plane()
-    fluid = QuiescentFluid(run, WATER, VISCOSITY, None, history="none", wall=wall)
+    fluid = QuiescentFluid(run, WATER, VISCOSITY, None, history="none", added_mass=wall)
 
     def energy() -> float:
         place, velocity = float(run.particles.position[0, 2]), float(run.particles.velocity[0, 2])

@@ -288,7 +288,7 @@ def land(density: float, viscosity: float, walls: Walls, step: float = 5e-4) -> 
     )  # fmt: skip
     beside = None if walls == "none" else WallDrag([FLOOR, *SIDES, LID], walls, film=True)
     oil = QuiescentFluid(
-        run, density, viscosity, law_of(abraham), history="none", wall=FLOOR, wall_drag=beside,
+        run, density, viscosity, law_of(abraham), history="none", added_mass=FLOOR, wall_drag=beside,
         gravity=(0.0, 0.0, -GRAVITY),
     )  # fmt: skip
     rows = [(RELEASE, 0.0)]
