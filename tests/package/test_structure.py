@@ -39,7 +39,7 @@ LONGEST_FILE, MARGIN = 500, 10
 MOST_ARGUMENTS, LONGEST_FUNCTION = 8, 80
 """Positional arguments and lines of a function outside compiled loops."""
 
-MANY_ARGUMENTS = 25
+MANY_ARGUMENTS = 23
 """Functions of more than `MOST_ARGUMENTS` arguments of all kinds, compiled ones included. It may only fall."""
 
 STRUCTURES = {"p", "parameters", "numbers", "bridge_functions"}

@@ -282,7 +282,6 @@ def pour(
     periodic: bool = False,
     gravity: float = 9.81,
     laws: Laws | None = None,
-    patience: float = 20.0,
     progress: Progress | None = None,
 ) -> ParticleSolver:
     """Let spheres fall into a column with a flat floor at z = 0 until they are at rest.
@@ -296,11 +295,10 @@ def pour(
     periodic   repeat the column sideways instead of closing it by walls
     gravity    [m/s2]
     laws       laws between particles; without rolling resistance, loose particles roll for a long time
-    patience   longest time, over the time of a fall from the top
     progress   called from time to time with the time and the remaining share of the energy
     returns    the run at rest; its `particles` are the bed
 
-    Raises RunFailed if the bed does not come to rest in time.
+    Raises RunFailed if the bed does not come to rest within 20 times the fall from the top.
     """
     width, depth = column
     diameters = np.asarray(diameters, float)
@@ -325,7 +323,7 @@ def pour(
     fall = math.sqrt(2.0 * top / gravity)
     brought = float(np.sum(spheres.mass * gravity * spheres.position[:, 2]))
     step = run.time_scales(gravity * fall).recommended
-    while run.time < patience * fall:
+    while run.time < 20.0 * fall:
         run.advance(step, max(1, int(0.05 * fall / step)))
         left = kinetic_energy(run.particles) / brought
         if progress is not None:
