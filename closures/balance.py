@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 from closures.numbers import archimedes as archimedes_number
 
@@ -116,40 +117,36 @@ def terminal_velocity(
     return fluidising_velocity(diameter, density, fluid_density, viscosity, 1.0, drag, gravity)
 
 
-def speed_after(
-    time: float,
-    speed: float,
-    diameter: float,
-    density: float,
-    fluid_density: float,
-    viscosity: float,
-    drag: Drag,
-    gravity: float = 9.81,
-    *,
-    added_mass: float = 0.0,
-) -> float:
+class Sphere(NamedTuple):
+    """A sphere that falls or rises alone in a fluid."""
+
+    diameter: float  # d [m]
+    density: float  # rho_p [kg/m3]
+    fluid_density: float  # rho_f [kg/m3]
+    viscosity: float  # eta, dynamic, of the fluid [Pa s]
+    drag: Drag  # F(reynolds, voidage)
+    gravity: float = 9.81  # g [m/s2]
+
+
+def speed_after(time: float, speed: float, sphere: Sphere, *, added_mass: float = 0.0) -> float:
     r"""Speed of an isolated falling or rising sphere after a given time, from its equation of motion.
 
     .. math:: (\rho_p + C_m\rho_f)V\dot v = |\rho_p - \rho_f|Vg - 3\pi\eta d\,F(Re)\,v
 
-    time           t [s]
-    speed          v at the start, in the direction in which the sphere falls or rises [m/s]
-    diameter       d [m]
-    density        rho_p, of the sphere [kg/m3]
-    fluid_density  rho_f [kg/m3]
-    viscosity      eta, dynamic [Pa s]
-    drag           F(reynolds, voidage)
-    gravity        g [m/s2]
-    added_mass     C_m; 0.5 for an isolated sphere [-]
-    returns        v after the time t, to 1e-9 relative [m/s]
+    time        t [s]
+    speed       v at the start, in the direction in which the sphere falls or rises [m/s]
+    sphere      and the fluid around it
+    added_mass  C_m; 0.5 for an isolated sphere [-]
+    returns     v after the time t, to 1e-9 relative [m/s]
 
     >>> from closures.drag_single import stokes
     >>> relaxation = 2500 * 1e-8 / 18e-3              # 0.1 mm in water, Stokes drag: u_t (1 - 1/e)
-    >>> round(speed_after(relaxation, 0.0, 1e-4, 2500.0, 1000.0, 1e-3, stokes) / 8.175e-3, 6)
+    >>> round(speed_after(relaxation, 0.0, Sphere(1e-4, 2500.0, 1000.0, 1e-3, stokes)) / 8.175e-3, 6)
     0.632121
     """
     from scipy.integrate import solve_ivp  # imported here: importing the laws alone does not load scipy
 
+    diameter, density, fluid_density, viscosity, drag, gravity = sphere
     inertia = (density + added_mass * fluid_density) / 6.0
     weight = abs(density - fluid_density) / 6.0 * gravity
     friction = 3.0 * viscosity / diameter**2

@@ -18,7 +18,7 @@ from cfddem.io.reading import RunData
 from cfddem.preflight.bed_estimate import bed_drag
 from cfddem.preflight.expansion import Expansions, expansions, is_compared, spread_in_words
 from closures import bed as laws_of_beds
-from closures.balance import pressure_gradient, speed_after, terminal_velocity
+from closures.balance import Sphere, pressure_gradient, speed_after, terminal_velocity
 from closures.drag import ergun
 from closures.registry import REGISTRY
 
@@ -164,7 +164,7 @@ def compared_with_drag_law(run: RunData, case: Case) -> Iterator[tuple[str, floa
         return
     direction = math.copysign(1.0, density - fluid.density) * gravity / strength
     speeds = slip @ direction
-    sphere = (case.bed.diameter, density, fluid.density, fluid.viscosity, drag, strength)
+    sphere = Sphere(case.bed.diameter, density, fluid.density, fluid.viscosity, drag, strength)
     yield f"terminal velocity by {law.name}", float(speeds[-1]), terminal_velocity(*sphere), "m/s"
     if case.laws.history != "none":
         return  # the equation of motion has a memory
@@ -173,7 +173,7 @@ def compared_with_drag_law(run: RunData, case: Case) -> Iterator[tuple[str, floa
         return
     exact = [float(speeds[0])]
     for begin, end in pairwise(times):
-        exact.append(speed_after(end - begin, exact[-1], *sphere, added_mass=case.laws.added_mass_at(1.0)))
+        exact.append(speed_after(end - begin, exact[-1], sphere, added_mass=case.laws.added_mass_at(1.0)))
     worst = int(np.abs(speeds - exact).argmax())
     if worst:
         name = f"equation of motion, largest deviation at {times[worst]:.3g} s"

@@ -14,7 +14,6 @@ from scipy.sparse.csgraph import connected_components
 from cfddem.backend.errors import InputError
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 BUBBLE = np.dtype([("centroid", "f8", 3), ("volume", "f8"), ("diameter", "f8")])
 """A bubble: centroid (x, y, z) [m], volume [m3], diameter of a sphere (in a flat bed, of a disc) of that size [m]."""
@@ -27,23 +26,21 @@ def find_bubbles(
     *,
     threshold: float = 0.8,
     surface: float | None = None,
-    open_cells: Mask | None = None,
     smallest: int = 4,
     flat: bool = False,
     periodic: tuple[bool, bool] = (False, False),
 ) -> np.ndarray:
     """Find the connected regions of a bed whose voidage exceeds a threshold.
 
-    voidage     (nz, ny, nx) [-]
-    spacing     hx, hy, hz of a cell [m]
-    origin      lowest corner of the box [m]
-    threshold   voidage at the boundary of a bubble [-]
-    surface     height of the bed [m]; cells above it are ignored; the whole box if None
-    open_cells  cells to include; all if None
-    smallest    fewest cells of a bubble
-    flat        the bed is thin in y: the diameter is that of a disc with the area of the bubble
-    periodic    whether x and y are periodic; a bubble can extend across a periodic side
-    returns     rows of dtype BUBBLE, lowest first
+    voidage    (nz, ny, nx), 0 in cells to leave out [-]
+    spacing    hx, hy, hz of a cell [m]
+    origin     lowest corner of the box [m]
+    threshold  voidage at the boundary of a bubble [-]
+    surface    height of the bed [m]; cells above it are ignored; the whole box if None
+    smallest   fewest cells of a bubble
+    flat       the bed is thin in y: the diameter is that of a disc with the area of the bubble
+    periodic   whether x and y are periodic; a bubble can extend across a periodic side
+    returns    rows of dtype BUBBLE, lowest first
 
     Regions that touch the surface, or the top of the box, belong to the freeboard and are left out. Cells are connected
     through faces.
@@ -51,8 +48,6 @@ def find_bubbles(
     if voidage.ndim != 3 or not 0.0 < threshold < 1.0:
         raise InputError("voidage, threshold", (voidage.shape, threshold), "a field (nz, ny, nx), and between 0 and 1")
     high = voidage > threshold
-    if open_cells is not None:
-        high &= open_cells
     top = len(voidage) if surface is None else int(np.clip((surface - origin[2]) / spacing[2], 0, len(voidage)))
     high[top:] = False
     labels, count = label(high)

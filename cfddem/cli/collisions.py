@@ -47,12 +47,7 @@ def _collide(
     require_folder(csv)
 
     def once(**point: float) -> immersed_pair.Collision:
-        return immersed_pair.collide(
-            pair,
-            diameter=diameters,
-            spin=(spin, 0.0),
-            **given | point,
-        )
+        return immersed_pair.collide(pair, diameter=diameters, spin=(spin, 0.0), **given | point)
 
     if data is not None:
         return compare_points(data, once, figure)
@@ -112,11 +107,7 @@ def _show_impact(result: wet_wall.Impact) -> None:
     show(values | lost, units | dict.fromkeys(lost, "J/kg"))
 
 
-impact = command(
-    wet_wall.impact,
-    "wet-wall",
-    show_result=_show_impact,
-)
+impact = command(wet_wall.impact, "wet-wall", show_result=_show_impact)
 
 
 def _three_spheres(*, map: Path | None, **given: Any) -> three_spheres.Triplet:

@@ -14,6 +14,8 @@ from typing import Any, Literal, NotRequired, get_args, get_origin, get_type_hin
 
 from typing_extensions import TypedDict
 
+from cfddem.preflight.issue import Issue
+
 Number = float | None
 """A number; null where it is not known, not finite, or has no meaning."""
 
@@ -26,16 +28,6 @@ class Quantity(TypedDict):
     value: Number
     unit: str
     note: str
-
-
-class Issue(TypedDict):
-    """An error, warning or note of a pre-run check, with the key of the case."""
-
-    severity: Literal["error", "warning", "note"]
-    key: str
-    reason: str
-    remedy: str
-    in_report: bool
 
 
 class Mistake(TypedDict):
@@ -159,21 +151,18 @@ class Target(TypedDict):
 class Gallery(TypedDict):
     """`new` without a name: the gallery."""
 
-    schema: str
     cases: list[GalleryCase]
 
 
 class Written(TypedDict):
     """`new NAME`, `view`, `export`, `sweep --write-jobs`: the files that were written."""
 
-    schema: str
     files: list[str]
 
 
 class CheckOutput(TypedDict):
     """`check`: status, issues, and numbers by group and name."""
 
-    schema: str
     case: str
     status: Literal["ok", "warning", "error"]
     issues: list[Issue]
@@ -183,7 +172,6 @@ class CheckOutput(TypedDict):
 class Stability(TypedDict):
     """`stability`: the uniform bed, and its waves."""
 
-    schema: str
     voidage: float
     slip: float
     kernel: float
@@ -198,7 +186,6 @@ class Stability(TypedDict):
 class Comparison(TypedDict):
     """`compare`: several runs, the first of which is the reference."""
 
-    schema: str
     runs: list[dict[str, Any]]
     changed: dict[str, list[Any]]
     key_results: dict[str, list[Any]]
@@ -209,7 +196,6 @@ class Comparison(TypedDict):
 class Sweep(TypedDict):
     """`sweep`: its runs; with `--sensitivity`, how much each key matters for each measure."""
 
-    schema: str
     folder: str
     runs: list[SweepRun]
     sensitivity: SensitivityPart | None
@@ -218,7 +204,6 @@ class Sweep(TypedDict):
 class CalibrationOutput(TypedDict):
     """`calibrate`: estimates of the varied keys."""
 
-    schema: str
     folder: str
     estimates: list[dict[str, Any]]
     chi2: Number
@@ -232,7 +217,6 @@ class CalibrationOutput(TypedDict):
 class Validation(TypedDict):
     """`validate`: comparisons with published results."""
 
-    schema: str
     holds: bool
     targets: list[Target]
 
@@ -240,7 +224,6 @@ class Validation(TypedDict):
 class Benchmark(TypedDict):
     """`bench`: what was measured, which depends on the target."""
 
-    schema: str
     target: str
     result: Any
 
@@ -248,7 +231,6 @@ class Benchmark(TypedDict):
 class Explanation(TypedDict):
     """`explain`: laws, keys of a case, and what a table does not have."""
 
-    schema: str
     laws: list[LawPage]
     keys: list[KeyPage]
     not_there: str
@@ -257,7 +239,6 @@ class Explanation(TypedDict):
 class Doctor(TypedDict):
     """`doctor`: checks of the machine."""
 
-    schema: str
     ok: bool
     checks: list[Check]
 
@@ -265,14 +246,12 @@ class Doctor(TypedDict):
 class Collisions(TypedDict):
     """`collide` over a range of Stokes numbers; each collision as in `collide`, without `schema`."""
 
-    schema: str
     collisions: list[dict[str, Any]]
 
 
 class MeasuredCollisions(TypedDict):
     """`collide --data`: how well computed collisions agree with measured points."""
 
-    schema: str
     name: str
     quantity: str
     unit: str
@@ -292,7 +271,6 @@ class MeasuredCollisions(TypedDict):
 class ThreeSpheres(TypedDict):
     """`three-spheres`: times over (film / impact speed), `time_star` over (diameter / impact speed)."""
 
-    schema: str
     outcome: str
     restitution12: Number
     restitution23: Number
@@ -303,7 +281,6 @@ class ThreeSpheres(TypedDict):
 class Failure(TypedDict):
     """Any command that fails: its exit code, and all errors, as on the standard error output."""
 
-    schema: str
     exit_code: int
     errors: list[Mistake]
 
@@ -334,10 +311,12 @@ SCHEMAS: dict[str, tuple[int, Any]] = {
 
 
 def form(name: str) -> Any:
-    """The form of a schema."""
+    """The form of a schema: that of its results, and the word `schema` itself."""
     found = SCHEMAS[name][1]
     if not isinstance(found, str):
-        return found
+        made = TypedDict(found.__name__, {"schema": str, **get_type_hints(found, include_extras=True)})  # type: ignore[misc]
+        made.__doc__ = found.__doc__
+        return made
     module, _, kind = found.partition(":")
     return form_of(getattr(import_module(module), kind), {"schema": str})
 

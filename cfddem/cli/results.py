@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,11 +13,17 @@ from cfddem.cli.json_output import print_json
 if TYPE_CHECKING:
     from cfddem.analysis.report_text import Report
 
+FOLDER = "run folder; default: the newest one here"
 FILES = "print the names of the written files as JSON"
+PANELS = "spheres, voidage, bubbles, streamlines, or temperature or vapour of the fluid; may be repeated"
+COLOUR = (
+    "what colours the spheres: speed, collisions, moisture, or a recorded field (species, temperature, liquid, "
+    "agglomerate); default: species of a mixture, else speed"
+)
 
 
 def report(
-    folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
+    folder: Annotated[Path | None, Parameter(help=FOLDER)] = None,
     *,
     output: Annotated[
         Path | None, Parameter(name=["--output", "-o"], help="HTML or Markdown (.md) file; default: NAME-report.html")
@@ -109,34 +116,39 @@ def compare(
     print("\n".join([*lines(result), "", f"{kind}: {written}"]))
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Look:
+    """What a picture or movie shows; its fields are options."""
+
+    snapshot: Annotated[int, Parameter(help="number of the snapshot; 0 is the first, -1 the last")] = -1
+    show: Annotated[list[str] | None, Parameter(help=PANELS, negative="")] = None
+    colour: Annotated[str | None, Parameter(help=COLOUR)] = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Instead:
+    """What is made instead of a picture; its fields are options."""
+
+    movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .gif, or .mp4 with cfddem[movie]")] = None
+    history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False
+    collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False
+    waves: Annotated[bool, Parameter(help="solid fraction over height and time instead", negative="")] = False
+    window: Annotated[bool, Parameter(help="interactive window instead of a file", negative="")] = False
+    web: Annotated[bool, Parameter(help="page in the browser instead of a file; stop with Ctrl-C", negative="")] = False
+    port: Annotated[int | None, Parameter(help="port of the page; default: 8080, or any free one")] = None
+
+
+LAST, PICTURE = Look(), Instead()
+
+
 def view(
-    folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
+    folder: Annotated[Path | None, Parameter(help=FOLDER)] = None,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="PNG file; default: NAME.png")] = None,
-    snapshot: Annotated[int, Parameter(help="number of the snapshot; 0 is the first, -1 the last")] = -1,
-    show: Annotated[
-        list[str] | None,
-        Parameter(
-            help="spheres, voidage, bubbles, streamlines, or temperature or vapour of the fluid; may be repeated",
-            negative="",
-        ),
-    ] = None,
-    colour: Annotated[
-        str | None,
-        Parameter(
-            help="what colours the spheres: speed, collisions, moisture, or a recorded field (species, temperature, "
-            "liquid, agglomerate); default: species of a mixture, else speed"
-        ),
-    ] = None,
-    movie: Annotated[Path | None, Parameter(help="movie of all snapshots, .gif, or .mp4 with cfddem[movie]")] = None,
-    history: Annotated[bool, Parameter(help="curves over time instead of a picture", negative="")] = False,
-    collisions: Annotated[bool, Parameter(help="map of recorded collisions instead of a picture", negative="")] = False,
-    waves: Annotated[bool, Parameter(help="solid fraction over height and time instead", negative="")] = False,
-    window: Annotated[bool, Parameter(help="interactive window instead of a file", negative="")] = False,
-    web: Annotated[
-        bool, Parameter(help="page in the browser instead of a file; stop with Ctrl-C", negative="")
-    ] = False,
-    port: Annotated[int | None, Parameter(help="port of the page; default: 8080, or any free one")] = None,
+    look: Look = LAST,
+    instead: Instead = PICTURE,
     json: Annotated[bool, Parameter(help=FILES, negative="")] = False,
 ) -> None:
     """Make a picture or movie of a run, or curves over time; or look at it in a window or in the browser.
@@ -152,26 +164,26 @@ def view(
     from cfddem.plotting.colours import usual
     from cfddem.plotting.scene import window as on_screen
 
-    folder, panels = folder or newest_run(Path()), show or ()
+    folder, panels, colour = folder or newest_run(Path()), look.show or (), look.colour
     require_folder(output)
-    require_folder(movie)
-    if web:
+    require_folder(instead.movie)
+    if instead.web:
         from cfddem.plotting.browser import browse
 
-        browse(folder, colour or usual(open_run(folder)), port)
-    elif window:
+        browse(folder, colour or usual(open_run(folder)), instead.port)
+    elif instead.window:
         on_screen(folder, colour or usual(open_run(folder)))
     else:
-        if movie is not None:
-            written = pictures.movie(folder, movie, show=panels, colour=colour)
-        elif collisions:
+        if instead.movie is not None:
+            written = pictures.movie(folder, instead.movie, show=panels, colour=colour)
+        elif instead.collisions:
             written = plots.collisions(folder, output)
-        elif waves:
+        elif instead.waves:
             written = study_figures.wave_map(folder, output)
-        elif history:
+        elif instead.history:
             written = plots.history(folder, output)
         else:
-            written = pictures.picture(folder, output, snapshot=snapshot, show=panels, colour=colour)
+            written = pictures.picture(folder, output, snapshot=look.snapshot, show=panels, colour=colour)
         if json:
             print_json("written", {"files": [written]})
         else:
@@ -179,7 +191,7 @@ def view(
 
 
 def export(
-    folder: Annotated[Path | None, Parameter(help="run folder; default: the newest one here")] = None,
+    folder: Annotated[Path | None, Parameter(help=FOLDER)] = None,
     *,
     to: Annotated[str, Parameter(help="format: vtu, csv or netcdf")] = "vtu",
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-FORMAT")] = None,

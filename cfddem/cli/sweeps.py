@@ -24,22 +24,41 @@ if TYPE_CHECKING:
 SENSITIVITY = "how much each key matters: sobol (shares of variance) or morris (effects over the ranges; fewer runs)"
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Values:
+    """The values of a sweep; its fields are options."""
+
+    over: Annotated[
+        list[str] | None, Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")
+    ] = None
+    vary: Annotated[
+        list[str] | None, Parameter(help="KEY=LOW..HIGH; may be repeated; the ranges are sampled", negative="")
+    ] = None
+    sample: Annotated[str, Parameter(help="how ranges are sampled: latin (hypercube) or sobol")] = "latin"
+    runs: Annotated[int, Parameter(help="number of samples, or of rows of a sensitivity")] = 16
+    sensitivity: Annotated[str | None, Parameter(help=SENSITIVITY)] = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Workers:
+    """Who makes the runs of a sweep; its fields are options."""
+
+    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1
+    scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None
+    write_jobs: Annotated[bool, Parameter(help="write commands and a Slurm script, run nothing", negative="")] = False
+
+
+NO_VALUES, HERE = Values(), Workers()
+
+
 def sweep(
     case: Annotated[Path | None, Parameter(help=CASE)] = None,
     *,
-    over: Annotated[
-        list[str] | None, Parameter(help="KEY=1,2,3 or KEY=1..5; repeat for all combinations", negative="")
-    ] = None,
-    vary: Annotated[
-        list[str] | None, Parameter(help="KEY=LOW..HIGH; may be repeated; the ranges are sampled", negative="")
-    ] = None,
-    sample: Annotated[str, Parameter(help="how ranges are sampled: latin (hypercube) or sobol")] = "latin",
-    runs: Annotated[int, Parameter(help="number of samples, or of rows of a sensitivity")] = 16,
-    sensitivity: Annotated[str | None, Parameter(help=SENSITIVITY)] = None,
+    values: Values = NO_VALUES,
     set: Annotated[list[str] | None, Parameter(help=SET, negative="")] = None,
-    jobs: Annotated[int, Parameter(name=["--jobs", "-j"], help="number of runs at a time")] = 1,
-    scheduler: Annotated[str | None, Parameter(help="address of a dask scheduler, whose workers make the runs")] = None,
-    write_jobs: Annotated[bool, Parameter(help="write commands and a Slurm script, run nothing", negative="")] = False,
+    workers: Workers = HERE,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help="folder; default: NAME-sweep")] = None,
     json: Annotated[bool, Parameter(help=JSON, negative="")] = False,
 ) -> None:
@@ -60,14 +79,15 @@ def sweep(
     from cfddem.studies.sweep import Outcome, failures
     from cfddem.studies.sweep import sweep as run_all
 
-    path = find_case(case)
-    asked = None if sensitivity is None else of_keys.asked(sensitivity, over or [], vary or [], runs)
-    values = chosen_values(over or [], vary or [], sample, runs) if asked is None else asked.runs
+    path, over, vary = find_case(case), values.over or [], values.vary or []
+    kind = values.sensitivity
+    asked = None if kind is None else of_keys.asked(kind, over, vary, values.runs)
+    chosen = chosen_values(over, vary, values.sample, values.runs) if asked is None else asked.runs
     folder = output or Path(f"{path.stem}-sweep")
-    if write_jobs:
+    if workers.write_jobs:
         from cfddem.studies.sweep import write_jobs as write
 
-        lines, script, count = write(path, values, folder, overrides(set or []))
+        lines, script, count = write(path, chosen, folder, overrides(set or []))
         if json:
             print_json("written", {"files": [lines, script]})
         else:
@@ -81,11 +101,12 @@ def sweep(
         status = "already finished" if outcome.kept else f"{outcome.status} in {outcome.seconds:.0f} s"
         print(f"{done:>4}  {outcome.name[:60]:<60}  {status}", file=sys.stderr if json else sys.stdout, flush=True)
 
-    if jobs == 1 and scheduler is None and not json:
+    if workers.jobs == 1 and workers.scheduler is None and not json:
         announce_compilation()
     outcomes = run_all(
-        path, values, folder, overrides=overrides(set or []), jobs=jobs, scheduler=scheduler, progress=progress
-    )
+        path, chosen, folder, overrides=overrides(set or []), jobs=workers.jobs, scheduler=workers.scheduler,
+        progress=progress,
+    )  # fmt: skip
     failed = list(failures(outcomes))
     for line in failed:
         print(f"cfddem: {line}", file=sys.stderr)

@@ -93,10 +93,7 @@ def bench(
     bed = wet_bed if bridges else gas_bed
 
     targets = {
-        "dem": (
-            lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"),
-            dense_bed.rows,
-        ),
+        "dem": (lambda: dense_bed.bench(particles, threads, film, bridges, full=films == "full"), dense_bed.rows),
         "fluid": (lambda: fluid_box.bench(threads), fluid_box.rows),
         "bed": (lambda: bed.bench(threads), bed.rows),
         "scaling": (lambda: scaling.bench(threads), scaling.rows),

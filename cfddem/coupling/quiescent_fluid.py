@@ -83,10 +83,9 @@ class QuiescentFluid:
     density     of the fluid [kg/m3]
     viscosity   of the fluid [Pa s]
     drag        drag law; None for no drag
-    added_mass  whether particles have an added mass, 1/2 far from the wall
+    added_mass  whether particles have an added mass, 1/2 far from walls; or a plane at rest that raises it, for motion
+                towards it and away from it alone: motion along the wall, whose added mass grows less, gets the same
     history     "mei_adrian", "basset" or "none"
-    wall        plane at rest that raises the added mass, for motion towards it and away from it alone: motion along
-                the wall, whose added mass grows less, gets the same; None for none
     wall_drag   extra drag beside walls; None for none
     gravity     (3,) [m/s2]
 
@@ -101,9 +100,8 @@ class QuiescentFluid:
         viscosity: float,
         drag: Law | None,
         *,
-        added_mass: bool = True,
+        added_mass: bool | Plane = True,
         history: Literal["none", "mei_adrian", "basset"] = "mei_adrian",
-        wall: Plane | None = None,
         wall_drag: WallDrag | None = None,
         gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
@@ -117,7 +115,7 @@ class QuiescentFluid:
         self.solver, self.density, self.viscosity = solver, density, viscosity
         forces: list[FluidForce] = [Weight(density, np.array(gravity))]
         if added_mass:
-            forces.append(AddedMassBesideWall(density, *filter(None, [wall])))
+            forces.append(AddedMassBesideWall(density, *([added_mass] if isinstance(added_mass, Plane) else [])))
         if drag:
             forces.append(Drag(drag, "A"))
         forces += filter(None, [wall_drag])

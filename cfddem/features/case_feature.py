@@ -8,27 +8,32 @@ from typing import Any, ClassVar, NamedTuple
 from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.fluid.fields import CellField
-from cfddem.io.quantities import Quantity, of_function
+from cfddem.io.quantities import Quantity
 from cfddem.model.feature import Equipment
 
 
 class Measured(NamedTuple):
-    """A column of the history: a number for the present state of a simulation."""
+    """A column of the history: a number for the present state of a feature."""
 
+    name: str
     unit: str  # SI, `1` for a plain number
     group: str  # how the report shows it: "measure", "imbalance" or "recorded"
-    function: Callable[[Any], float]  # of a simulation; its name is that of the column
+    meaning: str
+    value: Callable[[Any, Any], float]  # of the feature and the simulation
+    when: Callable[[Any], bool] = lambda case: True  # whether the history of a case has it
 
 
 class CaseFeature(Equipment):
     """Equipment that a case can have.
 
     table       of the case that turns it on
+    measures    columns of the history that it can give
     case        that has it
     simulation  of the case; particles and solvers are ready, and in their state at the start
     """
 
     table: ClassVar[str] = ""
+    measures: ClassVar[tuple[Measured, ...]] = ()
 
     def __init__(self, case: Case, simulation: Any) -> None:
         """Prepare what acts in every step."""
@@ -49,17 +54,11 @@ class CaseFeature(Equipment):
         return ()
 
     @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """What it measures in a case."""
-        return ()
-
-    @classmethod
     def columns(cls, case: Case) -> Mapping[str, Quantity]:
         """Columns of the history that it gives, by name."""
-        return {
-            each.function.__name__: of_function(each.function, each.unit, each.group) for each in cls.measures(case)
-        }
+        return {each.name: Quantity(each.unit, each.meaning, each.group) for each in cls.measures if each.when(case)}
 
     def values(self, simulation: Any) -> Mapping[str, float]:
         """Numbers for its columns."""
-        return {each.function.__name__: float(each.function(simulation)) for each in self.measures(simulation.case)}
+        shown = (each for each in self.measures if each.when(simulation.case))
+        return {each.name: float(each.value(self, simulation)) for each in shown}

@@ -18,6 +18,7 @@ from cfddem.case.schema import Case
 from cfddem.data.fields import Field
 from cfddem.features.case_feature import CaseFeature, Measured
 from cfddem.features.contact_heat_keys import ADIABATIC, ContactHeat, wall_names
+from cfddem.features.heat import mean_temperature
 from cfddem.features.heat_keys import Heat
 from cfddem.features.heat_network import (
     LENS,
@@ -36,7 +37,7 @@ from cfddem.particles.pair_graph import shifts
 from cfddem.particles.particle_feature import Engine, ParticleFeature
 from cfddem.particles.state import Particles
 from cfddem.particles.walls.nearest_point import NORMAL
-from closures.heat_radiation import local_surroundings, radiation_coefficient
+from closures.contact_heat import local_surroundings, radiation_coefficient
 
 
 class HeatExchangeOfContacts(CaseFeature):
@@ -48,7 +49,19 @@ class HeatExchangeOfContacts(CaseFeature):
     scale       heat that particles gained and lost so far, without sign [J]
     """
 
-    name, table = "contact heat", "contact_heat"
+    name, table, kept = "contact heat", "contact_heat", ("from_walls", "radiated", "gained", "scale")
+    measures = (
+        Measured("mean_temperature", "K", "measure", "mean temperature of the particles, by heat capacity",
+                 mean_temperature, lambda case: not Heat.of(case)),
+        Measured("contact_heat_from_walls", "J", "recorded", "heat that the walls have given to the particles",
+                 lambda heat, _: heat.from_walls),
+        Measured("contact_heat_radiated", "J", "recorded",
+                 "heat that the particles have received from the surroundings by radiation",
+                 lambda heat, _: heat.radiated),
+        Measured("contact_heat_imbalance", "1", "imbalance",
+                 "change of the heat in the particles that walls and surroundings did not give, over the heat "
+                 "exchanged", lambda heat, _: heat.imbalance),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = ContactHeat.of(case)
@@ -93,16 +106,10 @@ class HeatExchangeOfContacts(CaseFeature):
 
         return Field("temperature", "K", initial=start, snapshot=True, meaning="temperature"), UNKNOWN
 
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """Temperatures and heat."""
-        own = () if Heat.of(case) else (Measured("K", "measure", mean_temperature),)
-        return (
-            *own,
-            Measured("J", "recorded", contact_heat_from_walls),
-            Measured("J", "recorded", contact_heat_radiated),
-            Measured("1", "imbalance", contact_heat_imbalance),
-        )
+    @property
+    def imbalance(self) -> float:
+        """Change of the heat in the particles that walls and surroundings did not give, over the heat exchanged [-]."""
+        return abs(self.gained - self.from_walls - self.radiated) / self.scale if self.scale > 0.0 else 0.0
 
     def capacity(self, particles: Any) -> np.ndarray:
         """Heat capacity of every particle (N,) [J/K]."""
@@ -241,23 +248,11 @@ class HeatExchangeOfContacts(CaseFeature):
         mean = np.bincount(every, values, cells) / np.maximum(np.bincount(every, minlength=cells), 1)
         return np.asarray(local_surroundings(voidage[row], seen, mean[row]))  # type: ignore[arg-type]
 
-    def checkpoint(self) -> dict[str, Any]:
-        """The balance."""
-        return {name: getattr(self, name) for name in _KEPT}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()`."""
-        for name in _KEPT:
-            setattr(self, name, float(state[name]))
-
 
 def _capacities(case: Case, keys: ContactHeat) -> np.ndarray:
     """Specific heat capacity by number of material [J/kg/K]."""
     heat = Heat.of(case)
     return heat.capacities(case) if heat else keys.by_material(case, "heat_capacity")
-
-
-_KEPT = ("from_walls", "radiated", "gained", "scale")
 
 
 class HeatReach(ParticleFeature):
@@ -275,30 +270,3 @@ class HeatReach(ParticleFeature):
     def outgrows(self, engine: Engine, reach: float) -> bool:
         """Whether the list is too short, as the first of a run is."""
         return self.reach > reach
-
-
-# ---------------------------------------------------------------- measures
-
-
-def mean_temperature(simulation: Any) -> float:
-    """Mean temperature of the particles, by heat capacity."""
-    particles = simulation.owned
-    capacity = simulation.feature(HeatExchangeOfContacts).capacity(particles)
-    total = simulation.communicator.sum
-    return float(total(capacity * particles.temperature) / max(total(capacity), 1e-300))
-
-
-def contact_heat_from_walls(simulation: Any) -> float:
-    """Heat that the walls have given to the particles."""
-    return float(simulation.feature(HeatExchangeOfContacts).from_walls)
-
-
-def contact_heat_radiated(simulation: Any) -> float:
-    """Heat that the particles have received from the surroundings by radiation."""
-    return float(simulation.feature(HeatExchangeOfContacts).radiated)
-
-
-def contact_heat_imbalance(simulation: Any) -> float:
-    """Change of the heat in the particles that walls and surroundings did not give, over the heat exchanged."""
-    heat = simulation.feature(HeatExchangeOfContacts)
-    return abs(heat.gained - heat.from_walls - heat.radiated) / heat.scale if heat.scale > 0.0 else 0.0

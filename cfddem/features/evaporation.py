@@ -22,22 +22,28 @@ import numpy as np
 from cfddem.backend.law_set import adapted, specialise
 from cfddem.case.schema import Case
 from cfddem.features.case_feature import CaseFeature, Measured
-from cfddem.features.evaporating_bridges import Menisci
-from cfddem.features.evaporating_walls import WallFilms
 from cfddem.features.evaporation_keys import Evaporation
-from cfddem.features.evaporation_loops import FOUND, Air, Surfaces, evaporate, settle
+from cfddem.features.evaporation_loops import FOUND, Air, Surfaces, evaporate, menisci, settle, taken_from
 from cfddem.features.heat import HeatExchange
 from cfddem.features.heat_keys import Heat
 from cfddem.features.liquid import LiquidOnParticles
 from cfddem.features.vapour import Vapour
 from cfddem.particles.energy_of_bridges import DRIED
-from closures.evaporation import vapour_fraction
+from cfddem.particles.interactions.bridge_view import Bridges
+from cfddem.particles.system import BridgeSystem
+from closures.evaporation import latent_heat, saturation_pressure, stefan_drive, vapour_fraction
 from closures.kinds import DRYING_ARGUMENTS
 
 SMALLEST = 1e-6
 """Radius of a drop that has evaporated [m]."""
 
 _NONE, _NOTHING = np.zeros(0, np.int64), np.zeros(0)
+
+
+def dries_walls(case: Case) -> bool:
+    """Whether liquid on walls evaporates."""
+    keys = Evaporation.of(case)
+    return keys is not None and keys.wall_coefficient > 0.0
 
 
 class EvaporationOfLiquid(CaseFeature):
@@ -47,7 +53,17 @@ class EvaporationOfLiquid(CaseFeature):
     heat  latent heat taken so far [J]
     """
 
-    name, table = "evaporation", "evaporation"
+    name, table, kept = "evaporation", "evaporation", ("mass", "heat")
+    measures = (
+        Measured("evaporated_mass", "kg", "recorded", "mass of liquid that has evaporated, less what condensed",
+                 lambda evaporation, _: evaporation.mass),
+        Measured("latent_heat_taken", "J", "recorded",
+                 "latent heat of the liquid that has evaporated, from the particles",
+                 lambda evaporation, _: evaporation.heat),
+        Measured("latent_heat_of_walls", "J", "recorded",
+                 "latent heat of the liquid that has evaporated from walls, from the walls",
+                 lambda evaporation, _: evaporation.walls.heat, dries_walls),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Evaporation.of(case)
@@ -69,13 +85,6 @@ class EvaporationOfLiquid(CaseFeature):
             assert heat
             temperature = keys.wall_temperature or heat.gas_temperature
             self.walls = WallFilms(simulation, keys.wall_coefficient, temperature, keys.liquid_density)
-
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """What evaporated, and the heat that it took."""
-        keys = Evaporation.of(case)
-        of_walls = (Measured("J", "recorded", latent_heat_of_walls),) if keys and keys.wall_coefficient > 0.0 else ()
-        return (Measured("kg", "recorded", evaporated_mass), Measured("J", "recorded", latent_heat_taken), *of_walls)
 
     def before(self, simulation: Any, step: float) -> None:
         """Evaporate over the step [s], after the exchange of heat with the gas."""
@@ -141,27 +150,121 @@ class EvaporationOfLiquid(CaseFeature):
 
     def checkpoint(self) -> dict[str, Any]:
         """What evaporated, and its heat."""
-        kept: dict[str, Any] = {"mass": self.mass, "heat": self.heat}
-        return kept | {"walls": self.walls.checkpoint()} if self.walls else kept
+        return super().checkpoint() | ({"walls": self.walls.checkpoint()} if self.walls else {})
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
-        self.mass, self.heat = float(state["mass"]), float(state["heat"])
+        super().restore(state)
         if self.walls:
             self.walls.restore(state["walls"])
 
 
-def evaporated_mass(simulation: Any) -> float:
-    """Mass of liquid that has evaporated, less what condensed."""
-    return float(simulation.feature(EvaporationOfLiquid).mass)
+# ---------------------------------------------------------------- liquid on walls
+#
+# Liquid on walls that evaporates: by a coefficient of mass transfer and a temperature of the wall, which gives the
+# latent heat. No particle is cooled, and no vapour condenses on walls.
 
 
-def latent_heat_taken(simulation: Any) -> float:
-    """Latent heat of the liquid that has evaporated, from the particles."""
-    return float(simulation.feature(EvaporationOfLiquid).heat)
+class WallFilms:
+    """The liquid on the walls of a simulation: patches, and the film elsewhere, of one thickness.
+
+    film  thickness where no bridge has drawn or returned liquid so far [m]
+    heat  latent heat that the walls have given [J]
+    """
+
+    def __init__(self, simulation: Any, coefficient: float, temperature: float, density: float) -> None:
+        self.solver, self.coefficient, self.temperature = simulation.particle_solver, coefficient, temperature
+        self.density, self.heat, self._known = density, 0.0, int(self.solver.walls.patch_count[0])
+        numbers = self.solver.parameters.bridge
+        self.film = self._start = float(numbers.wall_film)
+        self.area = float(numbers.wall_patch) ** 2
+
+    def lose(self, fraction: float, pressure: float, gas_density: float, step: float) -> float:
+        """Evaporate over the step [s] into air of a mass fraction of vapour; returns the volume that leaves patches,
+        with what new ones had lost before [m3]."""
+        saturated = vapour_fraction(min(saturation_pressure(self.temperature), 0.999 * pressure), pressure)
+        rate = max(self.coefficient * gas_density * stefan_drive(saturated, fraction), 0.0) / self.density  # [m/s]
+        walls, count = self.solver.walls, int(self.solver.walls.patch_count[0])
+        gone = max(count - self._known, 0) * (self._start - self.film) * self.area
+        there = walls.patch_liquid[:count]
+        lost = np.minimum(there, rate * step * self.area)
+        there -= lost
+        gone += float(lost.sum())  # local: every rank has all patches
+        self._known = count
+        self._thin(max(self.film - rate * step, 0.0))
+        self.heat += gone * self.density * latent_heat(self.temperature)
+        return gone
+
+    def _thin(self, film: float) -> None:
+        """Let the film where there are no patches have a thickness [m]."""
+        self.film, solver = film, self.solver
+        solver.parameters = solver.parameters._replace(bridge=solver.parameters.bridge._replace(wall_film=film))
+        solver.system = solver.system._replace(parameters=solver.parameters)
+
+    def checkpoint(self) -> dict[str, float]:
+        """The film, the patches that are known, and the heat."""
+        return {"film": self.film, "known": self._known, "heat": self.heat}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from a `checkpoint()`."""
+        self._known, self.heat = int(state["known"]), float(state["heat"])
+        self._thin(float(state["film"]))
 
 
-def latent_heat_of_walls(simulation: Any) -> float:
-    """Latent heat of the liquid that has evaporated from walls, from the walls."""
-    walls = simulation.feature(EvaporationOfLiquid).walls
-    return float(walls.heat)
+# ---------------------------------------------------------------- bridges
+#
+# Bridges that evaporate: each of its particles takes a half of the meniscus, and gives the latent heat of its half.
+#
+# A bridge at a wall is all of its particle. What a bridge loses is found by the owners of its particles, so that ranks
+# agree on every bit.
+
+
+class Menisci:
+    """The bridges of a simulation at the beginning of a step.
+
+    area  of the menisci of every particle (N,) [m2]
+    mass  of the liquid in its parts of bridges (N,) [kg]
+    """
+
+    def __init__(self, simulation: Any, density: float) -> None:
+        solver, self.density = simulation.particle_solver, density
+        self.solver, self.count = solver, solver.particles.owned
+        self.rows = np.flatnonzero(solver.edges.bridge_film > 0.0)
+        # two parts of every bridge, the first of all bridges, then the second; that at a wall has one
+        parts = 2 * len(self.rows)
+        self.body, self.parts, self.masses = np.empty(parts, np.int64), np.empty(parts), np.empty(parts)
+        self.area, self.mass = np.zeros(self.count), np.zeros(self.count)
+        if parts:
+            system = BridgeSystem.of(solver.system)
+            menisci(self.rows, density, system, self.body, self.parts, self.masses, self.area, self.mass)
+
+    def lose(self, lost: np.ndarray) -> float:
+        """Take from the bridges what every particle loses from its parts of them (N,) [kg]; returns the energy of the
+        pulls that is gone [J].
+
+        Bridges lose by their areas. What one has not, the others of the particle give.
+        """
+        if not len(self.rows) and self.solver.communicator.size == 1:
+            return 0.0
+        taken = np.zeros(len(self.body))
+        taken_from(self.body, self.parts, self.masses, self.area, lost, taken)
+        halves = self._of_all_owners(taken.reshape(2, -1).T)
+        bridges: Bridges = self.solver.feature(Bridges)
+        return bridges.dry(self.rows, (halves[:, 0] + halves[:, 1]) / self.density)
+
+    def _of_all_owners(self, halves: np.ndarray) -> np.ndarray:
+        """Both parts of every bridge (n, 2) [kg], also where a particle of another rank has one."""
+        communicator, edges = self.solver.communicator, self.solver.edges
+        if communicator.size == 1:
+            return halves
+        names = edges.ends(self.solver.particles.id, self.rows).reshape(-1, 2)
+        shared = (self.body.reshape(2, -1) >= self.count).any(axis=0) & (names[:, 1] >= 0)
+        sent = communicator.joined(np.column_stack([names[shared].astype(float), halves[shared]]).reshape(-1, 4))
+        _, place = np.unique(sent[:, :2], axis=0, return_inverse=True)
+        sums = np.zeros((len(sent), 2))
+        np.add.at(sums, place.ravel(), sent[:, 2:])  # one of two parts is zero
+        known = {(one, other): sums[row] for (one, other), row in zip(sent[:, :2].tolist(), place.ravel().tolist())}
+        halves = halves.copy()
+        for row in np.flatnonzero(shared):
+            halves[row] = known[tuple(names[row].astype(float).tolist())]
+        return halves

@@ -39,6 +39,31 @@ class Feeds(CaseFeature):
     """Feeds and outlets of a case. A particle that enters replaces fluid of its own volume, or leaves room for it."""
 
     name = "feeds and outlets"
+    measures = (
+        Measured("fed_count", "1", "recorded", "number of particles that feeds have inserted so far",
+                 lambda feeds, _: feeds.fed, lambda case: case.feed),
+        Measured("waiting_count", "1", "recorded",
+                 "number of particles that are due, and wait for a free place in the box of a feed",
+                 lambda feeds, _: feeds.waiting, lambda case: case.feed),
+        Measured("removed_count", "1", "recorded", "number of particles that outlets have removed so far",
+                 lambda feeds, _: feeds.removed[0], lambda case: case.outlet),
+        Measured("removed_mass", "kg", "recorded", "mass of the particles that outlets have removed so far",
+                 lambda feeds, _: feeds.removed[1], lambda case: case.outlet),
+        Measured("residence_time", "s", "recorded",
+                 "mean residence time of the particles that outlets have removed so far; with feeds, of fed ones",
+                 lambda feeds, _: feeds.of_residence_times(np.mean), lambda case: case.outlet),
+        Measured("residence_time_deviation", "s", "recorded", "standard deviation of these residence times",
+                 lambda feeds, _: feeds.of_residence_times(np.std), lambda case: case.outlet),
+        Measured("residence_time_10", "s", "recorded",
+                 "residence time that a tenth of these particles have not reached",
+                 lambda feeds, _: feeds.of_residence_times(np.quantile, 0.1), lambda case: case.outlet),
+        Measured("residence_time_50", "s", "recorded",
+                 "residence time that half of these particles have not reached",
+                 lambda feeds, _: feeds.of_residence_times(np.quantile, 0.5), lambda case: case.outlet),
+        Measured("residence_time_90", "s", "recorded",
+                 "residence time that nine tenths of these particles have not reached",
+                 lambda feeds, _: feeds.of_residence_times(np.quantile, 0.9), lambda case: case.outlet),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.feeds = [_feed(case, each, number) for number, each in enumerate(case.feed)]
@@ -56,18 +81,6 @@ class Feeds(CaseFeature):
         """What the particles of a case with feeds or outlets remember."""
         entered = ENTERED if case.feed else replace(ENTERED, initial=0.0)
         return ((LANDED,) if case.feed else ()) + ((entered,) if case.outlet else ())
-
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """Numbers of particles that have entered and left."""
-        of_feeds = Measured("1", "recorded", fed_count), Measured("1", "recorded", waiting_count)
-        of_times = (residence_time, residence_time_deviation, residence_time_10, residence_time_50, residence_time_90)
-        of_outlets = (
-            Measured("1", "recorded", removed_count),
-            Measured("kg", "recorded", removed_mass),
-            *(Measured("s", "recorded", each) for each in of_times),
-        )
-        return (of_feeds if case.feed else ()) + (of_outlets if case.outlet else ())
 
     def after(self, simulation: Any) -> None:
         """Insert the particles that are due, and remove those that have left."""
@@ -107,6 +120,11 @@ class Feeds(CaseFeature):
         """How long each particle that has left was there, where this is known (n,) [s]."""
         return np.concatenate([np.zeros(0), *(each.times for each in self.outlets)])
 
+    def of_residence_times(self, number: Callable[..., Any], *more: float) -> float:
+        """A number of the residence times, as a function of NumPy finds it; NaN before any is known [s]."""
+        times = self.residence_times
+        return float(number(times, *more)) if len(times) else math.nan  # local: every rank has all times
+
     @property
     def removed(self) -> tuple[int, float]:
         """Number and mass of the particles that have left [-], [kg]."""
@@ -125,58 +143,6 @@ class Feeds(CaseFeature):
         """All feeds and outlets by name."""
         yield from ((f"feed_{number}", each) for number, each in enumerate(self.feeds))
         yield from ((f"outlet_{number}", each) for number, each in enumerate(self.outlets))
-
-
-def fed_count(simulation: Any) -> float:
-    """Number of particles that feeds have inserted so far."""
-    return simulation.feature(Feeds).fed
-
-
-def waiting_count(simulation: Any) -> float:
-    """Number of particles that are due, and wait for a free place in the box of a feed."""
-    return simulation.feature(Feeds).waiting
-
-
-def removed_count(simulation: Any) -> float:
-    """Number of particles that outlets have removed so far."""
-    return simulation.feature(Feeds).removed[0]
-
-
-def removed_mass(simulation: Any) -> float:
-    """Mass of the particles that outlets have removed so far."""
-    return simulation.feature(Feeds).removed[1]
-
-
-def residence_time(simulation: Any) -> float:
-    """Mean residence time of the particles that outlets have removed so far; with feeds, of fed ones."""
-    times = simulation.feature(Feeds).residence_times
-    return float(times.mean()) if len(times) else math.nan  # local: every rank has all times
-
-
-def residence_time_deviation(simulation: Any) -> float:
-    """Standard deviation of these residence times."""
-    times = simulation.feature(Feeds).residence_times
-    return float(times.std()) if len(times) else math.nan  # local: every rank has all times
-
-
-def residence_time_10(simulation: Any) -> float:
-    """Residence time that a tenth of these particles have not reached."""
-    return _quantile(simulation, 0.1)
-
-
-def residence_time_50(simulation: Any) -> float:
-    """Residence time that half of these particles have not reached."""
-    return _quantile(simulation, 0.5)
-
-
-def residence_time_90(simulation: Any) -> float:
-    """Residence time that nine tenths of these particles have not reached."""
-    return _quantile(simulation, 0.9)
-
-
-def _quantile(simulation: Any, share: float) -> float:
-    times = simulation.feature(Feeds).residence_times
-    return float(np.quantile(times, share)) if len(times) else math.nan
 
 
 def _feed(case: Case, given: CaseFeed, number: int) -> Feed:

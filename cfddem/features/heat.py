@@ -40,6 +40,28 @@ RECEIVED = ("heat_from_fluid", "J")
 OF_FLUID = CellField("temperature", "K", "temperature of the fluid")
 
 
+def mean_temperature(feature: Any, simulation: Any) -> float:
+    """Mean temperature of the particles, by their heat capacity [K].
+
+    feature  that has the method `capacity`
+    """
+    particles, total = simulation.owned, simulation.communicator.sum
+    capacity = feature.capacity(particles)
+    return float(total(capacity * particles.temperature)) / max(float(total(capacity)), 1e-300)
+
+
+def in_cells(case: Case) -> bool:
+    """Whether the fluid of a case with `[heat]` has a temperature in every cell."""
+    keys = Heat.of(case)
+    return keys is not None and keys.in_cells(case)
+
+
+def is_warmed(case: Case) -> bool:
+    """Whether drops of a spray have a temperature."""
+    keys = Heat.of(case)
+    return keys is not None and bool(keys.spray_temperature)
+
+
 class HeatExchange(CaseFeature):
     """Temperature of the particles and of the fluid, and the heat between them.
 
@@ -57,6 +79,35 @@ class HeatExchange(CaseFeature):
     """
 
     name, table = "heat", "heat"
+    kept = ("fluid_temperature", "given", "scale", "start", "other", "last", "sprayed")
+    measures = (
+        Measured("mean_temperature", "K", "measure", "mean temperature of the particles, by heat capacity",
+                 mean_temperature),
+        Measured("fluid_temperature", "K", "recorded", "mean temperature of the fluid",
+                 lambda heat, _: heat.cells.mean if heat.cells else heat.fluid_temperature),
+        Measured("heat_received", "J", "recorded", "heat that the particles have received from the fluid",
+                 lambda heat, _: heat.given),
+        Measured("outlet_temperature", "K", "measure", "mean temperature of the fluid that leaves",
+                 lambda heat, _: heat.cells.leaving, lambda case: in_cells(case) and case.column.ends == "flow"),
+        Measured("heat_in", "J", "recorded", "heat that the fluid has brought in, above its temperature at the start",
+                 lambda heat, _: heat.cells.sums["inflow"], in_cells),
+        Measured("heat_out", "J", "recorded",
+                 "heat that the fluid has carried out, above its temperature at the start",
+                 lambda heat, _: heat.cells.sums["outflow"], in_cells),
+        Measured("heat_from_walls", "J", "recorded", "heat that the fluid has received from walls",
+                 lambda heat, _: heat.cells.sums["walls"], in_cells),
+        Measured("heat_stored", "J", "recorded", "change of the heat in fluid and particles since the start",
+                 lambda heat, simulation: heat.cells.content + heat.stored(simulation.owned) - heat.start, in_cells),
+        Measured("heat_from_spray", "J", "recorded",
+                 "heat that drops of the spray have brought to the particles, negative where they are colder",
+                 lambda heat, _: heat.sprayed, is_warmed),
+        Measured("heat_imbalance", "1", "imbalance",
+                 "change of heat in the particles that the fluid did not give, or in the fluid that nothing gave, over "
+                 "that exchanged", lambda heat, _: heat.imbalance),
+        Measured("heat_out_of_range_count", "1", "recorded",
+                 "how often the law of heat transfer was evaluated outside of its range so far",
+                 lambda heat, _: heat.communicator.sum([heat.law.outside])),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys = Heat.of(case)
@@ -95,29 +146,19 @@ class HeatExchange(CaseFeature):
     @classmethod
     def cell_fields_of(cls, case: Case) -> tuple[CellField, ...]:
         """The temperature of the fluid."""
-        keys = Heat.of(case)
-        return (OF_FLUID,) if keys is not None and keys.in_cells(case) else ()
+        return (OF_FLUID,) if in_cells(case) else ()
 
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """Temperatures and heat."""
-        keys = Heat.of(case)
-        of_cells = (
-            *([Measured("K", "measure", outlet_temperature)] if case.column.ends == "flow" else []),
-            Measured("J", "recorded", heat_in),
-            Measured("J", "recorded", heat_out),
-            Measured("J", "recorded", heat_from_walls),
-            Measured("J", "recorded", heat_stored),
-        )
-        return (
-            Measured("K", "measure", mean_temperature),
-            Measured("K", "recorded", fluid_temperature),
-            Measured("J", "recorded", heat_received),
-            *(of_cells if keys is not None and keys.in_cells(case) else ()),
-            *([Measured("J", "recorded", heat_from_spray)] if keys and keys.spray_temperature else []),
-            Measured("1", "imbalance", heat_imbalance),
-            Measured("1", "recorded", heat_out_of_range_count),
-        )
+    @property
+    def imbalance(self) -> float:
+        """Change of heat in the particles that the fluid did not give, or in the fluid that nothing gave, over that
+        exchanged [-]."""
+        wrong, scale = abs(self.last - self.start - self.other - self.given), self.scale
+        if self.cells is not None:
+            sums = self.cells.sums
+            brought = sums["inflow"] - sums["outflow"] + sums["walls"] + sums["displaced"] - self.given
+            wrong = max(wrong, abs(self.cells.content - brought))
+            scale += abs(sums["inflow"]) + abs(sums["walls"])
+        return wrong / scale if scale > 0.0 else 0.0
 
     def capacity(self, particles: Any) -> np.ndarray:
         """Heat capacity of every particle (N,) [J/K]."""
@@ -207,89 +248,12 @@ class HeatExchange(CaseFeature):
 
     def checkpoint(self) -> dict[str, Any]:
         """The temperature of the fluid and the balance."""
-        kept = {name: getattr(self, name) for name in _KEPT} | {"outside": self.communicator.sum([self.law.outside])}
-        return kept if self.cells is None else kept | {"cells": self.cells.checkpoint()}
+        found = super().checkpoint() | {"outside": self.communicator.sum([self.law.outside])}
+        return found if self.cells is None else found | {"cells": self.cells.checkpoint()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
-        for name in _KEPT:
-            setattr(self, name, float(state[name]))
+        super().restore(state)
         self.law.outside = int(state["outside"]) if self.communicator.rank == 0 else 0
         if self.cells is not None:
             self.cells.restore(state["cells"])
-
-
-_KEPT = ("fluid_temperature", "given", "scale", "start", "other", "last", "sprayed")
-
-
-def _cells(simulation: Any) -> Scalar:
-    cells = simulation.feature(HeatExchange).cells
-    assert cells is not None
-    return cells
-
-
-def mean_temperature(simulation: Any) -> float:
-    """Mean temperature of the particles, by heat capacity."""
-    heat, particles, total = simulation.feature(HeatExchange), simulation.owned, simulation.communicator.sum
-    capacity = heat.capacity(particles)
-    return float(total(capacity * particles.temperature)) / max(float(total(capacity)), 1e-300)
-
-
-def fluid_temperature(simulation: Any) -> float:
-    """Mean temperature of the fluid."""
-    heat = simulation.feature(HeatExchange)
-    return float(heat.cells.mean if heat.cells else heat.fluid_temperature)
-
-
-def outlet_temperature(simulation: Any) -> float:
-    """Mean temperature of the fluid that leaves."""
-    return float(_cells(simulation).leaving)
-
-
-def heat_received(simulation: Any) -> float:
-    """Heat that the particles have received from the fluid."""
-    return float(simulation.feature(HeatExchange).given)
-
-
-def heat_in(simulation: Any) -> float:
-    """Heat that the fluid has brought in, above its temperature at the start."""
-    return _cells(simulation).sums["inflow"]
-
-
-def heat_out(simulation: Any) -> float:
-    """Heat that the fluid has carried out, above its temperature at the start."""
-    return _cells(simulation).sums["outflow"]
-
-
-def heat_from_walls(simulation: Any) -> float:
-    """Heat that the fluid has received from walls."""
-    return _cells(simulation).sums["walls"]
-
-
-def heat_from_spray(simulation: Any) -> float:
-    """Heat that drops of the spray have brought to the particles, negative where they are colder."""
-    return float(simulation.feature(HeatExchange).sprayed)
-
-
-def heat_stored(simulation: Any) -> float:
-    """Change of the heat in fluid and particles since the start."""
-    heat = simulation.feature(HeatExchange)
-    return float(_cells(simulation).content + heat.stored(simulation.owned) - heat.start)
-
-
-def heat_imbalance(simulation: Any) -> float:
-    """Change of heat in the particles that the fluid did not give, or in the fluid that nothing gave, over that
-    exchanged."""
-    heat = simulation.feature(HeatExchange)
-    wrong, scale = abs(heat.last - heat.start - heat.other - heat.given), heat.scale
-    if heat.cells is not None:
-        sums = heat.cells.sums
-        brought = sums["inflow"] - sums["outflow"] + sums["walls"] + sums["displaced"] - heat.given
-        wrong, scale = max(wrong, abs(heat.cells.content - brought)), scale + abs(sums["inflow"]) + abs(sums["walls"])
-    return wrong / scale if scale > 0.0 else 0.0
-
-
-def heat_out_of_range_count(simulation: Any) -> float:
-    """How often the law of heat transfer was evaluated outside of its range so far."""
-    heat = simulation.feature(HeatExchange)
-    return float(heat.communicator.sum([heat.law.outside]))

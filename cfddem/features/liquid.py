@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,19 +35,13 @@ class LiquidOnParticles(CaseFeature):
     evaporated  liquid that has left as vapour since the start [m3]
     """
 
-    name, table = "liquid", "liquid"
+    name, table, kept = "liquid", "liquid", ("start", "brought", "evaporated")
     fields = SNAPSHOT_FIELDS
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.particle_solver, self.brought, self.evaporated = simulation.particle_solver, 0.0, 0.0
         self.bridges: Bridges = self.particle_solver.feature(Bridges)
         self.start = self.total
-
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """Where the liquid is, and what it joins."""
-        bonds = (Measured("1", "measure", bond_count), Measured("1", "recorded", bonds_formed))
-        return (*MEASURES, *(bonds if case.liquid and case.liquid.bond else ()))
 
     def before_snapshot(self, simulation: Any) -> None:
         """Find the liquid that each particle carries, and its agglomerate."""
@@ -78,15 +73,6 @@ class LiquidOnParticles(CaseFeature):
         """Change of the total that nothing brought or took away, over all liquid there was [-]."""
         came = self.start + self.brought + self.bridges.fed
         return abs(self.total + self.evaporated - came) / max(came, -self.gained_by_walls, self.on_particles, 1e-300)
-
-    def checkpoint(self) -> dict[str, Any]:
-        """The liquid at the start, and what has come and gone since."""
-        return {"start": self.start, "brought": self.brought, "evaporated": self.evaporated}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()`."""
-        self.start, self.brought = float(state["start"]), float(state["brought"])
-        self.evaporated = float(state.get("evaporated", 0.0))
 
 
 # ---------------------------------------------------------------- of all ranks
@@ -143,105 +129,30 @@ def _fill_snapshot_fields(solver: ParticleSolver) -> None:
 # ---------------------------------------------------------------- measures
 
 
-def liquid_on_particles(simulation: Any) -> float:
-    """Volume of liquid in the films of the particles."""
-    return _budget(simulation).on_particles
-
-
-def liquid_in_bridges(simulation: Any) -> float:
-    """Volume of liquid in bridges."""
-    return _budget(simulation).in_bridges
-
-
-def liquid_gained_by_walls(simulation: Any) -> float:
-    """Volume of liquid on the walls less that at the start."""
-    return _budget(simulation).gained_by_walls
-
-
-def liquid_imbalance(simulation: Any) -> float:
-    """Change of all liquid that the spray did not bring, over all liquid."""
-    return _budget(simulation).imbalance
-
-
-def bridge_liquid_share(simulation: Any) -> float:
-    """Share of the liquid that is in bridges."""
-    budget = _budget(simulation)
-    return budget.in_bridges / budget.total if budget.total > 0.0 else math.nan
-
-
-def wet_share(simulation: Any) -> float:
-    """Share of the particles that carry liquid, on themselves or in a bridge."""
+def _wet_share(_: Any, simulation: Any) -> float:
     return SERIAL.count(_carried(simulation.particle_solver) > 0.0) / max(len(simulation.whole("id")), 1)
 
 
-def coating_variation(simulation: Any) -> float:
-    """Standard deviation of the liquid on a particle over its mean, with its part of the liquid of its bridges."""
+def _variation(_: Any, simulation: Any) -> float:
     carried = _carried(simulation.particle_solver)
     mean = carried.mean()  # local: of all ranks
     return float(carried.std() / mean) if mean > 0.0 else math.nan  # local: of all ranks
 
 
-def coating_at_10_percent(simulation: Any) -> float:
-    """Liquid on a particle over the mean, below which 10 % of the particles lie."""
-    return _coating_quantile(simulation, 0.1)
+def _coating(share: float) -> Callable[[Any, Any], float]:
+    """Measure of the liquid on a particle over the mean, below which a share of the particles lies."""
+
+    def quantile(_: Any, simulation: Any) -> float:
+        carried = _carried(simulation.particle_solver)
+        mean = carried.mean()  # local: of all ranks
+        return float(np.quantile(carried, share) / mean) if mean > 0.0 else math.nan  # local: of all ranks
+
+    return quantile
 
 
-def coating_at_50_percent(simulation: Any) -> float:
-    """Median of the liquid on a particle over the mean."""
-    return _coating_quantile(simulation, 0.5)
-
-
-def coating_at_90_percent(simulation: Any) -> float:
-    """Liquid on a particle over the mean, below which 90 % of the particles lie."""
-    return _coating_quantile(simulation, 0.9)
-
-
-def _coating_quantile(simulation: Any, share: float) -> float:
-    carried = _carried(simulation.particle_solver)
-    mean = carried.mean()  # local: of all ranks
-    return float(np.quantile(carried, share) / mean) if mean > 0.0 else math.nan  # local: of all ranks
-
-
-def bridge_count(simulation: Any) -> float:
-    """Number of liquid bridges."""
-    return float(_budget(simulation).bridges.count)
-
-
-def bond_count(simulation: Any) -> float:
-    """Number of solid bonds."""
-    bridges = _budget(simulation).bridges
-    return float(simulation.communicator.sum([len(bridges.bonds)]))
-
-
-def bonds_formed(simulation: Any) -> float:
-    """Number of solid bonds that have formed between the particles that are there."""
-    return float(_budget(simulation).bridges.bonds_formed)
-
-
-def bridges_per_particle(simulation: Any) -> float:
-    """Mean number of bridges of a particle to other particles."""
+def _bridges_per_particle(_: Any, simulation: Any) -> float:
     first, _, _ = _joined(simulation.particle_solver)
     return 2.0 * len(first) / max(len(simulation.whole("id")), 1)
-
-
-def agglomerate_size(simulation: Any) -> float:
-    """Mean number of particles in the agglomerate of a particle."""
-    return _sizes(simulation).mean_by_particle
-
-
-def largest_agglomerate(simulation: Any) -> float:
-    """Number of particles in the largest agglomerate."""
-    return float(_sizes(simulation).largest)
-
-
-def agglomerated_share(simulation: Any) -> float:
-    """Share of the particles that a bridge or a bond joins to another."""
-    return _sizes(simulation).joined
-
-
-def _budget(simulation: Any) -> LiquidOnParticles:
-    budget: LiquidOnParticles = simulation.feature(LiquidOnParticles)
-    return budget
 
 
 def _sizes(simulation: Any) -> AgglomerateSizes:
@@ -249,24 +160,43 @@ def _sizes(simulation: Any) -> AgglomerateSizes:
     return summary(first, second, len(_ids(simulation.particle_solver)))
 
 
-MEASURES = tuple(
-    Measured(*each)
-    for each in (
-        ("1", "measure", bridge_liquid_share),
-        ("1", "measure", wet_share),
-        ("1", "measure", coating_variation),
-        ("1", "measure", coating_at_10_percent),
-        ("1", "measure", coating_at_50_percent),
-        ("1", "measure", coating_at_90_percent),
-        ("1", "measure", bridge_count),
-        ("1", "measure", bridges_per_particle),
-        ("1", "measure", agglomerate_size),
-        ("1", "measure", largest_agglomerate),
-        ("1", "measure", agglomerated_share),
-        ("m3", "recorded", liquid_on_particles),
-        ("m3", "recorded", liquid_in_bridges),
-        ("m3", "recorded", liquid_gained_by_walls),
-        ("1", "imbalance", liquid_imbalance),
-    )
-)
-"""Of cases with a liquid."""
+def _has_bonds(case: Case) -> bool:
+    return bool(case.liquid and case.liquid.bond)
+
+
+LiquidOnParticles.measures = (
+    Measured("bridge_liquid_share", "1", "measure", "share of the liquid that is in bridges",
+             lambda liquid, _: liquid.in_bridges / liquid.total if liquid.total > 0.0 else math.nan),
+    Measured("wet_share", "1", "measure", "share of the particles that carry liquid, on themselves or in a bridge",
+             _wet_share),
+    Measured("coating_variation", "1", "measure",
+             "standard deviation of the liquid on a particle over its mean, with its part of the liquid of its bridges",
+             _variation),
+    Measured("coating_at_10_percent", "1", "measure",
+             "liquid on a particle over the mean, below which 10 % of the particles lie", _coating(0.1)),
+    Measured("coating_at_50_percent", "1", "measure", "median of the liquid on a particle over the mean",
+             _coating(0.5)),
+    Measured("coating_at_90_percent", "1", "measure",
+             "liquid on a particle over the mean, below which 90 % of the particles lie", _coating(0.9)),
+    Measured("bridge_count", "1", "measure", "number of liquid bridges", lambda liquid, _: liquid.bridges.count),
+    Measured("bridges_per_particle", "1", "measure", "mean number of bridges of a particle to other particles",
+             _bridges_per_particle),
+    Measured("agglomerate_size", "1", "measure", "mean number of particles in the agglomerate of a particle",
+             lambda _, simulation: _sizes(simulation).mean_by_particle),
+    Measured("largest_agglomerate", "1", "measure", "number of particles in the largest agglomerate",
+             lambda _, simulation: _sizes(simulation).largest),
+    Measured("agglomerated_share", "1", "measure", "share of the particles that a bridge or a bond joins to another",
+             lambda _, simulation: _sizes(simulation).joined),
+    Measured("liquid_on_particles", "m3", "recorded", "volume of liquid in the films of the particles",
+             lambda liquid, _: liquid.on_particles),
+    Measured("liquid_in_bridges", "m3", "recorded", "volume of liquid in bridges", lambda liquid, _: liquid.in_bridges),
+    Measured("liquid_gained_by_walls", "m3", "recorded", "volume of liquid on the walls less that at the start",
+             lambda liquid, _: liquid.gained_by_walls),
+    Measured("liquid_imbalance", "1", "imbalance",
+             "change of all liquid that the spray did not bring, over all liquid", lambda liquid, _: liquid.imbalance),
+    Measured("bond_count", "1", "measure", "number of solid bonds",
+             lambda liquid, simulation: simulation.communicator.sum([len(liquid.bridges.bonds)]), _has_bonds),
+    Measured("bonds_formed", "1", "recorded",
+             "number of solid bonds that have formed between the particles that are there",
+             lambda liquid, _: liquid.bridges.bonds_formed, _has_bonds),
+)  # fmt: skip

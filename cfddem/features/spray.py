@@ -44,6 +44,20 @@ class SprayZone(CaseFeature):
 
     name, table = "spray", "spray"
     fields = FIELDS
+    measures = (
+        Measured("liquid_sprayed", "m3", "recorded",
+                 "volume of liquid that the spray has brought to particles so far", lambda zone, _: zone.spray.volume),
+        Measured("liquid_missed", "m3", "recorded",
+                 "volume of liquid sprayed so far that found no particle",
+                 lambda zone, _: zone.spray.missed * zone.spray.drop_volume),
+        Measured("spray_zone_share", "1", "measure", "share of the particles in the spray zone",
+                 lambda zone, simulation: zone.share(simulation)),
+        Measured("spray_residence_time", "s", "recorded", "mean time so far of a visit to the spray zone",
+                 lambda _, simulation: mean_visit(simulation.owned, simulation.communicator)),
+        Measured("spray_circulation_time", "s", "recorded",
+                 "mean time so far from one entry of a particle into the spray zone to its next",
+                 lambda _, simulation: mean_round(simulation.owned, simulation.communicator)),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         given = case.spray
@@ -60,17 +74,6 @@ class SprayZone(CaseFeature):
             given.rate, given.drop_volume, zone, case.bed.seed, given.begin, end, communicator=simulation.communicator
         )
 
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """What the spray brings, and how particles pass through its zone."""
-        return (
-            Measured("m3", "recorded", liquid_sprayed),
-            Measured("m3", "recorded", liquid_missed),
-            Measured("1", "measure", spray_zone_share),
-            Measured("s", "recorded", spray_residence_time),
-            Measured("s", "recorded", spray_circulation_time),
-        )
-
     def after(self, simulation: Any) -> None:
         """Release the drops that are due, and note which particles are in the zone."""
         owned = simulation.owned
@@ -81,6 +84,11 @@ class SprayZone(CaseFeature):
         simulation.feature(LiquidOnParticles).brought = self.spray.volume
         note_visits(owned, self.spray.zone(owned.position), simulation.time)
 
+    def share(self, simulation: Any) -> float:
+        """Share of the particles in the zone [-]."""
+        owned, total = simulation.owned, simulation.communicator.sum
+        return float(total(self.spray.zone(owned.position)) / max(total([owned.count]), 1))
+
     def checkpoint(self) -> dict[str, Any]:
         """The drops so far."""
         return self.spray.checkpoint()
@@ -88,33 +96,6 @@ class SprayZone(CaseFeature):
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
         self.spray.restore(state)
-
-
-def liquid_sprayed(simulation: Any) -> float:
-    """Volume of liquid that the spray has brought to particles so far."""
-    return float(simulation.feature(SprayZone).spray.volume)
-
-
-def liquid_missed(simulation: Any) -> float:
-    """Volume of liquid sprayed so far that found no particle."""
-    spray = simulation.feature(SprayZone).spray
-    return float(spray.missed * spray.drop_volume)
-
-
-def spray_zone_share(simulation: Any) -> float:
-    """Share of the particles in the spray zone."""
-    owned, total = simulation.owned, simulation.communicator.sum
-    return float(total(simulation.feature(SprayZone).spray.zone(owned.position)) / max(total([owned.count]), 1))
-
-
-def spray_residence_time(simulation: Any) -> float:
-    """Mean time so far of a visit to the spray zone."""
-    return mean_visit(simulation.owned, simulation.communicator)
-
-
-def spray_circulation_time(simulation: Any) -> float:
-    """Mean time so far from one entry of a particle into the spray zone to its next."""
-    return mean_round(simulation.owned, simulation.communicator)
 
 
 # ---------------------------------------------------------------- visits to the zone

@@ -34,7 +34,24 @@ class Vapour(CaseFeature):
     received  mass of vapour that particles have received so far; below zero where they evaporate [kg]
     """
 
-    name, table = "vapour", "vapour"
+    name, table, kept = "vapour", "vapour", ("received", "scale")
+    measures = (
+        Measured("mean_vapour", "1", "recorded", "mean mass fraction of the vapour in the fluid",
+                 lambda vapour, _: vapour.cells.mean),
+        Measured("outlet_vapour", "1", "measure", "mean mass fraction of the vapour in the fluid that leaves",
+                 lambda vapour, _: vapour.cells.leaving, lambda case: case.column.ends == "flow"),
+        Measured("vapour_in", "kg", "recorded",
+                 "vapour that the fluid has brought in, above its mass fraction at the start",
+                 lambda vapour, _: vapour.cells.sums["inflow"]),
+        Measured("vapour_out", "kg", "recorded",
+                 "vapour that the fluid has carried out, above its mass fraction at the start",
+                 lambda vapour, _: vapour.cells.sums["outflow"]),
+        Measured("vapour_from_particles", "kg", "recorded", "vapour that the particles have given to the fluid",
+                 lambda vapour, _: -vapour.received),
+        Measured("vapour_imbalance", "1", "imbalance",
+                 "change of the vapour in the fluid that nothing gave, over what was given",
+                 lambda vapour, _: vapour.imbalance),
+    )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
         keys, law, fluid = VapourTable.of(case), case.laws.heat_law, simulation.required_fluid
@@ -54,18 +71,13 @@ class Vapour(CaseFeature):
         """The mass fraction."""
         return (OF_FLUID,)
 
-    @classmethod
-    def measures(cls, case: Case) -> tuple[Measured, ...]:
-        """Mass fractions and masses of the vapour."""
-        of_outlet = (Measured("1", "measure", outlet_vapour),) if case.column.ends == "flow" else ()
-        return (
-            Measured("1", "recorded", mean_vapour),
-            *of_outlet,
-            Measured("kg", "recorded", vapour_in),
-            Measured("kg", "recorded", vapour_out),
-            Measured("kg", "recorded", vapour_from_particles),
-            Measured("1", "imbalance", vapour_imbalance),
-        )
+    @property
+    def imbalance(self) -> float:
+        """Change of the vapour in the fluid that nothing gave, over what was given [-]."""
+        sums = self.cells.sums
+        given = sums["inflow"] - sums["outflow"] + sums["displaced"] - self.received
+        scale = self.scale + abs(sums["inflow"]) + abs(sums["outflow"])
+        return abs(self.cells.content - given) / scale if scale > 0.0 else 0.0
 
     def conductance(self, terms: Any) -> np.ndarray:
         """Conductance of the whole surface of every particle, by the law of heat transfer as Sherwood number (N,)
@@ -106,43 +118,9 @@ class Vapour(CaseFeature):
 
     def checkpoint(self) -> dict[str, Any]:
         """The mass fraction and the balance."""
-        return {"received": self.received, "scale": self.scale, "cells": self.cells.checkpoint()}
+        return super().checkpoint() | {"cells": self.cells.checkpoint()}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
-        self.received, self.scale = float(state["received"]), float(state["scale"])
+        super().restore(state)
         self.cells.restore(state["cells"])
-
-
-def mean_vapour(simulation: Any) -> float:
-    """Mean mass fraction of the vapour in the fluid."""
-    return float(simulation.feature(Vapour).cells.mean)
-
-
-def outlet_vapour(simulation: Any) -> float:
-    """Mean mass fraction of the vapour in the fluid that leaves."""
-    return float(simulation.feature(Vapour).cells.leaving)
-
-
-def vapour_in(simulation: Any) -> float:
-    """Vapour that the fluid has brought in, above its mass fraction at the start."""
-    return float(simulation.feature(Vapour).cells.sums["inflow"])
-
-
-def vapour_out(simulation: Any) -> float:
-    """Vapour that the fluid has carried out, above its mass fraction at the start."""
-    return float(simulation.feature(Vapour).cells.sums["outflow"])
-
-
-def vapour_from_particles(simulation: Any) -> float:
-    """Vapour that the particles have given to the fluid."""
-    return -float(simulation.feature(Vapour).received)
-
-
-def vapour_imbalance(simulation: Any) -> float:
-    """Change of the vapour in the fluid that nothing gave, over what was given."""
-    vapour = simulation.feature(Vapour)
-    sums, scale = vapour.cells.sums, vapour.scale
-    given = sums["inflow"] - sums["outflow"] + sums["displaced"] - vapour.received
-    scale += abs(sums["inflow"]) + abs(sums["outflow"])
-    return abs(vapour.cells.content - given) / scale if scale > 0.0 else 0.0

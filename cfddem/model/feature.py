@@ -26,17 +26,21 @@ class Feature:
 
     name    in checkpoints and messages; no two features of a simulation share one
     fields  of the particles that it needs; declared where it is added
+    kept    names of its numbers that a checkpoint holds
     """
 
     name: str = ""
     fields: tuple[Field, ...] = ()
+    kept: tuple[str, ...] = ()
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next step depends on, beside the fields."""
-        return {}
+        return {name: getattr(self, name) for name in self.kept}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()`."""
+        for name in self.kept:
+            setattr(self, name, type(getattr(self, name))(state[name]))
 
 
 class Equipment(Feature):

@@ -16,7 +16,7 @@ from cfddem.case.vessel import on_the_wrong_side, start_behind_a_surface, start_
 from cfddem.fluid.grid import Array
 from cfddem.particles.initial.filling import clear_of_walls, loose_places
 from cfddem.particles.initial.packing import lattice, random_packing
-from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, poured_bed
+from cfddem.particles.initial.pouring import AT_REST, NEARLY_AT_REST, Place, Spheres, poured_bed
 from cfddem.particles.interactions.bridge import LIQUID
 from cfddem.particles.interactions.laws import Laws
 from cfddem.particles.state import Particles
@@ -45,11 +45,13 @@ def particles_of(case: Case, table: np.ndarray, walls: Sequence[Wall], laws: Law
     if bed.start == "poured":
         with _box_named_as_in(case):
             spheres = poured_bed(
-                table, diameters, properties.density, walls, *start_box(case),
-                box=periodic_box(case), seed=bed.seed, material=properties.material, layer=_layer(case, properties),
-                gravity=abs(case.laws.gravity[2]), laws=laws.dry(),
+                Spheres(table, diameters, properties.density, properties.material, _layer(case, properties)),
+                Place(walls, *start_box(case), periodic_box(case)),
+                seed=bed.seed,
+                gravity=abs(case.laws.gravity[2]),
+                laws=laws.dry(),
                 at_rest=NEARLY_AT_REST if case.has_fluid else AT_REST,
-            ).particles  # fmt: skip
+            ).particles
         places, diameters = spheres.position, 2.0 * spheres.radius
     elif bed.start in ("packed", "expanded"):
         space = (*case.column.size[:2], case.column.height if bed.start == "packed" else expanded_height(case))

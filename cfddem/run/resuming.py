@@ -80,11 +80,7 @@ def case_to_continue(folder: Path, state: Mapping[str, Any] | None, until: float
 
 
 def restored(
-    case: Case,
-    state: Mapping[str, Any],
-    folder: Path,
-    communicator: Communicator,
-    **given: Any,
+    case: Case, state: Mapping[str, Any], folder: Path, communicator: Communicator, **given: Any
 ) -> Simulation:
     """The simulation of a checkpoint; InputError if the checkpoint does not fit.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -19,7 +19,6 @@ from cfddem.backend.stopwatch import Stopwatch
 from cfddem.case.column_grid import grid_of
 from cfddem.case.compare import require_measured_units
 from cfddem.case.schema import Case
-from cfddem.data.fields import Field
 from cfddem.features.feature_list import FEATURES
 from cfddem.fluid.block import in_portions
 from cfddem.fluid.fields import FLUID_FIELDS
@@ -34,7 +33,6 @@ from cfddem.io.folder import (
 )
 from cfddem.io.quantities import Quantities, Quantity, of_fields
 from cfddem.io.writer import RunFolder, folder_of_ranks
-from cfddem.model.feature import Feature, Function
 from cfddem.particles.guard import guard
 from cfddem.run import history
 from cfddem.run.progress import Status
@@ -50,7 +48,7 @@ from cfddem.run.resuming import (
     status_restored_on_refusal,
     warn_of_changes,
 )
-from cfddem.run.simulation import Callback, Simulation
+from cfddem.run.simulation import Simulation
 from cfddem.run.stopping import StopRequest, averages_from, require_measures_of
 
 CHECKPOINT_SHARE = 0.02
@@ -111,20 +109,18 @@ class Run:
         text: str | None = None,
         report: Report = lambda _: None,
         progress: Callable[[str], None] = lambda _: None,
-        fields: Sequence[Field] = (),
-        callbacks: Sequence[Callback] = (),
-        features: Sequence[Feature | Function] = (),
         communicator: Communicator = SERIAL,
         origin: Path | None = None,
+        **added: Any,
     ) -> Run:
         """Prepare a case in a new folder, and write its initial state.
 
         text               the case file as the user wrote it; made from the case if None
         report             called after every row of history
         progress           called with a line of text for each part of the preparation
-        fields, callbacks, features  of the simulation, see `Simulation`
         communicator       of the ranks that share the run; all of them call this. Rank 0 writes
         origin             folder of a run whose last state this one begins with: particles, contacts, flow and time
+        added              fields, callbacks and features of the simulation, see `Simulation`
         errors             InputError if the folder holds a run or cannot be written, or for a case that differs from
                            that of `origin` in more than a run can change
         """
@@ -136,13 +132,12 @@ class Run:
         state = None if origin is None else branch_state(case, Path(origin))
         communicator.by_first(lambda: prepare_folder(folder, text, case))
         case = with_kept_files(case, folder)
-        given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         wall = Stopwatch()
         with _no_empty_folder(folder):
             if state is None:
-                simulation = Simulation(case, progress, communicator=communicator, **given)
+                simulation = Simulation(case, progress, communicator=communicator, **added)
             else:
-                simulation = restored(case, state, Path(origin or ""), communicator, **given)
+                simulation = restored(case, state, Path(origin or ""), communicator, **added)
         wall.count("preparation")  # initial packing, loading of compiled loops
         simulation.wall.seconds |= wall.seconds
         grid = None if simulation.fluid is None else simulation.fluid.grid.whole
@@ -167,10 +162,8 @@ class Run:
         until: float | None = None,
         report: Report = lambda _: None,
         progress: Callable[[str], None] = lambda _: None,
-        fields: Sequence[Field] = (),
-        callbacks: Sequence[Callback] = (),
-        features: Sequence[Feature | Function] = (),
         communicator: Communicator = SERIAL,
+        **added: Any,
     ) -> Run:
         """Continue from the newest undamaged checkpoint of a folder, bit for bit; later snapshots and rows are dropped.
 
@@ -181,7 +174,6 @@ class Run:
         errors  InputError if the folder holds no run, or one that cannot be continued
         """
         folder = Path(folder)
-        given: dict[str, Any] = {"fields": fields, "callbacks": callbacks, "features": features}
         later = LARGE if communicator.size > 1 else ()
         state = checkpoint.newest(folder, later) if checkpoint.exists(folder) else None
         before = read_about(folder)
@@ -194,10 +186,10 @@ class Run:
         written = folder_of_ranks(communicator, lambda: RunFolder.reopen(folder))
         with status_restored_on_refusal(written, before):
             if state is None:
-                simulation = Simulation(case, progress, communicator=communicator, **given)
+                simulation = Simulation(case, progress, communicator=communicator, **added)
             else:
                 communicator.by_first(lambda: require_measures(written, case))
-                simulation = restored(case, state, folder, communicator, **given)
+                simulation = restored(case, state, folder, communicator, **added)
                 simulation.wall.seconds.update(written.about.get("wall_time", {}))
         warn_of_changes(written, case)
         written.drop_after(-1.0 if state is None else simulation.time)

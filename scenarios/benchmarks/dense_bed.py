@@ -47,12 +47,7 @@ GRAIN = Material(
     roughness=1e-7,
 )
 WATER = BridgeLaws(
-    viscosity=1e-3,
-    surface_tension=0.072,
-    film="deforming",
-    cut="constant",
-    tangential="davis",
-    minimum_gap=1e-7,
+    viscosity=1e-3, surface_tension=0.072, film="deforming", cut="constant", tangential="davis", minimum_gap=1e-7
 )
 BLOCKS = {1_000: (1, 1), 10_000: (1, 1), 100_000: (5, 2), 1_000_000: (10, 10)}
 
@@ -69,11 +64,7 @@ def positions(count: int) -> tuple[np.ndarray, tuple[float, float]]:
 
 
 def bed(
-    count: int = 10_000,
-    film: bool = False,
-    bridges: bool = False,
-    motions: str = "normal",
-    reach: float = 1.0,
+    count: int = 10_000, film: bool = False, bridges: bool = False, motions: str = "normal", reach: float = 1.0
 ) -> ParticleSolver:
     """The bed as a run, dry, with the film of water over its whole reach, or with liquid bridges.
 
@@ -88,12 +79,7 @@ def bed(
         grains,
         pair_table([GRAIN]),
         walls=[Plane()],
-        laws=Laws(
-            film=film,
-            film_motions=motions,
-            cutoff_ratio=reach,
-            bridge=WATER if bridges else None,
-        ),
+        laws=Laws(film=film, film_motions=motions, cutoff_ratio=reach, bridge=WATER if bridges else None),
         gravity=(0.0, 0.0, -9.81),
         box=(width, depth, None),
     )

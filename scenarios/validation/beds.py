@@ -78,11 +78,7 @@ def sedimentation(progress: Progress) -> list[Row]:
     rows = []
     case = vessel()
     fluid = case.required_fluid
-    for place, viscosity in (
-        ("water", fluid.viscosity),
-        ("syrup", SYRUP),
-        ("water, between walls", None),
-    ):
+    for place, viscosity in (("water", fluid.viscosity), ("syrup", SYRUP), ("water, between walls", None)):
         found: list[Settling] = []
         for share in SOLID_FRACTIONS:
             progress(f"sedimentation in {place} at a solid fraction of {share:g}")

@@ -264,13 +264,7 @@ def _draw(folder: Path, curves: Curves) -> None:
     """Terminal velocities with and without self-disturbance correction; a release; bed expansion."""
     figure, axes = panels(3, width=11.0)
     terminal = curves["terminal"]
-    axes[0].semilogx(
-        terminal["reynolds"][0],
-        terminal["uncorrected"][0],
-        "o-",
-        color=GREY,
-        label="uncorrected",
-    )
+    axes[0].semilogx(terminal["reynolds"][0], terminal["uncorrected"][0], "o-", color=GREY, label="uncorrected")
     axes[0].semilogx(
         terminal["reynolds"][0], terminal["velocity"][0], "s-", color=BLUE, label="corrected,\nworst of nine"
     )

@@ -15,7 +15,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.shapes import Plane
 from closures.added_mass import near_wall
-from closures.balance import speed_after
+from closures.balance import Sphere, speed_after
 from closures.drag_single import schiller_naumann
 from closures.registry import law_of
 from scenarios.beds.settling import study as settling
@@ -41,9 +41,9 @@ def fall(history: str, step: float, until: float) -> tuple[np.ndarray, np.ndarra
 
 def test_a_fall_follows_the_equation_of_motion() -> None:
     times, speeds = fall("none", 2e-4, 0.1)
-    sphere = (DIAMETER, GLASS.density, WATER, VISCOSITY, schiller_naumann, 9.81)
+    sphere = Sphere(DIAMETER, GLASS.density, WATER, VISCOSITY, schiller_naumann, 9.81)
     for place in (50, 150, 500):
-        assert speeds[place] == pytest.approx(speed_after(times[place], 0.0, *sphere, added_mass=0.5), rel=2e-3)
+        assert speeds[place] == pytest.approx(speed_after(times[place], 0.0, sphere, added_mass=0.5), rel=2e-3)
 
 
 def test_a_fall_with_memory_follows_the_full_convolution() -> None:
@@ -58,7 +58,7 @@ def test_added_mass_beside_a_wall_keeps_the_energy() -> None:
     """Without drag, (m + C m_f) v^2 is constant while the sphere approaches the wall."""
     radius = 0.5 * DIAMETER
     run, wall = sphere(-0.1, 6.0 * radius), Plane()
-    fluid = QuiescentFluid(run, WATER, VISCOSITY, None, history="none", wall=wall)
+    fluid = QuiescentFluid(run, WATER, VISCOSITY, None, history="none", added_mass=wall)
 
     def energy() -> float:
         place, velocity = float(run.particles.position[0, 2]), float(run.particles.velocity[0, 2])

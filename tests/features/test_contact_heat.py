@@ -18,7 +18,7 @@ from in_process_ranks import on_ranks
 from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.features.contact_heat import HeatExchangeOfContacts, contact_heat_imbalance
+from cfddem.features.contact_heat import HeatExchangeOfContacts
 from cfddem.features.contact_heat_keys import wall_names
 from cfddem.preflight.summary import preflight
 from cfddem.run.history import row
@@ -72,7 +72,7 @@ def temperatures(case: Case, times: set[float]) -> dict[float, tuple[float, floa
         simulation.until(time)
         cold, hot = simulation.particles.temperature
         found[time] = float(cold), float(hot)
-    assert contact_heat_imbalance(simulation) < 1e-12
+    assert simulation.feature(HeatExchangeOfContacts).imbalance < 1e-12
     return found
 
 
@@ -176,7 +176,7 @@ def test_a_wall_at_a_temperature_warms_the_particle_that_touches_it_alone() -> N
     assert simulation.particles.temperature == pytest.approx([350.0, HOT], abs=1e-3)
     capacity = simulation.feature(HeatExchangeOfContacts).capacity(simulation.particles)[0]
     assert row(simulation)["contact_heat_from_walls"] == pytest.approx(capacity * (350.0 - COLD), rel=1e-3)
-    assert contact_heat_imbalance(simulation) < 1e-11
+    assert simulation.feature(HeatExchangeOfContacts).imbalance < 1e-11
 
 
 def test_a_wall_with_a_coefficient_warms_by_its_exponential() -> None:
@@ -234,7 +234,7 @@ def test_particles_that_move_exchange_heat_while_they_touch() -> None:
     simulation.particles.velocity[:, 0] = (0.01, -0.01)
     simulation.until(0.02)
     assert simulation.particles.velocity[0, 0] < 0.0
-    assert simulation.particles.temperature[0] > COLD and contact_heat_imbalance(simulation) < 1e-10
+    assert simulation.particles.temperature[0] > COLD and simulation.feature(HeatExchangeOfContacts).imbalance < 1e-10
     now = simulation.particles.temperature.copy()
     simulation.until(0.03)
     assert np.array_equal(simulation.particles.temperature, now)

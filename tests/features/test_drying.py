@@ -15,7 +15,7 @@ from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
 from cfddem.features.evaporation_keys import Evaporation
 from cfddem.features.heat import HeatExchange
-from cfddem.features.vapour import Vapour, outlet_vapour, vapour_imbalance
+from cfddem.features.vapour import Vapour
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
 from closures.evaporation import latent_heat, saturation_pressure, vapour_fraction
@@ -44,7 +44,7 @@ def test_a_wet_bed_dries_at_the_rate_of_the_air_that_leaves_and_at_the_wet_bulb(
     simulation.until(3.5)
     now = row(simulation)
     rate = (now["evaporated_mass"] - then["evaporated_mass"]) / 0.5
-    leaves = 1.2 * SPEED * 0.008**2 * (outlet_vapour(simulation) - 0.005)
+    leaves = 1.2 * SPEED * 0.008**2 * (simulation.feature(Vapour).cells.leaving - 0.005)
     cooled = 1.2 * SPEED * 0.008**2 * 1007.0 * (320.0 - now["outlet_temperature"])
     particles, keys = simulation.particles, Evaporation.of(simulation.case)
     assert keys is not None
@@ -57,7 +57,7 @@ def test_a_wet_bed_dries_at_the_rate_of_the_air_that_leaves_and_at_the_wet_bulb(
     print(f"first layer {first:.3f} K, wet bulb at the reference speed {keys.wet_bulb(simulation.case):.3f} K")
     assert leaves == pytest.approx(rate, rel=0.01) and cooled == pytest.approx(latent * rate, rel=0.01)
     assert first == pytest.approx(keys.wet_bulb(simulation.case), abs=0.3)
-    assert now["heat_imbalance"] < 1e-10 and vapour_imbalance(simulation) < 1e-10
+    assert now["heat_imbalance"] < 1e-10 and simulation.feature(Vapour).imbalance < 1e-10
     assert now["vapour_from_particles"] == pytest.approx(now["evaporated_mass"], rel=1e-10)
 
 
@@ -74,7 +74,7 @@ def test_a_layer_of_wet_beads_is_dry_when_the_balance_says() -> None:
     now, particles, keys = row(simulation), simulation.particles, Evaporation.of(simulation.case)
     assert keys is not None
     rate = (now["evaporated_mass"] - then["evaporated_mass"]) / (simulation.time - begin)
-    by_air = 1.2 * SPEED * 0.008**2 * (outlet_vapour(simulation) - 0.005)
+    by_air = 1.2 * SPEED * 0.008**2 * (simulation.feature(Vapour).cells.leaving - 0.005)
     plateau = float(particles.temperature.mean())
     end = simulation.time + 998.0 * float(particles.liquid.sum()) / by_air
     whole = then["liquid_on_particles"]
@@ -85,7 +85,7 @@ def test_a_layer_of_wet_beads_is_dry_when_the_balance_says() -> None:
     assert rate == pytest.approx(by_air, rel=0.01)
     assert plateau == pytest.approx(keys.wet_bulb(simulation.case), abs=0.3)
     assert simulation.time == pytest.approx(end, rel=0.02)
-    assert row(simulation)["liquid_imbalance"] < 1e-12 and vapour_imbalance(simulation) < 1e-10
+    assert row(simulation)["liquid_imbalance"] < 1e-12 and simulation.feature(Vapour).imbalance < 1e-10
 
 
 def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
@@ -102,7 +102,7 @@ def test_air_at_rest_over_drops_is_saturated_and_no_water_is_lost() -> None:
     surface = vapour_fraction(saturation_pressure(float(simulation.particles.temperature.mean())), 101325.0)
     print(f"vapour {vapour.cells.value.mean():.6f}, saturated {surface:.6f}")
     assert vapour.cells.value == pytest.approx(surface, rel=5e-3)
-    assert vapour_imbalance(simulation) < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
+    assert simulation.feature(Vapour).imbalance < 1e-10 and row(simulation)["heat_imbalance"] < 1e-10
 
 
 MOVING = SEEDS.with_(**{

@@ -16,7 +16,7 @@ import pytest
 
 from cfddem.backend.errors import InputError
 from cfddem.case.schema import Case
-from cfddem.features.heat import HeatExchange, heat_imbalance, mean_temperature
+from cfddem.features.heat import HeatExchange
 from cfddem.preflight.summary import preflight
 from cfddem.run.history import row
 from cfddem.run.simulation import Simulation
@@ -66,7 +66,7 @@ def test_a_sphere_cools_by_the_published_exponential_at_any_step(step: float) ->
         heat.before(simulation, step)
         if (time := round(number * step, 9)) in PUBLISHED:
             assert abs(simulation.particles.temperature[0] - PUBLISHED[time]) < 1e-3 * 75.0
-    assert heat_imbalance(simulation) < 1e-12
+    assert simulation.feature(HeatExchange).imbalance < 1e-12
 
 
 def test_a_step_far_too_long_ends_at_the_temperature_of_the_fluid() -> None:
@@ -84,7 +84,7 @@ def test_a_mixed_fluid_and_the_particles_end_at_the_common_temperature_with_the_
         assert heat.fluid_temperature <= common + 1e-9 and simulation.particles.temperature[0] >= common - 1e-9
         total = capacity * simulation.particles.temperature[0] + 0.01 * heat.fluid_temperature
         assert total == pytest.approx((capacity + 0.01) * common, rel=1e-13)
-    assert mean_temperature(simulation) == pytest.approx(common, abs=1e-6)
+    assert row(simulation)["mean_temperature"] == pytest.approx(common, abs=1e-6)
 
 
 def test_history_snapshot_and_checkpoint_have_the_heat_and_continue_with_the_same_bits() -> None:

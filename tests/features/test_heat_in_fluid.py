@@ -20,7 +20,7 @@ from cfddem.backend.compile import use_threads
 from cfddem.backend.errors import InputError
 from cfddem.backend.portions import collected
 from cfddem.case.schema import Case
-from cfddem.features.heat import HeatExchange, heat_imbalance
+from cfddem.features.heat import HeatExchange
 from cfddem.fluid.conditions import FreeSlip, Inlet, Outlet, Periodic
 from cfddem.fluid.grid import Grid
 from cfddem.fluid.scalar import Scalar, ScalarKind
@@ -317,7 +317,7 @@ def test_a_packed_bed_cools_as_schumann_solved_it() -> None:
         error = np.abs(found - exact)
         print(f"t = {time} s: mean {found.mean():.4f}, mean error {error.mean():.5f}, largest {error.max():.5f}")
         assert error.max() < 0.01
-    assert heat_imbalance(simulation) < 1e-12
+    assert simulation.feature(HeatExchange).imbalance < 1e-12
 
 
 @pytest.mark.parametrize("box", [80e-6, 0.38e-3, 2e-3])
@@ -466,4 +466,4 @@ def test_a_hot_bed_in_cold_gas_cools_by_the_balance_of_both_phases() -> None:
     assert cooled > 20.0
     assert all(worst[name] < 0.02 * cooled for name in ("air that leaves", "cells", "layers"))
     assert worst["mixed"] > 0.05 * cooled and spread > 10.0
-    assert heat_imbalance(simulation) < 1e-11
+    assert simulation.feature(HeatExchange).imbalance < 1e-11

@@ -15,7 +15,7 @@ from cfddem.case.schema import Case
 from cfddem.io.reading import open_run
 from cfddem.particles.initial.filling import loose_places
 from cfddem.particles.initial.packing import from_table
-from cfddem.particles.initial.pouring import AT_REST, poured_bed
+from cfddem.particles.initial.pouring import AT_REST, Place, Spheres, poured_bed
 from cfddem.particles.material_pairs import pair_table
 from cfddem.particles.walls.shapes import Cylinder, Plane, Wall
 from cfddem.run.initial_particles import in_the_box
@@ -51,7 +51,7 @@ def test_box_without_room_is_refused() -> None:
 
 def test_bed_in_a_cup_lies_still() -> None:
     """Below the stated limit without damping; the largest overlap is that of the contacts."""
-    bed = poured_bed(pair_table([GRAIN]), np.full(200, DIAMETER), 2500.0, CUP, AROUND, SIZE, seed=1)
+    bed = poured_bed(Spheres(pair_table([GRAIN]), np.full(200, DIAMETER), 2500.0), Place(CUP, AROUND, SIZE), seed=1)
     position = bed.particles.position
     assert bed.energy < AT_REST
     assert 0.0 < bed.largest_overlap < 0.01
@@ -64,7 +64,7 @@ def test_bed_in_a_cup_lies_still() -> None:
 def test_walls_that_move_later_are_at_rest_while_a_bed_is_poured() -> None:
     """A belt under the bed does not carry it away."""
     belt: list[Wall] = [Plane(velocity=(1.0, 0.0, 0.0)), CUP[1]]
-    bed = poured_bed(pair_table([GRAIN]), np.full(30, DIAMETER), 2500.0, belt, AROUND, SIZE, seed=1)
+    bed = poured_bed(Spheres(pair_table([GRAIN]), np.full(30, DIAMETER), 2500.0), Place(belt, AROUND, SIZE), seed=1)
     assert not bed.run.walls.velocity.any()
 
 
@@ -77,7 +77,9 @@ def test_a_shallow_bed_on_a_wide_floor_comes_to_rest() -> None:
         Plane(point=(0.0, width, 0.0), normal=(0.0, -1.0, 0.0)),
     ]
     bed = poured_bed(
-        pair_table([GRAIN]), np.full(120, DIAMETER), 2500.0, sides, (0.0, 0.0, 0.0), (width, width, 0.02), seed=1
+        Spheres(pair_table([GRAIN]), np.full(120, DIAMETER), 2500.0),
+        Place(sides, (0.0, 0.0, 0.0), (width, width, 0.02)),
+        seed=1,
     )
     assert bed.energy < AT_REST
     assert bed.particles.position[:, 2].max() < 2.0 * DIAMETER
@@ -87,8 +89,7 @@ def test_the_energy_of_a_fall_from_above_the_floor_counts_all_of_it() -> None:
     """Spheres start in a box of 5 mm, 0.2 m above their cup: no more than the energy of that fall is ever left."""
     left: list[float] = []
     high = (-4e-3, -4e-3, 0.2)
-    bed = poured_bed(
-        pair_table([GRAIN]), np.full(30, DIAMETER), 2500.0, CUP, high, SIZE, seed=1,
+    bed = poured_bed(Spheres(pair_table([GRAIN]), np.full(30, DIAMETER), 2500.0), Place(CUP, high, SIZE), seed=1,
         progress=lambda _, share: left.append(share),
     )  # fmt: skip
     assert 0.5 < max(left) <= 1.0 + 1e-9
@@ -116,7 +117,9 @@ def test_shallow_beds_without_a_fluid_run(count: int, width: float, tmp_path: Pa
 
 def test_a_bed_that_does_not_rest_names_what_a_case_can_change() -> None:
     with pytest.raises(RunFailed) as refused:
-        poured_bed(pair_table([GRAIN]), np.full(200, DIAMETER), 2500.0, CUP, AROUND, SIZE, seed=1, patience=0.5)
+        poured_bed(
+            Spheres(pair_table([GRAIN]), np.full(200, DIAMETER), 2500.0), Place(CUP, AROUND, SIZE), seed=1, patience=0.5
+        )
     message = str(refused.value)
     assert "limit 3e-08" in message and "laws.rolling_resistance" in message and "bed.start" in message
     assert "patience" not in message

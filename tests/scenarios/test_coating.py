@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cfddem.features import liquid
-from cfddem.features.spray import SprayZone, spray_zone_share
+from cfddem.features.spray import SprayZone
 from cfddem.plotting.curves import draw_coating, panels
 from cfddem.preflight.summary import refuse_errors
 from cfddem.run.history import all_columns
@@ -43,7 +43,7 @@ def test_the_share_in_the_spray_zone_is_measured_from_the_start() -> None:
     simulation = Simulation(case)
     inside = simulation.feature(SprayZone).spray.zone(simulation.owned.position)
     assert 0 < inside.sum() < case.bed.count
-    assert spray_zone_share(simulation) == inside.mean()
+    assert simulation.feature(SprayZone).share(simulation) == inside.mean()
 
 
 def test_the_distribution_of_the_coating_is_measured_and_drawn() -> None:

@@ -23,7 +23,7 @@ The fluid receives the opposite of every force. Without slip there is no agitati
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -72,6 +72,7 @@ class Agitation(FluidForce):
     """
 
     name, lines, pushes = "agitation", ("agitation",), True
+    kept = ("steps",)  # from which random numbers follow
 
     def __init__(self, fluid: FluidSolver, kernel: FilterKernel, seed: int) -> None:
         self.fluid, self.kernel, self.seed, self.steps = fluid, kernel, seed, 0
@@ -101,14 +102,6 @@ class Agitation(FluidForce):
     def terms(self, particles: Particles, around: Neighbourhood, step: float) -> AgitationTerms:
         """What a model adds to the coming fluid step [s]."""
         raise NotImplementedError
-
-    def checkpoint(self) -> dict[str, Any]:
-        """The number of the step, from which random numbers follow."""
-        return {"steps": self.steps}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Continue from a `checkpoint()`."""
-        self.steps = int(state["steps"])
 
 
 def neighbourhood_mean(kernel: FilterKernel, cell_map: ParticleCellMap, solid: Array, values: Array) -> Array:

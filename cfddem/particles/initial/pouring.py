@@ -45,6 +45,25 @@ _UNBALANCED, _FEW, _SOME = 0.05, 1e-3, 2e-2
 """Unbalanced force over weight, and shares of particles that may exceed it: in a bed at rest, and nearly at rest."""
 
 
+class Spheres(NamedTuple):
+    """Spheres to pour."""
+
+    table: np.ndarray  # pair table, of `cfddem.particles.material_pairs.pair_table`
+    diameters: np.ndarray  # (N,) [m]
+    density: np.ndarray | float  # (N,) or one for all [kg/m3]
+    material: np.ndarray | int = 0  # (N,) or one for all, row of the pair table
+    layer: np.ndarray | None = None  # (N,) lower numbers are poured first; mixed if not given
+
+
+class Place(NamedTuple):
+    """Where spheres are poured. Walls lie below the box or in it."""
+
+    walls: Sequence[Wall]  # of the later run
+    corner: tuple[float, float, float]  # lowest corner of the box in which the spheres start, open upward [m]
+    size: tuple[float, float, float]  # its edges [m]
+    periodic: tuple[float | None, float | None, float | None] = (None, None, None)  # lengths; None along open axes [m]
+
+
 class Bed(NamedTuple):
     """A poured bed at rest."""
 
@@ -56,17 +75,10 @@ class Bed(NamedTuple):
 
 
 def poured_bed(
-    table: np.ndarray,
-    diameters: np.ndarray,
-    density: np.ndarray | float,
-    walls: Sequence[Wall],
-    corner: tuple[float, float, float],
-    size: tuple[float, float, float],
+    spheres: Spheres,
+    place: Place,
     *,
-    box: tuple[float | None, float | None, float | None] = (None, None, None),
     seed: int,
-    material: np.ndarray | int = 0,
-    layer: np.ndarray | None = None,
     gravity: float = 9.81,
     laws: Laws | None = None,
     at_rest: float = AT_REST,
@@ -81,45 +93,36 @@ def poured_bed(
     particles: a new run over the particles alone begins without friction, and the bed settles a little before it rests
     again.
 
-    table         pair table, :func:`cfddem.particles.material_pairs.pair_table`
-    diameters     (N,) [m]
-    density       (N,) or one for all [kg/m3]
-    walls         of the later run
-    corner, size  lowest corner and edges of the box in which the spheres start, open upward; walls lie below it or
-                  in it [m]
-    box           length of the periodic box, which begins at 0; None along open axes [m]
-    seed          of the initial positions
-    material      (N,) or one for all, row of the pair table
-    layer         (N,) lower numbers are poured first; mixed if not given
-    gravity       along -z [m/s2]
-    laws          of the later run
-    at_rest       largest remaining share of the energy of the fall
-    patience      longest time, over the time of a fall from the top, or through the width if that is longer
-    progress      called from time to time with the time and the remaining share of the energy
+    seed      of the initial positions
+    gravity   along -z [m/s2]
+    laws      of the later run
+    at_rest   largest remaining share of the energy of the fall
+    patience  longest time, over the time of a fall from the top, or through the width if that is longer
+    progress  called from time to time with the time and the remaining share of the energy
 
     Raises RunFailed if the bed does not come to rest in time.
     """
+    table, diameters, density, material, layer = spheres
     diameters = np.asarray(diameters, float)
-    still = [replace(wall, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for wall in walls]
-    places = loose_places(diameters, still, corner, size, seed, layer)
-    spheres = make_particles(places, 0.5 * diameters, density, material=material)
+    still = [replace(wall, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for wall in place.walls]
+    corner = place.corner
+    places = loose_places(diameters, still, corner, place.size, seed, layer)
+    loose = make_particles(places, 0.5 * diameters, density, material=material)
     laws = laws or Laws()
     # without viscosity films have no force, but they keep particles at their minimum gap
     laws = laws._replace(cutoff_ratio=min(laws.cutoff_ratio, 0.02))
     height = float(places[:, 2].max()) - corner[2] + 0.5 * float(diameters.max())
     soft = _softening(table, float(np.max(density)), height, gravity)
     run = ParticleSolver(
-        spheres,
+        loose,
         _softened(table, soft, True),
         walls=still,
         laws=laws,
         gravity=(0.0, 0.0, -gravity),
-        box=box,
+        box=place.periodic,
         check_steps=False,  # steps follow the time_scales here
     )
-    pouring = _Pouring(
-        run, float(np.sum(spheres.mass * gravity * (places[:, 2] - corner[2]))), gravity, height, patience
-    )
+    pouring = _Pouring(run, float(np.sum(loose.mass * gravity * (places[:, 2] - corner[2]))), gravity, height, patience)
     pouring.progress, pouring.at_rest = progress, at_rest
     pouring.fall()
     pouring.calm()
@@ -279,7 +282,6 @@ def pour(
     periodic: bool = False,
     gravity: float = 9.81,
     laws: Laws | None = None,
-    patience: float = 20.0,
     progress: Progress | None = None,
 ) -> ParticleSolver:
     """Let spheres fall into a column with a flat floor at z = 0 until they are at rest.
@@ -293,11 +295,10 @@ def pour(
     periodic   repeat the column sideways instead of closing it by walls
     gravity    [m/s2]
     laws       laws between particles; without rolling resistance, loose particles roll for a long time
-    patience   longest time, over the time of a fall from the top
     progress   called from time to time with the time and the remaining share of the energy
     returns    the run at rest; its `particles` are the bed
 
-    Raises RunFailed if the bed does not come to rest in time.
+    Raises RunFailed if the bed does not come to rest within 20 times the fall from the top.
     """
     width, depth = column
     diameters = np.asarray(diameters, float)
@@ -322,7 +323,7 @@ def pour(
     fall = math.sqrt(2.0 * top / gravity)
     brought = float(np.sum(spheres.mass * gravity * spheres.position[:, 2]))
     step = run.time_scales(gravity * fall).recommended
-    while run.time < patience * fall:
+    while run.time < 20.0 * fall:
         run.advance(step, max(1, int(0.05 * fall / step)))
         left = kinetic_energy(run.particles) / brought
         if progress is not None:

@@ -36,7 +36,7 @@ from cfddem.particles.walls.shapes import Plane
 from cfddem.plotting.curves import BLUE, GREY, ORANGE, label, legend, panels, save
 from cfddem.run.simulation import Simulation
 from closures.added_mass import near_wall
-from closures.balance import speed_after, terminal_velocity
+from closures.balance import Sphere, speed_after, terminal_velocity
 from closures.drag_single import abraham, schiller_naumann
 from closures.registry import REGISTRY, law_of
 from closures.wall_drag import along_wall, towards_wall
@@ -128,10 +128,10 @@ def equation_of_motion(case: Case, times: np.ndarray) -> np.ndarray:
     assert isinstance(case.laws.drag, str)
     law, gravity = REGISTRY["drag"][case.laws.drag].function, abs(case.laws.gravity[2])
     fluid = case.required_fluid
-    sphere = (case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
+    sphere = Sphere(case.bed.diameter, case.solid.density, fluid.density, fluid.viscosity, law, gravity)
     speeds = [0.0]
     for begin, end in pairwise(times):
-        speeds.append(speed_after(end - begin, speeds[-1], *sphere, added_mass=case.laws.added_mass_at(1.0)))
+        speeds.append(speed_after(end - begin, speeds[-1], sphere, added_mass=case.laws.added_mass_at(1.0)))
     return np.array(speeds)
 
 
@@ -288,7 +288,7 @@ def land(density: float, viscosity: float, walls: Walls, step: float = 5e-4) -> 
     )  # fmt: skip
     beside = None if walls == "none" else WallDrag([FLOOR, *SIDES, LID], walls, film=True)
     oil = QuiescentFluid(
-        run, density, viscosity, law_of(abraham), history="none", wall=FLOOR, wall_drag=beside,
+        run, density, viscosity, law_of(abraham), history="none", added_mass=FLOOR, wall_drag=beside,
         gravity=(0.0, 0.0, -GRAVITY),
     )  # fmt: skip
     rows = [(RELEASE, 0.0)]

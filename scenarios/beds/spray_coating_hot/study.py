@@ -17,7 +17,8 @@ import numpy as np
 from cfddem.analysis.drying import DryingRates, drying_rates
 from cfddem.case.gallery import gallery_files
 from cfddem.case.schema import Case
-from cfddem.io.reading import RunData
+from cfddem.io.reading import RunData, open_run
+from cfddem.plotting.curves import BLUE, ORANGE, label, legend, panels, save
 from cfddem.run.runner import Run
 
 ROOM = 293.15
@@ -85,3 +86,30 @@ def moisture(run: RunData) -> np.ndarray:
 
 if __name__ == "__main__":
     Run.begin(case(True, *map(float, sys.argv[2:3])), Path(sys.argv[1])).go()
+
+
+# ---------------------------------------------------------------- figure
+#
+# `python -m scenarios.beds.spray_coating_hot.study HOT COLD OUTPUT.png` draws two runs.
+
+
+def figure(hot: Path, cold: Path, output: Path) -> None:
+    """Moisture, motion and temperature of the beads of both runs in time."""
+    drawn, axes = panels(3, width=11.0, height=3.6)
+    for folder, colour, name in ((hot, ORANGE, "hot air"), (cold, BLUE, "cold air")):
+        run = open_run(folder)
+        time, history = run.history["time"], run.history
+        axes[0].plot(time, 100.0 * moisture(run), color=colour, label=name)
+        axes[1].semilogy(time, history["granular_temperature"], color=colour, lw=0.8)
+        axes[2].plot(time, history["mean_temperature"] - 273.15, color=colour, label=f"beads, {name}")
+        axes[2].plot(time, history["outlet_temperature"] - 273.15, color=colour, ls="--", lw=0.9)
+        print(f"{name}: {coated(run)}")
+    label(axes[0], "time", "s", "liquid over solid volume", "%")
+    label(axes[1], "time", "s", "granular temperature", "m2/s2")
+    label(axes[2], "time", "s", "temperature, dashed: outlet", "C")
+    legend(axes[0], loc="upper left")
+    save(drawn, output)
+
+
+if __name__ == "__main__":
+    figure(*(Path(each) for each in sys.argv[1:4]))

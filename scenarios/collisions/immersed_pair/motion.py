@@ -282,9 +282,8 @@ def fluid_around(
         density,
         viscosity,
         law_of(schiller_naumann) if "drag" in forces else None,
-        added_mass="added_mass" in forces,
+        added_mass="added_mass" in forces and (WALL if against_wall else True),
         history="mei_adrian" if "history" in forces else "none",
-        wall=WALL if against_wall else None,
         wall_drag=beside,
         gravity=(gravity, 0.0, 0.0),
     )

@@ -242,13 +242,7 @@ def _speed_and_viscosity(
 
 
 def _setting(
-    row: np.void,
-    bodies: Bodies,
-    velocity: float,
-    viscosity: float,
-    angle: float,
-    step_fraction: float,
-    laws: Laws,
+    row: np.void, bodies: Bodies, velocity: float, viscosity: float, angle: float, step_fraction: float, laws: Laws
 ) -> Setting:
     """Numbers of the collision; `row` is the entry of the pair table for the two materials."""
     reduced_radius, reduced_mass = bodies.reduced()

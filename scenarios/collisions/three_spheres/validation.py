@@ -203,11 +203,7 @@ def three_sphere_figures(folder: Path, curves: Curves) -> list[Row]:
         ("St = 2: changes partners", hard_spheres(2.0, 45.0), [0.0, 1.0, 2.0, 2.6, 3.5, 5.0]),
         ("St = 5", hard_spheres(5.0, 45.0), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]),
         ("St = 10", hard_spheres(10.0, 45.0), [0.0, 0.3, 0.6, 0.9, 1.2, 1.5]),
-        (
-            "St = 2, 2-3 at -45 deg",
-            hard_spheres(2.0, 45.0, -45.0, minimum_gap=0.04),
-            [0.0, 0.6, 1.5, 3.0, 6.1, 7.5],
-        ),
+        ("St = 2, 2-3 at -45 deg", hard_spheres(2.0, 45.0, -45.0, minimum_gap=0.04), [0.0, 0.6, 1.5, 3.0, 6.1, 7.5]),
     ]
     save(figures.sequences(runs), folder / "three_spheres_sequences.png")
     save(

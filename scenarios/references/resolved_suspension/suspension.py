@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -65,6 +65,15 @@ class Point:
         return 3.0 * math.pi * self.viscosity * self.diameter * factor * self.slip
 
 
+class Contacts(NamedTuple):
+    """Contacts of spheres."""
+
+    speed: float  # largest speed of approach to be expected; sets stiffness and steps
+    restitution: float = 0.97
+    friction: float = 0.1
+    roughness: float = 1e-3  # least gap of a film [d]
+
+
 class Suspension:
     """Free spheres in a resolved flow, in lattice units.
 
@@ -73,9 +82,9 @@ class Suspension:
     diameter    [cells]
     density_ratio  of spheres over fluid, above 1
     weight      force on every sphere besides those of fluid and contacts (3,); a buoyant weight
+    contacts    of the spheres, and the steps in time that they need
     walls       walls of the particle engine
     box         lengths in which the particle engine is periodic; None along open axes
-    speed       largest speed of approach to be expected; sets stiffness and steps of contacts
     """
 
     def __init__(
@@ -85,11 +94,8 @@ class Suspension:
         diameter: float,
         density_ratio: float,
         weight: tuple[float, float, float],
+        contacts: Contacts,
         *,
-        speed: float,
-        restitution: float = 0.97,
-        friction: float = 0.1,
-        roughness: float = 1e-3,
         walls: tuple[Any, ...] = (),
         box: tuple[float | None, float | None, float | None] | None = None,
     ) -> None:
@@ -98,7 +104,7 @@ class Suspension:
         self.mass, self.excess_mass = density_ratio * fluid_mass, (density_ratio - 1.0) * fluid_mass
         self.inertia, self.excess_inertia = (0.1 * each * diameter**2 for each in (self.mass, self.excess_mass))
         self.weight = np.array(weight, float)
-        solid = _solid(density_ratio, diameter, speed, restitution, friction, roughness)
+        solid = _solid(density_ratio, diameter, contacts)
         particles = make_particles(positions, 0.5 * diameter, density_ratio, viscosity=flow.viscosity)
         self.solver = ParticleSolver(
             particles,
@@ -107,7 +113,7 @@ class Suspension:
             laws=Laws(film=True, cutoff_ratio=GRID_GAP / (0.25 * diameter), lubrication=unresolved_film),
             box=tuple(float(n) for n in flow.shape) if box is None else box,  # type: ignore[arg-type]
         )
-        self.substeps = math.ceil(1.0 / self.solver.recommended_step(speed))
+        self.substeps = math.ceil(1.0 / self.solver.recommended_step(contacts.speed))
         count = len(positions)
         self.velocity, self.spin = np.zeros((count, 3)), np.zeros((count, 3))
         self.contact_impulse = np.zeros((count, 6))
@@ -150,16 +156,14 @@ class Suspension:
         return np.asarray((self.flow.momentum() - inside) / outside - self.velocity.mean(axis=0))
 
 
-def _solid(
-    density: float, diameter: float, speed: float, restitution: float, friction: float, roughness: float
-) -> Material:
-    """The solid whose head-on contact at `speed` overlaps by OVERLAP diameters."""
+def _solid(density: float, diameter: float, contacts: Contacts) -> Material:
+    """The solid whose head-on contact at the largest speed overlaps by OVERLAP diameters."""
     reduced_mass, reduced_radius = 0.5 * density * sphere_volume(diameter), 0.25 * diameter
-    reduced = 15.0 / 16.0 * reduced_mass * speed**2 / (math.sqrt(reduced_radius) * (OVERLAP * diameter) ** 2.5)
+    reduced = 15.0 / 16.0 * reduced_mass * contacts.speed**2 / (math.sqrt(reduced_radius) * (OVERLAP * diameter) ** 2.5)
     modulus = 2.0 * reduced * (1.0 - 0.25**2)
     return Material(
         density=density, youngs_modulus=1e9 * modulus, contact_modulus=modulus, poisson=0.25,
-        restitution=restitution, friction=friction, roughness=roughness * diameter,
+        restitution=contacts.restitution, friction=contacts.friction, roughness=contacts.roughness * diameter,
     )  # fmt: skip
 
 
@@ -170,7 +174,7 @@ def prepare(point: Point) -> Suspension:
     flow = Flow((n, n, n), point.viscosity, force=(0.0, 0.0, force))
     return Suspension(
         flow, random_arrangement(point), point.diameter, point.density_ratio, (0.0, 0.0, -point.weight),
-        speed=point.slip, restitution=point.restitution, friction=point.friction, roughness=point.roughness,
+        Contacts(point.slip, point.restitution, point.friction, point.roughness),
     )  # fmt: skip
 
 

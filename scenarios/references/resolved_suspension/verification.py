@@ -12,7 +12,7 @@ from closures.drag_resolved import beetstra, tenneti
 from closures.drag_single import clift, schiller_naumann
 from scenarios.references.resolved_suspension.film import approach_resistance, unresolved_film
 from scenarios.references.resolved_suspension.flow import Flow, force_of, sphere_volume
-from scenarios.references.resolved_suspension.suspension import Point, Suspension, random_arrangement
+from scenarios.references.resolved_suspension.suspension import Contacts, Point, Suspension, random_arrangement
 from scenarios.validation.table import Row, reference, worst
 
 ZICK_HOMSY = {0.064: 2.810, 0.125: 4.292, 0.216: 7.442, 0.343: 15.4}
@@ -223,7 +223,7 @@ def ten_cate(case: str, width: int = 54, speed: float = 0.03) -> float:
     weight = (ratio - 1.0) * sphere_volume(diameter) * GRAVITY * step**2 / cell
     centre = np.array([[0.5 * (width + 1), 0.5 * (width + 1), 0.5 + 0.1275 / cell]])
     sphere = Suspension(
-        flow, centre, diameter, ratio, (0.0, 0.0, -weight), speed=speed, box=(None, None, None)
+        flow, centre, diameter, ratio, (0.0, 0.0, -weight), Contacts(speed), box=(None, None, None)
     )  # fmt: skip
     highest = 0.0
     while sphere.solver.particles.position[0, 2] > 0.06 / cell:
@@ -259,7 +259,7 @@ def two_spheres(reynolds: float = 60.0, ratio: float = 1.5, diameter: int = 10, 
     flow = Flow(shape, viscosity, force=(0.0, 0.0, 2.0 * weight / math.prod(shape)))
     low = np.array([2.0, 2.0, 4.0]) * diameter
     pair = np.array([low, low + np.array([0.05, 0.0, 2.0]) * diameter])
-    fall = Suspension(flow, pair, diameter, ratio, (0.0, 0.0, -weight), speed=speed)
+    fall = Suspension(flow, pair, diameter, ratio, (0.0, 0.0, -weight), Contacts(speed))
     box = np.array(shape, float)
     rows = []
     while fall.steps * speed / diameter < until:

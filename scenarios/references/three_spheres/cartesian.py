@@ -10,8 +10,11 @@ import math
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 from scipy.integrate import solve_ivp
 
+from cfddem.case.settings import takes
+from scenarios.collisions.three_spheres.study import Collision
 from scenarios.references.ode import event
 
 PAIRS = {12: (0, 1), 23: (1, 2), 13: (0, 2)}
@@ -19,31 +22,25 @@ RIM = 1e-9
 """Films separate slightly farther out than they meet, so that rounding does not make and break them."""
 
 
-def cartesian(
-    stokes: float,
-    theta12: float,
-    theta23: float = 0.0,
-    *,
-    film_ratio: float = 0.01,
-    minimum_gap: float = 0.05,
-    capillary_number: float = math.inf,
-    friction: float = 0.0,
-    restitution: float = 1.0,
-    gap23: float = 1.0,
-    film23: float = 1.0,
-    film13: float = 1.0,
-    until: float = 20.0,
-) -> list[tuple[str, int, float, float]]:
+class Conditions(Collision):
+    """Those of `simulate_three_spheres`, with another end."""
+
+    until: float = Field(20.0, gt=0, description="end, in delta_12 / v_n0 [-]")
+
+
+@takes(Conditions)
+def cartesian(given: Conditions) -> list[tuple[str, int, float, float]]:
     """Events of three wet spheres: kind, pair, time and speed, in the units of `simulate_three_spheres`.
 
-    until    end, in delta_12 / v_n0 [-]
     returns  events in their order, up to the first contact slower than 1e-3, where endless bouncing begins
     """
-    diameter, mass = 1.0 / film_ratio, 2.0 * stokes
-    films = {12: 1.0, 23: film23, 13: film13}
-    one, two = math.radians(theta12), math.radians(theta23)
+    film_ratio, minimum_gap, capillary_number = given.film_ratio, given.minimum_gap, given.capillary_number
+    friction, restitution, until = given.friction, given.restitution, given.until
+    diameter, mass = 1.0 / film_ratio, 2.0 * given.stokes
+    films = {12: 1.0, 23: given.film23, 13: given.film13}
+    one, two = math.radians(given.theta12), math.radians(given.theta23)
     second = (diameter + 1.0) * np.array([math.cos(one), math.sin(one)])
-    third = second + (diameter + gap23) * np.array([math.cos(two), math.sin(two)])
+    third = second + (diameter + given.gap23) * np.array([math.cos(two), math.sin(two)])
     y = np.concatenate([[0.0, 0.0], second, third, [1.0 / math.cos(one), 0, 0, 0, 0, 0], np.zeros(3)])
     bound = {pair: _look(y, pair, diameter)[0] <= films[pair] + RIM for pair in PAIRS}
 

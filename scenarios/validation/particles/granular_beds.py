@@ -107,11 +107,7 @@ def slope(
     run = ParticleSolver(
         spheres,
         pair_table([glass]),
-        laws=Laws(
-            film=film,
-            friction_onset=onset,
-            rolling="spring_dashpot" if rolling_friction > 0.0 else "none",
-        ),
+        laws=Laws(film=film, friction_onset=onset, rolling="spring_dashpot" if rolling_friction > 0.0 else "none"),
         gravity=DOWN,
         box=(box[0], box[1], None),
     )
@@ -198,10 +194,7 @@ def suspension(
         places, 0.5 * diameter, SUSPENDED.density, viscosity=viscosity, fixed=(lower | upper) if fixed else False
     )
     run = ParticleSolver(
-        spheres,
-        pair_table([SUSPENDED]),
-        laws=Laws(film=True),
-        box=(box[0], box[1], None if fixed else box[2]),
+        spheres, pair_table([SUSPENDED]), laws=Laws(film=True), box=(box[0], box[1], None if fixed else box[2])
     )
     return run, upper[run.particles.id]
 
