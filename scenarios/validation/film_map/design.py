@@ -25,8 +25,11 @@ SOLID_FRACTIONS = (0.25, 0.35, 0.45)
 DENSITY_RATIOS = (1.5, 2.5, 7.0)
 """Of spheres over liquid."""
 
-ROUGHNESS = {"smooth": 5.0e-8, "between": 7.0e-7, "rough": 1.0e-5}
-"""[m]; the reduced radius R* is 5e-4 m."""
+ROUGHNESS = {"smooth": 5.0e-8, "rough": 1.0e-5, "soft": 5.0e-8}
+"""Of the spheres with films [m]; the reduced radius R* is 5e-4 m."""
+
+SOFT = 5.0
+"""Real modulus of soft spheres, over that of the softened contact; others have that of glass."""
 
 DRY = "no film"
 
@@ -92,7 +95,7 @@ def is_in_range(point: Point) -> bool:
 def plan() -> Iterator[Run]:
     """All runs, in the order in which they begin: a table is complete, and then finer, after each part.
 
-    The coarse design with two seeds, its agitated beds, the third seed, the roughness between, all other points.
+    The coarse design with two seeds, its agitated beds, the third seed, soft spheres, all other points.
     """
     corners = [each for each in points() if is_corner(each)]
     even, agitated = ([each for each in corners if each.agitated == moved] for moved in (False, True))
@@ -102,7 +105,7 @@ def plan() -> Iterator[Run]:
         (even, first, SEEDS[:2]),
         (agitated, first, SEEDS[:2]),
         (corners, first, SEEDS[2:]),
-        (corners, ("between",), SEEDS),
+        (corners, ("soft",), SEEDS),
         (others, first, SEEDS),
     ):
         for seed, point, film in itertools.product(seeds, chosen, films):
@@ -117,7 +120,9 @@ def bed(point: Point, film: str, seed: int) -> Case:
     case = _of_liquid(point.density_ratio, viscosity(point.stokes, point.density_ratio))
     exponent, terminal = expansion_exponents(case)["Richardson-Zaki"]
     velocity = terminal * (1.0 - point.solid_fraction) ** exponent
-    height = case.particle_count * math.pi / 6.0 * case.bed.diameter**3 / (case.column.floor_area * point.solid_fraction)
+    height = (
+        case.particle_count * math.pi / 6.0 * case.bed.diameter**3 / (case.column.floor_area * point.solid_fraction)
+    )
     end, reference = TURNOVERS * height / velocity, gallery()["lubrication-study"]
     assert isinstance(reference.bed.inlet_velocity, float)
     faster = (velocity / reference.bed.inlet_velocity) ** 2
@@ -125,12 +130,14 @@ def bed(point: Point, film: str, seed: int) -> Case:
     heavier = (point.density_ratio - 1.0) * liquid / (solid - liquid)
     modulus = reference.material["sphere"].contact_modulus
     assert modulus is not None
+    softened = modulus * max(heavier, point.density_ratio * liquid / solid * faster)
     return case.with_(**{
         "title": f"Bed of the map of films: {point.name}, {film}",
         "bed.inlet_velocity": velocity,
         "bed.seed": seed,
         "material.sphere.roughness": ROUGHNESS.get(film, ROUGHNESS["smooth"]),
-        "material.sphere.contact_modulus": modulus * max(heavier, point.density_ratio * liquid / solid * faster),
+        "material.sphere.contact_modulus": softened,
+        "material.sphere.youngs_modulus": SOFT * softened if film == "soft" else case.solid.youngs_modulus,
         "laws.lubrication": "none" if film == DRY else case.laws.lubrication,
         "laws.agitation": "free_spheres" if point.agitated else "none",
         "column.height": case.column.cell * math.ceil(1.6 * height / case.column.cell),

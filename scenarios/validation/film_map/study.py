@@ -17,12 +17,18 @@ from cfddem.backend.compile import use_threads
 from cfddem.features.energy import LOST
 from cfddem.io.reading import RunData
 from scenarios.beds.lubrication_study.study import outcome
-from scenarios.validation.film_map.design import DRY, Run, bed, plan, stokes_of
+from scenarios.validation.film_map import effects
+from scenarios.validation.film_map.design import Run, bed, plan, stokes_of
+from scenarios.validation.film_map.effects import CHANGED, OF_FILMS, Beds
+from scenarios.validation.film_map.figure import draw
 from scenarios.validation.kept_runs import finished, kept, taken
 from scenarios.validation.table import Progress, Row
 
 OF_COLLISIONS = ("film", "film_shear", "contact_damping", "hysteresis", "friction", "rolling")
 """Lines of the energy ledger that films and contacts lose."""
+
+REMAINDER = 1e-3
+"""Largest energy that the ledger of a bed leaves unexplained, over the dissipation."""
 
 
 def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row]:
@@ -35,10 +41,14 @@ def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row
     use_threads(1)
     end = monotonic() + 3600.0 * hours
     for each in plan():
-        if monotonic() > end:
+        if monotonic() >= end:
             break
         advance(folder / "runs", each, progress)
-    return []
+    beds = effects.finished_beds(folder / "runs")
+    effects.write_beds(beds, folder / "beds.csv")
+    if effects.compared(beds):
+        draw(beds, folder / "map.png")
+    return rows(beds)
 
 
 def advance(home: Path, run: Run, progress: Progress) -> None:
@@ -46,6 +56,24 @@ def advance(home: Path, run: Run, progress: Progress) -> None:
     with taken(home, run.name) as mine:
         if mine:
             kept(home / f"{run.name}.json", lambda: _means(home, run, progress))
+
+
+def rows(beds: Beds) -> list[Row]:
+    """Changes by films with errors, shares of beds with films, and the balance of energy."""
+    made = []
+    for point, film in effects.compared(beds):
+        for what, words in (CHANGED | OF_FILMS).items():
+            changed = what in CHANGED
+            found = (effects.change if changed else effects.mean)(beds, point, film, what)
+            if found is not None:
+                note = "one seed" if found.seeds == 1 else f"standard error {found.error:.2g} over {found.seeds} seeds"
+                words = f"{words}, relative change by films" if changed else words
+                made.append(Row(f"{point.name}, {film}: {words}", found.value, note=note))
+    if beds:
+        largest = max(means["largest_remainder"] for means in beds.values())
+        words = f"energy that the ledgers of {len(beds)} beds leave unexplained, over the dissipation"
+        made.append(Row(words, largest, 0.0, REMAINDER))
+    return made
 
 
 def _means(home: Path, run: Run, progress: Progress) -> dict[str, float]:
