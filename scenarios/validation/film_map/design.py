@@ -33,7 +33,8 @@ SOFT = 5.0
 
 DRY = "no film"
 
-SPHERES = 400
+SPHERES = 440
+"""The lowest beds are four cells high."""
 
 CORNERS = {"solid_fraction": (0.25, 0.45), "density_ratio": (2.5, 7.0)}
 """Levels of the coarse design, which runs first; it has all Stokes numbers."""

@@ -19,7 +19,7 @@ Beds = dict[Run, Means]
 
 UNITS = {
     "voidage": "-", "bed_height": "m", "granular_temperature": "m2/s2", "temperature_along": "m2/s2",
-    "temperature_across": "m2/s2", "layer_deviation": "-", "collisions": "1/s", "approaches": "1/s", "stokes": "-",
+    "temperature_across": "m2/s2", "collisions": "1/s", "approaches": "1/s", "stokes": "-",
     "stokes_of_fluctuations": "-", "gap_ratio": "-", "solids_meet": "-", "contacts": "-", "dissipated": "-",
     "dissipation": "W", "largest_remainder": "-",
 }  # fmt: skip
@@ -28,8 +28,8 @@ UNITS = {
 CHANGED = {
     "bed_height": "bed height",
     "granular_temperature": "granular temperature",
+    "temperature_along": "granular temperature along gravity",
     "temperature_across": "granular temperature across gravity",
-    "layer_deviation": "deviation of the solid fraction of layers",
     "collisions": "collisions of a sphere",
     "dissipation": "dissipation by films and contacts",
 }

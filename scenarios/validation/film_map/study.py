@@ -88,8 +88,8 @@ def means_of(data: RunData, run: Run) -> dict[str, float]:
              in which solids meet and approaches to within the reach of a film, of one sphere [1/s], stokes (median),
              gap_ratio (median of h_eps over the roughness), solids_meet (share of the approaches), contacts (over the
              number of spheres), dissipated (by films and contacts, over all dissipation), dissipation (of one sphere
-             by films and contacts [W]), stokes_of_fluctuations (at the root of the granular temperature),
-             layer_deviation (of the solid fraction, by waves) and largest_remainder (of the energy ledger)
+             by films and contacts [W]), stokes_of_fluctuations (at the root of the granular temperature)
+             and largest_remainder (of the energy ledger)
     """
     case = bed(run.point, run.film, run.seed)
     begin, end = window_of(data, case)
@@ -101,7 +101,6 @@ def means_of(data: RunData, run: Run) -> dict[str, float]:
         "voidage": "bed_voidage",
         "temperature_along": "granular_temperature_along",
         "temperature_across": "granular_temperature_across",
-        "layer_deviation": "layer_deviation",
     }
     found |= {name: float(np.nanmean(data.history[column][inside])) for name, column in history.items()}
     rows = {name: column[data.collisions["end"] >= begin] for name, column in data.collisions.items()}
