@@ -44,6 +44,9 @@ SEEDS = (1, 2, 3)
 TURNOVERS, SETTLED = 4.0, 1.5
 """End of a run and start of its averages, over the time in which the flow rises through the bed, H/U."""
 
+ROOM = 1.6
+"""Height of the column over that of the bed by Richardson and Zaki, at least."""
+
 REFERENCE_SPEED = 0.64
 """Speed of the fastest collisions over the superficial velocity, as in the case of the lubrication study."""
 
@@ -127,10 +130,10 @@ def bed(point: Point, film: str, seed: int) -> Case:
     end, reference = TURNOVERS * height / velocity, gallery()["lubrication-study"]
     assert isinstance(reference.bed.inlet_velocity, float)
     faster = (velocity / reference.bed.inlet_velocity) ** 2
-    solid, liquid = reference.material["sphere"].density, reference.required_fluid.density
+    solid, liquid = reference.solid.density, reference.required_fluid.density
     heavier = (point.density_ratio - 1.0) * liquid / (solid - liquid)
-    modulus = reference.material["sphere"].contact_modulus
-    assert modulus is not None
+    modulus, cell = reference.solid.contact_modulus, case.column.cell
+    assert modulus is not None and isinstance(cell, float)
     softened = modulus * max(heavier, point.density_ratio * liquid / solid * faster)
     return case.with_(**{
         "title": f"Bed of the map of films: {point.name}, {film}",
@@ -141,7 +144,7 @@ def bed(point: Point, film: str, seed: int) -> Case:
         "material.sphere.youngs_modulus": SOFT * softened if film == "soft" else case.solid.youngs_modulus,
         "laws.lubrication": "none" if film == DRY else case.laws.lubrication,
         "laws.agitation": "free_spheres" if point.agitated else "none",
-        "column.height": case.column.cell * math.ceil(1.6 * height / case.column.cell),
+        "column.height": cell * math.ceil(ROOM * height / cell),
         "run.until": end,
         "run.average_from": SETTLED * height / velocity,
         "run.every": end / 4.0,
@@ -169,15 +172,20 @@ def stokes_of(case: Case, speed: float) -> float:
 
     speed  v [m/s]
     """
-    density = case.material["sphere"].density
-    return 2.0 * density * case.bed.diameter * speed / (9.0 * case.required_fluid.viscosity)
+    return 2.0 * case.solid.density * case.bed.diameter * speed / (9.0 * viscosity_of(case))
+
+
+def viscosity_of(case: Case) -> float:
+    """Viscosity of the liquid, which has no layers [Pa s]."""
+    viscosity = case.required_fluid.viscosity
+    assert isinstance(viscosity, float)
+    return viscosity
 
 
 def reynolds(case: Case) -> float:
     """Re_m of a uniform bed: the solid fraction and its mean slip make it that of the superficial velocity."""
     assert isinstance(case.bed.inlet_velocity, float)
-    fluid = case.required_fluid
-    return fluid.density * case.bed.inlet_velocity * case.bed.diameter / fluid.viscosity
+    return case.required_fluid.density * case.bed.inlet_velocity * case.bed.diameter / viscosity_of(case)
 
 
 def _of_liquid(density_ratio: float, viscosity: float) -> Case:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.validation.film_map.design import DRY, ROUGHNESS, Point, Run, bed, plan, reynolds
+from scenarios.validation.film_map.design import DRY, ROUGHNESS, Point, Run, bed, plan, reynolds, viscosity_of
 from scenarios.validation.table import replacing
 
 Means = Mapping[str, float]
@@ -118,7 +118,7 @@ def write_beds(beds: Beds, path: Path) -> None:
             velocity = case.bed.inlet_velocity
             assert isinstance(velocity, float)
             roughness = math.nan if run.film == DRY else ROUGHNESS[run.film]
-            modulus, viscosity = case.solid.youngs_modulus, case.required_fluid.viscosity
+            modulus, viscosity = case.solid.youngs_modulus, viscosity_of(case)
             described = (roughness, modulus, viscosity, velocity, reynolds(case))
             numbers = (*described, *(means.get(name, math.nan) for name in UNITS))
             point = run.point
@@ -133,7 +133,8 @@ def read_beds(lines: Iterable[str]) -> Beds:
     found: Beds = {}
     for row in csv.DictReader(lines):
         values = {name.split(" [")[0]: text for name, text in row.items()}
-        numbers = (float(values[name]) for name in _KEYS[:3])
-        run = Run(Point(*numbers, agitated=values["agitated"] == "1"), values["film"], int(values["seed"]))
+        stokes, solid_fraction, density_ratio = (float(values[name]) for name in _KEYS[:3])
+        point = Point(stokes, solid_fraction, density_ratio, values["agitated"] == "1")
+        run = Run(point, values["film"], int(values["seed"]))
         found[run] = {name: float(values[name]) for name in UNITS if values[name]}
     return found

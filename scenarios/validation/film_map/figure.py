@@ -8,16 +8,16 @@ from typing import Any
 
 from cfddem.plotting.curves import BLUE, GREEN, GREY, ORANGE, RED, SKY, blank, label, save
 from scenarios.validation.film_map.design import DENSITY_RATIOS, ROUGHNESS, SOLID_FRACTIONS
-from scenarios.validation.film_map.effects import Beds, Estimate, change, compared, mean
+from scenarios.validation.film_map.effects import CHANGED, Beds, Estimate, change, compared, mean
 
 PANELS = {
-    "bed_height": ("change of the bed height", True),
-    "granular_temperature": ("change of the granular temperature", True),
-    "collisions": ("change of the collision rate", True),
-    "solids_meet": ("collisions in which solids meet", False),
-    "dissipation": ("dissipation with films over that without", True),
+    "bed_height": ("bed height", "change by films", "%"),
+    "granular_temperature": ("granular temperature", "change by films", "%"),
+    "collisions": ("collisions of a sphere", "change by films", "%"),
+    "solids_meet": ("collisions in which solids meet", "share", "%"),
+    "dissipation": ("dissipation by films and contacts", "over that without films", "-"),
 }
-"""Title of each panel, and whether it shows changes."""
+"""Title of each panel, and label and unit of its axis."""
 
 COLOURS = dict(zip(SOLID_FRACTIONS, (SKY, GREEN, BLUE)))
 OF_HEAVY = dict(zip(SOLID_FRACTIONS, (ORANGE, RED, GREY)))
@@ -27,24 +27,22 @@ MARKS = dict(zip(ROUGHNESS, "osD"))
 def draw(beds: Beds, path: Path) -> None:
     """Changes by films, and shares, against the median Stokes number of the collisions."""
     figure, axes = blank(2, 3, width=11.0, height=7.2)
-    for each, (what, (title, is_change)) in zip(axes, PANELS.items()):
+    for each, (what, (title, name, unit)) in zip(axes, PANELS.items()):
+        factor, none = (1.0, 1.0) if what == "dissipation" else (100.0, 0.0)
         for point, film in compared(beds):
             stokes = mean(beds, point, film, "stokes")
-            shown = (change if is_change else mean)(beds, point, film, what)
-            if stokes is None or shown is None:
-                continue
-            factor, offset = (1.0, 1.0) if what == "dissipation" else (100.0, 0.0)
-            each.errorbar(
-                stokes.value, offset + factor * shown.value, _error(shown, factor), _error(stokes, 1.0),
-                **_style(point.solid_fraction, point.density_ratio, film, point.agitated),
-            )  # fmt: skip
-        if is_change and what != "dissipation":
-            each.axhline(0.0, color="0.4", linewidth=0.8, zorder=0)
+            shown = (change if what in CHANGED else mean)(beds, point, film, what)
+            if stokes is not None and shown is not None:
+                each.errorbar(
+                    stokes.value, none + factor * shown.value, _error(shown, factor), _error(stokes, 1.0),
+                    **_style(point.solid_fraction, point.density_ratio, film, point.agitated),
+                )  # fmt: skip
+        if what in CHANGED:
+            each.axhline(none, color="0.4", linewidth=0.8, zorder=0)
         each.set_xscale("log")
-        label(each, "median St of the collisions", "-", title, "-" if what == "dissipation" else "%")
         if what == "dissipation":
-            each.axhline(1.0, color="0.4", linewidth=0.8, zorder=0)
             each.set_yscale("log")
+        label(each, "median St of the collisions", "-", name, unit, title)
     _explain(axes[-1], beds)
     save(figure, path)
 
@@ -79,4 +77,5 @@ def _explain(axes: Any, beds: Beds) -> None:
             axes.errorbar([], [], **style, linewidth=1.0)
     if any(point.agitated for point, _ in shown):
         axes.errorbar([], [], fmt="o", color="0.3", mfc="white", label="hollow: with agitation", linewidth=1.0)
-    axes.legend(loc="center left", frameon=False, fontsize=9.5)
+    if shown:
+        axes.legend(loc="center left", frameon=False, fontsize=9.5)

@@ -46,8 +46,7 @@ def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row
         advance(folder / "runs", each, progress)
     beds = effects.finished_beds(folder / "runs")
     effects.write_beds(beds, folder / "beds.csv")
-    if effects.compared(beds):
-        draw(beds, folder / "map.png")
+    draw(beds, folder / "map.png")
     return rows(beds)
 
 
