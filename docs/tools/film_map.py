@@ -122,9 +122,9 @@ def between(values: Sequence[float], unit: str = " %") -> str:
     """Lowest to highest of some values.
 
     >>> between([0.5, -1.25, 3.0])
-    '-1.2 to 3.0 %'
+    '-1.25 to 3 %'
     """
-    return f"{min(values):.1f} to {max(values):.1f}{unit}" if values else "not known yet"
+    return f"{min(values):.3g} to {max(values):.3g}{unit}" if values else "not known yet"
 
 
 def values(beds: Beds, pairs: Iterable[Pair], what: str) -> list[float]:
@@ -141,18 +141,17 @@ def headline(beds: Beds) -> str:
     levels = [level for level in STOKES if any(point.stokes == level for point, _ in pairs)]
     if not levels:
         return f"{len(beds)} of {len(list(plan()))} beds have run."
-    ends = [[pair for pair in pairs if pair[0].stokes == level] for level in (levels[0], levels[-1])]
+    ends = [[pair for pair in pairs if pair[0].stokes == level] for level in dict.fromkeys((levels[0], levels[-1]))]
     collisions, height = (
         [f"{COLUMNS[what][1] * found.value:+.{places}f}" for each in ends if (found := mean_of(beds, each, what))]
         for what, places in (("collisions", 0), ("bed_height", 2))
     )
-    if len(levels) == 1:
-        rate, raised = collisions[0], height[0]
-        only = f"At a terminal Stokes number of {levels[0]:g}"
-        return f"{only}, films change the collision rate by {rate} %, and the bed height by {raised} %."
+    asked = list(plan())
+    part = "" if len(beds) == len(asked) else f" ({len(beds)} of {len(asked)} beds so far)"
+    numbers = " and ".join(f"{each:g}" for each in dict.fromkeys((levels[0], levels[-1])))
     return (
-        f"At terminal Stokes numbers of {levels[0]:g} and {levels[-1]:g}, films change the collision rate by "
-        f"{' and '.join(collisions)} %, and the bed height by {' and '.join(height)} %."
+        f"At {'terminal Stokes numbers' if len(ends) > 1 else 'a terminal Stokes number'} of {numbers}, films change the collision rate by "
+        f"{' and '.join(collisions)} %, and the bed height by {' and '.join(height)} %{part}."
     )
 
 
@@ -258,7 +257,7 @@ def _statements(beds: Beds, pairs: Sequence[Pair]) -> Iterator[str]:
         f"{between(values(beds, high, 'stokes'), '')} the collision rate still changes by "
         f"{between(values(beds, high, 'collisions'))}; larger St are not on the map |"
     )
-    rates = [shown(mean_of(beds, each, "collisions"), 100.0, True) or "not known yet" for each in (smooth, rough)]
+    rates = [shown(mean_of(beds, each, "collisions"), 100.0, True) or "?" for each in (smooth, rough)]
     yield (
         f"| {nijssen} | smoother spheres are damped more | the collision rate changes by {rates[0]} % (smooth) and "
         f"{rates[1]} % (rough), means over the same beds |"

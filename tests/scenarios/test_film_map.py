@@ -69,7 +69,6 @@ def made_up() -> Beds:
                     means |= {
                         "granular_temperature": 1e-5,
                         "dissipation": 1e-9 * (1.0 + number),
-                        "layer_deviation": 0.1,
                     }
                     films = {"stokes": 2.0 * seed, "solids_meet": 0.4, "gap_ratio": 0.1, "dissipated": 0.001}
                     beds[Run(point, film, seed)] = means | (films if film != DRY else {})
