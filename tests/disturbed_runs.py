@@ -1,7 +1,7 @@
 """A tiny coupled run that is killed repeatedly at random instants, and comparisons of its end.
 
 `python tests/disturbed_runs.py 100` kills it a hundred times, which takes a quarter of an hour, mostly to start
-processes.
+processes. `python tests/disturbed_runs.py 20 hot` takes another of `CASES`.
 """
 
 from __future__ import annotations
@@ -53,12 +53,23 @@ record_collisions = true
 """
 """It has films from the start and contacts after a few milliseconds, and takes a second."""
 
-WET = (
+GAS = (
     TINY.replace("density = 1000.0", "density = 1.2", 1)
     .replace("viscosity = 2e-3", "viscosity = 1.8e-5", 1)
     .replace("inlet_velocity = 0.02", "inlet_velocity = 0.8")
     + """
 particle_step = 1e-5
+[laws]
+drag = "beetstra"
+lubrication = "none"
+self_disturbance_correction = false
+"""
+)
+"""Dry beads in air."""
+
+WET = (
+    GAS
+    + """
 [liquid]
 viscosity = 5e-3
 surface_tension = 0.02
@@ -71,13 +82,33 @@ drop_volume = 1e-13
 zone = "box"
 corner = [0.0, 0.0, 0.009]
 size = [0.012, 0.012, 0.009]
-[laws]
-drag = "beetstra"
-lubrication = "none"
-self_disturbance_correction = false
 """
 )
 """Wet beads in air under a spray: bridges form and break, walls carry liquid."""
+
+HOT = (
+    WET
+    + """
+[heat]
+particle_temperature = 316.0
+fluid_temperature = 316.0
+inlet_temperature = 343.15
+conductivity = 0.028
+fluid_heat_capacity = 1010.0
+heat_capacity = { glass = 840.0 }
+solid_conductivity = { glass = 1.0 }
+spray_temperature = 298.0
+[vapour]
+fluid_fraction = 0.007
+diffusivity = 2.9e-5
+[evaporation]
+full_thickness = 5.0e-6
+"""
+)
+"""The same under hot air, which takes up the water."""
+
+CASES = {"liquid": TINY, "gas": GAS, "wet": WET, "hot": HOT}
+"""Cases by the words of the command line."""
 
 
 def same_state(left: Path, right: Path) -> None:
@@ -168,11 +199,12 @@ def _snapshots(run: Path) -> int:
 
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    case = CASES[sys.argv[2]] if len(sys.argv) > 2 else TINY
     with tempfile.TemporaryDirectory() as place:
         disturbed, whole = Path(place) / "disturbed", Path(place) / "whole"
         disturbed.mkdir()
-        hit = kill_and_go_on(disturbed, count, seed=count)
-        Run.begin(Case.from_text(long_enough(count)), whole).go()
+        hit = kill_and_go_on(disturbed, count, count, case)
+        Run.begin(Case.from_text(long_enough(count, case)), whole).go()
         same_state(disturbed / "run", whole)
         same_record(disturbed / "run", whole)
         print(f"killed {hit} times; the end is equal bit for bit")

@@ -31,7 +31,7 @@ def validate(
     hours: Annotated[
         float | None,
         Parameter(
-            help="of wet-beds and bed-steps: begin no further piece after this time; the next call does the rest"
+            help=f"of {', '.join(PIECEMEAL)}: begin no further piece after this time; the next call does the rest"
         ),
     ] = None,
     json: Annotated[bool, Parameter(help="print the table as JSON", negative="")] = False,

@@ -26,6 +26,7 @@ TARGETS: dict[str, str] = {
     "beds": "scenarios.validation.beds",
     "lubrication": "scenarios.beds.lubrication_study.validation",
     "bed-steps": "scenarios.beds.lubrication_study.steps",
+    "film-map": "scenarios.validation.film_map.study",
     "film-impact": "scenarios.collisions.film_impact.validation",
     "wet-tumbler": "scenarios.collisions.wet_tumbler.validation",
     "wet": "scenarios.validation.wet",
@@ -38,10 +39,10 @@ TARGETS: dict[str, str] = {
 }
 """Name of each target, and the module that holds its `study`."""
 
-ONLY_IF_NAMED = ("resolved", "wet-beds", "bed-steps")
+ONLY_IF_NAMED = ("resolved", "wet-beds", "bed-steps", "film-map")
 """Targets that take up to a day; `all` leaves them out."""
 
-PIECEMEAL = ("wet-beds", "bed-steps")
+PIECEMEAL = ("wet-beds", "bed-steps", "film-map")
 """Targets that make their table of what has been computed, and go on with the rest another time."""
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from disturbed_runs import TINY, WET, kill_and_go_on, long_enough, same_record, same_state
+from disturbed_runs import CASES, TINY, WET, kill_and_go_on, long_enough, same_record, same_state
 
 from cfddem import open_run
 from cfddem.backend.communicator import SERIAL, Communicator
@@ -275,6 +275,17 @@ def test_kills_of_a_wet_run_leave_it_whole_and_its_end_unchanged(tmp_path: Path)
     history = open_run(tmp_path / "whole").history
     assert history["bridge_count"][-1] > 50 and history["liquid_sprayed"][-1] > 0.0
     assert history["liquid_imbalance"].max() < 1e-12
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["gas", "hot"])
+def test_kills_of_gas_and_hot_runs_leave_them_whole_and_their_ends_unchanged(kind: str, tmp_path: Path) -> None:
+    """Beads in air, dry, and wet under a spray in hot air, which takes up the water."""
+    assert kill_and_go_on(tmp_path, kills=6, seed=6, case=CASES[kind]) >= 3
+    begin(tmp_path / "whole", long_enough(6, CASES[kind])).go()
+    same_state(tmp_path / "run", tmp_path / "whole")
+    same_record(tmp_path / "run", tmp_path / "whole")
+    assert ("evaporated_mass" in open_run(tmp_path / "whole").history) == (kind == "hot")
 
 
 def test_a_signal_that_comes_while_ranks_agree_is_not_lost() -> None:

@@ -1,0 +1,1 @@
+"""The map of films: where lubrication films matter in liquid-fluidised beds."""

@@ -1,0 +1,120 @@
+"""The map of films: beds with and without films over Stokes number, roughness, solid fraction and density ratio.
+
+Each bed with a film is compared with the bed without one from the same seed. Runs are kept: interrupted runs are
+continued, finished ones are not repeated, and several processes may share them.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+
+from cfddem.analysis.report import window_of
+from cfddem.backend.compile import use_threads
+from cfddem.features.energy import LOST
+from cfddem.io.reading import RunData
+from scenarios.beds.lubrication_study.study import outcome
+from scenarios.validation.film_map import effects
+from scenarios.validation.film_map.design import Run, bed, plan, stokes_of
+from scenarios.validation.film_map.effects import CHANGED, OF_FILMS, Beds
+from scenarios.validation.film_map.figure import draw
+from scenarios.validation.kept_runs import finished, kept, taken
+from scenarios.validation.table import Progress, Row
+
+OF_COLLISIONS = ("film", "film_shear", "contact_damping", "hysteresis", "friction", "rolling")
+"""Lines of the energy ledger that films and contacts lose."""
+
+REMAINDER = 1e-3
+"""Largest energy that the ledger of a bed leaves unexplained, over the dissipation."""
+
+
+def study(folder: Path, progress: Progress, hours: float = math.inf) -> list[Row]:
+    """Run the missing beds on one thread, write table and figure of those there are, and return the table.
+
+    Several processes may share the folder. From then on, this process runs on one thread.
+
+    hours  after which no further bed begins
+    """
+    use_threads(1)
+    end = monotonic() + 3600.0 * hours
+    for each in plan():
+        if monotonic() >= end:
+            break
+        advance(folder / "runs", each, progress)
+    beds = effects.finished_beds(folder / "runs")
+    effects.write_beds(beds, folder / "beds.csv")
+    draw(beds, folder / "map.png")
+    return rows(beds)
+
+
+def advance(home: Path, run: Run, progress: Progress) -> None:
+    """Run one bed and keep its means, unless they are kept or another process runs it."""
+    with taken(home, run.name) as mine:
+        if mine:
+            kept(home / f"{run.name}.json", lambda: _means(home, run, progress))
+
+
+def rows(beds: Beds) -> list[Row]:
+    """Changes by films with errors, shares of beds with films, and the balance of energy."""
+    made = []
+    for point, film in effects.compared(beds):
+        for what, words in (CHANGED | OF_FILMS).items():
+            changed = what in CHANGED
+            found = (effects.change if changed else effects.mean)(beds, point, film, what)
+            if found is not None:
+                note = "one seed" if found.seeds == 1 else f"standard error {found.error:.2g} over {found.seeds} seeds"
+                words = f"{words}, relative change by films" if changed else words
+                made.append(Row(f"{point.name}, {film}: {words}", found.value, note=note))
+    if beds:
+        largest = max(means["largest_remainder"] for means in beds.values())
+        words = f"energy that the ledgers of {len(beds)} beds leave unexplained, over the dissipation"
+        made.append(Row(words, largest, 0.0, REMAINDER))
+    return made
+
+
+def _means(home: Path, run: Run, progress: Progress) -> dict[str, float]:
+    case = bed(run.point, run.film, run.seed)
+    return means_of(finished(case, home, run.name, progress, {}), run)
+
+
+def means_of(data: RunData, run: Run) -> dict[str, float]:
+    """Means of a finished run; quantities that a bed without films does not have are absent.
+
+    returns  voidage, bed_height [m], granular_temperature and its parts along and across gravity [m2/s2], collisions
+             in which solids meet and approaches to within the reach of a film, of one sphere [1/s], stokes (median),
+             gap_ratio (median of h_eps over the roughness), solids_meet (share of the approaches), contacts (over the
+             number of spheres), dissipated (by films and contacts, over all dissipation), dissipation (of one sphere
+             by films and contacts [W]), stokes_of_fluctuations (at the root of the granular temperature)
+             and largest_remainder (of the energy ledger)
+    """
+    case = bed(run.point, run.film, run.seed)
+    begin, end = window_of(data, case)
+    inside = data.history["time"] >= begin
+    of_bed = outcome(data, case)
+    found = {name: getattr(of_bed, name) for name in ("bed_height", "granular_temperature", "collisions", "contacts")}
+    found |= {name: getattr(of_bed, name) for name in ("stokes", "solids_meet")}
+    history = {
+        "voidage": "bed_voidage",
+        "temperature_along": "granular_temperature_along",
+        "temperature_across": "granular_temperature_across",
+    }
+    found |= {name: float(np.nanmean(data.history[column][inside])) for name, column in history.items()}
+    rows = {name: column[data.collisions["end"] >= begin] for name, column in data.collisions.items()}
+    films = np.isfinite(rows["stokes"]) & (rows["stokes"] > 0.0)
+    if films.any():
+        found["approaches"] = 2.0 * float(rows["weight"][films].sum()) / (case.particle_count * (end - begin))
+        found["gap_ratio"] = float(np.median((rows["elastohydrodynamic_gap"] / rows["roughness_gap"])[films]))
+    lost = {name: np.ptp(data.history[f"energy_{name}"][inside][[0, -1]]) for name in LOST if _is_in(data, name)}
+    by_collisions = sum(lost[name] for name in OF_COLLISIONS if name in lost)
+    found["dissipated"] = float(by_collisions / sum(lost.values()))
+    found["dissipation"] = float(by_collisions) / (case.particle_count * (end - begin))
+    found["largest_remainder"] = float(np.abs(data.history["energy_remainder"]).max() / sum(lost.values()))
+    found["stokes_of_fluctuations"] = stokes_of(case, math.sqrt(found["granular_temperature"]))
+    return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+def _is_in(data: RunData, line: str) -> bool:
+    return f"energy_{line}" in data.history
