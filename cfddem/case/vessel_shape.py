@@ -27,7 +27,7 @@ OWN_KEYS: Mapping[str, tuple[str, ...]] = {
     "cylinder": ("radius", "spin"),
     "cone": ("radius", "top_radius", "length", "spin"),
     "chain": ("line", "spin"),
-    "box": ("size", "angle"),
+    "box": ("size", "turn"),
     "surface": ("file", "scale", "point"),
 }
 """Keys of each shape beside those of all vessels."""
@@ -62,7 +62,7 @@ class CaseVessel(Checked):
         (), description="[height, radius] points of a chain, from the floor up; a cylinder goes on above them [m]"
     )
     size: tuple[Positive, Positive] | None = Field(None, description="edges of a box, from floor to lid [m]")
-    angle: float = Field(0.0, description="by which a box is turned about its upright axis [degree]")
+    turn: float = Field(0.0, description="angle by which a box is turned about its upright axis [degree]")
     file: str | None = Field(
         None, description="STL, PLY or VTP file of a closed surface; its place is relative to the case file"
     )
@@ -148,9 +148,9 @@ class CaseVessel(Checked):
 
     def plan_in(self, column: Any) -> np.ndarray:
         """x and y of the four corners of a box, counter-clockwise from above (4, 2) [m]."""
-        half, turn = 0.5 * np.array(self.size), math.radians(self.angle)
+        half, angle = 0.5 * np.array(self.size), math.radians(self.turn)
         corners = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        cosine, sine = math.cos(turn), math.sin(turn)
+        cosine, sine = math.cos(angle), math.sin(angle)
         return 0.5 * np.array(column.size[:2]) + corners @ np.array([[cosine, sine], [-sine, cosine]])
 
     def with_file(self, place: Callable[[str], str]) -> CaseVessel:

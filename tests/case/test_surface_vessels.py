@@ -114,7 +114,7 @@ def test_particles_and_fluid_are_as_far_from_the_surface(tmp_path: Path) -> None
 
 
 def test_particles_start_inside_of_a_surface_or_box_and_clear_of_it(tmp_path: Path) -> None:
-    for case in (made(tmp_path), box(angle=30.0), made(tmp_path, bed__start="poured", bed__inlet_velocity=0.0)):
+    for case in (made(tmp_path), box(turn=30.0), made(tmp_path, bed__start="poured", bed__inlet_velocity=0.0)):
         corner, size = start_box(case)
         ends = np.array(np.meshgrid(*([low, low + edge] for low, edge in zip(corner[:2], size[:2])), 0.07)).reshape(
             3, -1
@@ -128,7 +128,7 @@ def test_particles_start_inside_of_a_surface_or_box_and_clear_of_it(tmp_path: Pa
 
 
 def test_a_turned_box_has_its_area_and_its_cells() -> None:
-    case = box(angle=30.0)
+    case = box(turn=30.0)
     assert case.floor_area == pytest.approx(0.02 * 0.012)
     assert open_share(grid_of(case)).sum() * grid_of(case).cell_volume == pytest.approx(0.02 * 0.012 * 0.08, rel=5e-3)
     assert not [each for each in preflight(case).issues if each.severity == "error"]
