@@ -117,7 +117,7 @@ _EXPOSED: set[Callable[..., float]] = set()
 def expose(function: Callable[..., float]) -> None:
     """Let compiled loops call this plain function by its name."""
     _EXPOSED.add(function)
-    overload(function, strict=False, jit_options=INLINE)(lambda *_, **__: function)
+    overload(function, strict=False, jit_options=INLINE)(lambda *_, **__: function)  # type: ignore[arg-type]
 
 
 def is_exposed(function: Callable[..., Any]) -> bool:

@@ -30,17 +30,21 @@ class _LinkedCode(JITCodeLibrary):  # type: ignore[misc]
         """Where addresses are set."""
         return _WithoutAddresses
 
+    inlined = False
+    """Whether it becomes part of each loop that calls it, which is optimised as a whole."""
+
     def _optimize_final_module(self) -> None:
-        """The loop is optimised as a whole."""
+        if not self.inlined:
+            super()._optimize_final_module()  # type: ignore[no-untyped-call]
 
     def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
+        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
+        self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
         self._finalized = True
 
     def get_pointer_to_function(self, name: str) -> int:
         """Address of a function: none."""
-        self._ensure_finalized()
+        self._ensure_finalized()  # type: ignore[no-untyped-call]
         return 0
 
 
@@ -48,27 +52,29 @@ class _CalledCode(JITCodeLibrary):  # type: ignore[misc]
     """Code of a loop that Python calls, with that of all functions in it."""
 
     def _finalize_specific(self) -> None:
-        super()._finalize_specific()
+        super()._finalize_specific()  # type: ignore[no-untyped-call]
         for each in self._final_module.global_variables:
-            environment = lookup_environment(each.name)
+            environment = lookup_environment(each.name)  # type: ignore[no-untyped-call]
             if environment is not None:
-                self._codegen.set_env(each.name, environment)
+                self._codegen.set_env(each.name, environment)  # type: ignore[attr-defined]
 
 
 class Linked(Compiler):  # type: ignore[misc]
     """Compiles a function for other compiled functions."""
 
-    def __init__(self, typing: Any, target: Any, library: Any, *more: Any) -> None:
-        super().__init__(typing, target, _LinkedCode(target.codegen(), "linked"), *more)
+    def __init__(self, typing: Any, target: Any, library: Any, args: Any, result: Any, flags: Any, *more: Any) -> None:
+        code = _LinkedCode(target.codegen(), "linked")  # type: ignore[no-untyped-call]
+        code.inlined = bool(flags.forceinline)
+        super().__init__(typing, target, code, args, result, flags, *more)  # type: ignore[no-untyped-call]
 
 
 class Called(Compiler):  # type: ignore[misc]
     """Compiles a loop that Python calls."""
 
     def __init__(self, typing: Any, target: Any, library: Any, *more: Any) -> None:
-        code = _CalledCode(target.codegen(), "called")
-        code.enable_object_caching()
-        super().__init__(typing, target, code, *more)
+        code = _CalledCode(target.codegen(), "called")  # type: ignore[no-untyped-call]
+        code.enable_object_caching()  # type: ignore[no-untyped-call]
+        super().__init__(typing, target, code, *more)  # type: ignore[no-untyped-call]
 
 
 PART: dict[str, Any] = {
