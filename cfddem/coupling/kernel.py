@@ -28,7 +28,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.errors import InputError, nearest
 from cfddem.backend.exact_sums import unit_of
 from cfddem.coupling import kernel_loops as loops
@@ -90,7 +89,6 @@ class FilterKernel:
                   kernel of the nearer one, by its logarithm. Empty where all have the same
     twice         whether this is that of a deposit and a gather together, both with the mapping
     parts         into how many the cells of the fluid are divided along x, y, z
-    communicator  of the run
     owners        which rank owns which particles; as the cells if None
     """
 
@@ -104,15 +102,14 @@ class FilterKernel:
         sizes: Sequence[tuple[float, float]] = (),
         twice: bool = False,
         parts: Sequence[int] = (1, 1, 1),
-        communicator: Communicator = SERIAL,
         owners: Whole | None = None,
     ) -> None:
         if mapping not in MAPPINGS:
             raise InputError("laws.mapping", mapping, nearest(mapping, MAPPINGS))
         if not (np.isfinite(smoothing) and smoothing >= 0.0):
             raise InputError("kernel width", smoothing, "zero or positive, in m")
-        self.grid, self.mapping, self.smoothing, self.communicator = grid, mapping, float(smoothing), communicator
-        self.twice = twice
+        self.grid, self.mapping, self.smoothing = grid, mapping, float(smoothing)
+        self.communicator, self.twice = grid.communicator, twice
         self.periodic = np.array(periodic, bool)
         self._linear = 1.0 if mapping == "linear" else 0.0
         self._offsets = _pieces(PIECES) if mapping == "divided" else np.zeros((1, 3))

@@ -88,7 +88,7 @@ def cells_of(kernel: FilterKernel) -> FilterKernel:
     parts = parts_of(kernel)
     return FilterKernel(
         kernel.grid.divided(parts), kernel.periodic, smoothing=kernel.smoothing, sizes=kernel.sizes, twice=True,
-        parts=parts, communicator=kernel.communicator, owners=kernel.owners,
+        parts=parts, owners=kernel.owners,
     )  # fmt: skip
 
 

@@ -14,11 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cfddem.backend.communicator import SERIAL, Communicator
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.fluid.cell_counts import cell_counts
@@ -53,6 +54,8 @@ class Grid:
     solid    (nz, ny, nx) true where a cell is solid, or None
     walls    smooth walls, which cut cells (:func:`cfddem.fluid.cut_cells.within`), or None
 
+    Attributes: `communicator`, of the ranks that share the grid.
+
     >>> Grid(cells=(4, 4, 24), spacing=(5e-3, 5e-3, 5e-3)).origin
     (0.0, 0.0, 0.0)
     """
@@ -62,6 +65,7 @@ class Grid:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     solid: NDArray[np.bool_] | None = field(default=None, repr=False)
     walls: Any = field(default=None, repr=False)
+    communicator: ClassVar[Communicator] = SERIAL
 
     def __post_init__(self) -> None:
         if len(self.cells) != 3 or any(int(n) != n or n < 1 for n in self.cells):

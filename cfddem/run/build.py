@@ -150,7 +150,6 @@ def flow_of(
         mapping=case.laws.mapping,
         smoothing=case.laws.kernel_width * case.bed.largest_diameter,
         sizes=kernels_of(case),
-        communicator=communicator,
         owners=owners,
     )
     beside = wall_drag_of(case.laws.wall_drag, walls_of(case), laws_of(case))

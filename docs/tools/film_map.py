@@ -149,9 +149,10 @@ def headline(beds: Beds) -> str:
     asked = list(plan())
     part = "" if len(beds) == len(asked) else f" ({len(beds)} of {len(asked)} beds so far)"
     numbers = " and ".join(f"{each:g}" for each in dict.fromkeys((levels[0], levels[-1])))
+    where = "terminal Stokes numbers" if len(ends) > 1 else "a terminal Stokes number"
     return (
-        f"At {'terminal Stokes numbers' if len(ends) > 1 else 'a terminal Stokes number'} of {numbers}, films change the collision rate by "
-        f"{' and '.join(collisions)} %, and the bed height by {' and '.join(height)} %{part}."
+        f"At {where} of {numbers}, films change the collision rate by {' and '.join(collisions)} %, and the bed height by "
+        f"{' and '.join(height)} %{part}."
     )
 
 

@@ -311,7 +311,7 @@ def test_values_between_centres_have_the_bits_of_one_process(periodic: tuple[boo
         if communicator.size > 1:
             cells = Block(grid, divide(grid, 8, shape=shape), communicator)
             owners, mine = Divided(division, communicator), np.flatnonzero(division.owner(places) == communicator.rank)
-        kernel = FilterKernel(cells, periodic, communicator=communicator, owners=owners)
+        kernel = FilterKernel(cells, periodic, owners=owners)
         found = [kernel.between_centres(cells.part(each), places[mine]) for each in (layered, uneven)]
         order = np.argsort(communicator.joined(mine))
         return [communicator.joined(each)[order] for each in found]
@@ -422,7 +422,7 @@ def test_the_flux_of_solids_has_the_bits_of_one_process(
         if communicator.size > 1:
             cells = Block(grid, divide(grid, communicator.size, shape=shape), communicator)
             mine = Bricks(cells.division.planes(grid)).owner(places) == communicator.rank
-        kernel = FilterKernel(cells, periodic, smoothing=0.012, communicator=communicator)
+        kernel = FilterKernel(cells, periodic, smoothing=0.012)
         before, after = (kernel.map_particles(each[mine], radius[mine]) for each in (places, places + ways))
         return kernel.solid_flux(before, after, 1e-3)
 
