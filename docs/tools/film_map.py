@@ -151,7 +151,8 @@ def headline(beds: Beds) -> str:
     numbers = " and ".join(f"{each:g}" for each in dict.fromkeys((levels[0], levels[-1])))
     where = "terminal Stokes numbers" if len(ends) > 1 else "a terminal Stokes number"
     return (
-        f"At {where} of {numbers}, films change the collision rate by {' and '.join(collisions)} %, and the bed height by "
+        f"At {where} of {numbers}, films change the collision rate by "
+        f"{' and '.join(collisions)} %, and the bed height by "
         f"{' and '.join(height)} %{part}."
     )
 
