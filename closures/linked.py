@@ -3,6 +3,9 @@
 The compiler makes each function ready to run, with machine code and an entry from Python, also one that only other
 compiled functions call. Most functions of a loop are such parts of it, so most machine code would never run. A
 `Linked` function stays in the language of the compiler until a loop that Python calls, a `Called` one, takes it over.
+
+These classes replace parts of the compiler that its documentation does not describe. With a version that lacks one of
+them everything is compiled in the usual way: more slowly, to the same numbers.
 """
 
 from __future__ import annotations
@@ -77,13 +80,32 @@ class Called(Compiler):  # type: ignore[misc]
         super().__init__(typing, target, code, *more)  # type: ignore[no-untyped-call]
 
 
-PART: dict[str, Any] = {
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": Linked,
-}
-"""How functions are compiled that other compiled functions call."""
+REPLACED = (
+    "codegen",
+    "get_pointer_to_function",
+    "_optimize_final_module",
+    "_finalize_final_module",
+    "_finalize_dynamic_globals",
+    "_verify_declare_only_symbols",
+    "_finalize_specific",
+    "_ensure_finalized",
+)
+"""What `JITCodeLibrary` must have for the classes above."""
+
+
+def is_supported(library: type) -> bool:
+    """Whether the code libraries of this version of the compiler have all parts that are replaced here."""
+    return all(hasattr(library, name) for name in REPLACED)
+
+
+def ways(library: type) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Options of functions that other compiled functions call, and of loops that Python calls."""
+    linked, called = (Linked, Called) if is_supported(library) else (Compiler, Compiler)
+    part = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": linked}
+    return part, {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": called}
+
+
+PART, CALLED = ways(JITCodeLibrary)
 
 INLINE: dict[str, Any] = {**PART, "forceinline": True, "_nrt": False}
-"""Helpers are always inlined, and count no references: they own no arrays."""
+"""Small functions that are always inlined, and count no references: they own no arrays."""

@@ -51,7 +51,7 @@ from numba.extending import intrinsic, overload
 
 import closures.compiled as _cache_first  # noqa: F401  sets the compile cache before numba is loaded
 from cfddem.backend.errors import InputError
-from closures.linked import INLINE, PART, Called
+from closures.linked import CALLED, INLINE, PART
 
 __all__ = [
     "CHUNKS",
@@ -81,10 +81,6 @@ CHUNKS = 64
 """Reductions sum this many fixed pieces in order, so that the sum does not depend on the thread count."""
 
 
-_CALLED: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True, "pipeline_class": Called}
-"""How loops are compiled that Python calls."""
-
-
 # the compiler has this flag, but no word for it among the options of `njit`
 CPUTargetOptions.noalias = TargetOptions.Mapping("noalias")  # type: ignore[attr-defined]
 
@@ -99,7 +95,7 @@ class Serial:
 
     def __init__(self, function: Any) -> None:
         self.py_func, self.__name__ = function, function.__name__
-        self.called, self.within = kept_on_disk(njit(**_CALLED)(function)), _linked(function)
+        self.called, self.within = kept_on_disk(njit(**CALLED)(function)), _linked(function)
 
     @property
     def _numba_type_(self) -> Any:
@@ -126,8 +122,8 @@ class Threaded:
 
     def __init__(self, function: Any) -> None:
         self.py_func, self.__name__ = function, function.__name__
-        self.one = kept_on_disk(njit(**_CALLED)(renamed(function, f"{function.__name__}_on_one_thread")))
-        self.all = kept_on_disk(njit(**_CALLED, parallel=True)(function))
+        self.one = kept_on_disk(njit(**CALLED)(renamed(function, f"{function.__name__}_on_one_thread")))
+        self.all = kept_on_disk(njit(**CALLED, parallel=True)(function))
 
     @property
     def in_use(self) -> Any:
@@ -146,7 +142,7 @@ def threaded(function: Callable[..., Any]) -> Any:
 
 def either(function: Callable[..., Any]) -> Any:
     """Compile a loop over `prange` for one thread; `law_set.specialise` can compile it for all threads."""
-    return _marked(kept_on_disk(njit(**_CALLED)(function)), either)
+    return _marked(kept_on_disk(njit(**CALLED)(function)), either)
 
 
 def _linked(function: Callable[..., Any], **options: Any) -> Any:

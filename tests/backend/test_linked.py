@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import textwrap
@@ -106,3 +107,40 @@ def test_errors_of_parts_keep_their_values(tmp_path: Path) -> None:
         for _ in range(2)
     ]
     assert answers == ["('too large', 7.5) 0\n", "('too large', 7.5) 1\n"]
+
+
+@pytest.mark.parametrize("replaced", [True, False])
+def test_a_version_without_the_replaced_parts_gives_the_same_numbers(replaced: bool, tmp_path: Path) -> None:
+    script = f"""
+        from numba.core.codegen import JITCodeLibrary
+        from closures import linked
+
+        linked.PART, linked.CALLED = linked.ways(JITCodeLibrary if {replaced} else object)
+        linked.INLINE = {{**linked.PART, "forceinline": True, "_nrt": False}}
+        assert linked.PART["pipeline_class"].__name__ == {"Linked" if replaced else "Compiler"!r}
+
+        import numpy as np
+        from cfddem.backend.compile import inline, part, prange, serial
+
+        @inline
+        def rooted(x):
+            return (1.0 + x) ** 0.5
+
+        @part
+        def root_all(values):
+            for n in prange(len(values)):
+                values[n] = rooted(values[n])
+
+        @serial
+        def walk(values):
+            root_all(values)
+            return values.sum()
+
+        print(walk(np.arange(5.0)).hex())
+    """
+    (tmp_path / "script.py").write_text(textwrap.dedent(script), encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "XDG_CACHE_HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip() == sum(np.sqrt(1.0 + np.arange(5.0))).hex(), done.stderr
