@@ -61,7 +61,7 @@ class TwoPhaseBalance:
     ) -> None:
         self.density, self.capacity, self.conductivity, self.viscosity = gas
         self.simulation, self.inlet, self.place = simulation, inlet, place
-        particles, fluid = simulation.particles, simulation.required_fluid
+        particles, fluid = simulation.particles, simulation.fluid
         self.heat = specific * float(particles.mass[0])
         self.diameter = 2.0 * float(particles.radius[0])
         self.hot = particles.temperature[np.argsort(particles.id)].copy()
@@ -100,7 +100,7 @@ class TwoPhaseBalance:
         product: np.ndarray,
     ) -> tuple[np.ndarray, float]:
         """Values of the cells after a step, and the mean of what leaves; amount of the gas per volume."""
-        fluid, (nx, ny, nz) = self.simulation.required_fluid, self.grid.cells
+        fluid, (nx, ny, nz) = self.simulation.fluid, self.grid.cells
         volume = self.grid.cell_volume
         number = np.arange(nx * ny * nz).reshape(nz, ny, nx)
         eps = fluid.mean_voidage

@@ -112,7 +112,9 @@ class EnergyLedger(CaseFeature):
 
     def __init__(self, case: Case, simulation: Any) -> None:
         self.particle_solver, self.fluid, self.coupling = (
-            simulation.particle_solver, simulation.fluid, simulation.coupling,
+            simulation.particle_solver,
+            simulation.fluid if simulation.has_fluid else None,
+            simulation.coupling if simulation.has_fluid else None,
         )  # fmt: skip
         self._count: Energies = self.particle_solver.feature(Energies)
         self._acted_on = simulation.is_acted_on  # whether the line of forces from outside is shown

@@ -118,7 +118,7 @@ class HeatExchange(CaseFeature):
         self.communicator, self.humid = simulation.communicator, Vapour.is_in(case)
         self.cells: Scalar | None = None
         if keys.in_cells(case):
-            fluid, kernel = simulation.required_fluid, simulation.required_coupling.kernel
+            fluid, kernel = simulation.fluid, simulation.coupling.kernel
             of_volume = fluid.density * keys.fluid_heat_capacity
             kind = ScalarKind(
                 OF_FLUID.name, OF_FLUID.unit, OF_FLUID.meaning, keys.fluid_temperature, of_volume, keys.conductivity,

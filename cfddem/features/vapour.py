@@ -54,7 +54,7 @@ class Vapour(CaseFeature):
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
-        keys, law, fluid = VapourTable.of(case), case.laws.heat_law, simulation.required_fluid
+        keys, law, fluid = VapourTable.of(case), case.laws.heat_law, simulation.fluid
         assert keys is not None and law is not None
         self.keys, self.law, self.communicator = keys, ExchangeLaw(law), simulation.communicator
         self.conductivity = fluid.density * keys.diffusivity
@@ -94,7 +94,7 @@ class Vapour(CaseFeature):
         step         [s]
         returns      mass that every particle receives from the cells (N,) [kg], the opposite of what they give
         """
-        kernel, cell_map = simulation.required_coupling.kernel, simulation.terms.cell_map
+        kernel, cell_map = simulation.coupling.kernel, simulation.terms.cell_map
         sent = np.stack([conductance, conductance * surface], axis=1)
         coefficient, product = kernel.spread(cell_map, sent) / kernel.grid.cell_volume
         seen = self.cells.step(coefficient, product)

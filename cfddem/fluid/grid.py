@@ -14,12 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cfddem.backend.communicator import SERIAL, Communicator
+from cfddem.backend.communicator import SERIAL
 from cfddem.backend.compile import inline, prange, threaded
 from cfddem.backend.errors import InputError
 from cfddem.fluid.cell_counts import cell_counts
@@ -65,7 +65,7 @@ class Grid:
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     solid: NDArray[np.bool_] | None = field(default=None, repr=False)
     walls: Any = field(default=None, repr=False)
-    communicator: ClassVar[Communicator] = SERIAL
+    communicator = SERIAL
 
     def __post_init__(self) -> None:
         if len(self.cells) != 3 or any(int(n) != n or n < 1 for n in self.cells):

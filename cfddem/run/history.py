@@ -186,7 +186,7 @@ def bed_voidage(simulation: Simulation) -> float:
 @measure("1", when=_is_fluid_bed)
 def bed_voidage_from_pressure(simulation: Simulation) -> float:
     """Mean voidage of the bed, from the pressure gradient within it."""
-    particles, fluid, grid = simulation.owned, simulation.required_fluid, grid_of(simulation.case)
+    particles, fluid, grid = simulation.owned, simulation.fluid, grid_of(simulation.case)
     carried = 0.0 if simulation.case.bed.fixed else abs(simulation.gravity[2])  # a packed bed need not be carried
     total, volume = simulation.communicator.sum, particles.volume
     weight = (total(particles.density * volume) / total(volume) - fluid.density) * carried
@@ -198,7 +198,7 @@ def bed_voidage_from_pressure(simulation: Simulation) -> float:
 @measure("Pa", when=_is_fluid_bed)
 def pressure_drop(simulation: Simulation) -> float:
     """Pressure drop from below the floor to the top, without the hydrostatic part."""
-    fluid, column = simulation.required_fluid, simulation.case.column
+    fluid, column = simulation.fluid, simulation.case.column
     grid = grid_of(simulation.case)
     drop = measures.pressure_drop(fluid.whole("pressure"), grid.spacing, 0.0, column.height, open_cells=grid.open)
     inflow, voidage = fluid.grid.joined(fluid.volume_flux(2)[:-1])[0], fluid.whole("mean_voidage")[0]
@@ -249,14 +249,14 @@ def particle_count(simulation: Simulation) -> float:
 @measure("1", group="recorded", when=_has_fluid)
 def out_of_range_count(simulation: Simulation) -> float:
     """How often drag and film laws were evaluated outside of their ranges so far."""
-    of_fluid = simulation.required_coupling.outside
+    of_fluid = simulation.coupling.outside
     return of_fluid.get("drag", 0) + simulation.communicator.sum([simulation.particle_solver.outside])
 
 
 @measure("1", group="recorded", when=_is_agitated)
 def agitation_out_of_range_count(simulation: Simulation) -> float:
     """How often the law of agitation was evaluated outside of its range so far."""
-    return simulation.required_coupling.outside["agitation"]
+    return simulation.coupling.outside["agitation"]
 
 
 # ---------------------------------------------------------------- films
@@ -325,7 +325,7 @@ _declare("wall_loads", Measure(wall_load_columns, wall_loads))
 @measure("1", group="imbalance", when=_has_fluid)
 def momentum_imbalance(simulation: Simulation) -> float:
     """Momentum that the fluid gave and particles did not receive, over that given."""
-    fluid, particles, total = simulation.required_fluid, simulation.owned, simulation.communicator.sum
+    fluid, particles, total = simulation.fluid, simulation.owned, simulation.communicator.sum
     # walls, inlets and outlets belong to neither of the two sums
     given, got = total(drag_exchange(fluid), axis=(0, 1, 2)), total(particles.drag_impulse, axis=0)
     return max(abs(part) for part in given + got) / max(total(np.abs(particles.drag_impulse)), 1e-300)
@@ -334,7 +334,7 @@ def momentum_imbalance(simulation: Simulation) -> float:
 @measure("1", group="imbalance", when=_has_fluid)
 def volume_imbalance(simulation: Simulation) -> float:
     """Volume gained by a cell against the flux through its faces, over the largest flux."""
-    fluid, largest = simulation.required_fluid, simulation.communicator.largest
+    fluid, largest = simulation.fluid, simulation.communicator.largest
     flux = max(largest(np.abs(fluid.volume_flux(d))) * fluid.grid.face_area(d) for d in range(3))
     return largest(np.abs(continuity_residual(fluid))) / max(flux, 1e-300)
 

@@ -140,7 +140,7 @@ class Run:
                 simulation = restored(case, state, Path(origin or ""), communicator, **added)
         wall.count("preparation")  # initial packing, loading of compiled loops
         simulation.wall.seconds |= wall.seconds
-        grid = None if simulation.fluid is None else simulation.fluid.grid.whole
+        grid = simulation.fluid.grid.whole if simulation.has_fluid else None
         about = (
             provenance(case.bed.seed)
             | record_of(case)
@@ -330,7 +330,7 @@ class Run:
         simulation, solver = self.simulation, self.simulation.particle_solver
         with simulation.wall.part("snapshots"):
             fluid: dict[str, np.ndarray | Portions] | None = None
-            if simulation.fluid is not None:
+            if simulation.has_fluid:
                 grid = simulation.fluid.grid
                 fluid = {name: in_portions(grid, getattr(simulation.fluid, name), 0) for name in RECORDED}
                 for feature in simulation.features:

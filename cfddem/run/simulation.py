@@ -107,9 +107,9 @@ class Simulation:
         state: dict[str, Any] | None,
     ) -> None:
         """Put the parts together, and continue from a state."""
-        self._case, self.particle_solver, self.coupling = case, *parts
-        self._around = self.coupling or Uncoupled(self.particle_solver)
-        self.fluid, self.forces, self.gravity = self._around.fluid, self._around.forces, self._around.gravity
+        self._case, self.particle_solver, self._coupling = case, *parts
+        self._around = self._coupling or Uncoupled(self.particle_solver)
+        self._fluid, self.forces, self.gravity = self._around.fluid, self._around.forces, self._around.gravity
         self.communicator, self.wall = self.particle_solver.communicator, self.particle_solver.wall
         kinds = [] if case is None else [each for each in FEATURES if each.is_in(case)]
         if case is not None:
@@ -128,7 +128,7 @@ class Simulation:
             self.features[:0] = [kind(case, self) for kind in kinds]
         self._restore_features({} if state is None else state.get("features", {}))
         self.time_steps = TimeSteps(
-            settings, self.particle_solver, self.fluid, particle_step, self.communicator, self._step_limits
+            settings, self.particle_solver, self._fluid, particle_step, self.communicator, self._step_limits
         )
 
     @property
@@ -147,7 +147,7 @@ class Simulation:
         """
         added = feature if isinstance(feature, Feature) else OwnForce(feature, on)
         if isinstance(added, FluidForce):
-            if added.needs_fluid and self.fluid is None:
+            if added.needs_fluid and not self.has_fluid:
                 remedy = 'add it on="particles", or give the case a [fluid]'
                 raise InputError(f"force {added.name}", "on the fluid", "a force of a run with a fluid", remedy)
             self.forces.add(added, self.particles)
@@ -182,14 +182,19 @@ class Simulation:
         return self.particle_solver.particles
 
     @property
-    def required_fluid(self) -> FluidSolver:
-        """The solver of the fluid; InputError where there are dry particles only."""
-        return self._required(self.fluid)
+    def has_fluid(self) -> bool:
+        """Whether there is a fluid around the particles."""
+        return self._coupling is not None
 
     @property
-    def required_coupling(self) -> Coupling:
+    def fluid(self) -> FluidSolver:
+        """The solver of the fluid; InputError where there are dry particles only."""
+        return self._required(self._fluid)
+
+    @property
+    def coupling(self) -> Coupling:
         """The coupling of particles and fluid; InputError where there are dry particles only."""
-        return self._required(self.coupling)
+        return self._required(self._coupling)
 
     def _required(self, part: Part | None) -> Part:
         if part is None:

@@ -94,7 +94,7 @@ def wall_loads(simulation: Simulation) -> dict[str, float]:
     force, torque = (np.array(simulation.communicator.sum(each, axis=())) for each in _loads(simulation))
     axis = np.array((0.5 * case.column.size[0], 0.5 * case.column.size[1], 0.0))
     recorded = list(loaded_walls(case))
-    of_fluid = loads_on_walls(simulation.required_fluid, axis) if any(each.of_fluid for each in recorded) else {}
+    of_fluid = loads_on_walls(simulation.fluid, axis) if any(each.of_fluid for each in recorded) else {}
     for each in recorded:
         m = each.number
         pushed, turned, about = force[m], torque[m], (0.0, 0.0, 1.0)

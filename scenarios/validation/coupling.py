@@ -196,7 +196,7 @@ def packed(curves: Curves) -> list[Row]:
 def conserved(curves: Curves) -> list[Row]:
     """A stirred periodic box over 1000 fluid steps."""
     simulation = Simulation(STIRRED)
-    particles, fluid = simulation.particles, simulation.required_fluid
+    particles, fluid = simulation.particles, simulation.fluid
     particles.velocity[:] = np.random.default_rng(7).normal(0.0, 0.02, particles.velocity.shape) + 0.01
     simulation.particle_solver.refresh()
     scale = float((particles.mass * np.linalg.norm(particles.velocity, axis=1)).sum())

@@ -77,7 +77,7 @@ def measure(bed: str, steps: int) -> list[Simulation]:
             spent.append(seconds)
     mean = [1e3 * statistics.median(each) for each in zip(*spent)]
     print(
-        f"{bed}: {dry.particles.count} particles, {dry.required_fluid.grid.cells} cells; ms per step: "
+        f"{bed}: {dry.particles.count} particles, {dry.fluid.grid.cells} cells; ms per step: "
         + ", ".join(f"{each:.2f}" for each in mean)
     )
     for name, one, other in (("heat", 0, 1), ("vapour and evaporation", 2, 3)):

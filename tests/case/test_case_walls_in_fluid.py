@@ -79,7 +79,6 @@ def test_cells_outside_of_a_cone_are_solid_and_the_inlet_is_what_is_left() -> No
     assert rows["wall 0: solid cells"] == (~grid.open).sum()
     simulation = Simulation(case)
     simulation.until(0.002)
-    assert simulation.fluid is not None
     floor, lid = simulation.fluid.volume_flux(2)[0], simulation.fluid.volume_flux(2)[-1]
     assert floor[grid.open[0]] == pytest.approx(1.0) and not floor[~grid.open[0]].any()
     assert lid.sum() == pytest.approx(floor.sum(), rel=1e-6)
@@ -153,7 +152,6 @@ def test_feeds_in_a_fluid_displace_none_and_resume_bit_for_bit(tmp_path: Path) -
     """Beads that enter a liquid replace it: the flow hardly changes; a restored run has the same bits."""
     liquid = {"fluid.density": 1000.0, "fluid.viscosity": 1e-3, "bed.inlet_velocity": 0.0, "run.until": 0.02}
     straight = Simulation(Case.from_text(CONE, "c.toml", FED | liquid))
-    assert straight.fluid is not None
     fastest = []
     while straight.time < 0.006:
         straight.step()
@@ -166,7 +164,6 @@ def test_feeds_in_a_fluid_displace_none_and_resume_bit_for_bit(tmp_path: Path) -
     again = Simulation.restored(straight.case, checkpoint.newest(tmp_path / "kept")["state"])
     for each in (straight, again):
         each.until(0.012)
-    assert again.fluid is not None
     assert np.array_equal(again.particles.position, straight.particles.position)
     assert np.array_equal(again.fluid.velocity, straight.fluid.velocity)
     Run.begin(straight.case, tmp_path / "run")
@@ -185,7 +182,6 @@ def test_two_ranks_share_walls_and_feeds_in_a_fluid() -> None:
     def part(communicator: Any) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
         simulation = Simulation(case, communicator=communicator)
         simulation.until(0.002)
-        assert simulation.fluid is not None
         owned = simulation.owned
         return owned.id.copy(), owned.position.copy(), simulation.feature(Feeds).fed, simulation.fluid.whole("velocity")
 
@@ -194,5 +190,4 @@ def test_two_ranks_share_walls_and_feeds_in_a_fluid() -> None:
     places = np.concatenate([each[1] for each in parts])[np.argsort(ids)]
     assert {each[2] for each in parts} == {alone.feature(Feeds).fed} == {8}
     assert places == pytest.approx(alone.particles.position[np.argsort(alone.particles.id)], rel=1e-12)
-    assert alone.fluid is not None
     assert np.abs(parts[0][3] - alone.fluid.velocity).max() < 1e-12

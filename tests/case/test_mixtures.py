@@ -190,7 +190,6 @@ def test_drag_uses_the_diameter_over_the_local_sauter_mean() -> None:
 def test_spheres_of_one_size_see_their_own_diameter_while_they_move() -> None:
     """Both sums of the Sauter mean are of the same positions, though the voidage is the mean over the fluid step."""
     run = Simulation(mixture(bed__species__pellets__diameter=1e-3, bed__species__pellets__spread=0.0))
-    assert run.coupling is not None and run.fluid is not None
     run.step()
     run.particles.velocity[:, 2] = 0.2
     terms = run.coupling.prepare(run.particles, 1e-3)

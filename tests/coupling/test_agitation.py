@@ -68,7 +68,6 @@ def suspension(text: str = SUSPENSION, **changes: object) -> Simulation:
 
 def agitation_of(simulation: Simulation) -> AgitationTerms:
     """Agitation that the next step would have."""
-    assert simulation.coupling is not None
     terms = simulation.coupling.prepare(simulation.particles, simulation.last_step or 1e-4)
     velocity = terms.fluctuations["drag"]
     return AgitationTerms(velocity, terms.explicit.get("agitation", np.zeros_like(velocity)))
@@ -144,7 +143,6 @@ def test_beads_are_agitated_and_keep_their_mean_drag() -> None:
 @pytest.mark.parametrize("law", ["pseudo_turbulence", "lattanzi"])
 def test_without_slip_there_is_no_agitation(law: str) -> None:
     simulation = suspension(laws__agitation=law, laws__gravity=(0.0, 0.0, 0.0))
-    assert simulation.fluid is not None
     simulation.fluid.boundaries.driving[2] = 0.0
     simulation.fluid.set_velocity((0.0, 0.0, 0.0))
     for _ in range(3):
@@ -268,7 +266,6 @@ def test_same_bits_on_one_and_two_threads_and_after_a_restart() -> None:
     assert np.array_equal(*states)
     simulation.step()
     again = Simulation.restored(simulation.case, kept[0])
-    assert simulation.fluid is not None and again.fluid is not None
     again.fluid.boundaries.driving[:] = simulation.fluid.boundaries.driving
     again.step()
     assert np.array_equal(simulation.particles.velocity, again.particles.velocity)

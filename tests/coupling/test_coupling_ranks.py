@@ -68,14 +68,12 @@ BEDS = {
 def begun(case: Case, communicator: Communicator = SERIAL, state: dict[str, Any] | None = None) -> Simulation:
     """A run with a tight tolerance of the pressure."""
     simulation = Simulation(case, communicator=communicator, state=state)
-    assert simulation.fluid is not None
     simulation.fluid.tolerance = TIGHT
     return simulation
 
 
 def advanced(simulation: Simulation, steps: int) -> dict[str, Array]:
     """Particles by id, fluid, and what the history says after some steps."""
-    assert simulation.fluid is not None
     for _ in range(steps):
         simulation.step()
     names = ["position", "velocity", "spin", "applied", "drag_impulse"]

@@ -98,7 +98,6 @@ def test_the_first_step_is_exact_where_the_fluid_pushes_back() -> None:
 def test_momentum_is_what_the_force_gives(on: On) -> None:
     """On both, fluid and particles keep their momentum to round-off; alone, one gains F t for each particle."""
     simulation = Simulation(suspension())
-    assert simulation.fluid is not None
     simulation.add(electric, on=on)
     for _ in range(20):
         simulation.step()
@@ -173,7 +172,6 @@ def test_a_force_that_a_user_adds_is_one_like_ours() -> None:
             simulation.step()
     assert np.array_equal(ours.particles.velocity, added.particles.velocity)
     assert np.abs(ours.particles.velocity).max() > 1e-3
-    assert ours.coupling is not None and added.coupling is not None
     assert ours.coupling.outside["drag"] == added.coupling.outside["drag"]
 
 
@@ -234,7 +232,6 @@ def test_ranks_agree_on_a_force_on_both() -> None:
 
     def moved(communicator: Communicator) -> tuple[np.ndarray, np.ndarray]:
         simulation = Simulation(case, communicator=communicator, features=[OwnForce(electric, "both")])
-        assert simulation.fluid is not None
         simulation.fluid.tolerance = 1e-11
         for _ in range(3):
             simulation.step()

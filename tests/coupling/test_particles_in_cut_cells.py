@@ -122,7 +122,7 @@ def test_a_bed_in_a_round_column_accounts_for_its_energy(tmp_path):
     """Works of the terms of the fluid add up to its kinetic energy; the remainder is below 1 % of what was put in."""
     case = bed_of(800, {"shape": "cylinder"}).with_(**{"run.until": 0.02, "run.energy_budget": True})
     simulation = Simulation(case.with_(**{"run.energy_budget": False}))
-    fluid = simulation.required_fluid
+    fluid = simulation.fluid
     for _ in range(20):
         before = budgets.kinetic_energy(fluid)
         simulation.step()

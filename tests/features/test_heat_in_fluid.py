@@ -334,7 +334,7 @@ def test_tiny_hot_particles_and_gas_meet_at_the_common_temperature_with_steps_fa
     )  # fmt: skip
     simulation = Simulation(case)
     simulation.step()
-    heat, fluid = simulation.feature(HeatExchange), simulation.required_fluid
+    heat, fluid = simulation.feature(HeatExchange), simulation.fluid
     assert heat.cells is not None
     capacity = float(heat.capacity(simulation.particles).sum())
     of_gas = 1200.0 * (box**3 - float(simulation.particles.volume.sum()))

@@ -216,7 +216,7 @@ def test_a_hot_inlet_through_a_patch_heats_the_particles_of_a_cone_and_the_balan
     simulation = Simulation(Case.from_text(CASE, "c.toml"))
     for _ in range(20):
         simulation.step()
-    found, seconds = row(simulation), simulation.required_fluid.time
+    found, seconds = row(simulation), simulation.fluid.time
     nozzle, annulus = 2.0 * math.pi * 0.006**2, 0.5 * math.pi * (0.014**2 - 0.007**2)
     assert found["heat_in"] == pytest.approx(1200.0 * nozzle * 100.0 * seconds, rel=0.03)
     assert found["vapour_in"] == pytest.approx(1.2 * annulus * 0.02 * seconds, rel=0.03)

@@ -48,7 +48,6 @@ def test_the_page_feeds_three_layers_and_loses_none(
 
 def test_a_bead_that_enters_replaces_fluid_of_its_own_volume(page: dict[str, Any]) -> None:
     simulation = Simulation(Case.from_text(CASE + WATER), features=[page["Layers"]()])
-    assert simulation.fluid is not None
     simulation.step()
     simulation.step()
     assert simulation.particles.count == 17
@@ -80,7 +79,6 @@ def test_two_ranks_feed_the_same_beads_with_the_same_bits(page: dict[str, Any]) 
         case = Case.from_text(CASE + WATER).with_(**{"column.width": 0.03})
         simulation = Simulation(case, communicator=communicator, features=[page["Layers"]()])
         simulation.step()
-        assert simulation.fluid is not None
         fluid = (1.0 - simulation.fluid.whole("voidage")).sum() * simulation.fluid.grid.cell_volume
         return float(fluid), float((4.0 / 3.0 * np.pi * simulation.whole("radius") ** 3).sum())
 

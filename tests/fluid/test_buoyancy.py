@@ -50,7 +50,7 @@ def test_a_cavity_with_a_hot_wall_passes_the_heat_of_the_benchmark() -> None:
     cells = 32
     simulation = Simulation(cavity(1e4, cells))
     simulation.until(simulation.case.run.until)
-    heat, fluid = simulation.feature(HeatExchange).cells, simulation.required_fluid
+    heat, fluid = simulation.feature(HeatExchange).cells, simulation.fluid
     assert heat is not None
     temperature, unit = heat.value[:, 0], heat.kind.conductivity / heat.kind.capacity / EDGE
     hot = 2.0 * cells * (300.0 + 0.5 * WARMER - temperature[:, 0]).mean() / WARMER
@@ -64,7 +64,7 @@ def test_a_cavity_with_a_hot_wall_passes_the_heat_of_the_benchmark() -> None:
 
 def test_warm_fluid_is_lighter_by_its_expansion_and_at_rest_where_it_is_warm_everywhere() -> None:
     simulation = Simulation(cavity(1e4, 4))
-    fluid, heat = simulation.required_fluid, simulation.feature(HeatExchange)
+    fluid, heat = simulation.fluid, simulation.feature(HeatExchange)
     assert heat.cells is not None
     heat.cells.value[:] = 303.0
     force = heat.buoyancy(fluid)

@@ -70,7 +70,7 @@ def coupled(text: str | Path, steps: int = 2, **changes: Any) -> Simulation:
 
 def begun(simulation: Simulation) -> Simulation:
     """The simulation with a tight tolerance of the pressure."""
-    if simulation.fluid is not None:
+    if simulation.has_fluid:
         simulation.fluid.tolerance = TIGHT
     return simulation
 

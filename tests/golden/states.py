@@ -69,7 +69,6 @@ def _pairs(run: ParticleSolver) -> State:
 
 def fluid_state(simulation: Simulation) -> State:
     """Velocity, pressure and voidage of the cells."""
-    assert simulation.fluid is not None
     return field_state(simulation.fluid)
 
 
@@ -86,7 +85,7 @@ def state_of(simulation: Simulation) -> State:
     """Particles and fluid, and the fluid's force on each particle."""
     made = simulation.particles
     state = particle_state(simulation.particle_solver) | {"applied": made.applied[np.argsort(made.id)]}
-    return state if simulation.fluid is None else state | fluid_state(simulation)
+    return state if not simulation.has_fluid else state | fluid_state(simulation)
 
 
 def counted(run: ParticleSolver) -> State:

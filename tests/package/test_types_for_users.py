@@ -52,7 +52,7 @@ def test_mypy_accepts_scripts_of_users_and_finds_a_wrong_argument_in_one(tmp_pat
     names = [f"readme{number}.py" for number in range(len(first_page))]
     for name, text in zip(names, first_page, strict=True):
         (tmp_path / name).write_text(text, encoding="utf-8")
-    assert len(names) == 3 and "required_fluid" in first_page[2]
+    assert len(names) == 3 and "simulation.fluid" in first_page[2]
     (tmp_path / "script.py").write_text(SCRIPT, encoding="utf-8")
     wrong = SCRIPT.replace("10.0", '"ten"').replace("Simulation(case)", "Simulation(10.0)")
     (tmp_path / "wrong.py").write_text(wrong, encoding="utf-8")

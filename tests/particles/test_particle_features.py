@@ -116,8 +116,8 @@ def test_a_case_without_a_fluid_is_refused_in_words_where_one_is_needed() -> Non
     simulation = Simulation(case)
     for needed in (
         lambda: case.required_fluid,
-        lambda: simulation.required_fluid,
-        lambda: simulation.required_coupling,
+        lambda: simulation.fluid,
+        lambda: simulation.coupling,
     ):
         with pytest.raises(InputError, match="fluid"):
             needed()

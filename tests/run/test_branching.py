@@ -57,7 +57,7 @@ def test_a_changed_value_acts_and_the_branch_can_be_resumed(bed: Path, tmp_path:
     assert (case.required_fluid.viscosity, case.solid.restitution) == (0.003, 0.5)
     resumed = Run.resume(folder, until=0.016)
     simulation = resumed.simulation
-    assert np.unique(simulation.required_fluid.viscosity).tolist() == [0.003]
+    assert np.unique(simulation.fluid.viscosity).tolist() == [0.003]
     assert np.unique(simulation.particles.viscosity).tolist() == [0.003]
     resumed.go()
     assert open_run(folder).history["time"][-1] == pytest.approx(0.016)

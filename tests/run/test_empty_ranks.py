@@ -95,7 +95,7 @@ def after(
     if communicator.size > 1 and "three" in name:  # beads that cross borders along x
         communicator.shape = (communicator.size, 1, 1)
     simulation = Simulation(FEW[name], communicator=communicator, state=state)
-    if simulation.fluid is not None:
+    if simulation.has_fluid:
         simulation.fluid.tolerance = TIGHT
     counts = [simulation.owned.count]
     for _ in range(steps):

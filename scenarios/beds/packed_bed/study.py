@@ -47,7 +47,7 @@ def flow_through(described: Case, velocity: float, slab: tuple[float, float] = (
     simulation = Simulation(
         described.with_(**{"bed.inlet_velocity": velocity, "run.fluid_step": 0.2 * edge / velocity})
     )
-    fluid = simulation.required_fluid
+    fluid = simulation.fluid
     height = described.column.height
     low, high = slab[0] * height, slab[1] * height
     before = np.inf

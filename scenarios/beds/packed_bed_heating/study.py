@@ -77,12 +77,12 @@ def heating(described: Case, times: Sequence[float]) -> list[Heating]:
     """Heat the bed of a case; temperatures of its layers of cells at some times [s]."""
     simulation, keys = Simulation(described), Heat.of(described)
     assert keys is not None
-    fluid, heat, found = simulation.required_fluid, simulation.feature(HeatExchange), []
+    fluid, heat, found = simulation.fluid, simulation.feature(HeatExchange), []
     assert heat.cells is not None
     start, inlet, speed = keys.particle_temperature, keys.sides_of(described).inflow, described.bed.inlet_velocity
     layers, edge = fluid.grid.shape[0], fluid.grid.spacing[2]
     height = (np.arange(layers) + 0.5) * edge
-    assert isinstance(speed, float)
+    assert isinstance(speed, float) and isinstance(inlet, float)
     for time in times:
         simulation.until(time)
         particles = simulation.particles

@@ -104,7 +104,7 @@ def fall(
     simulation = Simulation(case)
     while simulation.time < end * (1.0 - 1e-12):
         simulation.step(end)
-    fluid = float(simulation.required_fluid.velocity[..., 2].mean())
+    fluid = float(simulation.fluid.velocity[..., 2].mean())
     velocity = (fluid - float(simulation.particles.velocity[0, 2])) / speed
     return Fall(reynolds, cell, self_disturbance, velocity)
 
@@ -217,7 +217,7 @@ def in_held_gas() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     velocity = [0.0]
     for instant in times[1:]:
         while simulation.time < instant * (1.0 - 1e-12):
-            simulation.required_fluid.set_velocity((0.0, 0.0, 0.4))
+            simulation.fluid.set_velocity((0.0, 0.0, 0.4))
             simulation.step(float(instant))
         velocity.append(float(simulation.particles.velocity[0, 2]))
     return times, np.array(velocity), exact

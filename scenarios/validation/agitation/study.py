@@ -309,7 +309,7 @@ def run(row: dict[str, Any], *, settle: float = 10.0, until: float = 60.0, **cha
     simulation = Simulation(case)
     ratio = row["drag_factor"] / tenneti(row["reynolds"], 1.0 - row["solid_fraction"])
     _hold_drag(simulation, ratio)
-    fluid, particles = simulation.required_fluid, simulation.particles
+    fluid, particles = simulation.fluid, simulation.particles
     excess = (point.density_ratio - 1.0) * DENSITY
     fluid.boundaries.driving[2] = row["solid_fraction"] * excess * -case.laws.gravity[2]
     fluid.set_velocity((0.0, 0.0, SLIP))
@@ -335,7 +335,7 @@ def _hold_drag(simulation: Simulation, ratio: float) -> None:
 
 def _note(series: Series, simulation: Simulation, point: Point, hits: float, impact: float) -> None:
     """Add a sample, in units of the lattice."""
-    fluid, particles = simulation.required_fluid, simulation.particles
+    fluid, particles = simulation.fluid, simulation.particles
     order = np.argsort(particles.id)
     length, speed = point.diameter / DIAMETER, point.slip / SLIP
     weight = (particles.mass - fluid.density * particles.volume)[:, None] * np.array(simulation.case.laws.gravity)
