@@ -1,4 +1,4 @@
-"""The page of the map of films from its data: its numbers, its figure, and its row in the list of cases.
+"""The page of the map of films from its data: its numbers and its figure.
 
 `python docs/tools/film_map.py RESULTS` takes the finished beds of `cfddem validate film-map -o RESULTS`, runs none, and
 stores data, table and figure in docs. Without a folder it writes the page from the stored data.
@@ -20,12 +20,20 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT)] * (str(ROOT) not in sys.path)
 
 from scenarios.validation.film_map import effects  # noqa: E402
-from scenarios.validation.film_map.design import DENSITY_RATIOS, SOLID_FRACTIONS, STOKES, Point, is_corner, plan  # noqa: E402
+from scenarios.validation.film_map.design import (  # noqa: E402
+    DENSITY_RATIOS,
+    SEEDS,
+    SOLID_FRACTIONS,
+    STOKES,
+    Point,
+    Run,
+    is_corner,
+    plan,
+)
 from scenarios.validation.film_map.effects import Beds, Estimate  # noqa: E402
 
 DATA = ROOT / "docs" / "tables" / "film-map.csv"
 PAGE = ROOT / "scenarios" / "validation" / "film_map" / "README.md"
-LIST = ROOT / "scenarios" / "README.md"
 BEGIN, END = "<!-- from the data: begin -->", "<!-- from the data: end -->"
 
 Pair = tuple[Point, str]
@@ -55,28 +63,33 @@ def store(results: Path) -> None:
 
 
 def write() -> None:
-    """Write the page and its row in the list of cases from the stored data."""
-    page, listed = pages(stored())
-    PAGE.write_text(page, encoding="utf-8")
-    LIST.write_text(listed, encoding="utf-8")
+    """Write the page from the stored data."""
+    PAGE.write_text(page_of(stored()), encoding="utf-8")
 
 
 def stored() -> Beds:
-    """The beds of the stored data."""
-    return effects.read_beds(DATA.read_text(encoding="utf-8").splitlines())
+    """The beds of the stored data; none before there are any."""
+    return {} if not DATA.exists() else effects.read_beds(DATA.read_text(encoding="utf-8").splitlines())
 
 
-def pages(beds: Beds) -> tuple[str, str]:
-    """Page and list of cases with the numbers of some beds."""
-    page, listed = PAGE.read_text(encoding="utf-8"), LIST.read_text(encoding="utf-8")
-    said = headline(beds)
+def page_of(beds: Beds) -> str:
+    """The page with the numbers of some beds."""
+    page, said = PAGE.read_text(encoding="utf-8"), headline(beds)
     page = re.sub(r"\n\n\*\*.*?\*\*\n\n", lambda _: f"\n\n**{wrapped(said, 116)}**\n\n", page, count=1, flags=re.DOTALL)
-    inner = "\n\n".join([f"**{wrapped(said, 116)}**", *sections(beds)])
+    inner = "\n\n".join([f"**{wrapped(said, 116)}**", *(sections(beds) if is_known(beds) else ())])
     before, after = page.split(BEGIN)[0], page.split(END)[1]
-    row = r"(\(validation/film_map/README\.md\) \| [^|]+ \| )[^|]+( \|)"
-    return f"{before}{BEGIN}\n\n{inner}\n\n{END}{after}", re.sub(
-        row, lambda found: f"{found[1]}{said}{found[2]}", listed
-    )
+    return f"{before}{BEGIN}\n\n{inner}\n\n{END}{after}"
+
+
+def is_known(beds: Beds) -> bool:
+    """Whether the coarse design has run with two seeds: fewer beds say nothing about the map."""
+    return set(coarse()) <= set(beds)
+
+
+def coarse() -> list[Run]:
+    """Beds of the coarse design with two seeds."""
+    return [each for each in plan() if is_corner(each.point) and not each.point.agitated
+            and each.seed in SEEDS[:2] and each.film != "soft"]  # fmt: skip
 
 
 # ---------------------------------------------------------------- numbers
@@ -137,21 +150,19 @@ def values(beds: Beds, pairs: Iterable[Pair], what: str) -> list[float]:
 
 def headline(beds: Beds) -> str:
     """The main result: how the effect of films of smooth and rough spheres changes with the Stokes number."""
-    pairs = even(beds)
-    levels = [level for level in STOKES if any(point.stokes == level for point, _ in pairs)]
-    if not levels:
-        return f"{len(beds)} of {len(list(plan()))} beds have run."
-    ends = [[pair for pair in pairs if pair[0].stokes == level] for level in dict.fromkeys((levels[0], levels[-1]))]
+    if not is_known(beds):
+        return f"The map has not been computed yet: {len(coarse())} beds make its coarse design."
+    pairs, levels = even(beds), STOKES
+    ends = [[pair for pair in pairs if pair[0].stokes == level] for level in (levels[0], levels[-1])]
     collisions, height = (
         [f"{COLUMNS[what][1] * found.value:+.{places}f}" for each in ends if (found := mean_of(beds, each, what))]
         for what, places in (("collisions", 0), ("bed_height", 2))
     )
     asked = list(plan())
     part = "" if len(beds) == len(asked) else f" ({len(beds)} of {len(asked)} beds so far)"
-    numbers = " and ".join(f"{each:g}" for each in dict.fromkeys((levels[0], levels[-1])))
-    where = "terminal Stokes numbers" if len(ends) > 1 else "a terminal Stokes number"
+    numbers = " and ".join(f"{each:g}" for each in (levels[0], levels[-1]))
     return (
-        f"At {where} of {numbers}, films change the collision rate by "
+        f"At terminal Stokes numbers of {numbers}, films change the collision rate by "
         f"{' and '.join(collisions)} %, and the bed height by "
         f"{' and '.join(height)} %{part}."
     )
@@ -170,9 +181,8 @@ def sections(beds: Beds) -> Iterator[str]:
     """The parts of the results."""
     pairs, asked = effects.compared(beds), list(plan())
     seeds = sorted({found.seeds for pair in pairs if (found := of_pair(beds, pair, "bed_height")) is not None})
-    if not seeds:
-        yield f"{len(beds)} of {len(asked)} beds have run; none can be compared yet."
-        return
+    picture = "Changes of a liquid bed by films, against the Stokes number of its collisions"
+    yield f"![{picture}](../../../docs/images/film_map.png)"
     yield wrapped(
         f"{len(beds)} of {len(asked)} beds have run; {len(pairs)} beds with films are compared with the bed without, "
         f"from {' to '.join(f'{each}' for each in sorted({min(seeds), max(seeds)}))} seeds. "

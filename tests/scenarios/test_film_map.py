@@ -110,14 +110,18 @@ def test_the_table_has_changes_with_errors_and_the_balance_of_energy(monkeypatch
 
 
 def test_the_page_says_what_its_data_say() -> None:
-    """Written again from the stored data, page and list of cases are what they are."""
-    written = page.pages(page.stored())
-    assert (page.PAGE.read_text(), page.LIST.read_text()) == written
+    """Written again from the stored data, it is what it is."""
+    assert page.PAGE.read_text() == page.page_of(page.stored())
 
 
-def test_statements_of_the_page_follow_the_data() -> None:
+def test_a_map_of_few_beds_says_nothing() -> None:
+    text = page.page_of(made_up())
+    assert "72 beds make its coarse design" in text and "| St = 20 |" not in text
+
+
+def test_statements_of_the_page_follow_the_data(monkeypatch: pytest.MonkeyPatch) -> None:
     assert doctest.testmod(page).failed == 0
-    text, listed = page.pages(made_up())
+    monkeypatch.setattr(page, "is_known", lambda beds: True)
+    text = page.page_of(made_up())
     assert "10 of 327 beds have run" in text and "| St = 20 |" in text
-    assert page.headline(made_up()) in listed
     assert "| +0.75 ± 0.25 |" in text and "up in 2 and down in 0 of 2 beds" in text
