@@ -96,7 +96,9 @@ class CaseRun(Checked):
         False, description="record the energy budget, force by force; takes up to 50 % more time"
     )
     wall_forces: bool = Field(
-        False, description="record force and torque of particles and fluid on every wall; without, on those that move"
+        False,
+        description="record force and torque of particles on every wall, and of the fluid on floor, lid, sides of a "
+        "box and the wall of a vessel; without, those of particles on walls that move",
     )
     record_collisions: bool = Field(
         False, description="record every collision of two particles, from first to last contact"

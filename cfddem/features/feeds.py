@@ -51,18 +51,18 @@ class Feeds(CaseFeature):
                  lambda feeds, _: feeds.removed[1], lambda case: case.outlet),
         Measured("residence_time", "s", "recorded",
                  "mean residence time of the particles that outlets have removed so far; with feeds, of fed ones",
-                 lambda feeds, _: feeds.of_residence_times(np.mean), lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[0], lambda case: case.outlet),
         Measured("residence_time_deviation", "s", "recorded", "standard deviation of these residence times",
-                 lambda feeds, _: feeds.of_residence_times(np.std), lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[1], lambda case: case.outlet),
         Measured("residence_time_10", "s", "recorded",
                  "residence time that a tenth of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times(np.quantile, 0.1), lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[2], lambda case: case.outlet),
         Measured("residence_time_50", "s", "recorded",
                  "residence time that half of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times(np.quantile, 0.5), lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[3], lambda case: case.outlet),
         Measured("residence_time_90", "s", "recorded",
                  "residence time that nine tenths of these particles have not reached",
-                 lambda feeds, _: feeds.of_residence_times(np.quantile, 0.9), lambda case: case.outlet),
+                 lambda feeds, _: feeds.of_residence_times[4], lambda case: case.outlet),
     )  # fmt: skip
 
     def __init__(self, case: Case, simulation: Any) -> None:
@@ -70,6 +70,7 @@ class Feeds(CaseFeature):
         self.outlets = [
             ParticleOutlet(each.corner, tuple(np.add(each.corner, each.size)), inside=True) for each in case.outlet
         ]
+        self._summary: tuple[int, tuple[float, ...]] = (-1, ())  # number that left, and what their times gave
 
     @classmethod
     def is_in(cls, case: Case) -> bool:
@@ -120,10 +121,15 @@ class Feeds(CaseFeature):
         """How long each particle that has left was there, where this is known (n,) [s]."""
         return np.concatenate([np.zeros(0), *(each.times for each in self.outlets)])
 
-    def of_residence_times(self, number: Callable[..., Any], *more: float) -> float:
-        """A number of the residence times, as a function of NumPy finds it; NaN before any is known [s]."""
-        times = self.residence_times
-        return float(number(times, *more)) if len(times) else math.nan  # local: every rank has all times
+    @property
+    def of_residence_times(self) -> tuple[float, ...]:
+        """Mean, standard deviation, 10, 50 and 90 % quantile of the residence times; NaN before any is known [s]."""
+        if (count := self.removed[0]) != self._summary[0]:
+            times, found = self.residence_times, [math.nan] * 5
+            if len(times):  # local: every rank has all times
+                found = [float(each) for each in (np.mean(times), np.std(times), *np.quantile(times, (0.1, 0.5, 0.9)))]
+            self._summary = count, tuple(found)
+        return self._summary[1]
 
     @property
     def removed(self) -> tuple[int, float]:
@@ -138,6 +144,7 @@ class Feeds(CaseFeature):
         """Continue from a `checkpoint()` of the same case."""
         for name, each in self._by_name():
             each.restore(state[name])
+        self._summary = (-1, ())
 
     def _by_name(self) -> Iterator[tuple[str, Feed | ParticleOutlet]]:
         """All feeds and outlets by name."""

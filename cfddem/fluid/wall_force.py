@@ -30,7 +30,10 @@ def loads_on_walls(fluid: FluidSolver, centre: Any) -> dict[str, tuple[Array, Ar
     centre   about which the torques are (3,) [m]
     returns  name of a side, or `SMOOTH` -> force (3,) [N], torque (3,) [N m]
     """
-    made = {side.name: [_on_side(fluid, side)] for side in fluid.boundaries.sides}
+    slope = fluid.cell_pressure_gradient()  # ranks exchange values here, so all of them do, whichever sides they touch
+    fluid.rates()  # brings the effective viscosity up to date
+    viscosity = fluid.grid.inner(fluid.fields.effective_viscosity)
+    made = {side.name: [_on_side(fluid, side, slope, viscosity)] for side in fluid.boundaries.sides}
     if fluid.grid.walls:
         made[SMOOTH] = [force_on_walls(fluid), pressure_on_walls(fluid)]
     found = {}
@@ -43,8 +46,12 @@ def loads_on_walls(fluid: FluidSolver, centre: Any) -> dict[str, tuple[Array, Ar
     return found
 
 
-def _on_side(fluid: FluidSolver, side: Side) -> tuple[Array, Array]:
-    """Pressure and shear stress on the faces of a side that are walls: places (n, 3) [m], and forces (n, 3) [N]."""
+def _on_side(fluid: FluidSolver, side: Side, slope: Array, viscosity: Array) -> tuple[Array, Array]:
+    """Pressure and shear stress on the faces of a side that are walls: places (n, 3) [m], and forces (n, 3) [N].
+
+    slope      gradient of the pressure in cells (3, nz, ny, nx) [Pa/m]
+    viscosity  effective one of the fluid in cells (nz, ny, nx) [Pa s]
+    """
     grid, d, end = fluid.grid, side.axis, -1 if side.high else 0
 
     def plane(values: Any) -> Any:
@@ -55,16 +62,14 @@ def _on_side(fluid: FluidSolver, side: Side) -> tuple[Array, Array]:
     here = (share > 0.0) & ~np.isin(side.owner, side.inlets) & ~plane(side.outlet)
     area, half = grid.face_area(d) * share[here], 0.5 * grid.spacing[d]
     place = np.stack([side.layer(each, end)[here] for each in np.broadcast_arrays(*grid.faces(d))], axis=-1)
-    slope = side.layer(fluid.cell_pressure_gradient(), end)[d][here]
-    pressure = side.layer(fluid.pressure, end)[here] - side.inward * half * slope
-    fluid.rates()  # brings the effective viscosity up to date
-    viscosity = side.layer(grid.inner(fluid.fields.effective_viscosity), end)[here]
+    pressure = side.layer(fluid.pressure, end)[here] - side.inward * half * side.layer(slope, end)[d][here]
+    at_wall = side.layer(viscosity, end)[here]
     sticks = plane(side.mirror)[here] < 0.0
     velocity = np.moveaxis(fluid.velocity, -1, 0)
     force = np.zeros((len(area), 3))
     for e in range(3):
         slip = side.layer(velocity[e], end)[here] - plane(side.wall)[e][here]
-        force[:, e] = -side.inward * pressure * area if e == d else sticks * viscosity * slip / half * area
+        force[:, e] = -side.inward * pressure * area if e == d else sticks * at_wall * slip / half * area
     return place, force
 
 

@@ -143,7 +143,15 @@ class ParticleOutlet:
 
     def __init__(self, low: Vector = _NOWHERE_BELOW, high: Vector = _NOWHERE_ABOVE, *, inside: bool = False) -> None:
         self.low, self.high, self.inside = np.array(low, float), np.array(high, float), inside
-        self.left, self.mass, self.times = 0, 0.0, np.zeros(0)
+        self.left, self.mass, self._times = 0, 0.0, [np.zeros(0)]
+
+    @property
+    def times(self) -> np.ndarray:
+        """Residence times in the order in which particles left, of those that leave together the shortest first
+        (n,) [s]."""
+        if len(self._times) > 1:
+            self._times = [np.concatenate(self._times)]
+        return self._times[0]
 
     def takes(self, position: np.ndarray) -> np.ndarray:
         """Which positions (N, 3) [m] are removed (N,) bool."""
@@ -157,7 +165,7 @@ class ParticleOutlet:
         self.mass += run.communicator.sum(gone.mass)
         if left and "entered" in gone:
             stayed = run.time - run.communicator.joined(gone.entered)
-            self.times = np.append(self.times, np.sort(stayed[np.isfinite(stayed)]))
+            self._times.append(np.sort(stayed[np.isfinite(stayed)]))  # joined where they are read
         return left
 
     def checkpoint(self) -> dict[str, Any]:
@@ -166,7 +174,7 @@ class ParticleOutlet:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Continue from a `checkpoint()` of the same outlet."""
-        self.left, self.mass, self.times = int(state["left"]), float(state["mass"]), np.array(state["times"], float)
+        self.left, self.mass, self._times = int(state["left"]), float(state["mass"]), [np.array(state["times"], float)]
 
 
 def apart_from_walls(place: np.ndarray, radius: np.ndarray, walls: Walls) -> np.ndarray:

@@ -14,6 +14,7 @@ from cfddem.features.contact_heat_keys import wall_names
 from cfddem.fluid.grid import Array
 from cfddem.fluid.wall_force import SMOOTH, loads_on_walls
 from cfddem.io.quantities import Quantity
+from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.walls.nearest_point import DISTANCE, NORMAL, TOUCH
 from cfddem.run.simulation import Simulation
 
@@ -91,7 +92,7 @@ def wall_load_columns(case: Case) -> dict[str, Quantity]:
 def wall_loads(simulation: Simulation) -> dict[str, float]:
     """Values of the columns, from contacts, films and bridges; a film or bridge has its last impulse over the step."""
     case, walls, found = simulation.case, simulation.particle_solver.walls, dict[str, float]()
-    force, torque = (np.array(simulation.communicator.sum(each, axis=())) for each in _loads(simulation))
+    force, torque = loads_of_particles(simulation.particle_solver)
     axis = np.array((0.5 * case.column.size[0], 0.5 * case.column.size[1], 0.0))
     recorded = list(loaded_walls(case))
     of_fluid = loads_on_walls(simulation.fluid, axis) if any(each.of_fluid for each in recorded) else {}
@@ -112,25 +113,29 @@ def wall_loads(simulation: Simulation) -> dict[str, float]:
     return found
 
 
-def _loads(simulation: Simulation) -> tuple[Array, Array]:
-    """Force on each wall, and torque about the centre of its spin, from the particles of this rank (walls, 3)."""
-    solver = simulation.particle_solver
+def loads_of_particles(solver: ParticleSolver) -> tuple[Array, Array]:
+    """Force of the particles on each wall, and torque about the centre of its spin; of all ranks, with the same bits.
+
+    returns  forces (walls, 3) [N], torques (walls, 3) [N m]
+    """
     edges, walls, particles = solver.edges, solver.walls, solver.particles
-    force, torque = np.zeros((2, len(walls.sweep), 3))
     at_walls = slice(edges.between_particles, None)
     owner, own = walls.wall[edges.second[at_walls]], edges.first[at_walls]
     touch = edges.touch.reshape(-1, TOUCH)
     place = particles.position[own] - touch[:, DISTANCE, None] * touch[:, NORMAL : NORMAL + 3]
     arm = place - (walls.centre + walls.shift)[owner]
     rate = 1.0 / solver.last_step if solver.last_step > 0.0 else 0.0
+    force, torque = np.zeros((2, len(owner), 3))
     for name, factor in {"force": 1.0, "bridge_force": 1.0, **dict.fromkeys(IMPULSES, rate)}.items():
         if name in edges:
-            pushed = -factor * edges[name][at_walls, :3]
-            np.add.at(force, owner, pushed)
-            np.add.at(torque, owner, np.cross(arm, pushed))
+            force -= factor * edges[name][at_walls, :3]
+    torque += np.cross(arm, force)
     for name in COUPLES:
         if name in edges:
-            np.add.at(torque, owner, rate * edges[name][at_walls, -3:])
+            torque += rate * edges[name][at_walls, -3:]
     if "moment" in edges:  # of rolling resistance
-        np.subtract.at(torque, owner, edges["moment"][at_walls])
+        torque -= edges["moment"][at_walls]
+    rows = np.concatenate([force, torque], axis=1)
+    sums = [solver.communicator.sum(rows[owner == number], axis=0) for number in range(len(walls.sweep))]
+    force, torque = np.array(sums).reshape(-1, 2, 3).swapaxes(0, 1)
     return force, torque

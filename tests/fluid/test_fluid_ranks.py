@@ -23,6 +23,7 @@ from cfddem.fluid.pressure import ranks as shared
 from cfddem.fluid.pressure.regions import ClosedRegions
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import turned
+from cfddem.fluid.wall_force import loads_on_walls
 
 
 @pytest.fixture(autouse=True)
@@ -176,7 +177,7 @@ def advanced(fluid: FluidSolver, steps: int = 2) -> None:
 
 
 def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str, Array]:
-    """State, forces, budgets and values at points of a fluid, of the whole box."""
+    """State, forces, budgets, loads on walls and values at points of a fluid, of the whole box."""
     grid, total = fluid.grid, fluid.communicator.sum
     points = np.random.default_rng(2).uniform(0.0, 1.0, (100, 3)) * np.array(grid.whole.size)
     mine = np.ones(len(points), bool)
@@ -194,6 +195,7 @@ def everything(fluid: FluidSolver, division: Division | None = None) -> dict[str
         "kinetic energy": np.array(budgets.kinetic_energy(fluid)),
         "rates": np.array(fluid.rates()),
         "points": total(velocity, axis=()),
+        "loads on walls": np.array(list(loads_on_walls(fluid, np.zeros(3)).values())),
     }
 
 
@@ -203,7 +205,7 @@ CUBE = pytest.param((3, 3, 3), marks=pytest.mark.slow)
 @pytest.mark.parametrize("shape", [(3, 1, 1), (1, 2, 1), (1, 1, 3), (2, 2, 1), (3, 1, 2), (2, 2, 2), CUBE])
 @pytest.mark.parametrize("name", FLOWS)
 def test_a_divided_fluid_is_the_whole_one(name: str, shape: tuple[int, ...]) -> None:
-    """Fields, forces, budgets and values at points after two steps, bit for bit."""
+    """Fields, forces, budgets, loads on walls and values at points after two steps, bit for bit."""
     division = bricks(FLOWS[name][0].cells, *shape)
 
     def program(communicator: Communicator) -> dict[str, Array]:

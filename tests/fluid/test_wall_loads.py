@@ -135,3 +135,28 @@ def test_columns_of_walls_are_there_by_choice_and_have_the_names_of_walls() -> N
     box = Case.from_text(BED, "c.toml")
     assert "x_low_force_x" in all_columns(box) and "x_low_fluid_force_x" not in all_columns(box)
     assert math.isclose(case.vessel.spin if case.vessel else 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "with_fluid", "without"),
+    [
+        ({"vessel.shape": "cylinder"}, {"floor", "lid", "side"}, set()),
+        ({"column.sides": "no_slip"}, {"floor", "lid", "x_low", "x_high", "y_low", "y_high"}, set()),
+        ({"column.shape": "cylinder"}, {"floor", "lid"}, {"side"}),
+        ({"wall": [{"shape": "plane", "point": [0.0, 0.0, 0.03], "normal": [0.0, 0.0, -1.0], "solid": "none"}]},
+         {"floor", "lid", "x_low", "x_high", "y_low", "y_high"}, {"wall_0"}),
+    ],
+    ids=["vessel", "box", "steps", "another wall"],
+)  # fmt: skip
+def test_the_fluid_has_a_force_on_those_walls_that_the_key_names(
+    table: dict[str, Any], with_fluid: set[str], without: set[str]
+) -> None:
+    """Floor, lid, sides of a box and the wall of a vessel; not a wall of steps, nor one of `[[wall]]`."""
+    case = Case.from_text(BED, "c.toml", {"fluid": {"density": 1.2, "viscosity": 1.8e-5}, **table})
+    columns = all_columns(case)
+    of_particles = {name.removesuffix("_force_z") for name in columns if name.endswith("_force_z")}
+    of_fluid = {name.removesuffix("_fluid") for name in of_particles if name.endswith("_fluid")}
+    assert of_fluid == with_fluid
+    assert {name for name in of_particles if not name.endswith("_fluid")} == with_fluid | without
+    said = str(type(case.run).model_fields["wall_forces"].description)
+    assert "of particles on every wall, and of the fluid on floor, lid, sides of a box and the wall of a vessel" in said

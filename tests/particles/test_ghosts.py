@@ -30,6 +30,7 @@ from cfddem.particles.solver import ParticleSolver
 from cfddem.particles.state import Particles, make_particles
 from cfddem.particles.walls.shapes import Box, Mesh, Plane, Wall
 from cfddem.run import history
+from cfddem.run.wall_loads import loads_of_particles
 
 GLASS = Material(density=2500, youngs_modulus=10e6, poisson=0.25, restitution=0.8, friction=0.4, rolling_friction=0.02)
 STEEL = Material(density=7800, youngs_modulus=20e6, poisson=0.3, restitution=0.9, friction=0.2, rolling_friction=0.01)
@@ -180,7 +181,7 @@ def test_a_divided_box_has_the_bits_of_the_whole_one(
     spheres, given = settings(film, walls, liquid)
     ranks = int(np.prod(shape))
 
-    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int, tuple[float, ...]]:
+    def program(communicator: Communicator) -> tuple[dict[str, np.ndarray], int, int, tuple[float, ...], Any]:
         division = bricks(shape, spheres.position)
         run = finished(spheres.copy(), given, 0, communicator=communicator, division=division)
         before, most = set(run.particles.id[: run.particles.owned].tolist()), 0
@@ -188,7 +189,8 @@ def test_a_divided_box_has_the_bits_of_the_whole_one(
             run.advance(STEP, 100)
             most = max(most, run.particles.count - run.particles.owned)
         moved = len(before - set(run.particles.id[: run.particles.owned].tolist()))
-        return state(run), moved, most, (*run.film_counts[:2], run.largest_film_rate, run.film_counts[3])
+        films = *run.film_counts[:2], run.largest_film_rate, run.film_counts[3]
+        return state(run), moved, most, films, loads_of_particles(run)
 
     results = on_ranks(ranks, program)
     whole = finished(spheres.copy(), given, 0)
@@ -196,9 +198,12 @@ def test_a_divided_box_has_the_bits_of_the_whole_one(
         whole.advance(STEP, 100)
     assert whole.lists.made > 3
     assert sum(moved for _, moved, *_ in results) > 2
-    assert all(ghosts > 20 for _, _, ghosts, _ in results)
-    assert [films[:3] for *_, films in results] == [(*whole.film_counts[:2], whole.largest_film_rate)] * ranks
-    assert sum(films[3] for *_, films in results) == whole.film_counts[3]  # each film belongs to one rank
+    assert all(ghosts > 20 for _, _, ghosts, *_ in results)
+    loads = loads_of_particles(whole)
+    assert np.abs(loads).min(axis=(0, 2), initial=np.inf).all()  # every wall has some
+    assert all(np.array_equal(found, loads) for *_, found in results)
+    assert [films[:3] for *_, films, _ in results] == [(*whole.film_counts[:2], whole.largest_film_rate)] * ranks
+    assert sum(films[3] for *_, films, _ in results) == whole.film_counts[3]  # each film belongs to one rank
     assert (whole.film_counts[0] == 300.0) == (film or liquid)
     assert_same_bits(joined([each for each, *_ in results]), joined([state(whole)]))
 

@@ -249,11 +249,21 @@ def test_a_moving_wall_gives_momentum(kind: str) -> None:
     assert np.linalg.norm(run.particles.velocity[0]) == pytest.approx(1.0, rel=2e-2 if kind == "paddle" else 2e-3)
 
 
+def case_with_a_paddle() -> SimpleNamespace:
+    """What the loads on walls read of a case: one wall that spins, without a column around it."""
+    paddle = CaseWall(shape="cylinder", axis=(0.0, 1.0, 0.0), radius=1.0, spin=(0.0, 5.0, 0.0))
+    open_space = SimpleNamespace(ends="periodic", sides="periodic", front=None, size=(0.0, 0.0, 0.0))
+    return SimpleNamespace(
+        wall=(paddle,), column=open_space, line=None, vessel=None, has_fluid=False,
+        run=SimpleNamespace(wall_forces=False),
+    )  # fmt: skip
+
+
 def test_the_power_and_torque_of_a_paddle_are_what_the_sphere_gains() -> None:
     """Over an elastic strike: the power sums up to the kinetic energy, the torque to the angular momentum."""
     solid = SOLID.model_copy(update={"friction": 0.0})
     run = sphere([0.0, 0.0, RADIUS], [MOVING["paddle"]], solid=solid, gravity=(0.0, 0.0, 0.0))
-    case = SimpleNamespace(wall=(CaseWall(shape="cylinder", axis=(0.0, 1.0, 0.0), radius=1.0, spin=(0.0, 5.0, 0.0)),))
+    case = case_with_a_paddle()
     simulation = SimpleNamespace(particle_solver=run, case=case, communicator=SERIAL)
     assert set(wall_loads(simulation)) == set(wall_load_columns(case))  # type: ignore[arg-type]
     run.advance(STEP, 9900)
@@ -272,7 +282,7 @@ def test_the_power_and_torque_of_a_paddle_are_what_the_sphere_gains() -> None:
 def test_the_film_of_a_paddle_is_in_its_force_and_torque() -> None:
     """The film alone takes the sphere along, without contact: the loads sum up to its momentum."""
     run = sphere([0.0, 0.0, RADIUS], [MOVING["paddle"]], film=1.0, gravity=(0.0, 0.0, 0.0))
-    case = SimpleNamespace(wall=(CaseWall(shape="cylinder", axis=(0.0, 1.0, 0.0), radius=1.0, spin=(0.0, 5.0, 0.0)),))
+    case = case_with_a_paddle()
     simulation = SimpleNamespace(particle_solver=run, case=case, communicator=SERIAL)
     given = dict.fromkeys(wall_load_columns(case), 0.0)  # type: ignore[arg-type]
     for _ in range(2500):
