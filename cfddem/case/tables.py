@@ -51,6 +51,11 @@ class Column(Checked):
         return self.width, self.width if self.depth is None else self.depth, self.height
 
     @property
+    def periodic(self) -> tuple[bool, bool, bool]:
+        """Whether x, y, z are periodic."""
+        return self.sides == "periodic", (self.front or self.sides) == "periodic", self.ends == "periodic"
+
+    @property
     def floor_area(self) -> float:
         """Area of the floor [m2]."""
         width, depth, _ = self.size

@@ -227,6 +227,16 @@ def test_a_temperature_beside_thin_walls_is_refused_in_a_line():
         Scalar(fluid, ScalarKind("temperature", "K", "", 300.0, 1.0, 1.0), ScalarSides(300.0))
 
 
+@pytest.mark.parametrize("place", [0.0, 1.0])
+def test_a_plate_in_periodic_sides_is_refused_and_one_beside_them_closes_faces(place):
+    sides = {"x_low": Periodic(), "x_high": Periodic()}
+    with pytest.raises(InputError, match="thin wall: must be away from the periodic sides along x; move it by a cell"):
+        FluidSolver(within(Grid((4, 4, 4), (0.25,) * 3), divided(plate(place))), sides, density=1.0, viscosity=1.0)
+    grid = within(Grid((4, 4, 4), (0.25,) * 3), divided(plate(0.25 + 0.5 * place)))
+    cut = FluidSolver(grid, sides, density=1.0, viscosity=1.0).boundaries.cut
+    assert (grid.inner(cut.thin[0]) > 0.0).sum() == 16
+
+
 def test_thin_walls_that_cannot_be_are_refused():
     with pytest.raises(InputError, match="at least one triangle with an area"):
         thin_wall(np.zeros((1, 3, 3)))
