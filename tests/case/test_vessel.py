@@ -230,11 +230,16 @@ def test_the_flow_through_a_patch_is_its_velocity_times_its_area():
 
 def inflow(case: Case) -> float:
     """Flow through the floor at 0.5 s [m3/s]."""
+    open_part = Boundaries(grid_of(case), boundaries_of(case)).cut.aperture[2][2, 2:-3, 2:-3]
+    return float((faces_of(case) * open_part).sum() * grid_of(case).face_area(2))
+
+
+def faces_of(case: Case) -> np.ndarray:
+    """Velocity through the faces of the floor at 0.5 s (ny, nx) [m/s]."""
     boundaries = Boundaries(grid_of(case), boundaries_of(case))
     boundaries.set_inlets(0.5, np.ones(grid_of(case).padded_shape))
     side = next(each for each in boundaries.sides if each.name == "z_low")
-    open_part = boundaries.cut.aperture[2][2, 2:-3, 2:-3]
-    return float((side.wall[2, 2:-3, 2:-3] * open_part).sum() * grid_of(case).face_area(2))
+    return side.wall[2, 2:-3, 2:-3]
 
 
 @pytest.mark.parametrize(
@@ -253,6 +258,22 @@ def test_a_mass_flow_enters_exactly_also_where_no_face_follows_the_edge(patch):
     assert case.fastest_inflow == pytest.approx(0.012 / 1.2 / area, rel=1e-9)
     with pytest.raises(InputError, match=r"mass_flow.*left out where there is a velocity"):
         made(patch={"nozzle": flow | patch | {"velocity": 1.0}})
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"velocity": 4.0, "profile": "parabolic"}, {"mass_flow": 0.002, "profile": "parabolic"}, {"mass_flow": 0.002}],
+    ids=str,
+)
+def test_the_floor_beneath_an_inlet_lets_nothing_through(given):
+    """Through faces that a disc covers comes what it brings alone; around it the floor has its own velocity."""
+    patch = {"nozzle": {"kind": "inlet", "shape": "disc", "diameter": 0.04} | given}
+    alone, both = (faces_of(made(patch=patch, bed__inlet_velocity=each, column__cell=0.005)) for each in (0.0, 1.0))
+    x = 0.005 * (np.arange(32) + 0.5) - 0.08
+    away = np.hypot(x, x[:, None])
+    inside, outside = away < 0.02 - 0.0036, (away > 0.02 + 0.0036) & (away < 0.03)
+    assert inside.sum() == 32 and (alone[inside] > 0.0).all() and (both[inside] == alone[inside]).all()
+    assert outside.any() and (both - alone)[outside] == pytest.approx(1.0)
 
 
 def test_an_inlet_opens_the_wall_before_it_and_a_wall_closes_the_inlet_before_it():
