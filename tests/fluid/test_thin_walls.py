@@ -190,7 +190,7 @@ def test_small_cells_of_a_vessel_belong_to_large_ones_on_their_side_of_a_baffle(
     """From the axis to the wall, and from wall to wall: particles on one side then leave the other one empty."""
     n, radial = 12, np.array([math.cos(turn), math.sin(turn), 0.0])
     for begin in (0.0, -1.0):
-        ends = [(0.5, 0.5, 0.0) + begin * radial, (0.5, 0.5, 0.0) + radial]
+        ends = [np.array(MIDDLE) + each * radial for each in (begin, 1.0)]
         corners = np.array([ends[0] - [0, 0, 1], ends[1] - [0, 0, 1], ends[1] + [0, 0, 2], ends[0] + [0, 0, 2]])
         thin = thin_wall(corners[[[0, 1, 2], [0, 2, 3]]])
         grid = within(Grid((n, n, 3), (1.0 / n,) * 3), divided(thin, cylinder(MIDDLE, 0.47)))
