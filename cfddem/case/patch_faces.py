@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
 from cfddem.case.column_grid import grid_of
-from cfddem.case.patches import CasePatch
+from cfddem.case.patches import CasePatch, open_area_of
 from cfddem.case.tables import CaseTables
 from cfddem.fluid.cut_cells import section
 
@@ -53,15 +53,17 @@ def patch_faces(case: CaseTables, side: str) -> PatchFaces:
     patches = {name: each for name, each in case.patches.items() if each.side == side}
     made = PatchFaces(patches, {name: coverage(case, each) for name, each in patches.items()}, 1.0)
     for name, share in made.shares.items():
-        if not share.any():
+        flows = patches[name].mass_flow is not None
+        if not share.any() or (flows and open_area_of(case, patches[name]) == 0.0):
             remedy = "move it, or make it larger than a cell"
             raise InputError(f"patch.{name}", None, f"on a part of the {side} that is open to the fluid", remedy)
+    entering = [_covered(case, patches[name], made.shares[name]) for name in made.inlets]
     for name, each in patches.items():
         if each.mass_flow is not None:  # exactly, also where faces do not follow the edge
-            area, face = min(each.area, case.area_of(side)), grid_of(case).face_area(2)
+            area, face = open_area_of(case, each), grid_of(case).face_area(2)
             made.shares[name][:] *= area / (float((made.shares[name] * _apertures(case, side)).sum()) * face)
     closed = [made.whole(name) for name, each in patches.items() if each.kind != "inlet"]
-    beside = np.maximum(1.0 - sum(made.shares[name] for name in made.inlets), 0.0)
+    beside = np.maximum(1.0 - sum(entering), 0.0)
     return made._replace(rest=np.where(np.any(closed, axis=0), 0.0, beside) if closed else beside)
 
 
@@ -91,6 +93,13 @@ def coverage(case: CaseTables, patch: CasePatch) -> Array:
         sums = [values.reshape(PLACES, nx, PLACES).sum(axis=(0, 2)) for values in (weight, inside)]
         made[row] = sums[0] / np.maximum(sums[1], 1.0)
     return made
+
+
+def _covered(case: CaseTables, patch: CasePatch, share: Array) -> Array:
+    """Share of the open part of each face that a patch covers, whatever its profile (ny, nx) [-]."""
+    return (
+        share.copy() if patch.profile == "uniform" else coverage(case, patch.model_copy(update={"profile": "uniform"}))
+    )
 
 
 def face_at(case: CaseTables, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -14,6 +14,9 @@ from cfddem.backend.errors import InputError, shown
 from cfddem.case.bed import NonNegative, Positive, check_times, speeds_of
 from cfddem.case.materials import Checked
 
+PLACES = 120
+"""Places along x and y at which a patch is sampled."""
+
 Array = NDArray[np.float64]
 Place = tuple[float, float]
 
@@ -82,15 +85,15 @@ class CasePatch(Checked):
             raise InputError("profile", self.profile, f'uniform for shape = "{self.shape}"', "a disc may be parabolic")
         return self
 
-    def by_velocity(self, density: float, side: float) -> CasePatch:
-        """The same patch with the velocity of its mass flow.
+    def by_velocity(self, density: float, area: float) -> CasePatch:
+        """The same patch with the velocity of its mass flow; as it is where no part of it is open.
 
         density  of the fluid that enters [kg/m3]
-        side     area of the side on which it is [m2]
+        area     through which it enters, see `open_area_of` [m2]
         """
-        if self.mass_flow is None or density == 0.0:
+        through = density * area
+        if self.mass_flow is None or through == 0.0:
             return self
-        through = density * min(self.area, side)
         flow = self.mass_flow
         speed = tuple((t, each / through) for t, each in flow) if isinstance(flow, tuple) else flow / through
         return self.model_copy(update={"velocity": speed})
@@ -132,6 +135,40 @@ class CasePatch(Checked):
         if self.size is not None:
             return math.prod(self.size)
         return 0.25 * math.pi * (self.diameter**2 - (self.inner_diameter or 0.0) ** 2) if self.diameter else math.inf
+
+
+def on_the_side(case: Any, side: str, x: Array, y: Array) -> NDArray[np.bool_]:
+    """Which places (N,) of the plane of floor or lid lie within the column of a case and its vessel (N,)."""
+    width, depth, height = case.column.size
+    z = np.full(x.size, 0.0 if side == "floor" else height)
+    inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
+    return np.asarray(inside & (case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0))
+
+
+def _sampled(case: Any, patch: CasePatch) -> tuple[Array, NDArray[np.bool_]]:
+    """Weights of a patch at places on and around it, and which of these lie on its side of the vessel."""
+    width, depth, _ = case.column.size
+    middle = patch.centre or (0.5 * width, 0.5 * depth)
+    edges = patch.size or (2.0 * width, 2.0 * depth)
+    reach = patch.diameter or float(max(edges))
+    along = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
+    x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + along, middle[1] + along))
+    return patch.weight(x, y, middle), on_the_side(case, patch.side, x, y)
+
+
+def open_share_of(case: Any, patch: CasePatch) -> float:
+    """Share of a patch that lies on its side of the vessel [-]; of a whole side that of the side."""
+    weight, inside = _sampled(case, patch)
+    return float(np.count_nonzero((weight > 0.0) & inside)) / max(int(np.count_nonzero(weight)), 1)
+
+
+def open_area_of(case: Any, patch: CasePatch) -> float:
+    """Flow through the part of a patch on its side of the vessel over the velocity of the patch: the area of this part,
+    weighted by the profile [m2]."""
+    if patch.shape == "whole":
+        return float(case.area_of(patch.side))
+    weight, inside = _sampled(case, patch)
+    return patch.area * float((weight * inside).sum() / max(weight.sum(), 1e-300))
 
 
 def refuse_no_inlets(case: Any, key: str, names: Mapping[str, float]) -> None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError, model_validator
 
-from cfddem.backend.errors import InputError
+from cfddem.backend.errors import InputError, shown
 from cfddem.backend.law_choice import chosen
 from cfddem.case.bed import AT_RANDOM, POURED_SOLID_FRACTION
 from cfddem.case.compare import data_in
@@ -25,6 +25,7 @@ from cfddem.case.materials import Material, check_pairs, unknown_materials
 from cfddem.case.tables import CaseTables
 from cfddem.case.toml_text import parse, read_text, set_value
 from cfddem.case.vessel import vessel_of
+from cfddem.case.wall_geometry import extent
 from cfddem.case.walls import place_of, walls_in
 from closures.agitation import SHARES, TIMES, AgitationFactors, free_spheres
 from closures.kinds import BUILT_IN
@@ -88,6 +89,20 @@ class Case(CaseTables):
         if closing:
             remedy = 'or take column.shape = "cylinder", a wall with steps of cells, without vessel and thin walls'
             raise InputError(closing[0], None, f'"none" or "thin" {where}', remedy)
+        return self
+
+    @model_validator(mode="after")
+    def _thin_walls_end_before_periodic_sides(self) -> Case:
+        for n, wall in enumerate(self.wall):
+            reach = extent(wall) if wall in self.thin_walls and wall.shape != "surface" else None
+            if reach is None:  # the grid refuses a surface, once its file is read
+                continue
+            for d, length in enumerate(self.column.size):
+                if self.column.periodic[d] and (reach[0, d] <= 0.0 or reach[1, d] >= length):
+                    low, high = (f"{each:.4g}" for each in reach[:, d])
+                    raise InputError(f"wall.{n}.point", shown(wall.point), f"such that the thin wall ends before the "
+                                     f"periodic sides, at 0 and {length:g} m along {'xyz'[d]}", f"it reaches from "
+                                     f"{low} to {high} m; move it, or make it smaller")  # fmt: skip
         return self
 
     @model_validator(mode="after")

@@ -15,9 +15,9 @@ from cfddem.case.case_laws import CaseLaws
 from cfddem.case.compare import CaseData
 from cfddem.case.liquid import Liquid, Spray
 from cfddem.case.materials import NO_FLUID, Checked, Fluid, Material, Materials, Pairs
-from cfddem.case.patches import CasePatch
+from cfddem.case.patches import CasePatch, open_area_of
 from cfddem.case.vessel_shape import CaseVessel, Line
-from cfddem.case.vessel_surface import floor_area, surface_in
+from cfddem.case.vessel_surface import area_of_end, surface_in
 from cfddem.case.walls import CaseWall
 
 
@@ -49,6 +49,11 @@ class Column(Checked):
     def size(self) -> Point:
         """Edges of the box (x, y, z) [m]."""
         return self.width, self.width if self.depth is None else self.depth, self.height
+
+    @property
+    def periodic(self) -> tuple[bool, bool, bool]:
+        """Whether x, y, z are periodic."""
+        return self.sides == "periodic", (self.front or self.sides) == "periodic", self.ends == "periodic"
 
     @property
     def floor_area(self) -> float:
@@ -192,11 +197,14 @@ class CaseTables(Checked):
     def patches(self) -> dict[str, CasePatch]:
         """The patches by name, with the velocities of those that have a mass flow."""
         density = self.around.density
-        return {name: each.by_velocity(density, self.area_of(each.side)) for name, each in self.patch.items()}
+        return {
+            name: each if each.mass_flow is None else each.by_velocity(density, open_area_of(self, each))
+            for name, each in self.patch.items()
+        }
 
     def area_of(self, side: str) -> float:
         """Area of the floor or the lid [m2]."""
-        return self.floor_area if side == "floor" or not self.line else math.pi * self.line[-1][1] ** 2
+        return self.column.floor_area if not self.vessel else area_of_end(self.vessel, self.column, side)
 
     @property
     def line(self) -> Line:
@@ -209,7 +217,7 @@ class CaseTables(Checked):
     @property
     def floor_area(self) -> float:
         """Area of the floor, inside the vessel if there is one [m2]."""
-        return self.column.floor_area if not self.vessel else floor_area(self.vessel, self.column)
+        return self.area_of("floor")
 
     def beyond_the_side(self, places: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.float64]:
         """How far places (N, 3) are outside of the vessel or of a round column, across it if it is round (N,); negative

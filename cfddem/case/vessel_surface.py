@@ -41,16 +41,18 @@ def surface_in(vessel: CaseVessel, column: Any) -> Surface:
     return together(*(Plane(wall.point, wall.normal) for wall in vessel.walls_in(column)))
 
 
-def floor_area(vessel: CaseVessel, column: Any) -> float:
-    """Cross-section at the floor, or at the lower end of a surface that lies above it [m2]."""
+def area_of_end(vessel: CaseVessel, column: Any, side: str) -> float:
+    """Cross-section at "floor" or "lid", or at the end of a surface that does not reach it [m2]."""
     if vessel.is_round:
-        return math.pi * vessel.line_in(column)[0][1] ** 2
+        return math.pi * vessel.line_in(column)[0 if side == "floor" else -1][1] ** 2
     if vessel.size:
         return math.prod(vessel.size)
     surface = surface_in(vessel, column)
     assert isinstance(surface, ClosedSurface)
-    lowest = max(0.0, float(surface.corners[:, :, 2].min()))
-    return section_area(surface.corners, lowest + 1e-6 * column.height)
+    heights, beside = surface.corners[:, :, 2], 1e-6 * column.height
+    if side == "floor":
+        return section_area(surface.corners, max(0.0, float(heights.min())) + beside)
+    return section_area(surface.corners, min(column.height, float(heights.max())) - beside)
 
 
 def corners_in(vessel: CaseVessel, column: Any) -> Array:

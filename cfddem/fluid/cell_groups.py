@@ -1,7 +1,7 @@
 """Groups of cut cells: a small one belongs to the nearest that is at least half open.
 
 A scalar has one value in all cells of a group, and the balance of a group is that of its open volume. So a cell of any
-size takes part without limiting the step, and nothing is lost between cells.
+size takes part without limiting the step, and nothing is lost between cells. No group reaches through a thin wall.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from cfddem.fluid.cut_cells import CutCells
 from cfddem.fluid.grid import Array, Grid
 from cfddem.fluid.near_walls_loops import shut
 from cfddem.fluid.solver import FluidSolver
+from cfddem.fluid.thin_walls import ASIDE, Divided
 
 LEAST = 0.5
 """Share of a cell that must be open for a group of its own [-]."""
@@ -25,9 +26,14 @@ LEAST = 0.5
 BEYOND = 2
 """Layers of solid cells beside the fluid that take the value of the nearest group: fluxes look so far."""
 
+REACH = 3
+"""Layers of cells among which a cell beside a thin wall finds a large one on its side."""
+
 
 def large_cells(grid: Grid, open_share: Any) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
     """Which cells are too small for a group of their own (nz, ny, nx), and the large cell of every one, flat.
+
+    A small cell without a large one on its side of the thin walls has a group of its own.
 
     open_share  of every cell, 0 in solid cells (nz, ny, nx)
     """
@@ -35,7 +41,33 @@ def large_cells(grid: Grid, open_share: Any) -> tuple[NDArray[np.bool_], NDArray
     if small.all():
         raise InputError("walls", None, "such that some cells are at least half open", "take smaller cells")
     nearest = distance_transform_edt(small, sampling=grid.spacing[::-1], return_indices=True)[1]
-    return small, np.ravel_multi_index(tuple(nearest), grid.shape).ravel()
+    home = np.ravel_multi_index(tuple(nearest), grid.shape).ravel()
+    if isinstance(grid.walls, Divided):
+        home = _on_one_side(grid, small, np.flatnonzero(small & (open_share > 0.0)), home)
+        small = small & (home != np.arange(home.size)).reshape(small.shape)
+    return small, home
+
+
+def _on_one_side(
+    grid: Grid, small: NDArray[np.bool_], cells: NDArray[np.int64], home: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """The homes of all cells, where those of some small cells have no thin wall before them, or are these cells."""
+    centres = [np.ravel(each) for each in np.broadcast_arrays(*grid.centres())]
+    places = np.stack(centres, axis=-1) + ASIDE * np.array(grid.spacing)
+    across = cells[grid.walls.thin.between(places[cells], places[home[cells]])]
+    steps = np.indices((2 * REACH + 1,) * 3).reshape(3, -1).T - REACH
+    away = np.linalg.norm(steps * grid.spacing[::-1], axis=1)
+    steps = steps[np.argsort(away, kind="stable")]
+    there = np.stack(np.unravel_index(across, grid.shape), axis=-1)[:, None] + steps
+    inside = ((there >= 0) & (there < grid.shape)).all(axis=2)
+    others = np.ravel_multi_index(tuple(np.moveaxis(there, 2, 0)), grid.shape, mode="clip")
+    rows, columns = np.nonzero(inside & ~small.ravel()[others])
+    reached = np.zeros(others.shape, bool)
+    reached[rows, columns] = ~grid.walls.thin.between(places[across[rows]], places[others[rows, columns]])
+    nearest = others[np.arange(len(across)), reached.argmax(axis=1)]
+    home = home.copy()
+    home[across] = np.where(reached.any(axis=1), nearest, across)
+    return home
 
 
 class SingleCells:
@@ -72,6 +104,9 @@ class CutGroups(SingleCells):
     def __init__(self, fluid: FluidSolver) -> None:
         grid, cut = fluid.grid, fluid.boundaries.cut
         assert isinstance(cut, CutCells)
+        if isinstance(grid.walls, Divided):
+            remedy = "leave out divided(), so that they are for particles only"
+            raise InputError("thin walls", None, "left out beside a temperature or a vapour", remedy)
         if grid.whole is not grid:
             remedy = "take one process, or solid cells"
             raise InputError("ranks", None, "1 for a temperature or a vapour within smooth walls", remedy)

@@ -24,7 +24,7 @@ from cfddem.backend.errors import InputError
 from cfddem.fluid.grid import HIGH, LOW, Array, Grid
 from cfddem.fluid.halo import Halo
 from cfddem.fluid.surfaces import Surface
-from cfddem.fluid.thin_walls import parted
+from cfddem.fluid.thin_walls import parted, refuse_across_periodic_sides
 
 SMALLEST_VOLUME = 1e-6
 """Share of a cell below which it is solid [-]."""
@@ -256,7 +256,10 @@ def cut_cells_of_box(grid: Grid, periodic: tuple[bool, ...]) -> CutCells:
     """The cut cells of a whole grid with smooth walls: made once for the fluid and for the kernel of its particles.
 
     periodic  whether x, y, z are periodic
+    errors    InputError for a thin wall at periodic sides
     """
+    for d in np.flatnonzero(periodic):
+        refuse_across_periodic_sides(grid.walls, list(grid.centres()), grid.spacing, int(d))
     return CutCells(grid, Halo(grid.cells, np.array(periodic)))
 
 

@@ -109,3 +109,15 @@ def parted(surface: Surface, centres: list[Array], spacing: tuple[float, ...], d
         return np.zeros(centres[0].shape, bool)
     here = np.stack([np.ravel(each) for each in centres], axis=-1) + ASIDE * np.array(spacing)
     return surface.thin.between(here - np.eye(3)[d] * spacing[d], here).reshape(centres[0].shape)
+
+
+def refuse_across_periodic_sides(surface: Surface, centres: list[Array], spacing: tuple[float, ...], d: int) -> None:
+    """Raise InputError for a thin wall between the first or last cells along a periodic d and their images.
+
+    centres  x, y, z of the cells, which broadcast [m]
+    """
+    first, last = ([*centres[:d], at, *centres[d + 1 :]] for at in (centres[d].min(), centres[d].max() + spacing[d]))
+    for border in (first, last):
+        if parted(surface, list(np.broadcast_arrays(*border)), spacing, d).any():
+            remedy = "move it by a cell, or take another condition for these sides"
+            raise InputError("thin wall", None, f"away from the periodic sides along {'xyz'[d]}", remedy)

@@ -11,6 +11,7 @@ import numpy as np
 
 from cfddem.case.bed import POURED_SOLID_FRACTION, Jet
 from cfddem.case.materials import NO_FLUID
+from cfddem.case.patches import open_area_of
 from cfddem.case.schema import Case
 from cfddem.case.vessel import Vessel, floor_places, vessel_of
 from cfddem.case.wall_geometry import Array
@@ -163,7 +164,7 @@ def mean_inlet_velocity(case: Case) -> float:
     inlet = 0.0 if closed else case.bed.highest_inlet_velocity
     of_floor = [each for each in on_floor if each.kind == "inlet"]
     if of_floor:
-        shares = [min(1.0, each.area / max(case.floor_area, 1e-300)) for each in of_floor]
+        shares = [open_area_of(case, each) / max(case.floor_area, 1e-300) for each in of_floor]
         entering = sum(each.highest * share for each, share in zip(of_floor, shares))
         return entering + max(0.0, 1.0 - sum(shares)) * inlet
     return inlet + sum(share_of_jet(case, jet) * (jet.velocity - inlet) for jet in case.bed.jets)

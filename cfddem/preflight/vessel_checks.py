@@ -7,15 +7,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cfddem.case.patches import CasePatch
+from cfddem.case.patches import PLACES, CasePatch, on_the_side, open_share_of
 from cfddem.case.schema import Case
 from cfddem.preflight.issue import Issue, percent
 
 FEWEST_ACROSS = 4.0
 """Cells across the narrowest part of a vessel, below which its flow has no profile [-]."""
-
-PLACES = 120
-"""Places along x and y at which a patch is sampled."""
 
 MOSTLY = 0.99
 """Share of a patch that must be open to the fluid for no warning [-]."""
@@ -71,23 +68,12 @@ def check_patches(case: Case) -> Iterator[Issue]:
                 "move its centre [x, y], in m from the corner of the column",
             )  # fmt: skip
         elif share < MOSTLY and patch.shape != "whole":
+            outside = "has no flow" if patch.mass_flow is None else "passes its part of mass_flow to the rest"
             yield Issue(
                 "warning", f"patch.{name}",
-                f"{percent(1.0 - share)} of it lies outside of the {patch.side}, and has no flow",
+                f"{percent(1.0 - share)} of it lies outside of the {patch.side}, and {outside}",
                 "make it smaller, or move its centre",
             )  # fmt: skip
-
-
-def open_share_of(case: Case, patch: CasePatch) -> float:
-    """Share of a patch that lies on its side of the vessel [-]; of a whole side that of the side."""
-    width, depth, _ = case.column.size
-    middle = patch.centre or (0.5 * width, 0.5 * depth)
-    edges = patch.size or (2.0 * width, 2.0 * depth)
-    reach = patch.diameter or float(max(edges))
-    along = (np.arange(PLACES) + 0.5) / PLACES * reach - 0.5 * reach
-    x, y = (each.reshape(-1) for each in np.meshgrid(middle[0] + along, middle[1] + along))
-    mine = patch.weight(x, y, middle) > 0.0
-    return float(np.count_nonzero(mine & _inside(case, patch.side, x, y))) / max(int(np.count_nonzero(mine)), 1)
 
 
 def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:
@@ -95,15 +81,7 @@ def _is_open(case: Case, patches: Sequence[CasePatch]) -> bool:
     width, depth, _ = case.column.size
     along = (np.arange(PLACES) + 0.5) / PLACES
     x, y = (each.reshape(-1) for each in np.meshgrid(width * along, depth * along))
-    free = _inside(case, "lid", x, y)
+    free = on_the_side(case, "lid", x, y)
     for each in patches:
         free &= each.weight(x, y, (0.5 * width, 0.5 * depth)) == 0.0
     return bool(free.any())
-
-
-def _inside(case: Case, side: str, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Which places of the plane of floor or lid lie within the column and its vessel."""
-    width, depth, height = case.column.size
-    z = np.full(x.size, 0.0 if side == "floor" else height)
-    inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= depth)
-    return np.asarray(inside & (case.beyond_the_side(np.stack([x, y, z], axis=-1)) <= 0.0))

@@ -257,13 +257,12 @@ def leaking_share(case: Case, wall: CaseWall, closed: dict[int, np.ndarray]) -> 
 
 
 def _is_periodic(case: Case) -> bool:
-    return "periodic" in (case.column.sides, case.column.front, case.column.ends)
+    return any(case.column.periodic)
 
 
 def _repeats(case: Case, wall: CaseWall) -> bool:
     """Whether a wall is the same in every periodic image of the column."""
-    column = case.column
-    periodic = [each == "periodic" for each in (column.sides, column.front or column.sides, column.ends)]
+    periodic = case.column.periodic
     if wall.shape == "plane":
         return not any(part for part, repeats in zip(wall.normal, periodic) if repeats)
     if wall.shape == "cylinder" and wall.length is None:

@@ -200,8 +200,7 @@ def _must_be_inside(position: Array, case: Case) -> None:
 
 def periodic_directions(case: Case) -> tuple[bool, bool, bool]:
     """Whether x, y, z are periodic."""
-    column = case.column
-    return column.sides == "periodic", (column.front or column.sides) == "periodic", column.ends == "periodic"
+    return case.column.periodic
 
 
 def periodic_box(case: Case) -> tuple[float | None, float | None, float | None]:

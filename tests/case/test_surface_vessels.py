@@ -87,6 +87,15 @@ def box(**given: Any) -> Case:
 # ---------------------------------------------------------------- one surface for particles and fluid
 
 
+def test_floor_and_lid_of_a_surface_have_their_own_areas_and_a_mass_flow_the_speed_of_its_side(tmp_path):
+    """Polygons of the file's sides within circles of 8 and 18 mm, 5 times as much."""
+    lid = {"kind": "inlet", "side": "lid", "mass_flow": 0.001}
+    case = made(tmp_path, patch={"drain": {"kind": "outlet"}, "top": lid})
+    assert case.area_of("lid") / case.area_of("floor") == pytest.approx((18.0 / 8.0) ** 2, rel=1e-4)
+    assert case.area_of("lid") == pytest.approx(math.pi * 0.018**2, rel=0.03)
+    assert case.patches["top"].highest == pytest.approx(0.001 / 1.2 / case.area_of("lid"), rel=1e-9)
+
+
 def test_a_cone_from_a_file_is_the_cone_of_a_line(tmp_path: Path) -> None:
     """Open shares of cells, volume of the bed and area of the floor, within those of a polygon of 48 sides."""
     drawn = made(tmp_path)

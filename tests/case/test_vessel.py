@@ -24,6 +24,7 @@ from cfddem.particles.initial.filling import clear_of_walls
 from cfddem.particles.state import make_particles
 from cfddem.particles.walls.arrays import near_walls, wall_arrays
 from cfddem.particles.walls.shapes import Turned
+from cfddem.preflight.bed_estimate import mean_inlet_velocity
 from cfddem.preflight.summary import preflight
 from cfddem.run.build import boundaries_of, laws_of, materials_of, walls_of
 from cfddem.run.division import require_parallel
@@ -230,29 +231,78 @@ def test_the_flow_through_a_patch_is_its_velocity_times_its_area():
 
 def inflow(case: Case) -> float:
     """Flow through the floor at 0.5 s [m3/s]."""
+    open_part = Boundaries(grid_of(case), boundaries_of(case)).cut.aperture[2][2, 2:-3, 2:-3]
+    return float((faces_of(case) * open_part).sum() * grid_of(case).face_area(2))
+
+
+def faces_of(case: Case) -> np.ndarray:
+    """Velocity through the faces of the floor at 0.5 s (ny, nx) [m/s]."""
     boundaries = Boundaries(grid_of(case), boundaries_of(case))
     boundaries.set_inlets(0.5, np.ones(grid_of(case).padded_shape))
     side = next(each for each in boundaries.sides if each.name == "z_low")
-    open_part = boundaries.cut.aperture[2][2, 2:-3, 2:-3]
-    return float((side.wall[2, 2:-3, 2:-3] * open_part).sum() * grid_of(case).face_area(2))
+    return side.wall[2, 2:-3, 2:-3]
+
+
+def lens(one: float, other: float, apart: float) -> float:
+    """Area that two circles have in common, in closed form [m2]."""
+    to_one = (apart**2 + one**2 - other**2) / (2.0 * apart)
+    parts = [r**2 * math.acos(d / r) - d * math.sqrt(r**2 - d**2) for r, d in ((one, to_one), (other, apart - to_one))]
+    return sum(parts)
 
 
 @pytest.mark.parametrize(
-    "patch",
+    ("patch", "area", "to"),
     [
-        {"shape": "disc", "diameter": 0.033}, {"shape": "whole"},
-        {"shape": "disc", "diameter": 0.05, "centre": [0.07, 0.08]},
+        ({"shape": "disc", "diameter": 0.033}, 0.25 * math.pi * 0.033**2, 1e-9),
+        ({"shape": "whole"}, 0.25 * math.pi * 0.06**2, 1e-9),
+        ({"shape": "disc", "diameter": 0.05, "centre": [0.07, 0.08]}, lens(0.025, 0.03, 0.01), 3e-3),
+        ({"shape": "disc", "diameter": 0.05, "centre": [0.055, 0.08]}, lens(0.025, 0.03, 0.025), 3e-3),
     ],
-    ids=str,
+    ids=["on faces", "whole", "beyond the edge", "half outside"],
 )  # fmt: skip
-def test_a_mass_flow_enters_exactly_also_where_no_face_follows_the_edge(patch):
+def test_a_mass_flow_enters_exactly_also_where_no_face_follows_the_edge(patch, area, to):
+    """Its speed is that through the part of the patch that lies on the floor."""
     flow = {"kind": "inlet", "mass_flow": [[0.0, 0.0], [1.0, 0.012]]}
     case = made(patch={"nozzle": flow | patch})
     assert inflow(case) == pytest.approx(0.006 / 1.2, rel=1e-9)
-    area = 0.25 * math.pi * patch.get("diameter", 0.06) ** 2
-    assert case.fastest_inflow == pytest.approx(0.012 / 1.2 / area, rel=1e-9)
+    assert case.fastest_inflow == pytest.approx(0.012 / 1.2 / area, rel=to)
     with pytest.raises(InputError, match=r"mass_flow.*left out where there is a velocity"):
         made(patch={"nozzle": flow | patch | {"velocity": 1.0}})
+
+
+@pytest.mark.parametrize("profile", ["uniform", "parabolic"])
+def test_the_speed_of_a_mass_flow_through_a_disc_beyond_a_side_is_that_at_its_faces(profile):
+    """A disc of 23.7 mm, 3 mm from a side of a box; its highest speed at a face is that of the check."""
+    text = re.sub(r"(?ms)^\[vessel\].*?(?=^\[patch)", "", TEXT)
+    disc = {"kind": "inlet", "shape": "disc", "centre": [0.003, 0.08], "diameter": 0.0237, "mass_flow": 1e-3}
+    patch = {"nozzle": disc | {"profile": profile}}
+    case = Case.from_text(text, "c.toml", {"patch": patch, "column.cell": 0.0025, "bed.diameter": 1e-3})
+    if profile == "uniform":
+        half, away = 0.01185, 0.003
+        area = half**2 * (math.pi - math.acos(away / half)) + away * math.sqrt(half**2 - away**2)
+        assert case.fastest_inflow == pytest.approx(1e-3 / 1.2 / area, rel=3e-3)  # 2.86 m/s
+        assert mean_inlet_velocity(case) == pytest.approx(1e-3 / 1.2 / 0.16**2, rel=1e-9)
+    assert faces_of(case).max() == pytest.approx(case.fastest_inflow, rel=0.03)
+    said = [each.reason for each in preflight(case).issues if each.key == "patch.nozzle"]
+    assert sum("% of it lies outside of the floor, and passes its part of mass_flow" in each for each in said) == 1, (
+        said
+    )
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"velocity": 4.0, "profile": "parabolic"}, {"mass_flow": 0.002, "profile": "parabolic"}, {"mass_flow": 0.002}],
+    ids=str,
+)
+def test_the_floor_beneath_an_inlet_lets_nothing_through(given):
+    """Through faces that a disc covers comes what it brings alone; around it the floor has its own velocity."""
+    patch = {"nozzle": {"kind": "inlet", "shape": "disc", "diameter": 0.04} | given}
+    alone, both = (faces_of(made(patch=patch, bed__inlet_velocity=each, column__cell=0.005)) for each in (0.0, 1.0))
+    x = 0.005 * (np.arange(32) + 0.5) - 0.08
+    away = np.hypot(x, x[:, None])
+    inside, outside = away < 0.02 - 0.0036, (away > 0.02 + 0.0036) & (away < 0.03)
+    assert inside.sum() == 32 and (alone[inside] > 0.0).all() and (both[inside] == alone[inside]).all()
+    assert outside.any() and (both - alone)[outside] == pytest.approx(1.0)
 
 
 def test_an_inlet_opens_the_wall_before_it_and_a_wall_closes_the_inlet_before_it():

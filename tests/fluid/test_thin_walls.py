@@ -14,12 +14,15 @@ from test_surfaces_of_triangles import BOX, revolved, turned_by
 from cfddem.backend.errors import InputError
 from cfddem.coupling.kernel import FilterKernel
 from cfddem.fluid.budgets import continuity_residual
+from cfddem.fluid.cell_groups import large_cells
 from cfddem.fluid.conditions import Inlet, NoSlip, Outlet, Periodic
-from cfddem.fluid.cut_cells import within
+from cfddem.fluid.cut_cells import open_share, within
 from cfddem.fluid.grid import Grid
+from cfddem.fluid.scalar import Scalar, ScalarKind
+from cfddem.fluid.scalar_conditions import ScalarSides
 from cfddem.fluid.solver import FluidSolver
 from cfddem.fluid.surfaces import cylinder
-from cfddem.fluid.thin_walls import ThinWall, divided, thin_wall
+from cfddem.fluid.thin_walls import ASIDE, ThinWall, divided, thin_wall
 from cfddem.fluid.wall_force import force_on_walls
 
 MIDDLE = (0.5, 0.5, 0.0)
@@ -180,6 +183,58 @@ def test_particles_deposit_on_their_side_and_gather_from_it():
     line[:, 0] = np.linspace(0.2, place - 1e-3, 2001)
     seen = kernel.gather(kernel.stencil(line, np.full(2001, 0.01)), field)[:, 0]
     assert np.abs(np.diff(seen)).max() < 0.01
+
+
+@pytest.mark.parametrize("turn", [0.3, 0.5, 0.785])
+def test_small_cells_of_a_vessel_belong_to_large_ones_on_their_side_of_a_baffle(turn):
+    """From the axis to the wall, and from wall to wall: particles on one side then leave the other one empty."""
+    n, radial = 12, np.array([math.cos(turn), math.sin(turn), 0.0])
+    for begin in (0.0, -1.0):
+        ends = [np.array(MIDDLE) + each * radial for each in (begin, 1.0)]
+        corners = np.array([ends[0] - [0, 0, 1], ends[1] - [0, 0, 1], ends[1] + [0, 0, 2], ends[0] + [0, 0, 2]])
+        thin = thin_wall(corners[[[0, 1, 2], [0, 2, 3]]])
+        grid = within(Grid((n, n, 3), (1.0 / n,) * 3), divided(thin, cylinder(MIDDLE, 0.47)))
+        share = np.asarray(open_share(grid))
+        small, home = large_cells(grid, share)
+        places = np.stack([each.ravel() for each in np.broadcast_arrays(*grid.centres())], axis=-1) + ASIDE / n
+        held = np.flatnonzero((share > 0.0) & (share < 0.5))
+        assert len(held) == 3 * 24 and small.ravel()[held].all() and not small.ravel()[home[held]].any()
+        assert not thin.between(places[held], places[home[held]]).any()
+    rng = np.random.default_rng(2)
+    away, angle = 0.45 * np.sqrt(rng.uniform(0, 1, 300)), turn + rng.uniform(0.0, math.pi, 300)
+    position = np.stack([0.5 + away * np.cos(angle), 0.5 + away * np.sin(angle), rng.uniform(0.02, 0.2, 300)], axis=-1)
+    kernel = FilterKernel(grid, (False, False, False), smoothing=0.2)
+    cells = kernel.map_particles(position, np.full(300, 0.01))
+    volume = (kernel.solid_fraction(cells) * share).ravel() * grid.cell_volume
+    own = np.sign(thin.side(position))[0] == np.sign(thin.side(places))
+    assert volume[~own].sum() == 0.0 and volume[own].sum() == pytest.approx(cells.volume.sum(), rel=1e-12)
+
+
+def test_a_small_cell_without_a_large_one_on_its_side_has_a_group_of_its_own():
+    """Within a closed tube of one cell, whose only cell is said to be a tenth open."""
+    thin = thin_wall(np.add(0.06 * BOX, [0.55, 0.45, 0.5]))
+    grid = within(Grid((10, 10, 1), (0.1, 0.1, 1.0)), divided(thin))
+    share = np.ones(grid.shape)
+    share[0, 4, 5] = share[0, 1, 1] = 0.1
+    small, home = large_cells(grid, share)
+    assert home[45] == 45 and not small[0, 4, 5] and small.sum() == 1 and home[11] != 11
+
+
+def test_a_temperature_beside_thin_walls_is_refused_in_a_line():
+    grid = within(Grid((4, 4, 4), (0.25,) * 3), divided(plate(0.55)))
+    fluid = FluidSolver(grid, {"z_low": Inlet(0.5), "z_high": Outlet()}, density=1.0, viscosity=1e-2)
+    with pytest.raises(InputError, match=r"thin walls: must be left out beside a temperature or a vapour; leave out"):
+        Scalar(fluid, ScalarKind("temperature", "K", "", 300.0, 1.0, 1.0), ScalarSides(300.0))
+
+
+@pytest.mark.parametrize("place", [0.0, 1.0])
+def test_a_plate_in_periodic_sides_is_refused_and_one_beside_them_closes_faces(place):
+    sides = {"x_low": Periodic(), "x_high": Periodic()}
+    with pytest.raises(InputError, match="thin wall: must be away from the periodic sides along x; move it by a cell"):
+        FluidSolver(within(Grid((4, 4, 4), (0.25,) * 3), divided(plate(place))), sides, density=1.0, viscosity=1.0)
+    grid = within(Grid((4, 4, 4), (0.25,) * 3), divided(plate(0.25 + 0.5 * place)))
+    cut = FluidSolver(grid, sides, density=1.0, viscosity=1.0).boundaries.cut
+    assert (grid.inner(cut.thin[0]) > 0.0).sum() == 16
 
 
 def test_thin_walls_that_cannot_be_are_refused():
