@@ -17,9 +17,11 @@ from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
-from cfddem.fluid.grid import Array
+
+Array = NDArray[np.float64]
 
 
 class Surface(Protocol):

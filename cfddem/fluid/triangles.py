@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cfddem.backend.errors import InputError
-from cfddem.fluid.grid import Array
+
+Array = NDArray[np.float64]
 
 OF_LEAF = 4
 """Least number of triangles in a box that is not divided."""
