@@ -141,7 +141,7 @@ def law_of(function: Callable[..., float]) -> Law:
 GROUP = "cfddem.closures"
 """Group of entry points through which an installed package provides laws."""
 
-_WITHOUT_LAWS = ("check", "compiled", "kinds", "registry")
+_WITHOUT_LAWS = ("check", "compiled", "kinds", "linked", "registry")
 
 
 @cache
